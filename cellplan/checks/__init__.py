@@ -1,0 +1,1 @@
+"""Verification of what was written, by arithmetic that planning never used."""

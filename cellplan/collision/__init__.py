@@ -1,0 +1,1 @@
+"""Contact verdicts and distances that are never above the truth."""

@@ -1,0 +1,69 @@
+"""Everything that can go wrong, as one tree; each class knows the exit status it ends the program with."""
+
+from enum import IntEnum
+
+
+class ExitStatus(IntEnum):
+    """What the shell sees when a command ends."""
+
+    PASSED = 0
+    CHECK_FAILED = 1
+    BAD_INPUT = 2
+    NO_SOLUTION = 3
+    INTERNAL = 4
+    INTERRUPTED = 130
+
+
+class CellplanError(Exception):
+    """Anything cellplan refuses or cannot do; the message is one line that says where, what, got and allowed."""
+
+    status = ExitStatus.INTERNAL
+
+
+class InputError(CellplanError):
+    """Something the user wrote cannot be used: a value, a file, an option."""
+
+    status = ExitStatus.BAD_INPUT
+
+
+class InvalidFileError(InputError):
+    """All complaints about one file at once, one line each.
+
+    Attributes:
+        complaints: The single errors, in the order of the file.
+    """
+
+    def __init__(self, complaints: list[InputError]) -> None:
+        """Join the complaints, one per line."""
+        super().__init__("\n".join(str(complaint) for complaint in complaints))
+        self.complaints = complaints
+
+
+class StartOutsideLimitsError(InputError):
+    """A start posture given in the cell lies outside the joint limits."""
+
+
+class StartOffTaskError(InputError):
+    """A start posture given in the cell does not put the tool on the start of its task."""
+
+
+class NoSolutionError(CellplanError):
+    """The input is sound, but no motion can be found for it."""
+
+    status = ExitStatus.NO_SOLUTION
+
+
+class UnreachablePointError(NoSolutionError):
+    """A robot cannot bring its tool to a point of its task."""
+
+
+class StartNotFoundError(NoSolutionError):
+    """No start posture was found that reaches the task within limits and without collision."""
+
+
+class DivergedError(NoSolutionError):
+    """The integration left the task by so much that going on would be meaningless."""
+
+
+class SelfTestError(CellplanError):
+    """A start-up test with a known answer gave another one: no verdict can be trusted."""

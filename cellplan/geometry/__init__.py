@@ -1,0 +1,1 @@
+"""Numbers only: poses, shapes, curves, surfaces and meshes."""

@@ -1,0 +1,101 @@
+"""Solid shapes of robot links, tools, parts and fixtures: their support functions and bounding spheres.
+
+Every shape lives in its own frame, centred on the origin; cylinders and capsules stand along z. A half-space is the
+region z <= 0. Lengths are in [m].
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Cuboid with edge lengths ``size`` along x, y, z."""
+
+    size: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder:
+    """Circular cylinder along z."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Capsule:
+    """All points within ``radius`` of a segment of ``length`` along z; the whole is ``length + 2 radius`` long."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """Ball round the origin."""
+
+    radius: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """Triangle mesh; the vertices need not be centred.
+
+    Attributes:
+        vertices: Corner points in [m], shape (V, 3).
+        faces: Corner indices of each triangle, counter-clockwise from outside, shape (M, 3).
+        source: File name for messages.
+        is_closed: Whether the surface encloses a volume (every edge shared by exactly two triangles).
+    """
+
+    vertices: Array
+    faces: np.ndarray[tuple[int, int], np.dtype[np.int64]]
+    source: str
+    is_closed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class HalfSpace:
+    """All points with z <= 0: the floor."""
+
+
+Solid = Box | Cylinder | Capsule | Sphere | Mesh
+Shape = Solid | HalfSpace
+
+
+def support(shape: Solid, directions: Array) -> Array:
+    """Largest ``x . n`` over all points x of the shape, for directions of shape (..., 3) in the shape's frame."""
+    n = directions
+    reach: Array
+    match shape:
+        case Box(size):
+            reach = np.abs(n) @ (0.5 * np.asarray(size))
+        case Cylinder(radius, length):
+            reach = radius * np.hypot(n[..., 0], n[..., 1]) + 0.5 * length * np.abs(n[..., 2])
+        case Capsule(radius, length):
+            reach = radius * np.linalg.norm(n, axis=-1) + 0.5 * length * np.abs(n[..., 2])
+        case Sphere(radius):
+            reach = radius * np.linalg.norm(n, axis=-1)
+        case Mesh():
+            reach = np.max(n @ shape.vertices.T, axis=-1)
+    return reach
+
+
+def bounding_sphere(shape: Solid) -> tuple[Array, float]:
+    """Centre in the shape's frame and radius of a sphere that holds the whole shape."""
+    match shape:
+        case Box(size):
+            return np.zeros(3), 0.5 * float(np.linalg.norm(size))
+        case Cylinder(radius, length):
+            return np.zeros(3), float(np.hypot(radius, 0.5 * length))
+        case Capsule(radius, length):
+            return np.zeros(3), radius + 0.5 * length
+        case Sphere(radius):
+            return np.zeros(3), radius
+        case Mesh():
+            centre = 0.5 * (shape.vertices.min(axis=0) + shape.vertices.max(axis=0))
+            return centre, float(np.linalg.norm(shape.vertices - centre, axis=1).max())

@@ -1,0 +1,1 @@
+"""Files: cells, robots, meshes and toolpaths in; tables and folders out."""

@@ -1,0 +1,1 @@
+"""Frozen data: what every stage takes and returns. SI units and radians throughout."""

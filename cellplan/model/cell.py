@@ -1,0 +1,213 @@
+"""Cell: what the user wrote, as immutable data."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from cellplan.geometry.shapes import Shape, Solid
+from cellplan.geometry.transforms import Array
+from cellplan.model.robot import Body, RobotModel
+from cellplan.model.task import Task
+
+
+class Mode(StrEnum):
+    """Who moves: MODO 1, 2, 3 of Ribeiro 2010, chapter 5."""
+
+    SIMULTANEOUS = "simultaneous"
+    PAIRWISE = "pairwise"
+    PART_AT_REST = "part_at_rest"
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where the words of a cell stand, so that a later complaint can still name the line.
+
+    Attributes:
+        file: File name as the user gave it.
+        lines: Line number, from 1, of each key path (``robots.kuka.start_deg``).
+    """
+
+    file: str = "<cell>"
+    lines: Mapping[str, int] = field(default_factory=dict)
+
+    def at(self, key: str) -> str:
+        """``file:line: key`` for a key path; the nearest enclosing key gives the line when the key is a default."""
+        enclosing = key
+        while enclosing not in self.lines and "." in enclosing:
+            enclosing = enclosing.rpartition(".")[0]
+        line = self.lines.get(enclosing)
+        return f"{self.file}:{line}: {key}" if line else f"{self.file}: {key}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tool:
+    """A tool on a flange: its tip and its solids.
+
+    Attributes:
+        X_FT: Tool tip in the flange frame, z out of the tool.
+        bodies: Solids, their poses ``X_BS`` given in F, ``link`` unused.
+    """
+
+    X_FT: Array
+    bodies: tuple[Body, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Robot:
+    """A robot placed in the cell.
+
+    Attributes:
+        name: Name in the cell.
+        model: Its data sheet.
+        X_WB: Base in the world.
+        tool: What it carries.
+        start: Start posture in [rad] or [m], shape (n,); None when it is to be found.
+        weights: Joint weights, positive, shape (n,): a larger one moves that joint less.
+    """
+
+    name: str
+    model: RobotModel
+    X_WB: Array
+    tool: Tool
+    start: Array | None
+    weights: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Grasp:
+    """A robot holding the part; ``X_PT`` is the holder's tool tip in the part frame."""
+
+    robot: str
+    X_PT: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Part:
+    """The workpiece.
+
+    Attributes:
+        shape: The solid.
+        X_PS: Pose of the shape's frame in the part frame P.
+        held_by: The robots that hold it; empty when it is fixed in the world.
+        X_WP: Pose in the world when nobody holds it; None otherwise.
+    """
+
+    shape: Solid
+    X_PS: Array
+    held_by: tuple[Grasp, ...]
+    X_WP: Array | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Obstacle:
+    """A fixed thing in the cell."""
+
+    name: str
+    shape: Shape
+    X_WS: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionSettings:
+    """Who moves and on which clock: ``duration`` and ``step`` in [s]."""
+
+    mode: Mode
+    duration: float
+    step: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SolverSettings:
+    """How joint speeds are found.
+
+    Attributes:
+        method: Name of the resolution method.
+        gain: Error feedback gain in [1/s].
+        damping: Largest damping factor; None lets the smallest singular value decide (``auto``).
+        seed: Seed of every random search.
+    """
+
+    method: str
+    gain: float
+    damping: float | None
+    seed: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exclusion:
+    """A pair of bodies the user wants left out of the collision check, and why."""
+
+    bodies: tuple[str, str]
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckSettings:
+    """What the checks demand.
+
+    Attributes:
+        clearance: Smallest allowed distance in [m] between things that must not touch.
+        contact_zone: Radius in [m] round the tool tip within which tool and part may touch.
+        exclusions: Pairs left out at the user's word.
+    """
+
+    clearance: float
+    contact_zone: float
+    exclusions: tuple[Exclusion, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cell:
+    """Robots, part, tasks and surroundings.
+
+    Attributes:
+        name: Name of the cell and of its output folder.
+        robots: In the order of the file: the order of the stacked joint vector.
+        part: The workpiece.
+        tasks: In the order of the file.
+        obstacles: The environment.
+        motion: Mode and clock.
+        solver: Method and gains.
+        checks: Demands.
+        origin: Where the words stand in the file.
+        inputs: SHA-256 of every file that was read, by the path as written.
+    """
+
+    name: str
+    robots: tuple[Robot, ...]
+    part: Part
+    tasks: tuple[Task, ...]
+    obstacles: tuple[Obstacle, ...]
+    motion: MotionSettings
+    solver: SolverSettings
+    checks: CheckSettings
+    origin: Origin
+    inputs: Mapping[str, str]
+
+    def robot(self, name: str) -> Robot:
+        """The robot of that name."""
+        return next(robot for robot in self.robots if robot.name == name)
+
+    def task(self, name: str) -> Task:
+        """The task of that name."""
+        return next(task for task in self.tasks if task.name == name)
+
+    @property
+    def positioners(self) -> tuple[str, ...]:
+        """Names of the robots that hold the part."""
+        return tuple(grasp.robot for grasp in self.part.held_by)
+
+    def columns(self, robot: str) -> slice:
+        """Place of a robot's joints in the stacked joint vector."""
+        first = 0
+        for placed in self.robots:
+            last = first + len(placed.model.joints)
+            if placed.name == robot:
+                return slice(first, last)
+            first = last
+        raise KeyError(robot)
+
+    @property
+    def joint_count(self) -> int:
+        """Length of the stacked joint vector."""
+        return sum(len(robot.model.joints) for robot in self.robots)

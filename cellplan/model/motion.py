@@ -1,0 +1,91 @@
+"""Schedule, motion and program: where each tool must be, what all joints do, and what is written for each robot."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.task import Task
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TaskSchedule:
+    """One task on the common clock of N instants.
+
+    Attributes:
+        task: The task.
+        X_PT: Wanted tool tip in P at each instant, shape (N, 4, 4); held still before the start and after the end.
+        V_PT_P: Wanted twist of the tool relative to the part in P, linear first, shape (N, 6).
+        travelled: Length of path behind the tool in [m], shape (N,).
+        length: Length of the whole path on the surface in [m].
+        end: Instant in [s] at which the path is done.
+    """
+
+    task: Task
+    X_PT: Array
+    V_PT_P: Array
+    travelled: Array
+    length: float
+    end: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Schedule:
+    """All tasks on one clock.
+
+    Attributes:
+        times: Instants in [s], evenly spaced from 0, shape (N,).
+        tasks: The tasks that are worked on.
+    """
+
+    times: Array
+    tasks: tuple[TaskSchedule, ...]
+
+    @property
+    def step(self) -> float:
+        """Time between two instants in [s]."""
+        return float(self.times[-1] / (len(self.times) - 1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """Joint positions of all robots on the common clock.
+
+    Attributes:
+        times: Instants in [s], shape (N,).
+        q: Stacked joint positions in [rad] or [m], shape (N, nq), in the order of ``Cell.robots``.
+    """
+
+    times: Array
+    q: Array
+
+    def __post_init__(self) -> None:
+        """Check at the door that nothing is missing or not finite."""
+        if self.q.shape[:1] != self.times.shape:
+            raise ValueError(f"motion: {len(self.q)} rows for {len(self.times)} instants")
+        if not np.all(np.isfinite(self.q)):
+            raise ValueError("motion: a joint position is not finite")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointTable:
+    """What one robot is told to do: the content of its written table, read back.
+
+    Attributes:
+        robot: Name of the robot.
+        joints: Joint names in the order of the columns.
+        times: Instants in [s], shape (N,).
+        q: Joint positions in [rad] or [m], shape (N, n).
+    """
+
+    robot: str
+    joints: tuple[str, ...]
+    times: Array
+    q: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Program:
+    """One rendered joint table per robot: file text by robot name."""
+
+    tables: dict[str, str]

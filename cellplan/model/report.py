@@ -1,0 +1,187 @@
+"""Report: every verified statement with its margin, where and when it is worst, and the series behind the plots."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from cellplan.geometry.transforms import Array
+
+
+class ClearanceClass(StrEnum):
+    """What keeps its distance from what."""
+
+    ROBOT_ROBOT = "robot_robot"
+    SELF = "self"
+    PART = "part"
+    ENVIRONMENT = "environment"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One verified statement.
+
+    Attributes:
+        name: What was checked (``joint_position``, ``joint_velocity``, ``position_error``, ``clearance`` …).
+        subject: Robot and joint, task, or pair of bodies.
+        passed: The verdict.
+        value: The worst value, in ``unit``.
+        limit: What was allowed, in ``unit``.
+        unit: Unit of value and limit as printed.
+        at_s: Instant of the worst value in [s]; None where there is none.
+        message: One line for people: what, by how much, where, when.
+    """
+
+    name: str
+    subject: str
+    passed: bool
+    value: float
+    limit: float
+    unit: str
+    at_s: float | None
+    message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TaskAccuracy:
+    """Tool error of one task on the part, recomputed from the written tables.
+
+    Attributes:
+        task: Name of the task.
+        robot: Name of the operator.
+        position_error: Position error in P in [m], shape (N, 3); unconstrained components are zero.
+        orientation_error: Rotation vector of ``R_PT,wanted R_PT^T`` in P in [rad], shape (N, 3); likewise.
+        path_length: Length of the path on the surface in [m].
+        end_s: Instant at which the path is done.
+    """
+
+    task: str
+    robot: str
+    position_error: Array
+    orientation_error: Array
+    path_length: float
+    end_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointUse:
+    """How one joint is used, in [rad] or [m], and where it is worst."""
+
+    robot: str
+    joint: str
+    is_revolute: bool
+    min: float
+    max: float
+    lower: float
+    upper: float
+    margin: float
+    margin_at_s: float
+    peak_velocity: float
+    velocity_limit: float
+    peak_velocity_at_s: float
+    travel: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClearanceMinimum:
+    """Smallest distance of one class over the whole motion.
+
+    Attributes:
+        minimum: Distance in [m], never above the truth; 0 when the pair touches; None when there is no such pair.
+        pair: Names of the two bodies, None when there is no such pair.
+        at_s: Instant in [s].
+        certified: Whether the figure also holds between the samples.
+    """
+
+    minimum: float | None
+    pair: tuple[str, str] | None
+    at_s: float | None
+    certified: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """A stretch of time in which two bodies touch."""
+
+    pair: tuple[str, str]
+    clearance_class: ClearanceClass
+    first_s: float
+    last_s: float
+    is_allowed: bool
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ClearanceReport:
+    """All that is known about distances.
+
+    Attributes:
+        minima: Smallest distance per class.
+        contacts: Everything that touches, allowed or not.
+        exclusions: Pairs that were not checked, as (first, second, reason).
+        pair_count: Pairs that were checked.
+        curve_times: Instants of the plotted curve in [s], shape (K,).
+        curves: Smallest distance per class in [m] at those instants, shape (K,) each.
+    """
+
+    minima: Mapping[ClearanceClass, ClearanceMinimum]
+    contacts: tuple[Contact, ...]
+    exclusions: tuple[tuple[str, str, str], ...]
+    pair_count: int
+    curve_times: Array
+    curves: Mapping[ClearanceClass, Array]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Conditioning:
+    """Smallest singular values along the motion (metres and radians as they come).
+
+    Attributes:
+        stack: Of the cooperation Jacobian's constrained rows, shape (N,).
+        robots: Of each operator's own block and of each positioner's, shape (N,) each.
+    """
+
+    stack: Array
+    robots: Mapping[str, Array]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Report:
+    """The verdict of one run and everything behind it.
+
+    Attributes:
+        cell: Name of the cell.
+        mode: Who moved.
+        tasks: Names of the tasks that were worked on.
+        checks: Every verified statement.
+        accuracy: Tool errors, one entry per task.
+        joints: One entry per joint of every robot.
+        clearance: Distances.
+        conditioning: Smallest singular values.
+        motion_share: Share of all joint travel per robot, 0..1, and the busiest joint of each, as (share, joint).
+        times: The common clock in [s], shape (N,).
+        q: Positions read back from the tables in [rad] or [m], shape (N, n), by robot.
+        qd: Speeds between the samples, shape (N - 1, n), by robot.
+    """
+
+    cell: str
+    mode: str
+    tasks: tuple[str, ...]
+    checks: tuple[Check, ...]
+    accuracy: tuple[TaskAccuracy, ...]
+    joints: tuple[JointUse, ...]
+    clearance: ClearanceReport
+    conditioning: Conditioning
+    motion_share: Mapping[str, tuple[float, str]]
+    times: Array
+    q: Mapping[str, Array]
+    qd: Mapping[str, Array]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check passed."""
+        return all(check.passed for check in self.checks)
+
+    @property
+    def cycle_time(self) -> float:
+        """Length of the common clock in [s]."""
+        return float(self.times[-1])

@@ -1,0 +1,153 @@
+"""Robot: joint axes and link bodies at the reference posture, where every joint reads zero."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from cellplan.geometry.shapes import Solid
+from cellplan.geometry.transforms import Array, is_rigid
+
+BASE = -1  # index of the link that does not move, where a link is named by the joint that carries it
+
+
+class JointKind(StrEnum):
+    """How a joint moves."""
+
+    REVOLUTE = "revolute"
+    PRISMATIC = "prismatic"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Joint:
+    """One driven axis, given at the reference posture in the robot's base frame B.
+
+    Attributes:
+        name: Name in tables and reports.
+        kind: Revolute ([rad]) or prismatic ([m]).
+        parent: Index of the joint that carries this one; ``BASE`` for the first of a chain.
+        axis_B: Unit direction, shape (3,).
+        point_B: A point on the axis in [m], shape (3,).
+        lower: Lowest allowed position in [rad] or [m]; -inf for a joint that may turn without end.
+        upper: Highest allowed position; +inf for a joint that may turn without end.
+        velocity: Largest allowed speed in [rad/s] or [m/s].
+        acceleration: Largest allowed acceleration, if known.
+        jerk: Largest allowed jerk, if known.
+    """
+
+    name: str
+    kind: JointKind
+    parent: int
+    axis_B: Array
+    point_B: Array
+    lower: float
+    upper: float
+    velocity: float
+    acceleration: float | None = None
+    jerk: float | None = None
+
+    @property
+    def is_revolute(self) -> bool:
+        """Whether the joint turns rather than slides."""
+        return self.kind is JointKind.REVOLUTE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FollowerJoint:
+    """A joint that another one drives through a linkage (a mimic joint): ``q = ratio q_leader + offset``.
+
+    Attributes:
+        name: Name in messages.
+        kind: Revolute or prismatic.
+        parent: Index of the link that carries it, counted over joints first and followers after them.
+        axis_B: Unit direction at the reference posture, shape (3,).
+        point_B: A point on the axis in [m], shape (3,).
+        leader: Index of the driving joint in ``RobotModel.joints``.
+        ratio: Follower's motion per leader's motion.
+        offset: Follower's position in [rad] or [m] when the leader reads zero.
+    """
+
+    name: str
+    kind: JointKind
+    parent: int
+    axis_B: Array
+    point_B: Array
+    leader: int
+    ratio: float
+    offset: float
+
+    @property
+    def is_revolute(self) -> bool:
+        """Whether the joint turns rather than slides."""
+        return self.kind is JointKind.REVOLUTE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Body:
+    """A solid fixed to one link.
+
+    Attributes:
+        name: Name in reports, unique within its robot.
+        link: Index of the joint that carries it, followers counted after joints; ``BASE`` for the foot of the robot.
+        shape: The solid, in its own frame.
+        X_BS: Pose of the shape's frame in B at the reference posture (for tools: in F; for parts: in P).
+    """
+
+    name: str
+    link: int
+    shape: Solid
+    X_BS: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RobotModel:
+    """A kind of robot: what stands in its data sheet.
+
+    Attributes:
+        name: Model name.
+        source: Where the figures come from.
+        joints: The driven joints, each after the one that carries it.
+        followers: Joints driven through linkages; they come after all joints in link numbering.
+        flange_link: Index of the joint that carries the flange.
+        X_BF: Flange (mechanical interface) in B at the reference posture, z out of the flange.
+        bodies: Link bodies.
+    """
+
+    name: str
+    source: str
+    joints: tuple[Joint, ...]
+    flange_link: int
+    X_BF: Array
+    bodies: tuple[Body, ...]
+    followers: tuple[FollowerJoint, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check the order of the joints and the frames once, so that no later stage has to."""
+        axes: list[Joint | FollowerJoint] = [*self.joints, *self.followers]
+        for index, axis in enumerate(axes):
+            if not BASE <= axis.parent < index:
+                raise ValueError(f"robot '{self.name}': joint '{axis.name}' must come after the joint that carries it")
+            if abs(np.linalg.norm(axis.axis_B) - 1.0) > 1e-9:  # rounding only: readers normalise
+                raise ValueError(f"robot '{self.name}': joint '{axis.name}' needs a unit axis")
+        if not is_rigid(self.X_BF):
+            raise ValueError(f"robot '{self.name}': the flange frame is not a rigid pose")
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the driven joints."""
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def lower(self) -> Array:
+        """Lower joint limits, shape (n,)."""
+        return np.array([joint.lower for joint in self.joints])
+
+    @property
+    def upper(self) -> Array:
+        """Upper joint limits, shape (n,)."""
+        return np.array([joint.upper for joint in self.joints])
+
+    @property
+    def velocity(self) -> Array:
+        """Speed limits, shape (n,)."""
+        return np.array([joint.velocity for joint in self.joints])

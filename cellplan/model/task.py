@@ -1,0 +1,137 @@
+"""Task: what one operator does on the part, as the user wrote it."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from cellplan.geometry.transforms import Array
+
+
+class PlaneName(StrEnum):
+    """Plane of the part frame that a planar path is drawn in; the first letter is its first axis."""
+
+    XY = "xy"
+    YZ = "yz"
+    XZ = "xz"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CirclePath:
+    """Circle in a plane of the part frame; starts on the plane's first axis."""
+
+    plane: PlaneName
+    center: tuple[float, float]
+    radius: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PolygonPath:
+    """Corners joined by straight sides, in a plane of the part frame (rectangle, rhombus, planar polyline).
+
+    Attributes:
+        plane: The plane.
+        corners: Corner points on the plane's two axes in [m]; the first is the start.
+        is_closed: Whether the last corner is joined to the first; closed paths are turned counter-clockwise seen
+            from outside the surface.
+    """
+
+    plane: PlaneName
+    corners: tuple[tuple[float, float], ...]
+    is_closed: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpacePolylinePath:
+    """Points in the part frame joined by straight sides."""
+
+    points: tuple[tuple[float, float, float], ...]
+    is_closed: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SampledPath:
+    """Tool targets from a file: positions, and orientations where the file gives them.
+
+    Attributes:
+        source: File name for messages.
+        points: Tool tip positions in [m], shape (N, 3), expressed in P.
+        axes: Unit tool axes pointing into the part, shape (N, 3), or None.
+        rotations: Tool orientations, shape (N, 3, 3), or None; at most one of axes and rotations is given.
+        is_smooth: Whether a curve is laid through the points instead of straight sides.
+        is_closed: Whether the last point is joined to the first.
+    """
+
+    source: str
+    points: Array
+    axes: Array | None
+    rotations: Array | None
+    is_smooth: bool
+    is_closed: bool
+
+
+PathSpec = CirclePath | PolygonPath | SpacePolylinePath | SampledPath
+
+
+class TimeLawKind(StrEnum):
+    """How the position on a path grows with time."""
+
+    CONSTANT = "constant"
+    TRAPEZOID = "trapezoid"
+    QUINTIC = "quintic"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeLaw:
+    """Time law of one stretch of path; ``ramp`` is the share of the time spent speeding up (trapezoid only)."""
+
+    kind: TimeLawKind
+    ramp: float = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerance:
+    """Largest allowed tool error on the part in [m] and [rad]."""
+
+    position: float
+    orientation: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Task:
+    """One operator's work on the part.
+
+    Attributes:
+        name: Name of the task.
+        robot: Name of the operator.
+        path: The path as written.
+        project: Unit direction in P naming the side of the part the path is laid on (the outward side the projection
+            comes from), shape (3,); None when the path is used where it stands.
+        plane_offset: Position of an unprojected planar path along the plane's normal axis in [m].
+        tool_axis: ``None`` for the inward surface normal (or the axes of the file), else a unit direction in P.
+        tool_x: Direction in P that the tool's x axis leans to, shape (3,).
+        turn: Angle in [rad] by which the tool turns about its own z axis, evenly over the path's length.
+        axes: Constrained components of the tool's motion in P, in the order x, y, z, rx, ry, rz.
+        is_spin_free: Whether rotation about the tool's own axis is left open.
+        tolerance: Largest allowed error.
+        start: Start of the motion on the common clock in [s].
+        duration: Time for the whole path in [s]; None when the feed decides.
+        feed: Largest speed along the path on the surface in [m/s]; None when the duration decides.
+        time_law: Law of each stretch between stops.
+        blend: Corner rounding distance in [m]; None means that the tool stops at every corner.
+    """
+
+    name: str
+    robot: str
+    path: PathSpec
+    project: Array | None
+    plane_offset: float
+    tool_axis: Array | None
+    tool_x: Array
+    turn: float
+    axes: tuple[int, ...]
+    is_spin_free: bool
+    tolerance: Tolerance
+    start: float
+    duration: float | None
+    feed: float | None
+    time_law: TimeLaw
+    blend: float | None

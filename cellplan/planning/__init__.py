@@ -1,0 +1,1 @@
+"""From a cell to a motion: toolpaths, schedule, start postures, cooperation Jacobian, integration."""

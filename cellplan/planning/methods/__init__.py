@@ -1,0 +1,1 @@
+"""Resolution methods: one file and one signature each."""

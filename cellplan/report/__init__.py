@@ -1,0 +1,1 @@
+"""The report as JSON, as one HTML page and as plots."""

@@ -1,0 +1,1 @@
+"""The cell made computable: kinematic chains and collision bodies, built once."""
