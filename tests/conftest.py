@@ -1,0 +1,28 @@
+"""Fixtures that every test may use."""
+
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The folder that holds the package, the cells and the docs."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def cells() -> Path:
+    """The shipped cell files."""
+    return ROOT / "cells"
+
+
+@pytest.fixture(scope="session")
+def shared_robots() -> Path:
+    """Real robot descriptions; they are not part of the project, so tests that need them may be skipped."""
+    folder = ROOT.parent / "shared" / "robots"
+    if not folder.is_dir():
+        pytest.skip("the real robot descriptions (../shared/robots) are not on this machine")
+    return folder
