@@ -1,0 +1,9 @@
+"""Progress of long stages, told to whoever listens."""
+
+from collections.abc import Callable
+
+Progress = Callable[[str, float], None]  # (what is being done, share done 0..1)
+
+
+def silent(stage: str, share: float) -> None:  # noqa: ARG001
+    """Listen to nothing."""
