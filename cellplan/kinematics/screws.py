@@ -1,0 +1,95 @@
+"""Where every link of a robot is, by successive screw displacements in plain NumPy.
+
+The checks, the collision bodies and the reports use this file; the planner uses another engine, so that a mistake in
+one of them shows as an error in the report ([Ribeiro2010]_ appendix B).
+"""
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array, pose_from, rotation_about
+from cellplan.model.cell import Robot
+from cellplan.model.robot import BASE, FollowerJoint, Joint
+
+
+class ScrewChain:
+    """The links of one placed robot."""
+
+    def __init__(self, robot: Robot) -> None:
+        """Take the joint axes at the reference posture, followers after driven joints."""
+        model = robot.model
+        self._axes: tuple[Joint | FollowerJoint, ...] = (*model.joints, *model.followers)
+        self._flange_link = model.flange_link
+        self._X_WB = robot.X_WB
+        self._X_BF = model.X_BF
+        self._X_BT = model.X_BF @ robot.tool.X_FT
+        self._followers = model.followers
+        self._n = len(model.joints)
+
+    def link_displacements(self, q: Array) -> Array:
+        """Displacement of every link from its place in B at the reference posture to its place in the world.
+
+        The displaced pose of anything fixed to link i is ``X_WS = D[:, i + 1] @ X_BS`` (the base is i = -1):
+        ``D_i = D_parent A_i(q_i)`` with the screw displacement ``A_i`` ([Ribeiro2010]_ Eq. B.73).
+
+        Args:
+            q: Positions of the driven joints in [rad] or [m], shape (N, n).
+
+        Returns:
+            Displacements, shape (N, links + 1, 4, 4).
+        """
+        D = np.empty((len(q), len(self._axes) + 1, 4, 4))
+        D[:, 0] = self._X_WB
+        for link, (axis, position) in enumerate(zip(self._axes, self._positions(q), strict=True)):
+            np.matmul(D[:, axis.parent + 1], _screw_displacement(axis, position), out=D[:, link + 1])
+        return D
+
+    def flange_poses(self, q: Array) -> Array:
+        """Flange in the world, shape (N, 4, 4)."""
+        poses: Array = self.link_displacements(q)[:, self._flange_link + 1] @ self._X_BF
+        return poses
+
+    def tool_poses(self, q: Array) -> Array:
+        """Tool tip in the world, shape (N, 4, 4)."""
+        poses: Array = self.link_displacements(q)[:, self._flange_link + 1] @ self._X_BT
+        return poses
+
+    def flange_screws(self, q: Array) -> Array:
+        r"""Twist that unit speed of each driven joint gives the flange, taken at the world origin.
+
+        ``$ = [s0 x s; s]`` for a revolute and ``[s; 0]`` for a prismatic joint (linear part first), expressed in W
+        ([Ribeiro2010]_ Eqs. B.15, B.16); a follower on the way to the flange adds its share to its leader's column.
+
+        Returns:
+            Screws, shape (N, 6, n); zero for joints that do not carry the flange.
+        """
+        D = self.link_displacements(q)
+        screws = np.zeros((len(q), 6, self._n))
+        link = self._flange_link
+        while link != BASE:
+            axis = self._axes[link]
+            column, share = (axis.leader, axis.ratio) if isinstance(axis, FollowerJoint) else (link, 1.0)
+            screws[:, :, column] += share * _moved_screw(axis, D[:, axis.parent + 1])
+            link = axis.parent
+        return screws
+
+    def _positions(self, q: Array) -> list[Array]:
+        """Positions of all axes, followers included, shape (N,) each."""
+        driven = list(q.T)
+        return driven + [follower.ratio * driven[follower.leader] + follower.offset for follower in self._followers]
+
+
+def _screw_displacement(axis: Joint | FollowerJoint, position: Array) -> Array:
+    """Displacement by a turn about, or a slide along, one axis in its reference place, shape (N, 4, 4)."""
+    if not axis.is_revolute:
+        return pose_from(np.broadcast_to(np.eye(3), (len(position), 3, 3)), position[:, None] * axis.axis_B)
+    R = rotation_about(axis.axis_B, position)
+    return pose_from(R, axis.point_B - R @ axis.point_B)
+
+
+def _moved_screw(axis: Joint | FollowerJoint, D: Array) -> Array:
+    """Unit screw of an axis carried along by displacements of shape (N, 4, 4), linear part first, shape (N, 6)."""
+    s = D[:, :3, :3] @ axis.axis_B
+    if not axis.is_revolute:
+        return np.concatenate([s, np.zeros_like(s)], axis=1)
+    s0 = D[:, :3, :3] @ axis.point_B + D[:, :3, 3]
+    return np.concatenate([np.cross(s0, s), s], axis=1)
