@@ -1,0 +1,73 @@
+# Every target works on a bare machine: Python 3.11 or newer with venv, make and a package index are all it takes.
+# PYTHON=/path/to/python picks the interpreter that `.venv` is made from; WORKERS=n picks the number of test processes.
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help install test test-all lint format demo clean FORCE
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+WORKERS ?= auto
+USABLE := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
+comma := ,
+
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+help:
+	@echo "make demo      solve the shipped four-robot cell and say where the report is"
+	@echo "make test      formatter, linter, types, import rules, sizes and all quick tests"
+	@echo "make test-all  the same with the slow tests"
+	@echo "make lint      everything but the tests"
+	@echo "make format    put the code into shape"
+	@echo "make clean     remove .venv, caches and results"
+
+# The stamp holds the folder it was made in: a checkout that was moved or copied is installed again.
+ifneq ($(shell cat $(STAMP) 2>/dev/null),$(CURDIR))
+$(STAMP): FORCE
+endif
+
+$(STAMP): pyproject.toml
+	@set -e; \
+	python=""; \
+	for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 python3.12 python3.11 python3.14 python); do \
+	    if "$$candidate" -c "$(USABLE)" >/dev/null 2>&1; then python="$$candidate"; break; fi; \
+	done; \
+	if [ -z "$$python" ]; then \
+	    echo "make: no usable Python: expected 3.11 or newer with the modules venv and ensurepip$(if $(PYTHON),$(comma) got PYTHON=$(PYTHON));" \
+	         "install it (Debian and Ubuntu: apt install python3 python3-venv) or say make PYTHON=/path/to/python" >&2; \
+	    exit 1; \
+	fi; \
+	if ! $(BIN)/python -m pip --version >/dev/null 2>&1 || ! $(BIN)/python -c "$(USABLE)" >/dev/null 2>&1; then \
+	    echo "making $(VENV) from $$("$$python" -c 'import platform, sys; print(sys.executable, platform.python_version())')"; \
+	    "$$python" -m venv --clear $(VENV); \
+	fi; \
+	echo "installing cellplan and its tools into $(VENV)"; \
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'; \
+	printf '%s' '$(CURDIR)' >$@
+
+install: $(STAMP)
+
+lint: $(STAMP)
+	$(BIN)/python -m ruff format --check .
+	$(BIN)/python -m ruff check .
+	$(BIN)/python -m mypy
+	$(BIN)/lint-imports
+
+test: lint
+	$(BIN)/python -m pytest -q -n $(WORKERS) -m "not slow"
+
+test-all: lint
+	$(BIN)/python -m pytest -q -n $(WORKERS)
+
+format: $(STAMP)
+	$(BIN)/python -m ruff check --fix .
+	$(BIN)/python -m ruff format .
+
+demo: $(STAMP)
+	$(BIN)/python -m cellplan solve cells/four_robots.yaml
+	@echo "open outputs/four-robots/report.html in a browser"
+
+clean:
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist outputs/*/
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,167 @@
+"""The shape of the house: sizes, doors to the engines, and a command line that starts at once."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "cellplan"
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+SCRIPTS = sorted(path for folder in ("tests", "docs", "benchmarks") for path in (ROOT / folder).rglob("*.py"))
+
+FILE_LINES = 400
+BODY_LINES = 40
+CLASS_METHODS = 12
+PARAMETERS = 6
+
+# Each engine may be imported by these files only. A change of engine is then a change of one file.
+DOORS = {
+    "pinocchio": ["kinematics/combined.py"],
+    "fcl": ["collision/engine.py"],
+    "trimesh": ["geometry/meshes.py"],
+    "rtree": ["geometry/meshes.py"],
+    "matplotlib": ["report/plots*.py"],
+    "jinja2": ["report/html.py"],
+    "yaml": ["io/yaml_reader.py", "io/yaml_writer.py"],
+    "pydantic": ["io/schema*.py", "io/schema*/*.py"],
+    "rich": ["cli/*.py"],
+    "typer": ["cli/*.py"],
+}
+EVERYWHERE = {"cellplan", "numpy"}
+HEAVY = {"numpy", "pinocchio", "fcl", "coal", "trimesh", "rtree", "matplotlib", "pydantic", "jinja2", "yaml"}
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def place(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def functions(tree: ast.AST) -> Iterator[Function]:
+    return (node for node in ast.walk(tree) if isinstance(node, Function))
+
+
+def has_docstring(node: Function) -> bool:
+    return ast.get_docstring(node, clean=False) is not None
+
+
+def body_lines(node: Function) -> int:
+    statements = node.body[1:] if has_docstring(node) else node.body
+    if not statements:
+        return 0
+    first = node.body[0].end_lineno if has_docstring(node) else statements[0].lineno - 1
+    return (node.end_lineno or 0) - (first or 0)
+
+
+def parameters(node: Function) -> list[ast.arg]:
+    arguments = node.args
+    named = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
+    return [argument for argument in named if argument.arg not in {"self", "cls"}]
+
+
+def is_command(path: Path, node: Function) -> bool:
+    """The options of a command are the parameters of its function; each says so in an Annotated type."""
+    annotated = [ast.unparse(a.annotation).startswith("Annotated[") for a in parameters(node) if a.annotation]
+    return path.parent == PACKAGE / "cli" and all(annotated) and len(annotated) == len(parameters(node))
+
+
+def imported_modules(path: Path) -> set[str]:
+    modules = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            modules |= {alias.name.partition(".")[0] for alias in node.names}
+        if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            modules.add(node.module.partition(".")[0])
+    return modules
+
+
+def modules_loaded_by(*arguments: str) -> set[str]:
+    run = subprocess.run(
+        [sys.executable, "-X", "importtime", *arguments], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    return {match[1] for match in re.finditer(r"^import time:.*\|\s*([\w]+)", run.stderr, flags=re.MULTILINE)}
+
+
+@pytest.mark.parametrize("path", [*SOURCES, *SCRIPTS], ids=place)
+def test_no_file_is_longer_than_one_can_read_at_once(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= FILE_LINES
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=place)
+def test_functions_and_classes_stay_small(path: Path) -> None:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+
+    too_big = [f"{f.name}: {body_lines(f)} lines" for f in functions(tree) if body_lines(f) > BODY_LINES]
+    too_big += [
+        f"{f.name}: {len(parameters(f))} parameters"
+        for f in functions(tree)
+        if len(parameters(f)) > PARAMETERS and not is_command(path, f)
+    ]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef):
+            methods = sum(isinstance(child, Function) for child in node.body)
+            too_big += [f"{node.name}: {methods} methods"] if methods > CLASS_METHODS else []
+
+    assert too_big == []
+
+
+def test_no_file_is_an_empty_placeholder() -> None:
+    empty = [place(path) for path in [*SOURCES, *SCRIPTS] if not path.read_text(encoding="utf-8").strip()]
+    hollow = [
+        place(path)
+        for path in SOURCES
+        if path.name != "__init__.py" and len(ast.parse(path.read_text(encoding="utf-8")).body) < 2
+    ]
+    packages_without_content = [
+        place(path.parent) for path in SOURCES if path.name == "__init__.py" and not any_other_module(path.parent)
+    ]
+
+    assert empty + hollow + packages_without_content == []
+
+
+def any_other_module(folder: Path) -> bool:
+    return any(path.name != "__init__.py" for path in folder.rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=place)
+def test_every_engine_has_one_door(path: Path) -> None:
+    inside = PurePosixPath(path.relative_to(PACKAGE).as_posix())
+    foreign = imported_modules(path) - sys.stdlib_module_names - EVERYWHERE
+
+    smuggled = [name for name in sorted(foreign) if not any(inside.match(door) for door in DOORS.get(name, []))]
+
+    assert smuggled == [], f"{inside} may not import {smuggled}"
+
+
+def test_every_engine_is_a_declared_dependency() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {re.split(r"[<>=!~ \[]", requirement)[0].lower() for requirement in project["dependencies"]}
+    package_of = {"pinocchio": "pin", "fcl": "python-fcl", "yaml": "pyyaml"}
+
+    used = {name for path in SOURCES for name in imported_modules(path)} - sys.stdlib_module_names - {"cellplan"}
+
+    assert {package_of.get(name, name) for name in used} <= declared
+
+
+@pytest.mark.parametrize("arguments", [("-c", "import cellplan.cli.main"), ("-m", "cellplan", "--help")], ids=" ".join)
+def test_help_starts_without_any_engine(arguments: tuple[str, ...]) -> None:
+    assert modules_loaded_by(*arguments) & HEAVY == set()
+
+
+def test_nothing_unfinished_is_shipped() -> None:
+    marks = re.compile(r"\b(TODO|FIXME|XXX|NotImplementedError)\b")
+
+    unfinished = [place(path) for path in SOURCES if marks.search(path.read_text(encoding="utf-8"))]
+
+    assert unfinished == []
+
+
+def test_scripts_are_executable() -> None:
+    assert os.access(ROOT / ".ci" / "run", os.X_OK)
