@@ -1,0 +1,110 @@
+"""The door to pinocchio: all robots of a cell as one combined model for the planner."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.robot import BASE, FollowerJoint, Joint
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CellState:
+    """Kinematics of the whole cell at one stacked joint vector.
+
+    Attributes:
+        screws_W: Twist that unit speed of each joint gives what it carries, taken at the world origin, linear part
+            first, shape (6, nq), expressed in W.
+        X_WT: Tool tip of each robot, in the order of the cell, shape (robots, 4, 4).
+        X_WP: Part frame, shape (4, 4).
+    """
+
+    screws_W: Array
+    X_WT: Array
+    X_WP: Array
+
+
+class CombinedModel:
+    """One pinocchio model of all robots; joint columns stand in the order of the stacked joint vector.
+
+    Attributes:
+        carries_flange: Whether a joint moves a robot's flange, shape (robots, nq).
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        """Build the model from the joint-axis tables; nothing is read from files here."""
+        self._model = pin.Model()
+        self._leaders: list[int] = []
+        self._ratios: list[float] = []
+        self._offsets: list[float] = []
+        self.carries_flange = np.zeros((len(cell.robots), cell.joint_count), dtype=bool)
+        self._flange_ids: list[int] = []
+        self._X_JT: list[Array] = []
+        for index, robot in enumerate(cell.robots):
+            self._add_robot(robot, cell.columns(robot.name), self.carries_flange[index])
+        self._data = self._model.createData()
+        self._spread = np.zeros((self._model.nv, cell.joint_count))
+        self._spread[np.arange(self._model.nv), self._leaders] = self._ratios
+        self._offset = np.array(self._offsets)
+        self._is_plain = bool(np.array_equal(self._spread, np.eye(cell.joint_count)))
+        self._X_WT = np.tile(np.eye(4), (len(cell.robots), 1, 1))
+        self._holder, self._X_TP = _part_carrier(cell)
+
+    def state(self, q: Array) -> CellState:
+        """Kinematics at the stacked joint vector ``q``, shape (nq,); the result owns its arrays."""
+        full = q if self._is_plain else self._spread @ q + self._offset
+        pin.computeJointJacobians(self._model, self._data, full)
+        screws = self._data.J.copy() if self._is_plain else self._data.J @ self._spread
+        X_WT = self._X_WT.copy()
+        for index, (joint_id, X_JT) in enumerate(zip(self._flange_ids, self._X_JT, strict=True)):
+            X_WT[index] = self._data.oMi[joint_id].homogeneous @ X_JT
+        X_WP = self._X_TP if self._holder is None else X_WT[self._holder] @ self._X_TP
+        return CellState(screws, X_WT, X_WP)
+
+    def _add_robot(self, robot: Robot, columns: slice, carries: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> None:
+        """Add one robot's joints; every joint frame is parallel to B at the reference posture."""
+        model = robot.model
+        axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
+        ids: list[int] = []
+        for axis in axes:
+            if axis.parent == BASE:
+                parent_id, X_parent = 0, robot.X_WB @ _at(axis.point_B)
+            else:
+                parent_id, X_parent = ids[axis.parent], _at(axis.point_B - axes[axis.parent].point_B)
+            kind = pin.JointModelRevoluteUnaligned if axis.is_revolute else pin.JointModelPrismaticUnaligned
+            placement = pin.SE3(X_parent[:3, :3], X_parent[:3, 3])
+            ids.append(self._model.addJoint(parent_id, kind(axis.axis_B), placement, f"{robot.name}/{axis.name}"))
+            leader, ratio, offset = len(ids) - 1, 1.0, 0.0
+            if isinstance(axis, FollowerJoint):
+                leader, ratio, offset = axis.leader, axis.ratio, axis.offset
+            self._leaders.append(columns.start + leader)
+            self._ratios.append(ratio)
+            self._offsets.append(offset)
+        link = model.flange_link
+        self._flange_ids.append(0 if link == BASE else ids[link])
+        X_joint = inverse(robot.X_WB) if link == BASE else _at(axes[link].point_B)
+        self._X_JT.append(inverse(X_joint) @ model.X_BF @ robot.tool.X_FT)
+        while link != BASE:
+            axis = axes[link]
+            carries[columns.start + (axis.leader if isinstance(axis, FollowerJoint) else link)] = True
+            link = axis.parent
+
+
+def _at(point: Array) -> Array:
+    """Pose without rotation."""
+    X = np.eye(4)
+    X[:3, 3] = point
+    return X
+
+
+def _part_carrier(cell: Cell) -> tuple[int | None, Array]:
+    """Index of the robot that carries the part frame and the part in its tool frame; None and X_WP when fixed."""
+    if not cell.part.held_by:
+        if cell.part.X_WP is None:
+            raise ValueError("a part that nobody holds needs a pose in the world")
+        return None, cell.part.X_WP
+    grasp = cell.part.held_by[0]
+    names = [robot.name for robot in cell.robots]
+    return names.index(grasp.robot), inverse(grasp.X_PT)

@@ -1,0 +1,160 @@
+"""Random cells for tests of planning: any number of operators, revolute and prismatic joints, followers on the way."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cellplan.geometry.shapes import Sphere
+from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
+from cellplan.model.cell import (
+    Cell,
+    CheckSettings,
+    Grasp,
+    Mode,
+    MotionSettings,
+    Origin,
+    Part,
+    Robot,
+    SolverSettings,
+    Tool,
+)
+from cellplan.model.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
+from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
+
+CellMaker = Callable[..., Cell]
+
+
+def random_pose(rng: np.random.Generator) -> Array:
+    return pose_from(rotation_exp(rng.normal(size=3)), rng.normal(size=3))
+
+
+def random_model(rng: np.random.Generator, joints: int, *, with_follower: bool = False) -> RobotModel:
+    axes = [
+        Joint(
+            name=f"j{i}",
+            kind=JointKind.PRISMATIC if i % 3 == 2 else JointKind.REVOLUTE,
+            parent=i - 1 if i else BASE,
+            axis_B=_unit(rng),
+            point_B=rng.normal(size=3),
+            lower=-3.0,
+            upper=3.0,
+            velocity=3.0,
+        )
+        for i in range(joints)
+    ]
+    followers = ()
+    if with_follower:  # the flange sits on a lever that the second joint drives
+        followers = (
+            FollowerJoint(
+                name="lever",
+                kind=JointKind.REVOLUTE,
+                parent=joints - 1,
+                axis_B=_unit(rng),
+                point_B=rng.normal(size=3),
+                leader=1,
+                ratio=-0.7,
+                offset=0.2,
+            ),
+        )
+    return RobotModel(
+        name="random",
+        source="drawn",
+        joints=tuple(axes),
+        followers=followers,
+        flange_link=joints if with_follower else joints - 1,
+        X_BF=random_pose(rng),
+        bodies=(),
+    )
+
+
+def _unit(rng: np.random.Generator) -> Array:
+    axis = rng.normal(size=3)
+    return axis / np.linalg.norm(axis)
+
+
+def make_task(robot: str, **changes: object) -> Task:
+    task = Task(
+        name=f"task_{robot}",
+        robot=robot,
+        path=CirclePath(plane=PlaneName.XY, center=(0.0, 0.0), radius=0.1),
+        project=None,
+        plane_offset=0.0,
+        tool_axis=np.array([0.0, 0.0, -1.0]),
+        tool_x=np.array([1.0, 0.0, 0.0]),
+        turn=0.0,
+        axes=(0, 1, 2, 3, 4, 5),
+        is_spin_free=False,
+        tolerance=Tolerance(position=1e-4, orientation=np.radians(0.01)),
+        start=0.0,
+        duration=1.0,
+        feed=None,
+        time_law=TimeLaw(kind=TimeLawKind.QUINTIC),
+        blend=None,
+    )
+    return replace(task, **changes)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="session")
+def random_cell() -> CellMaker:
+    """A maker of cells: ``random_cell(seed, operators=3, held=True, with_follower=False)``."""
+
+    def make(seed: int, *, operators: int, held: bool = True, with_follower: bool = False) -> Cell:
+        rng = np.random.default_rng(seed)
+        names = ["holder", *(f"op{i}" for i in range(operators))]
+        robots = tuple(
+            Robot(
+                name=name,
+                model=random_model(rng, int(rng.integers(5, 8)), with_follower=with_follower),
+                X_WB=random_pose(rng),
+                tool=Tool(X_FT=random_pose(rng), bodies=()),
+                start=None,
+                weights=np.ones(0),
+            )
+            for name in names
+        )
+        robots = tuple(replace(r, weights=rng.uniform(0.5, 2.0, len(r.model.joints))) for r in robots)
+        grasp = Grasp(robot="holder", X_PT=random_pose(rng))
+        part = Part(
+            shape=Sphere(0.1),
+            X_PS=np.eye(4),
+            held_by=(grasp,) if held else (),
+            X_WP=None if held else random_pose(rng),
+        )
+        return Cell(
+            name="random",
+            robots=robots,
+            part=part,
+            tasks=tuple(make_task(name) for name in names[1:]),
+            obstacles=(),
+            motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=1.0, step=1e-3),
+            solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
+            checks=CheckSettings(clearance=0.005, contact_zone=0.02),
+            origin=Origin(),
+            inputs={},
+        )
+
+    return make
+
+
+@pytest.fixture
+def moved() -> Callable[[Cell, Array], Cell]:
+    """Move a whole cell by a rigid motion of the world."""
+
+    def move(cell: Cell, X: Array) -> Cell:
+        part = cell.part if cell.part.X_WP is None else replace(cell.part, X_WP=X @ cell.part.X_WP)
+        robots = tuple(replace(robot, X_WB=X @ robot.X_WB) for robot in cell.robots)
+        return replace(cell, robots=robots, part=part)
+
+    return move
+
+
+@pytest.fixture(scope="session")
+def task_maker() -> Callable[..., Task]:
+    return make_task
+
+
+@pytest.fixture
+def some_pose() -> Array:
+    return pose([1.0, -2.0, 0.5], [0.3, -0.8, 2.0])
