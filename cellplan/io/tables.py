@@ -1,0 +1,251 @@
+"""Joint tables: the text file that tells one robot where its joints are at each instant of the common clock.
+
+A table is ASCII-plain text: header lines that start with ``#``, one line of column names with their units, one row per
+sample. The written number is the truth: angles and lengths are rounded to twelve decimals of a degree or a millimetre,
+written so that they read back to that very number, and everything that is verified is verified on what was read back.
+"""
+
+import hashlib
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Robot
+from cellplan.model.motion import JointTable
+
+TITLE = "cellplan joint table v1"
+CAUTION = (
+    "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
+)
+NOT_CHECKED = "not checked"
+
+DECIMALS = 12  # [-] of a degree, a millimetre or a second: far below the noise of the arithmetic, exact to read back
+MM_PER_M = 1e3  # [mm/m]
+CLOCK_TOL = 1e-6  # [s] room for steps that are not whole decimals, such as 1/3000 s
+MAX_NUMBER = 1e9  # [deg], [mm] or [s]: beyond it twelve decimals would be pretence
+
+Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
+
+_NUMBER = r"-?[0-9]{1,20}(?:\.[0-9]{1,40})?"
+_FIELD = re.compile(_NUMBER)
+_UNITS = ("deg", "mm")
+_SHA256 = "sha256 "
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableHeader:
+    """What the header lines of a table say besides its title and the caution.
+
+    Attributes:
+        cell: Name of the cell.
+        mode: Who moves.
+        verdict: ``passed``, ``REJECTED: <first violation>`` or ``not checked``.
+        digests: SHA-256 in hexadecimal by what it is the digest of (``cell``, ``program``).
+    """
+
+    cell: str
+    mode: str
+    verdict: str = NOT_CHECKED
+    digests: Mapping[str, str]
+
+
+def render_table(robot: Robot, times: Array, q: Array, *, header: TableHeader) -> str:
+    """Write the joint table of one robot.
+
+    Args:
+        robot: Whose table it is.
+        times: Instants in [s], shape (N,).
+        q: Its joint positions in [rad] or [m], shape (N, n).
+        header: What stands above the rows.
+
+    Raises:
+        InputError: When a joint's name cannot stand in a table.
+    """
+    return _render_header(robot.name, header) + _render_rows(robot, times, q)
+
+
+def replace_header(text: str, *, header: TableHeader) -> str:
+    """Put another header above the rows of a table, which stay as they are byte for byte."""
+    robot = _header_fields(text, "table")["robot"]
+    return _render_header(robot, header) + table_body(text)
+
+
+def table_body(text: str) -> str:
+    """A table without its header lines: the line of column names and the rows."""
+    start = 0
+    while text.startswith("#", start):
+        end = text.find("\n", start)
+        start = len(text) if end < 0 else end + 1
+    return text[start:]
+
+
+def program_digest(tables: Mapping[str, str]) -> str:
+    """SHA-256 of the rows of all tables; headers do not count, so the digest can stand in them."""
+    digest = hashlib.sha256()
+    for robot, text in tables.items():
+        digest.update(f"{robot}\n".encode())
+        digest.update(table_body(text).encode())
+    return digest.hexdigest()
+
+
+def parse_table(text: str, source: str) -> JointTable:
+    """Read a joint table back, strictly: nothing is skipped, guessed or repaired.
+
+    Args:
+        text: The content of the file.
+        source: File name for messages.
+
+    Returns:
+        Instants in [s] and joint positions in [rad] or [m].
+
+    Raises:
+        InputError: With file, line and column, when the text is not a whole joint table.
+    """
+    robot = _header_fields(text, source)["robot"]
+    body = table_body(text)
+    first_line = 1 + text.count("\n", 0, len(text) - len(body))
+    if body and not body.endswith("\n"):
+        raise InputError(f"{source}: expected the last row to end with a line break; the file is cut off")
+    columns, _, rows = body.partition("\n")
+    joints, is_angle = _parse_columns(columns, f"{source}:{first_line}")
+    numbers = _parse_rows(rows, columns.split(","), source=source, first_line=first_line + 1)
+    times = numbers[:, 0].copy()
+    _check_clock(times, source=source, first_line=first_line + 1)
+    return JointTable(robot=robot, joints=joints, times=times, q=_to_si(numbers[:, 1:], is_angle))
+
+
+def parse_header(text: str, source: str) -> TableHeader:
+    """Read what the header lines of a table say.
+
+    Raises:
+        InputError: With file and line, when a header line is missing or of no known form.
+    """
+    fields = _header_fields(text, source)
+    digests = {
+        key.removesuffix(" digest"): value.removeprefix(_SHA256)
+        for key, value in fields.items()
+        if key.endswith(" digest")
+    }
+    return TableHeader(cell=fields["cell"], mode=fields["mode"], verdict=fields["verdict"], digests=digests)
+
+
+def _render_header(robot: str, header: TableHeader) -> str:
+    fields = {"robot": robot, "cell": header.cell, "mode": header.mode}
+    fields |= {f"{name} digest": f"{_SHA256}{digest}" for name, digest in header.digests.items()}
+    fields["verdict"] = header.verdict
+    lines = [TITLE, *(f"{key}: {_one_line(value)}" for key, value in fields.items()), CAUTION]
+    return "".join(f"# {line}\n" for line in lines)
+
+
+def _one_line(value: str) -> str:
+    """The value without line breaks and control characters: nothing may break out of a comment."""
+    return " ".join("".join(char if char.isprintable() else " " for char in value).split())
+
+
+def _render_rows(robot: Robot, times: Array, q: Array) -> str:
+    joints = robot.model.joints
+    if q.shape != (len(times), len(joints)):
+        raise ValueError(f"table of '{robot.name}': expected shape {(len(times), len(joints))}, got {q.shape}")
+    for joint in joints:
+        if not re.fullmatch(r"[^\s,\"#]+", joint.name) or not joint.name.isprintable():
+            raise InputError(
+                f"robot '{robot.name}': joint name {joint.name!r} cannot stand in a joint table; "
+                "allowed are names without space, comma, quote and #"
+            )
+    names = ",".join(["time_s", *(f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in joints)])
+    scaled = (np.rad2deg(q[:, i]) if joint.is_revolute else q[:, i] * MM_PER_M for i, joint in enumerate(joints))
+    written = (_plain_decimals(column) for column in (times, *scaled))
+    return "\n".join([names, *map(",".join, zip(*written, strict=True))]) + "\n"
+
+
+def _plain_decimals(column: Array) -> list[str]:
+    """The shortest text of each number, rounded to ``DECIMALS``, that reads back to the rounded number."""
+    if not np.all(np.abs(column) < MAX_NUMBER):
+        raise ValueError("joint table: a number is not finite or absurdly large")
+    rounded = np.round(column, DECIMALS) + 0.0  # + 0.0 turns -0.0 into 0.0
+    texts = [repr(number) for number in rounded.tolist()]
+    for index in np.flatnonzero((np.abs(rounded) < 1e-3) & (rounded != 0.0)):  # repr would use an exponent here
+        texts[index] = f"{rounded[index]:.{DECIMALS}f}".rstrip("0")
+    return texts
+
+
+def _header_fields(text: str, source: str) -> dict[str, str]:
+    lines = text[: len(text) - len(table_body(text))].split("\n")[:-1]
+    if not lines or lines[0] != f"# {TITLE}":
+        got = text.partition("\n")[0][:60]
+        raise InputError(f"{source}:1: expected the line '# {TITLE}', got {got!r}")
+    if lines[-1] != f"# {CAUTION}":
+        raise InputError(f"{source}:{len(lines)}: expected the header to end with '# {CAUTION}'")
+    fields: dict[str, str] = {}
+    for number, line in enumerate(lines[1:-1], start=2):
+        key, colon, value = line.removeprefix("# ").partition(": ")
+        if not line.startswith("# ") or not colon or not value or key in fields:
+            raise InputError(f"{source}:{number}: expected a header line '# key: value', each key once, got {line!r}")
+        fields[key] = value
+    for key in ("robot", "cell", "mode", "verdict"):
+        if key not in fields:
+            raise InputError(f"{source}: the header has no line '# {key}: …'")
+    return fields
+
+
+def _parse_columns(line: str, where: str) -> tuple[tuple[str, ...], Flags]:
+    """Joint names from the line of column names, and whether each column holds angles."""
+    first, *names = line.split(",")
+    if first != "time_s" or not names:
+        raise InputError(f"{where}: expected the column names 'time_s,<joint>_deg,…', got {line[:80]!r}")
+    joints, units = [], []
+    for name in names:
+        joint, _, unit = name.rpartition("_")
+        if not joint or unit not in _UNITS:
+            raise InputError(f"{where}: column {name!r}: expected a joint's name with the ending _deg or _mm")
+        if joint in joints:
+            raise InputError(f"{where}: column {name!r}: joint '{joint}' stands twice")
+        joints.append(joint)
+        units.append(unit)
+    return tuple(joints), np.array([unit == "deg" for unit in units])
+
+
+def _to_si(numbers: Array, is_angle: Flags) -> Array:
+    return np.where(is_angle, np.deg2rad(numbers), numbers / MM_PER_M)
+
+
+def _parse_rows(rows: str, columns: list[str], *, source: str, first_line: int) -> Array:
+    """All numbers, shape (N, columns)."""
+    lines = rows.split("\n")[:-1]
+    if len(lines) < 2:
+        raise InputError(f"{source}: expected at least two rows of numbers, got {len(lines)}")
+    row = re.compile(_NUMBER + rf"(?:,{_NUMBER}){{{len(columns) - 1}}}")
+    if not all(map(row.fullmatch, lines)):
+        raise _first_bad_row(lines, row, columns=columns, source=source, first_line=first_line)
+    numbers = np.array(list(map(float, ",".join(lines).split(","))))
+    return numbers.reshape(len(lines), len(columns))
+
+
+def _first_bad_row(
+    lines: Iterable[str], row: re.Pattern[str], *, columns: list[str], source: str, first_line: int
+) -> InputError:
+    """The complaint about the first row that is not a row of plain decimals."""
+    number, line = next((n, line) for n, line in enumerate(lines, start=first_line) if not row.fullmatch(line))
+    fields = line.split(",")
+    if len(fields) != len(columns):
+        return InputError(f"{source}:{number}: expected {len(columns)} numbers, got {len(fields)}")
+    name, field = next(pair for pair in zip(columns, fields, strict=True) if not _FIELD.fullmatch(pair[1]))
+    return InputError(f"{source}:{number}: {name}: expected a plain decimal number such as -12.5, got {field[:40]!r}")
+
+
+def _check_clock(times: Array, *, source: str, first_line: int) -> None:
+    """Refuse a clock that does not start at zero or does not tick evenly."""
+    if times[0] != 0.0:
+        raise InputError(f"{source}:{first_line}: time_s: expected the first row at 0, got {times[0]:g}")
+    even = np.median(np.diff(times)) * np.arange(len(times))
+    late = np.flatnonzero((np.abs(times - even) > CLOCK_TOL) | (np.diff(times, prepend=-1.0) <= 0.0))
+    if len(late):
+        row = int(late[0])
+        raise InputError(
+            f"{source}:{first_line + row}: time_s: expected evenly spaced, growing instants "
+            f"({even[row]:.6g} here), got {times[row]:.6g}"
+        )
