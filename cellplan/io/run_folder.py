@@ -1,0 +1,203 @@
+"""Run folder: the files of one run, which appear on disk whole or not at all.
+
+Files are collected in a hidden folder beside the final one, each forced to the disk, and the folder is renamed into
+place at the end. A folder that cellplan did not write is never replaced.
+"""
+
+import contextlib
+import os
+import shutil
+from pathlib import Path, PurePosixPath
+from types import TracebackType
+from typing import Self
+from uuid import uuid4
+
+from cellplan.errors import InputError
+
+MARK = '"schema": "cellplan.'  # stands in the first lines of every report.json that cellplan writes
+MARK_WITHIN = 200  # [bytes]
+OWN_NAMES = frozenset(
+    {"cell.yaml", "plots", "programs", "rejected", "report.html", "report.json", "tables", "view.html", ".DS_Store"}
+)
+
+
+class RunFolder:
+    """Writer of one run folder, to be used in a ``with`` statement.
+
+    On a normal end the folder takes the place of an older run at the same path. On an exception or an interruption
+    everything is removed and an older run stays as it was.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Name the folder; nothing is touched before the ``with`` statement begins."""
+        self.path = path
+        self._draft = path.parent / f".{path.name}.{uuid4().hex[:12]}.partial"
+        self._made_parents: list[Path] = []
+
+    def __enter__(self) -> Self:
+        """Check the place and open the hidden folder.
+
+        Raises:
+            InputError: When the folder must not or cannot be written.
+        """
+        refuse_unless_replaceable(self.path)
+        try:
+            self._made_parents = _make_parents(self.path.parent)
+            self._draft.mkdir()
+        except OSError as error:
+            _remove_empty(self._made_parents)
+            raise _cannot_write(self.path, error) from error
+        return self
+
+    def write_text(self, name: str, text: str) -> None:
+        """Write a text file in UTF-8, line breaks as given; ``name`` is relative, with ``/`` between folders."""
+        self.write_bytes(name, text.encode())
+
+    def write_bytes(self, name: str, content: bytes) -> None:
+        """Write a file and force it to the disk.
+
+        Raises:
+            InputError: When the disk is full, read-only or otherwise refuses.
+        """
+        relative = PurePosixPath(name)
+        if relative.is_absolute() or ".." in relative.parts or not relative.name:
+            raise ValueError(f"run folder: {name!r} does not lie inside the folder")
+        target = self._draft / relative
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with target.open("xb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise _cannot_write(self.path / relative, error) from error
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Put the folder into place, or remove every trace of it.
+
+        Raises:
+            InputError: When the folder cannot be put into place.
+        """
+        try:
+            if error is None:
+                self._put_into_place()
+                self._made_parents = []
+        except OSError as failure:
+            raise _cannot_write(self.path, failure) from failure
+        finally:
+            shutil.rmtree(self._draft, ignore_errors=True)
+            _remove_empty(self._made_parents)
+
+    def _put_into_place(self) -> None:
+        """Rename the older run aside and the new one into place; undo the first when the second fails."""
+        refuse_unless_replaceable(self.path)  # again: planning took a while
+        for folder in (self._draft, *(path for path in self._draft.rglob("*") if path.is_dir())):
+            _sync_folder(folder)
+        aside = self._draft.with_suffix(".replaced")
+        if not self.path.exists():
+            self._draft.rename(self.path)
+        else:
+            self.path.rename(aside)
+            try:
+                self._draft.rename(self.path)
+            except BaseException:
+                if not self.path.exists():
+                    aside.rename(self.path)
+                raise
+        shutil.rmtree(aside, ignore_errors=True)
+        with contextlib.suppress(OSError):  # the run is in place; a folder that may not be read need not be synced
+            _sync_folder(self.path.parent)
+
+
+def refuse_unless_replaceable(path: Path) -> None:
+    """Refuse a place that cellplan must not write to; call it early, before any long work.
+
+    Raises:
+        InputError: When the path is a symbolic link, a file, the working folder or a folder with other things in it.
+    """
+    try:
+        for link in (path, path.parent):
+            if link.is_symlink():
+                raise InputError(f"{path}: output is never written through a symbolic link, and '{link}' is one")
+        if not path.exists():
+            _refuse_unless_writable(path)
+            return
+        if not path.is_dir():
+            raise InputError(f"{path}: expected a folder for the output, got a file")
+        if Path.cwd().resolve().is_relative_to(path.resolve()):
+            raise InputError(f"{path}: the output needs a folder of its own, not the one you are working in")
+        _refuse_unless_writable(path)
+        foreign = _foreign_entry(path)
+    except OSError as error:
+        raise _cannot_write(path, error) from error
+    if foreign:
+        raise InputError(
+            f"{path}: holds '{foreign}', which cellplan did not write; choose another folder or empty this one"
+        )
+
+
+def is_run_folder(path: Path) -> bool:
+    """Whether a folder holds a report that cellplan wrote."""
+    report = path / "report.json"
+    if report.is_symlink() or not report.is_file():
+        return False
+    with report.open("rb") as file:
+        return MARK.encode() in file.read(MARK_WITHIN)
+
+
+def _foreign_entry(path: Path) -> str | None:
+    """The first thing in a folder that is not part of a run; None when the folder is empty or a run."""
+    entries = sorted(path.iterdir())
+    if entries and not is_run_folder(path):
+        return entries[0].name
+    for entry in entries:
+        if entry.is_symlink() or (entry.name not in OWN_NAMES and not (entry.is_dir() and is_run_folder(entry))):
+            return entry.name
+    return None
+
+
+def _refuse_unless_writable(path: Path) -> None:
+    """Refuse when the nearest existing folder above the path is no folder or cannot be written to."""
+    above = path.parent
+    while not above.exists() and above != above.parent:
+        above = above.parent
+    if not above.is_dir():
+        raise InputError(f"{path}: cannot write the output: '{above}' is not a folder")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: cannot write the output: no right to write to '{above}'")
+
+
+def _make_parents(folder: Path) -> list[Path]:
+    """Make the missing folders above the output; returns those made, the innermost first."""
+    missing = []
+    while not folder.exists():
+        missing.append(folder)
+        folder = folder.parent
+    for path in reversed(missing):
+        path.mkdir(exist_ok=True)
+    return missing
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for folder in folders:
+        try:
+            folder.rmdir()
+        except OSError:  # somebody else put something there meanwhile: it stays
+            return
+
+
+def _sync_folder(folder: Path) -> None:
+    """Force a folder's list of names to the disk, where the system knows how."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _cannot_write(path: Path, error: OSError) -> InputError:
+    return InputError(f"{path}: cannot write the output: {(error.strerror or str(error)).lower()}")

@@ -1,0 +1,192 @@
+"""Run folders: they appear whole or not at all, and nothing of anybody else's is ever lost."""
+
+import errno
+import os
+import resource
+import signal
+import stat
+from pathlib import Path
+
+import pytest
+
+from cellplan.errors import InputError
+from cellplan.io.run_folder import RunFolder
+
+REPORT = '{\n  "schema": "cellplan.report/1",\n  "status": "passed"\n}\n'
+
+
+def write_run(path: Path, tables: str = "rows") -> None:
+    with RunFolder(path) as folder:
+        folder.write_text("report.json", REPORT)
+        folder.write_text("tables/arm.csv", tables)
+
+
+def write_half_a_run(path: Path, failure: type[BaseException]) -> None:
+    with RunFolder(path) as folder:
+        folder.write_text("report.json", REPORT)
+        raise failure
+
+
+def everything_in(path: Path) -> list[str]:
+    return sorted(str(entry.relative_to(path)) for entry in path.rglob("*"))
+
+
+def names_in(path: Path) -> list[str]:
+    return sorted(entry.name for entry in path.iterdir())
+
+
+def test_run_appears_with_all_its_files_and_nothing_else(tmp_path: Path) -> None:
+    write_run(tmp_path / "outputs" / "bench", tables="a\nb\n")
+    assert everything_in(tmp_path) == [
+        "outputs",
+        "outputs/bench",
+        "outputs/bench/report.json",
+        "outputs/bench/tables",
+        "outputs/bench/tables/arm.csv",
+    ]
+    assert (tmp_path / "outputs/bench/tables/arm.csv").read_bytes() == b"a\nb\n"
+
+
+def test_nothing_is_visible_before_the_end(tmp_path: Path) -> None:
+    with RunFolder(tmp_path / "bench") as folder:
+        folder.write_text("report.json", REPORT)
+        assert not (tmp_path / "bench").exists()
+        assert all(name.startswith(".") for name in names_in(tmp_path))
+
+
+def test_folder_is_readable_as_the_user_mask_says(tmp_path: Path) -> None:
+    before = os.umask(0o022)
+    try:
+        write_run(tmp_path / "bench")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "bench").stat().st_mode) == 0o755
+
+
+def test_new_run_replaces_the_old_one_whole(tmp_path: Path) -> None:
+    write_run(tmp_path / "bench")
+    with RunFolder(tmp_path / "bench") as folder:
+        folder.write_text("report.json", REPORT)
+        folder.write_bytes("plots/a.png", b"\x89")
+    assert everything_in(tmp_path / "bench") == ["plots", "plots/a.png", "report.json"]
+    assert names_in(tmp_path) == ["bench"]
+
+
+def test_run_with_runs_inside_it_can_be_replaced(tmp_path: Path) -> None:
+    with RunFolder(tmp_path / "bench") as folder:
+        folder.write_text("report.json", REPORT)
+        folder.write_text("circle/report.json", REPORT)
+    write_run(tmp_path / "bench")
+    assert everything_in(tmp_path / "bench") == ["report.json", "tables", "tables/arm.csv"]
+
+
+@pytest.mark.parametrize("failure", [ValueError, KeyboardInterrupt, SystemExit])
+def test_failure_leaves_nothing_behind_and_the_old_run_as_it_was(tmp_path: Path, failure: type[BaseException]) -> None:
+    write_run(tmp_path / "old", tables="old")
+    for name in ("old", "outputs/deep/new"):
+        with pytest.raises(failure):
+            write_half_a_run(tmp_path / name, failure)
+    assert names_in(tmp_path) == ["old"]
+    assert (tmp_path / "old/tables/arm.csv").read_text() == "old"
+
+
+@pytest.mark.parametrize("fails_at", [1, 2])
+def test_failing_swap_leaves_the_old_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails_at: int) -> None:
+    write_run(tmp_path / "bench", tables="old")
+    real, calls = Path.rename, 0
+
+    def failing(self: Path, target: Path) -> Path:
+        nonlocal calls
+        calls += 1
+        if calls == fails_at:
+            raise OSError(errno.EIO, "Input/output error")
+        return real(self, target)
+
+    monkeypatch.setattr(Path, "rename", failing)
+    with pytest.raises(InputError, match="bench: cannot write the output: input/output error"):
+        write_run(tmp_path / "bench", tables="new")
+    assert names_in(tmp_path) == ["bench"]
+    assert (tmp_path / "bench/tables/arm.csv").read_text() == "old"
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(InputError) as caught, RunFolder(path):
+        pass
+    return str(caught.value)
+
+
+def test_folder_with_other_things_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos/cat.jpg").write_bytes(b"cat")
+    (tmp_path / "photos/report.json").write_text('{"schema": "other/1"}')
+    path = tmp_path / "photos"
+    assert refusal(path) == (
+        f"{path}: holds 'cat.jpg', which cellplan did not write; choose another folder or empty this one"
+    )
+    assert everything_in(path) == ["cat.jpg", "report.json"]
+
+
+def test_notes_put_into_a_run_are_not_lost(tmp_path: Path) -> None:
+    write_run(tmp_path / "bench")
+    (tmp_path / "bench/notes.txt").write_text("keep")
+    assert "holds 'notes.txt', which cellplan did not write" in refusal(tmp_path / "bench")
+    assert (tmp_path / "bench/notes.txt").read_text() == "keep"
+
+
+def test_empty_folder_is_used(tmp_path: Path) -> None:
+    (tmp_path / "bench").mkdir()
+    write_run(tmp_path / "bench")
+    assert (tmp_path / "bench/report.json").is_file()
+
+
+def test_file_in_the_place_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "bench").write_text("mine")
+    assert refusal(tmp_path / "bench") == f"{tmp_path / 'bench'}: expected a folder for the output, got a file"
+    assert refusal(tmp_path / "bench" / "run").endswith("bench' is not a folder")
+
+
+def test_symbolic_links_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
+    for name in ("link", "dangling", "link/run"):
+        assert "never written through a symbolic link" in refusal(tmp_path / name)
+    assert names_in(tmp_path / "real") == []
+
+
+def test_working_folder_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    for path in (Path(), Path("../here"), tmp_path):
+        assert "needs a folder of its own" in refusal(path)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="the administrator may write everywhere")
+def test_folder_without_the_right_to_write_is_refused(tmp_path: Path) -> None:
+    tmp_path.chmod(0o555)
+    try:
+        assert "no right to write" in refusal(tmp_path / "bench")
+    finally:
+        tmp_path.chmod(0o755)
+
+
+@pytest.mark.parametrize("name", ["/etc/x", "../x", "a/../../x", ""])
+def test_file_outside_the_folder_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ValueError, match="does not lie inside the folder"), RunFolder(tmp_path / "bench") as folder:
+        folder.write_text(name, "x")
+    assert names_in(tmp_path) == []
+
+
+def test_full_disk_is_one_line_and_leaves_nothing(tmp_path: Path) -> None:
+    """A limit on the size of files stands in for a full disk: the write itself fails."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+        with pytest.raises(InputError) as caught:
+            write_run(tmp_path / "bench", tables="x" * 5000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, ignored)
+    assert str(caught.value) == f"{tmp_path / 'bench/tables/arm.csv'}: cannot write the output: file too large"
+    assert names_in(tmp_path) == []
