@@ -49,7 +49,7 @@ class Joint:
     @property
     def is_revolute(self) -> bool:
         """Whether the joint turns rather than slides."""
-        return self.kind is JointKind.REVOLUTE
+        return self.kind == JointKind.REVOLUTE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,7 +79,7 @@ class FollowerJoint:
     @property
     def is_revolute(self) -> bool:
         """Whether the joint turns rather than slides."""
-        return self.kind is JointKind.REVOLUTE
+        return self.kind == JointKind.REVOLUTE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

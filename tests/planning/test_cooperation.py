@@ -8,6 +8,7 @@ import pytest
 from cellplan.geometry.transforms import inverse, pose_from, rotation_about, rotation_exp, rotation_vector
 from cellplan.kinematics.combined import CombinedModel
 from cellplan.kinematics.screws import ScrewChain
+from cellplan.model.robot import JointKind
 from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian, pose_errors
 
 DERIVATIVE_TOL = 1e-6  # relative; central differences with h = 1e-5 leave h^2 and eps / h, both near 1e-10
@@ -123,7 +124,7 @@ def test_planar_pair_has_the_closed_form(random_cell):
     cell = random_cell(16, operators=1)
     hinge = replace(
         cell.robots[0].model.joints[0],
-        kind="revolute",
+        kind=JointKind.REVOLUTE,
         axis_B=np.array([0.0, 0.0, 1.0]),
         point_B=np.zeros(3),
     )

@@ -1,0 +1,133 @@
+"""Joint positions, speeds and accelerations that were read back, against their limits."""
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Robot
+from cellplan.model.report import Check, JointUse
+from cellplan.model.robot import Joint
+
+
+def joint_uses(robot: Robot, times: Array, q: Array) -> tuple[JointUse, ...]:
+    """How each joint of one robot is used.
+
+    Between two samples a joint moves evenly, so its speed there is the difference quotient.
+
+    Args:
+        robot: The robot.
+        times: Instants in [s], shape (N,).
+        q: Positions, shape (N, n).
+    """
+    speeds = np.abs(np.diff(q, axis=0)) / np.diff(times)[:, None]
+    return tuple(_use(robot, index, times, q[:, index], speeds=speeds[:, index]) for index in range(q.shape[1]))
+
+
+def check_joints(robot: Robot, uses: tuple[JointUse, ...], times: Array, q: Array) -> list[Check]:
+    """Position and speed of every joint, and acceleration where a limit is known."""
+    checks = []
+    for index, (joint, use) in enumerate(zip(robot.model.joints, uses, strict=True)):
+        checks += [_check_position(use, times, q[:, index]), _check_velocity(use)]
+        if joint.acceleration is not None:
+            checks.append(_check_acceleration(robot, joint, times, q[:, index]))
+    return checks
+
+
+def _use(robot: Robot, index: int, times: Array, q: Array, *, speeds: Array) -> JointUse:
+    """Extremes of one joint and when they happen."""
+    joint = robot.model.joints[index]
+    margins = np.minimum(q - joint.lower, joint.upper - q)
+    nearest, fastest = int(np.argmin(margins)), int(np.argmax(speeds))
+    return JointUse(
+        robot=robot.name,
+        joint=joint.name,
+        is_revolute=joint.is_revolute,
+        min=float(q.min()),
+        max=float(q.max()),
+        lower=joint.lower,
+        upper=joint.upper,
+        margin=float(margins[nearest]),
+        margin_at_s=float(times[nearest]),
+        peak_velocity=float(speeds[fastest]),
+        velocity_limit=joint.velocity,
+        peak_velocity_at_s=float(times[fastest + 1]),
+        travel=float(np.abs(np.diff(q)).sum()),
+    )
+
+
+def _check_position(use: JointUse, times: Array, q: Array) -> Check:
+    """One joint's worst position; the message names the first instant of a violation too."""
+    scale, unit = _unit(use.is_revolute)
+    worst = int(np.searchsorted(times, use.margin_at_s))
+    value = scale * float(q[worst])
+    limit = scale * (use.lower if q[worst] - use.lower < use.upper - q[worst] else use.upper)
+    passed = use.margin >= 0.0
+    if np.isinf(use.margin):
+        verdict = "may turn without end"
+    elif passed:
+        verdict = f"stays {scale * use.margin:.4g} {unit} inside its limits"
+    else:
+        first = float(times[np.argmax((q < use.lower) | (q > use.upper))])
+        side = "below its lower" if limit == scale * use.lower else "beyond its upper"
+        verdict = (
+            f"goes {-scale * use.margin:.4g} {unit} {side} limit {limit:g} {unit} "
+            f"(reaches {value:.4f} {unit}; outside from {first:.3f} s)"
+        )
+    return Check(
+        name="joint_position",
+        subject=f"{use.robot}/{use.joint}",
+        passed=passed,
+        value=value,
+        limit=limit,
+        unit=unit,
+        at_s=use.margin_at_s,
+        message=f"joint {use.robot}/{use.joint} {verdict}, worst at {use.margin_at_s:.3f} s",
+    )
+
+
+def _check_velocity(use: JointUse) -> Check:
+    """One joint's largest speed."""
+    scale, unit = _unit(use.is_revolute)
+    passed = use.peak_velocity <= use.velocity_limit
+    verdict = "moves at most at" if passed else "is too fast:"
+    percent = 100 * use.peak_velocity / use.velocity_limit
+    return Check(
+        name="joint_velocity",
+        subject=f"{use.robot}/{use.joint}",
+        passed=passed,
+        value=scale * use.peak_velocity,
+        limit=scale * use.velocity_limit,
+        unit=f"{unit}/s",
+        at_s=use.peak_velocity_at_s,
+        message=(
+            f"joint {use.robot}/{use.joint} {verdict} {scale * use.peak_velocity:.4g} {unit}/s "
+            f"at {use.peak_velocity_at_s:.3f} s ({percent:.4g} % of its limit {scale * use.velocity_limit:g} {unit}/s)"
+        ),
+    )
+
+
+def _check_acceleration(robot: Robot, joint: Joint, times: Array, q: Array) -> Check:
+    """One joint's largest acceleration, from second differences."""
+    scale, unit = _unit(joint.is_revolute)
+    speeds = np.diff(q) / np.diff(times)
+    accelerations = np.abs(np.diff(speeds)) / np.diff(times)[1:]
+    worst = int(np.argmax(accelerations)) if len(accelerations) else 0
+    value = float(accelerations[worst]) if len(accelerations) else 0.0
+    limit = joint.acceleration if joint.acceleration is not None else np.inf
+    return Check(
+        name="joint_acceleration",
+        subject=f"{robot.name}/{joint.name}",
+        passed=value <= limit,
+        value=scale * value,
+        limit=scale * limit,
+        unit=f"{unit}/s2",
+        at_s=float(times[worst + 1]),
+        message=(
+            f"joint {robot.name}/{joint.name} accelerates at most at {scale * value:.4g} {unit}/s2 "
+            f"at {times[worst + 1]:.3f} s, limit {scale * limit:g} {unit}/s2"
+        ),
+    )
+
+
+def _unit(is_revolute: bool) -> tuple[float, str]:
+    """Factor and unit that people read."""
+    return (float(np.degrees(1.0)), "deg") if is_revolute else (1e3, "mm")

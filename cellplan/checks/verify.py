@@ -1,0 +1,104 @@
+"""Verification: everything that is said about a run is computed here, from the joint tables that were read back."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from cellplan.checks.clearance import check_clearance
+from cellplan.checks.conditioning import conditioning
+from cellplan.checks.limits import check_joints, joint_uses
+from cellplan.checks.tracking import check_accuracy, part_poses, task_accuracy
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.motion import JointTable, Schedule
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report import Check, JointUse, Report
+from cellplan.scene.scene import Scene
+
+
+def verify(
+    scene: Scene,
+    schedule: Schedule,
+    tables: Sequence[JointTable],
+    *,
+    moving: Sequence[str],
+    progress: Progress = silent,
+) -> Report:
+    """Check tool errors, joint limits and clearance of a run.
+
+    The kinematics is that of successive screw displacements; nothing of the planner is used.
+
+    Args:
+        scene: The cell made computable.
+        schedule: Where every tool must be at each instant.
+        tables: One joint table per robot, parsed from its text.
+        moving: Names of the robots that may move; the others must stand still.
+        progress: Who wants to know how far it is.
+
+    Raises:
+        InputError: A table is missing, or does not fit the cell or the clock.
+    """
+    cell = scene.cell
+    q = _positions(cell, schedule, tables)
+    progress("checking tool errors and joints", 0.0)
+    X_WP = part_poses(cell, scene.chains, q)
+    accuracy = tuple(
+        task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
+    )
+    checks: list[Check] = []
+    for scheduled, errors in zip(schedule.tasks, accuracy, strict=True):
+        checks += check_accuracy(schedule, errors, scheduled.task)
+    uses: list[JointUse] = []
+    for robot in cell.robots:
+        own = joint_uses(robot, schedule.times, q[robot.name])
+        uses += own
+        checks += check_joints(robot, own, schedule.times, q[robot.name])
+    stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
+    clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
+    return Report(
+        cell=cell.name,
+        mode=str(cell.motion.mode),
+        tasks=tuple(scheduled.task.name for scheduled in schedule.tasks),
+        checks=(*checks, *clearance_checks),
+        accuracy=accuracy,
+        joints=tuple(uses),
+        clearance=clearance,
+        conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving),
+        motion_share=_motion_share(uses),
+        times=schedule.times,
+        q=q,
+        qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
+    )
+
+
+def _positions(cell: Cell, schedule: Schedule, tables: Sequence[JointTable]) -> Mapping[str, Array]:
+    """Positions by robot name, after making sure that the tables are complete and fit the cell and the clock."""
+    by_name = {table.robot: table for table in tables}
+    if len(by_name) != len(tables) or set(by_name) != {robot.name for robot in cell.robots}:
+        raise InputError(f"tables: expected one for each of {[robot.name for robot in cell.robots]}, got {[*by_name]}")
+    for robot in cell.robots:
+        table = by_name[robot.name]
+        if table.joints != robot.model.joint_names:
+            raise InputError(f"table of '{robot.name}': expected joints {robot.model.joint_names}, got {table.joints}")
+        if not np.array_equal(table.times, schedule.times):
+            raise InputError(f"table of '{robot.name}': its instants are not those of the schedule")
+        if not np.all(np.isfinite(table.q)):
+            raise InputError(f"table of '{robot.name}': a position is not a finite number")
+    return {name: table.q for name, table in by_name.items()}
+
+
+def _motion_share(uses: Sequence[JointUse]) -> dict[str, tuple[float, str]]:
+    """Share of all motion that each robot does, and its busiest joint.
+
+    Motion is the time each joint would need for its travel at its top speed, so that turning and sliding joints, large
+    and small ones, can be added.
+    """
+    effort: dict[str, dict[str, float]] = {}
+    for use in uses:
+        effort.setdefault(use.robot, {})[use.joint] = use.travel / use.velocity_limit
+    total = sum(sum(joints.values()) for joints in effort.values())
+    return {
+        robot: (sum(joints.values()) / total if total else 0.0, max(joints, key=lambda name: joints[name]))
+        for robot, joints in effort.items()
+    }

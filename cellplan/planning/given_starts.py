@@ -1,0 +1,97 @@
+"""Start postures given in the cell are examined before anything is solved: within limits, tool on the task's start."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cellplan.errors import InputError, InvalidFileError, StartOffTaskError, StartOutsideLimitsError
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.kinematics.screws import ScrewChain
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.robot import Joint
+from cellplan.model.task import Task
+from cellplan.model.toolpath import Toolpath
+from cellplan.planning.cooperation import constraint_rows, pose_errors
+
+
+def start_key(robot: Robot) -> str:
+    """Key path of a robot's start posture in the cell file."""
+    return f"robots.{robot.name}.start_deg"
+
+
+def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
+    """Refuse start postures that no solve could be right with.
+
+    Args:
+        cell: The cell; starts that are to be found are passed over.
+        toolpaths: Toolpath of every task, by task name.
+
+    Raises:
+        StartOutsideLimitsError: A joint starts outside its limits.
+        StartOffTaskError: A tool does not start on its task.
+        InvalidFileError: More than one of these.
+    """
+    complaints: list[InputError] = [
+        complaint for robot in cell.robots if robot.start is not None for complaint in _outside(cell, robot)
+    ]
+    if not complaints:
+        complaints = [complaint for task in cell.tasks for complaint in _off_task(cell, task, toolpaths[task.name])]
+    if len(complaints) == 1:
+        raise complaints[0]
+    if complaints:
+        raise InvalidFileError(complaints)
+
+
+def part_pose(cell: Cell, holder_start: Array | None) -> Array | None:
+    """The part at the start; None while its holder's posture is still to be found."""
+    if not cell.part.held_by:
+        return cell.part.X_WP
+    if holder_start is None:
+        return None
+    grasp = cell.part.held_by[0]
+    X_WT = ScrewChain(cell.robot(grasp.robot)).tool_poses(holder_start[None])[0]
+    pose: Array = X_WT @ inverse(grasp.X_PT)
+    return pose
+
+
+def _outside(cell: Cell, robot: Robot) -> list[InputError]:
+    """One complaint for each joint that starts outside its limits."""
+    start = robot.start
+    if start is None:
+        return []
+    return [
+        StartOutsideLimitsError(
+            f"{cell.origin.at(start_key(robot))}: joint '{joint.name}' starts at {_shown(joint, position)}, outside "
+            f"its limits {_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}"
+        )
+        for joint, position in zip(robot.model.joints, start, strict=True)
+        if not joint.lower <= position <= joint.upper
+    ]
+
+
+def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
+    """A complaint when a given start does not put the tool on the start of its task, within the task's tolerance."""
+    robot = cell.robot(task.robot)
+    holder = cell.robot(cell.positioners[0]).start if cell.positioners else None
+    X_WP = part_pose(cell, holder)
+    if robot.start is None or X_WP is None:
+        return []
+    X_PT = inverse(X_WP) @ ScrewChain(robot).tool_poses(robot.start[None])
+    wanted = toolpath.pieces[0].poses(np.zeros(1))
+    rows = constraint_rows(task, wanted)[0]
+    error = rows.T @ (rows @ pose_errors(wanted, X_PT, [task.is_spin_free])[0])
+    distance, angle = np.linalg.norm(error[:3]), np.linalg.norm(error[3:])
+    if distance <= task.tolerance.position and angle <= task.tolerance.orientation:
+        return []
+    return [
+        StartOffTaskError(
+            f"{cell.origin.at(start_key(robot))}: the tool is {1e3 * distance:.3f} mm and {np.degrees(angle):.4f} deg "
+            f"from the start of task '{task.name}', allowed are {1e3 * task.tolerance.position:g} mm and "
+            f"{np.degrees(task.tolerance.orientation):g} deg; `auto` finds a posture"
+        )
+    ]
+
+
+def _shown(joint: Joint, position: float) -> str:
+    """A joint position with its unit, as people write it."""
+    return f"{np.degrees(position):g} deg" if joint.is_revolute else f"{1e3 * position:g} mm"

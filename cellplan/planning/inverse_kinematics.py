@@ -1,0 +1,112 @@
+"""All postures that bring one operator's tool to one place on the part, by multi-start."""
+
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array, inverse, skew
+from cellplan.kinematics.screws import ScrewChain
+from cellplan.model.robot import RobotModel
+from cellplan.model.task import Task
+from cellplan.planning.cooperation import constraint_rows, pose_errors
+
+CLOSED: Final = 1e-9  # [m, rad] a posture counts as found when the tool is this near its goal
+SAME_POSTURE: Final = 1e-3  # [rad, m] solutions nearer to each other are one branch
+LONGEST_MOVE: Final = 0.4  # [rad, m] largest change of a joint in one iteration: farther, the linear model is wrong
+DAMPING: Final = 1e-3  # keeps iterations finite at singular postures; small enough to converge to CLOSED
+ITERATIONS: Final = 80
+
+
+def random_postures(model: RobotModel, count: int, rng: np.random.Generator) -> Array:
+    """Postures drawn evenly within the joint limits (one turn for endless joints), shape (count, n)."""
+    lower, upper = finite_limits(model)
+    return rng.uniform(lower, upper, (count, len(lower)))
+
+
+def finite_limits(model: RobotModel) -> tuple[Array, Array]:
+    """Joint limits with half a turn to either side for joints that may turn without end."""
+    endless = np.isinf(model.lower) | np.isinf(model.upper)
+    return np.where(endless, -np.pi, model.lower), np.where(endless, np.pi, model.upper)
+
+
+def reaching_postures(chain: ScrewChain, task: Task, X_PT: Array, *, X_WP: Array, seeds: Array) -> Array:
+    """Run damped Newton iterations from all seeds at once and keep what arrives.
+
+    Joint limits are not looked at here: a posture out of limits may have an equal one a turn away.
+
+    Args:
+        chain: The operator.
+        task: Says which components of the pose count.
+        X_PT: Wanted tool tip in P, shape (4, 4).
+        X_WP: The part, shape (4, 4).
+        seeds: Postures to start from, shape (B, n).
+
+    Returns:
+        Postures with the tool within ``CLOSED`` of the goal, shape (K, n).
+    """
+    q = seeds.copy()
+    rows = constraint_rows(task, X_PT[None])[0]
+    goal = np.broadcast_to(X_PT, (len(q), 4, 4))
+    R_PW = X_WP[:3, :3].T
+    error = np.full((len(q), len(rows)), np.inf)
+    for _ in range(ITERATIONS):
+        X_WT = chain.tool_poses(q)
+        error = pose_errors(goal, inverse(X_WP) @ X_WT, [task.is_spin_free] * len(q)) @ rows.T
+        if np.abs(error).max() < CLOSED:
+            break
+        J = rows @ _tip_jacobian(chain.flange_screws(q), X_WT[:, :3, 3], R_PW)
+        J_T = np.swapaxes(J, 1, 2)
+        normal = J @ J_T + DAMPING**2 * np.eye(len(rows))
+        move = (J_T @ np.linalg.solve(normal, error[:, :, None]))[:, :, 0]
+        longest = np.abs(move).max(axis=1, keepdims=True)
+        q += move * np.minimum(1.0, LONGEST_MOVE / np.maximum(longest, LONGEST_MOVE))
+    arrived: Array = q[np.abs(error).max(axis=1) < CLOSED]
+    return arrived
+
+
+def within_limits(model: RobotModel, q: Array) -> Array:
+    """Turn joints by whole turns as near to mid-range as they go and drop postures out of limits, shape (K, n)."""
+    lower, upper = finite_limits(model)
+    turning = np.array([joint.is_revolute for joint in model.joints])
+    middle = 0.5 * (lower + upper)
+    turns = np.where(turning, np.round((q - middle) / (2 * np.pi)), 0.0)
+    q = q - 2 * np.pi * turns
+    inside = q[np.all((q >= lower) & (q <= upper), axis=1)]
+    return _distinct(inside)
+
+
+def margin_shares(model: RobotModel, q: Array) -> Array:
+    """Smallest distance to a joint limit as share of half the range, shape (...): 1 in the middle, 0 on a limit."""
+    lower, upper = model.lower, model.upper
+    bounded = np.isfinite(lower) & np.isfinite(upper)
+    if not bounded.any():
+        return np.ones(q.shape[:-1])
+    q, lower, upper = q[..., bounded], lower[bounded], upper[bounded]
+    shares: Array = (np.minimum(q - lower, upper - q) / (0.5 * (upper - lower))).min(axis=-1)
+    return shares
+
+
+def smallest_singular_values(chain: ScrewChain, task: Task, X_PT: Array, q: Array) -> Array:
+    """Smallest singular value of the operator's constrained Jacobian at each posture, shape (K,)."""
+    X_WT = chain.tool_poses(q)
+    R_PW = X_PT[:3, :3] @ np.swapaxes(X_WT[:, :3, :3], 1, 2)
+    rows = constraint_rows(task, X_PT[None])[0]
+    J = rows @ _tip_jacobian(chain.flange_screws(q), X_WT[:, :3, 3], R_PW)
+    values: Array = np.linalg.svd(J, compute_uv=False)[:, -1]
+    return values
+
+
+def _tip_jacobian(screws_W: Array, p_WT: Array, R_PW: Array) -> Array:
+    """Jacobians of tool tips in axes parallel to P from screws at the world origin, shape (B, 6, n)."""
+    linear = screws_W[:, :3] - skew(p_WT) @ screws_W[:, 3:]
+    jacobians: Array = np.concatenate([R_PW @ linear, R_PW @ screws_W[:, 3:]], axis=1)
+    return jacobians
+
+
+def _distinct(q: Array) -> Array:
+    """One posture of each branch, in the order they were found."""
+    kept: list[Array] = []
+    for posture in q:
+        if all(np.abs(posture - other).max() > SAME_POSTURE for other in kept):
+            kept.append(posture)
+    return np.array(kept).reshape(len(kept), q.shape[1])

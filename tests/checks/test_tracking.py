@@ -1,0 +1,122 @@
+"""The reported tool error against errors put in by hand."""
+
+import numpy as np
+import pytest
+
+from cellplan.checks.tracking import _turn_between, check_accuracy, task_accuracy
+from cellplan.geometry.transforms import pose_from, rotation_exp, rotation_vector
+from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
+
+RNG = np.random.default_rng(3)
+
+
+class StillChain:
+    """A robot whose tool is where it is told to be."""
+
+    def __init__(self, X_WT):
+        self.X_WT = X_WT
+
+    def tool_poses(self, q):
+        return self.X_WT
+
+
+def scheduled_task(X_PT, *, axes=(0, 1, 2, 3, 4, 5), is_spin_free=False):
+    task = Task(
+        name="ring",
+        robot="arm",
+        path=CirclePath(plane=PlaneName.XY, center=(0.0, 0.0), radius=0.1),
+        project=None,
+        plane_offset=0.0,
+        tool_axis=None,
+        tool_x=np.array([1.0, 0, 0]),
+        turn=0.0,
+        axes=axes,
+        is_spin_free=is_spin_free,
+        tolerance=Tolerance(position=1e-4, orientation=1e-3),
+        start=0.0,
+        duration=1.0,
+        feed=None,
+        time_law=TimeLaw(kind=TimeLawKind.QUINTIC),
+        blend=None,
+    )
+    n = len(X_PT)
+    return TaskSchedule(task=task, X_PT=X_PT, V_PT_P=np.zeros((n, 6)), travelled=np.zeros(n), length=1.0, end=1.0)
+
+
+def random_poses(n):
+    return pose_from(rotation_exp(RNG.normal(size=(n, 3))), RNG.normal(size=(n, 3)))
+
+
+def accuracy_of(offset, turn, **options):
+    """Displace a tool from its wanted place by a known offset and turn in P."""
+    wanted, X_WP = random_poses(len(offset)), random_poses(len(offset))
+    actual = wanted.copy()
+    actual[:, :3, 3] -= offset
+    actual[:, :3, :3] = rotation_exp(-turn) @ wanted[:, :3, :3]
+    scheduled = scheduled_task(wanted, **options)
+    return task_accuracy(scheduled, StillChain(X_WP @ actual), q=np.zeros((len(offset), 6)), X_WP=X_WP)
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e-6, 1e-2, 1.0, 3.0])
+def test_known_displacement_comes_back(size):
+    offset = size * RNG.normal(size=(50, 3))
+    direction = RNG.normal(size=(50, 3))
+    turn = size * direction / np.linalg.norm(direction, axis=1, keepdims=True)
+
+    accuracy = accuracy_of(offset, turn)
+
+    np.testing.assert_allclose(accuracy.position_error, offset, atol=1e-14)  # rounding of poses of size 1
+    np.testing.assert_allclose(accuracy.orientation_error, turn, atol=2e-15 if size < 1e-3 else 1e-12)
+
+
+def test_half_turn_is_not_lost():
+    accuracy = accuracy_of(np.zeros((1, 3)), np.array([[np.pi, 0.0, 0.0]]))
+    assert np.linalg.norm(accuracy.orientation_error) == pytest.approx(np.pi, abs=1e-7)  # sin is flat there
+
+
+def test_open_components_do_not_count():
+    offset, turn = RNG.normal(size=(5, 3)), np.zeros((5, 3))
+    turn[:, 2] = 0.2
+    accuracy = accuracy_of(offset, turn, axes=(0, 1))
+    np.testing.assert_allclose(accuracy.position_error[:, :2], offset[:, :2], atol=1e-14)
+    assert not accuracy.position_error[:, 2].any()
+    assert not accuracy.orientation_error.any()
+
+
+def test_free_spin_counts_the_tilt_alone():
+    wanted, eye = random_poses(20), np.eye(4)[None]
+    spun = wanted.copy()
+    spins = np.zeros((20, 3))
+    spins[:, 2] = RNG.uniform(-3, 3, 20)
+    spun[:, :3, :3] = wanted[:, :3, :3] @ rotation_exp(spins)
+    tilts = np.cross(wanted[:, :3, 2], RNG.normal(size=(20, 3)))
+    tilts *= 0.1 / np.linalg.norm(tilts, axis=1, keepdims=True)
+    tilted = spun.copy()
+    tilted[:, :3, :3] = rotation_exp(-tilts) @ spun[:, :3, :3]
+    scheduled = scheduled_task(wanted, is_spin_free=True)
+
+    only_spun = task_accuracy(scheduled, StillChain(spun), q=np.zeros((20, 6)), X_WP=eye)
+    also_tilted = task_accuracy(scheduled, StillChain(tilted), q=np.zeros((20, 6)), X_WP=eye)
+
+    assert np.abs(only_spun.orientation_error).max() < 1e-15
+    np.testing.assert_allclose(also_tilted.orientation_error, tilts, atol=1e-14)
+
+
+def test_chord_formula_agrees_with_the_rotation_vector():
+    turns = rotation_exp(RNG.uniform(-1.7, 1.7, (200, 3)))
+    columns = np.swapaxes(turns, 1, 2)
+    np.testing.assert_allclose(
+        _turn_between(np.broadcast_to(np.eye(3), columns.shape), columns), rotation_vector(turns), atol=1e-12
+    )
+
+
+def test_check_names_instant_and_amount():
+    offset = np.zeros((3, 3))
+    offset[1, 0] = 2e-4
+    accuracy = accuracy_of(offset, np.zeros((3, 3)))
+    schedule = Schedule(times=np.array([0.0, 0.5, 1.0]), tasks=())
+    position, orientation = check_accuracy(schedule, accuracy, scheduled_task(random_poses(1)).task)
+    assert not position.passed
+    assert position.message == "position error of task 'ring': 0.2 mm at 0.500 s, allowed 0.1 mm"
+    assert orientation.passed
