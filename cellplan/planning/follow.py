@@ -66,6 +66,7 @@ class _Follower:
         self._twists = np.stack([scheduled.V_PT_P for scheduled in schedule.tasks], axis=1)
         self._rows = [constraint_rows(scheduled.task, scheduled.X_PT) for scheduled in schedule.tasks]
         self._is_whole = all(len(task.axes) == 6 and not task.is_spin_free for task in tasks)
+        self._is_linear = np.array([[float(axis in task.axes) for axis in range(3)] for task in tasks])
         self._is_spin_free = [task.is_spin_free for task in tasks]
         self._weights = np.concatenate([robot.weights for robot in cell.robots])
         self._method = METHODS[cell.solver.method]
@@ -88,11 +89,12 @@ class _Follower:
 
     def _refuse_lost_path(self, error: Array) -> None:
         """Stop where going on would be meaningless; not a number counts as lost."""
-        for task, components in zip(self._tasks, error, strict=True):
-            linear = components[[axis for axis in task.axes if axis < 3]]
-            distance = float(np.linalg.norm(linear))
-            if not distance < LOST_DISTANCE or not np.all(np.isfinite(components)):
-                raise DivergedError(
-                    f"the tool of '{task.robot}' is {1e3 * distance:.0f} mm from task '{task.name}': "
-                    "the path cannot be followed from this start posture"
-                )
+        distances = np.linalg.norm(error[:, :3] * self._is_linear, axis=1)
+        if distances.max() < LOST_DISTANCE and np.isfinite(error.sum()):
+            return
+        worst = int(np.argmax(distances))
+        task = self._tasks[worst]
+        raise DivergedError(
+            f"the tool of '{task.robot}' is {1e3 * distances[worst]:.0f} mm from task '{task.name}': "
+            "the path cannot be followed from this start posture"
+        )

@@ -77,7 +77,7 @@ def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
     if robot.start is None or X_WP is None:
         return []
     X_PT = inverse(X_WP) @ ScrewChain(robot).tool_poses(robot.start[None])
-    wanted = toolpath.pieces[0].poses(np.zeros(1))
+    wanted = toolpath.X_PT_start[None]
     rows = constraint_rows(task, wanted)[0]
     error = rows.T @ (rows @ pose_errors(wanted, X_PT, [task.is_spin_free])[0])
     distance, angle = np.linalg.norm(error[:3]), np.linalg.norm(error[3:])

@@ -120,7 +120,7 @@ def _postures_meeting(
     cell = scene.cell
     holder = cell.robot(cell.positioners[0])
     X_WT = scene.chains[task.robot].tool_poses(operator_start[None])[0]
-    X_W_holder = X_WT @ inverse(toolpath.pieces[0].poses(np.zeros(1))[0]) @ cell.part.held_by[0].X_PT
+    X_W_holder = X_WT @ inverse(toolpath.X_PT_start) @ cell.part.held_by[0].X_PT
     whole = replace(task, axes=(0, 1, 2, 3, 4, 5), is_spin_free=False)
     seeds = random_postures(holder.model, SEEDS, rng)
     q = reaching_postures(scene.chains[holder.name], whole, X_W_holder, X_WP=np.eye(4), seeds=seeds)
@@ -181,7 +181,7 @@ def _branches(
     task = next((task for task in cell.tasks if task.robot == robot.name), None)
     if task is None:
         return [(np.inf, np.clip(np.zeros(len(robot.model.joints)), *finite_limits(robot.model)))]
-    X_PT = toolpaths[task.name].pieces[0].poses(np.zeros(1))[0]
+    X_PT = toolpaths[task.name].X_PT_start
     chain = scene.chains[robot.name]
     seeds = random_postures(robot.model, SEEDS, rng)
     q = within_limits(robot.model, reaching_postures(chain, task, X_PT, X_WP=X_WP, seeds=seeds))

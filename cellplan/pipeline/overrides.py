@@ -1,0 +1,69 @@
+"""What the command line may change of a cell before it is solved."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from difflib import get_close_matches
+
+from cellplan.errors import InputError
+from cellplan.model.cell import Cell, Mode
+from cellplan.planning.methods import METHODS
+
+SHORTEST = 1e-3  # [s] shorter cycles are slips of the pen
+
+
+def with_overrides(
+    cell: Cell,
+    *,
+    mode: str | None = None,
+    method: str | None = None,
+    duration: float | None = None,
+    task: str | None = None,
+) -> Cell:
+    """The cell with other choices; what is None stays as it is.
+
+    Args:
+        cell: The cell as written.
+        mode: Who moves.
+        method: Resolution method.
+        duration: Length of the common clock in [s], for tasks without a time or feed of their own.
+        task: The only task to work on; the other operators stand still.
+
+    Raises:
+        InputError: A choice does not exist, or makes no sense.
+    """
+    if mode is not None:
+        motion = replace(cell.motion, mode=Mode(_known("--mode", mode, [str(each) for each in Mode])))
+        cell = replace(cell, motion=motion)
+    if method is not None:
+        solver = replace(cell.solver, method=_known("--method", method, METHODS))
+        cell = replace(cell, solver=solver)
+    if duration is not None:
+        cell = _with_duration(cell, duration)
+    if task is not None:
+        name = _known("--task", task, [each.name for each in cell.tasks])
+        cell = replace(cell, tasks=tuple(each for each in cell.tasks if each.name == name))
+    return cell
+
+
+def _with_duration(cell: Cell, duration: float) -> Cell:
+    """The cell on a clock of another length; tasks that filled the old clock fill the new one."""
+    if not SHORTEST <= duration < float("inf"):
+        raise InputError(f"--duration: expected a number of seconds of at least {SHORTEST:g}, got {duration:g}")
+    old = cell.motion.duration
+    tasks = []
+    for task in cell.tasks:
+        fills_clock = task.duration is not None and abs(task.start + task.duration - old) <= 1e-9 * old
+        if fills_clock and task.start >= duration:
+            raise InputError(f"--duration: task '{task.name}' starts at {task.start:g} s, after {duration:g} s")
+        tasks.append(replace(task, duration=duration - task.start) if fills_clock else task)
+    return replace(cell, tasks=tuple(tasks), motion=replace(cell.motion, duration=duration))
+
+
+def _known(option: str, given: str, allowed: Iterable[str]) -> str:
+    """The given word if it is allowed, else an error that offers the nearest one."""
+    words = list(allowed)
+    if given in words:
+        return given
+    near = get_close_matches(given, words, n=1)
+    hint = f"; did you mean '{near[0]}'?" if near else ""
+    raise InputError(f"{option}: expected one of {', '.join(words)}, got '{given}'{hint}")
