@@ -1,0 +1,117 @@
+"""Convex hull of a mesh by the quickhull method: the point farthest outside joins, the faces it sees give way."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.errors import InputError
+from cellplan.geometry.mesh_topology import components, count_edges, make_mesh
+from cellplan.geometry.shapes import Mesh
+from cellplan.geometry.transforms import Array
+
+FLAT: Final = 1e-9  # [-] of the extent: thinner meshes have no hull with an inside
+OUTSIDE_STEPS: Final = (1e-11, 1e-9, 1e-7)  # [-] of the extent: points nearer than this to a face count as on it
+
+Indices = NDArray[np.int64]
+
+
+def convex_hull(mesh: Mesh) -> Mesh:
+    """Smallest convex mesh that holds all vertices, up to 1e-7 of the extent; closed, facing outward.
+
+    Raises:
+        InputError: The mesh is flat.
+    """
+    points = np.unique(mesh.vertices, axis=0)
+    extent = float(np.ptp(points, axis=0).max())
+    first = _first_tetrahedron(points, FLAT * extent)
+    if first is None:
+        raise InputError(f"{mesh.source}: expected a body with a volume, got a flat one")
+    for step in OUTSIDE_STEPS:
+        faces = _grow(points, first, room=step * extent)
+        if count_edges(faces).is_closed:
+            return make_mesh(points, faces, source=mesh.source)
+    raise InputError(f"{mesh.source}: expected a mesh with a convex hull, got one too ill-shaped for it")
+
+
+def _first_tetrahedron(points: Array, room: float) -> Indices | None:
+    """Four outward faces over four points far from each other, or None when all points lie in a plane."""
+    axis = int(np.argmax(np.ptp(points, axis=0)))
+    a, b = int(np.argmin(points[:, axis])), int(np.argmax(points[:, axis]))
+    off_line = np.linalg.norm(np.cross(points - points[a], points[b] - points[a]), axis=1)
+    c = int(np.argmax(off_line))
+    length = float(np.linalg.norm(points[b] - points[a]))
+    if length == 0.0 or off_line[c] <= room * length:
+        return None
+    normal = np.cross(points[b] - points[a], points[c] - points[a])
+    height = (points - points[a]) @ (normal / np.linalg.norm(normal))
+    d = int(np.argmax(np.abs(height)))
+    if abs(height[d]) <= room:
+        return None
+    if height[d] > 0.0:
+        b, c = c, b
+    return np.array([[a, b, c], [a, d, b], [b, d, c], [c, d, a]])
+
+
+def _grow(points: Array, faces: Indices, *, room: float) -> Indices:
+    """Take in the farthest outside point until none lies more than ``room`` outside."""
+    normals, offsets = _planes(points, faces)
+    owner, height = _assign(points, np.arange(len(points)), normals, offsets)
+    while height.max() > room:
+        apex = int(np.argmax(height))
+        seen = _seen_faces(faces, normals @ points[apex] - offsets > room, start=int(owner[apex]))
+        horizon = _horizon(faces[seen])
+        fresh = np.column_stack([horizon, np.full(len(horizon), apex)])
+        fresh_normals, fresh_offsets = _planes(points, fresh)
+        loose = np.flatnonzero(seen[owner] & (height > -np.inf))
+        place = np.cumsum(~seen) - 1
+        owner = np.where(seen[owner], 0, place[owner])
+        height[loose] = -np.inf
+        faces = np.concatenate([faces[~seen], fresh])
+        normals, offsets = (
+            np.concatenate([normals[~seen], fresh_normals]),
+            np.concatenate([offsets[~seen], fresh_offsets]),
+        )
+        loose = loose[loose != apex]
+        owner[loose], height[loose] = _assign(points, loose, fresh_normals, fresh_offsets)
+        owner[loose] += len(faces) - len(fresh)
+        height[loose[height[loose] <= room]] = -np.inf  # inside for good: the hull only grows
+    return faces
+
+
+def _planes(points: Array, faces: Indices) -> tuple[Array, Array]:
+    """Unit normals and offsets of faces; a face without area gets a normal of zero and sees nothing."""
+    corner = points[faces]
+    normals = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.where(length > 0.0, length, 1.0)
+    return normals, np.sum(normals * corner[:, 0], axis=1)
+
+
+def _assign(points: Array, chosen: Indices, normals: Array, offsets: Array) -> tuple[Indices, Array]:
+    """For each chosen point the face it lies farthest outside of, and how far."""
+    height = points[chosen] @ normals.T - offsets
+    owner = np.argmax(height, axis=1) if len(normals) else np.zeros(len(chosen), dtype=np.int64)
+    return owner, height[np.arange(len(chosen)), owner]
+
+
+def _seen_faces(faces: Indices, seen: NDArray[np.bool_], *, start: int) -> NDArray[np.bool_]:
+    """The seen faces that hang together with the one the point was assigned to."""
+    seen[start] = True
+    index = np.flatnonzero(seen)
+    edges = np.sort(np.stack([faces[index], np.roll(faces[index], -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
+    face = np.repeat(np.arange(len(index)), 3)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    same = np.all(edges[order[:-1]] == edges[order[1:]], axis=1)
+    group = components(len(index), np.stack([face[order[:-1]][same], face[order[1:]][same]], axis=1))
+    connected = np.zeros(len(faces), dtype=bool)
+    connected[index[group == group[np.searchsorted(index, start)]]] = True
+    return connected
+
+
+def _horizon(seen: Indices) -> Indices:
+    """Directed edges of the seen faces whose other side is not seen, shape (H, 2)."""
+    edges = np.stack([seen, np.roll(seen, -1, axis=1)], axis=2).reshape(-1, 2)
+    base = int(edges.max()) + 1
+    inner = np.isin(edges[:, 0] * base + edges[:, 1], edges[:, 1] * base + edges[:, 0])
+    return edges[~inner]

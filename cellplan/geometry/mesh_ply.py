@@ -1,0 +1,188 @@
+"""PLY mesh files, text and binary, read into loose triangles."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.errors import InputError
+from cellplan.geometry.mesh_polygons import Polygons, Triangles, fan
+
+TYPES: Final = {
+    name: code
+    for code, names in {
+        "i1": ("char", "int8"),
+        "u1": ("uchar", "uint8"),
+        "i2": ("short", "int16"),
+        "u2": ("ushort", "uint16"),
+        "i4": ("int", "int32"),
+        "u4": ("uint", "uint32"),
+        "f4": ("float", "float32"),
+        "f8": ("double", "float64"),
+    }.items()
+    for name in names
+}
+ORDERS: Final = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
+INDEX_NAMES: Final = ("vertex_indices", "vertex_index")
+MAX_ROWS: Final = 3_000_000  # more than the largest allowed mesh can need
+MAX_CORNERS: Final = 1000  # more in one face is a damaged file
+
+
+@dataclass(frozen=True, slots=True)
+class _Property:
+    """One column of an element; ``count`` is the type of the length of a list, None for a plain number."""
+
+    name: str
+    kind: str
+    count: str | None
+
+
+@dataclass(slots=True)
+class _Element:
+    """A table in the file: name, number of rows, columns."""
+
+    name: str
+    rows: int
+    properties: list[_Property]
+
+    def column(self, names: tuple[str, ...]) -> int | None:
+        """Place of the first column of one of these names."""
+        return next((i for i, prop in enumerate(self.properties) if prop.name in names), None)
+
+
+class _Values:
+    """The numbers behind the header, taken one after the other; text and binary look the same from outside."""
+
+    def __init__(self, body: bytes, order: str) -> None:
+        """Take the bytes after the header; ``order`` is the byte order, empty for text."""
+        self._order = order
+        self._body = body
+        self._place = 0
+        self._words: NDArray[np.float64] = np.array(body.split() if not order else [], dtype=np.float64)
+
+    def take(self, kind: str, count: int) -> NDArray[np.float64]:
+        """The next ``count`` numbers of one type."""
+        if not self._order:
+            values = self._words[self._place : self._place + count]
+            self._place += count
+        else:
+            dtype = np.dtype(self._order + TYPES[kind])
+            values = np.frombuffer(self._body, dtype=dtype, count=count, offset=self._place).astype(np.float64)
+            self._place += count * dtype.itemsize
+        if len(values) != count:
+            raise ValueError("ends too early")
+        return values
+
+    def take_table(self, element: _Element) -> NDArray[np.float64]:
+        """All rows of an element that has no lists, shape (rows, columns)."""
+        width = len(element.properties)
+        if not self._order:
+            return self.take("", element.rows * width).reshape(-1, width)
+        dtype = np.dtype([(f"c{i}", self._order + TYPES[prop.kind]) for i, prop in enumerate(element.properties)])
+        table = np.frombuffer(self._body, dtype=dtype, count=element.rows, offset=self._place)
+        self._place += table.nbytes
+        return np.stack([table[f"c{i}"].astype(np.float64) for i in range(width)], axis=1)
+
+    @property
+    def is_used_up(self) -> bool:
+        """Whether nothing but blanks is left."""
+        return self._place == len(self._words) if not self._order else not self._body[self._place :].strip(b"\r\n\0 ")
+
+
+def parse_ply(data: bytes, name: str) -> Triangles:
+    """Vertices and triangles of a PLY file; columns other than x, y, z and the corner lists are passed over.
+
+    Raises:
+        InputError: The file is damaged or holds no faces.
+    """
+    order, elements, body = _header(data, name)
+    vertices: NDArray[np.float64] | None = None
+    polygons: Polygons | None = None
+    try:
+        values = _Values(body, order)
+        for element in elements:
+            columns = [element.column((axis,)) for axis in "xyz"]
+            if element.name == "vertex" and None not in columns and not _has_lists(element):
+                vertices = values.take_table(element)[:, [column for column in columns if column is not None]]
+            elif element.name == "face" and element.column(INDEX_NAMES) is not None:
+                polygons = list(_polygons(values, element))
+            elif _has_lists(element):
+                list(_rows(values, element))
+            else:
+                values.take_table(element)
+    except ValueError as error:
+        raise InputError(
+            f"{name}: expected the numbers that the PLY header names, got a damaged file: {error}"
+        ) from None
+    if vertices is None or polygons is None:
+        raise InputError(f"{name}: expected a PLY file with elements 'vertex' (x, y, z) and 'face' (vertex_indices)")
+    if not values.is_used_up:
+        raise InputError(f"{name}: expected the end of the file after the numbers that the PLY header names, got more")
+    return fan(vertices, polygons, name)
+
+
+def _header(data: bytes, name: str) -> tuple[str, list[_Element], bytes]:
+    """Byte order, elements and the bytes after the header."""
+    head, mark, body = data.partition(b"end_header")
+    lines = [line.split() for line in head.decode("latin-1").splitlines()]
+    if not mark or not lines or lines[0] != ["ply"]:
+        raise InputError(f"{name}: expected a PLY file that starts with 'ply' and has an 'end_header'")
+    order: str | None = None
+    elements: list[_Element] = []
+    for line, words in enumerate(lines[1:], start=2):
+        try:
+            order = _header_line(words, elements) or order
+        except (KeyError, ValueError, IndexError):
+            shown = " ".join(words)[:60]
+            raise InputError(f"{name}:{line}: expected a PLY header line, got '{shown}'") from None
+    if order is None:
+        raise InputError(f"{name}: expected a PLY header with a 'format' line")
+    return ORDERS[order], elements, body[2:] if body.startswith(b"\r\n") else body[1:]
+
+
+def _header_line(words: list[str], elements: list[_Element]) -> str | None:
+    """Take in one line of the header; the name of the format when it is that line."""
+    match words:
+        case [] | ["comment" | "obj_info", *_]:
+            pass
+        case ["format", order, "1.0"] if order in ORDERS:
+            return order
+        case ["element", name, rows] if 0 <= int(rows) <= MAX_ROWS:
+            elements.append(_Element(name, int(rows), []))
+        case ["property", "list", count, kind, name] if TYPES[count][0] != "f" and kind in TYPES:
+            elements[-1].properties.append(_Property(name, kind, count))
+        case ["property", kind, name] if kind in TYPES:
+            elements[-1].properties.append(_Property(name, kind, None))
+        case _:
+            raise ValueError("not a line of a PLY header")
+    return None
+
+
+def _has_lists(element: _Element) -> bool:
+    """Whether the rows may differ in length."""
+    return any(prop.count for prop in element.properties)
+
+
+def _polygons(values: _Values, element: _Element) -> Iterator[list[int]]:
+    """Corner indices of each face."""
+    column = element.column(INDEX_NAMES)
+    for row in _rows(values, element):
+        corners = row[column or 0]
+        indices = corners.astype(np.int64)
+        if len(corners) < 3 or np.any(indices != corners):
+            raise ValueError("a face needs three or more whole vertex numbers")
+        yield indices.tolist()
+
+
+def _rows(values: _Values, element: _Element) -> Iterator[list[NDArray[np.float64]]]:
+    """Columns of each row of an element with lists."""
+    for _ in range(element.rows):
+        row = []
+        for prop in element.properties:
+            length = 1 if prop.count is None else int(values.take(prop.count, 1)[0])
+            if not 0 <= length <= MAX_CORNERS:
+                raise ValueError(f"a list has {length} entries")
+            row.append(values.take(prop.kind, length))
+        yield row

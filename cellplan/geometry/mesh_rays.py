@@ -1,0 +1,176 @@
+"""Where rays meet a mesh: a tree of boxes finds the triangles near a ray, a watertight test decides.
+
+The scalar triple product that tells on which side of an edge a ray passes is the same number with opposite sign for
+the two triangles of that edge, so no ray can slip through between them; rays through edges and vertices hit.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.shapes import Mesh
+from cellplan.geometry.transforms import Array
+
+LEAF: Final = 4  # triangles in a leaf of the tree, at most
+RAY_CHUNK: Final = 2048  # rays followed at once
+BOX_SLACK: Final = 1e-9  # [-] of the extent: boxes are grown by it so that rays along their faces stay in
+EDGE_SLACK: Final = 1e-14  # [-] rounding of a triple product against the squared distance of the corners
+GRAZING: Final = 1e-12  # [rad] rays flatter than this to a triangle run along it: its neighbours are hit instead
+MORTON_BITS: Final = 20  # bits per axis of the order in which triangles are put into the tree
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RayHits:
+    """First meeting of each ray with a mesh.
+
+    Attributes:
+        points: Where the ray meets the mesh in [m], shape (N, 3); NaN where it misses.
+        faces: Which triangle, shape (N,); -1 where it misses.
+        distance: Way from the ray's origin in [m], shape (N,); inf where it misses.
+    """
+
+    points: Array
+    faces: Indices
+    distance: Array
+
+    @property
+    def is_hit(self) -> NDArray[np.bool_]:
+        """Which rays meet the mesh, shape (N,)."""
+        met: NDArray[np.bool_] = self.faces >= 0
+        return met
+
+
+def ray_hits(mesh: Mesh, origins: Array, directions: Array) -> RayHits:
+    """First hit of each ray; a surface that an origin lies on is hit at distance zero.
+
+    Args:
+        mesh: The surface; triangles are hit from both sides.
+        origins: Starts of the rays in [m], shape (N, 3), in the frame of the mesh.
+        directions: Directions of any length, shape (N, 3), or (3,) for all rays.
+
+    Raises:
+        ValueError: An origin or a direction is not finite, or a direction is zero.
+    """
+    origins = np.asarray(origins, dtype=float).reshape(-1, 3)
+    rays = np.broadcast_to(np.asarray(directions, dtype=float), origins.shape)
+    length = np.linalg.norm(rays, axis=1, keepdims=True)
+    if not (np.all(np.isfinite(origins)) and np.all(np.isfinite(length)) and np.all(length > 0.0)):
+        raise ValueError("rays need finite origins and finite directions other than zero")
+    rays = rays / length
+    triangles = mesh.vertices[mesh.faces]
+    middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
+    ahead = np.sum((middle - origins) * rays, axis=1)  # rays are followed from their point nearest to the middle
+    tree = _Tree.over(triangles)
+    face, way = np.full(len(origins), -1), np.full(len(origins), np.inf)
+    for first in range(0, len(origins), RAY_CHUNK):
+        chosen = slice(first, first + RAY_CHUNK)
+        starts = origins[chosen] + ahead[chosen, None] * rays[chosen]
+        face[chosen], way[chosen] = _first_hits(tree, triangles, starts, rays=rays[chosen], behind=-ahead[chosen])
+    hit = face >= 0
+    points = np.full(origins.shape, np.nan)
+    points[hit] = origins[hit] + ((ahead + way)[hit, None]) * rays[hit]
+    return RayHits(points=points, faces=face, distance=np.where(hit, np.maximum(ahead + way, 0.0), np.inf))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tree:
+    """Binary tree of boxes over triangles sorted along a space-filling curve.
+
+    Attributes:
+        order: Triangles in leaf order, shape (leaves, per leaf); the last one repeated to fill up.
+        low: Lower box corners of each level from the root, shapes (2^level, 3).
+        high: Upper box corners.
+    """
+
+    order: Indices
+    low: tuple[Array, ...]
+    high: tuple[Array, ...]
+
+    @classmethod
+    def over(cls, triangles: Array) -> "_Tree":
+        """Build the tree over triangles of shape (M, 3, 3)."""
+        low, high = triangles.min(axis=1), triangles.max(axis=1)
+        depth = max(0, int(np.ceil(np.log2(len(triangles) / LEAF))))
+        per_leaf = -(-len(triangles) // 2**depth)
+        order = np.argsort(_morton(0.5 * (low + high)), kind="stable")
+        order = np.pad(order, (0, per_leaf * 2**depth - len(order)), mode="edge").reshape(-1, per_leaf)
+        slack = BOX_SLACK * float(np.abs(triangles - triangles[0, 0]).max())
+        lows, highs = [low[order].min(axis=1) - slack], [high[order].max(axis=1) + slack]
+        for _ in range(depth):
+            lows.append(lows[-1].reshape(-1, 2, 3).min(axis=1))
+            highs.append(highs[-1].reshape(-1, 2, 3).max(axis=1))
+        return cls(order, tuple(lows[::-1]), tuple(highs[::-1]))
+
+    def near(self, starts: Array, rays: Array) -> tuple[Indices, Indices]:
+        """Pairs of ray and triangle whose box the ray's line passes; both shape (K,)."""
+        ray, node = np.arange(len(starts)), np.zeros(len(starts), dtype=np.int64)
+        for level, (low, high) in enumerate(zip(self.low, self.high, strict=True)):
+            if level:
+                ray, node = np.repeat(ray, 2), (2 * node[:, None] + np.arange(2)).ravel()
+            passed = _passes(low[node] - starts[ray], high[node] - starts[ray], rays[ray])
+            ray, node = ray[passed], node[passed]
+        return np.repeat(ray, self.order.shape[1]), self.order[node].ravel()
+
+
+def _morton(points: Array) -> NDArray[np.uint64]:
+    """Place of each point, shape (M, 3), along a curve that keeps neighbours together."""
+    low = points.min(axis=0)
+    cell = float((points - low).max()) / (2**MORTON_BITS - 1) or 1.0
+    grid = ((points - low) / cell).astype(np.uint64)
+    code = np.zeros(len(points), dtype=np.uint64)
+    for bit in range(MORTON_BITS):
+        for axis in range(3):
+            code |= ((grid[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
+    return code
+
+
+def _passes(low: Array, high: Array, rays: Array) -> NDArray[np.bool_]:
+    """Whether lines through the origin pass boxes given relative to it, all shape (K, 3)."""
+    along = rays == 0.0
+    slope = np.where(along, 1.0, rays)
+    a, b = low / slope, high / slope
+    enter = np.where(along, -np.inf, np.minimum(a, b)).max(axis=1)
+    leave = np.where(along, np.inf, np.maximum(a, b)).min(axis=1)
+    beside = np.any(along & ((low > 0.0) | (high < 0.0)), axis=1)
+    passed: NDArray[np.bool_] = (enter <= leave) & ~beside
+    return passed
+
+
+def _first_hits(tree: _Tree, triangles: Array, starts: Array, *, rays: Array, behind: Array) -> tuple[Indices, Array]:
+    """Nearest triangle of each ray, and the way to it from ``starts``; ways below ``behind`` lie behind the origin."""
+    ray, face = tree.near(starts, rays)
+    corner = triangles[face] - starts[ray, None, :]
+    direction = rays[ray]
+    a, b, c = corner[:, 0], corner[:, 1], corner[:, 2]
+    sides = np.stack([_triple(direction, b, c), _triple(direction, c, a), _triple(direction, a, b)], axis=1)
+    slack = EDGE_SLACK * np.sum(corner * corner, axis=2).max(axis=1, initial=0.0)
+    inside = np.all(sides >= -slack[:, None], axis=1) | np.all(sides <= slack[:, None], axis=1)
+    normal = np.cross(b - a, c - a)
+    steep = np.sum(normal * direction, axis=1)
+    crossing = inside & (np.abs(steep) > GRAZING * np.linalg.norm(normal, axis=1))
+    ray, face, corner = ray[crossing], face[crossing], corner[crossing]
+    way = np.sum(normal[crossing] * corner[:, 0], axis=1) / steep[crossing]
+    depth = np.einsum("kci,ki->kc", corner, direction[crossing])
+    way = np.clip(way, depth.min(axis=1, initial=np.inf), depth.max(axis=1, initial=-np.inf))
+    reach = float(np.abs(triangles).max()) + float(np.abs(starts).max(initial=0.0))
+    ahead = way >= behind[ray] - GRAZING * reach
+    ray, face, way = ray[ahead], face[ahead], way[ahead]
+    order = np.lexsort((face, way, ray))
+    met, place = np.unique(ray[order], return_index=True)
+    first_face, first_way = np.full(len(starts), -1), np.full(len(starts), np.inf)
+    first_face[met], first_way[met] = face[order][place], way[order][place]
+    return first_face, first_way
+
+
+def _triple(d: Array, p: Array, q: Array) -> Array:
+    """``d . (p x q)`` row by row; changing p for q changes nothing but the sign, to the last bit."""
+    product: Array = (
+        d[:, 0] * (p[:, 1] * q[:, 2] - p[:, 2] * q[:, 1])
+        + d[:, 1] * (p[:, 2] * q[:, 0] - p[:, 0] * q[:, 2])
+        + d[:, 2] * (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])
+    )
+    return product
