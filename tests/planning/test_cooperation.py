@@ -4,13 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_cells import make_task, moved, random_cell
 
-from cellplan.geometry.transforms import inverse, pose_from, rotation_about, rotation_exp, rotation_vector
+from cellplan.geometry.transforms import inverse, pose, pose_from, rotation_about, rotation_exp, rotation_vector
 from cellplan.kinematics.combined import CombinedModel
 from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.robot import JointKind
 from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian, pose_errors
 
+SOME_POSE = pose([1.0, -2.0, 0.5], [0.3, -0.8, 2.0])
 DERIVATIVE_TOL = 1e-6  # relative; central differences with h = 1e-5 leave h^2 and eps / h, both near 1e-10
 H = 1e-5
 
@@ -46,7 +48,7 @@ def central_differences(cell, q, moving):
 
 @pytest.mark.parametrize("operators", range(1, 9))
 @pytest.mark.parametrize("with_follower", [False, True], ids=["plain", "follower"])
-def test_jacobian_is_the_derivative_of_the_relative_poses(random_cell, operators, with_follower):
+def test_jacobian_is_the_derivative_of_the_relative_poses(operators, with_follower):
     cell = random_cell(operators, operators=operators, with_follower=with_follower)
     q = np.random.default_rng(7).uniform(-1.5, 1.5, cell.joint_count)
     moving = [r.name for r in cell.robots]
@@ -57,13 +59,13 @@ def test_jacobian_is_the_derivative_of_the_relative_poses(random_cell, operators
     assert np.abs(J - expected).max() <= DERIVATIVE_TOL * np.abs(expected).max()
 
 
-def test_random_cells_have_prismatic_joints_in_positioner_and_operator(random_cell):
+def test_random_cells_have_prismatic_joints_in_positioner_and_operator():
     cell = random_cell(3, operators=3)
     for robot in cell.robots:
         assert {joint.is_revolute for joint in robot.model.joints} == {True, False}
 
 
-def test_part_at_rest_gives_zero_positioner_columns(random_cell):
+def test_part_at_rest_gives_zero_positioner_columns():
     cell = random_cell(11, operators=3)
     q = np.random.default_rng(1).uniform(-1.5, 1.5, cell.joint_count)
     operators = [task.robot for task in cell.tasks]
@@ -74,7 +76,7 @@ def test_part_at_rest_gives_zero_positioner_columns(random_cell):
     assert np.abs(J - central_differences(cell, q, operators)).max() <= DERIVATIVE_TOL * np.abs(J).max()
 
 
-def test_part_on_a_fixture_needs_no_positioner(random_cell):
+def test_part_on_a_fixture_needs_no_positioner():
     cell = random_cell(12, operators=2, held=False)
     q = np.random.default_rng(2).uniform(-1.5, 1.5, cell.joint_count)
     moving = [r.name for r in cell.robots]
@@ -84,7 +86,7 @@ def test_part_on_a_fixture_needs_no_positioner(random_cell):
     assert np.abs(J - central_differences(cell, q, moving)).max() <= DERIVATIVE_TOL * np.abs(J).max()
 
 
-def test_blocks_form_an_arrow(random_cell):
+def test_blocks_form_an_arrow():
     cell = random_cell(13, operators=4)
     q = np.random.default_rng(3).uniform(-1.5, 1.5, cell.joint_count)
     J = planners_jacobian(cell, q, [r.name for r in cell.robots])
@@ -96,17 +98,17 @@ def test_blocks_form_an_arrow(random_cell):
                 assert not J[i][:, cell.columns(other.robot)].any()
 
 
-def test_moving_the_whole_cell_changes_nothing(random_cell, moved, some_pose):
+def test_moving_the_whole_cell_changes_nothing():
     cell = random_cell(14, operators=3)
     q = np.random.default_rng(4).uniform(-1.5, 1.5, cell.joint_count)
     moving = [r.name for r in cell.robots]
 
-    here, there = planners_jacobian(cell, q, moving), planners_jacobian(moved(cell, some_pose), q, moving)
+    here, there = planners_jacobian(cell, q, moving), planners_jacobian(moved(cell, SOME_POSE), q, moving)
 
     assert np.abs(here - there).max() < 1e-12 * np.abs(here).max() * 10  # rounding of a few products
 
 
-def test_two_engines_agree_on_poses_and_screws(random_cell):
+def test_two_engines_agree_on_poses_and_screws():
     cell = random_cell(15, operators=3, with_follower=True)
     q = np.random.default_rng(5).uniform(-2.0, 2.0, cell.joint_count)
 
@@ -119,7 +121,7 @@ def test_two_engines_agree_on_poses_and_screws(random_cell):
         np.testing.assert_allclose(state.screws_W[:, columns], chain.flange_screws(q[None, columns])[0], atol=1e-11)
 
 
-def test_planar_pair_has_the_closed_form(random_cell):
+def test_planar_pair_has_the_closed_form():
     """Two joints in line: the relative speed is lever arm times rate, with a minus for the positioner."""
     cell = random_cell(16, operators=1)
     hinge = replace(
@@ -172,10 +174,10 @@ def test_free_spin_error_lays_the_axis_and_ignores_the_turn():
     np.testing.assert_allclose(corrected, wanted[:, :3, 2], atol=1e-12)
 
 
-def test_constraint_rows_pick_named_axes_and_leave_the_spin(task_maker):
+def test_constraint_rows_pick_named_axes_and_leave_the_spin():
     X_PT = pose_from(rotation_exp(np.array([[0.2, 0.4, -0.1]])), np.zeros((1, 3)))
-    planar = constraint_rows(task_maker("op0", axes=(0, 1, 5)), X_PT)[0]
-    spinning = constraint_rows(task_maker("op0", is_spin_free=True), X_PT)[0]
+    planar = constraint_rows(make_task("op0", axes=(0, 1, 5)), X_PT)[0]
+    spinning = constraint_rows(make_task("op0", is_spin_free=True), X_PT)[0]
 
     np.testing.assert_array_equal(planar, np.eye(6)[[0, 1, 5]])
     assert spinning.shape == (5, 6)

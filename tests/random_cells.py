@@ -1,13 +1,11 @@
 """Random cells for tests of planning: any number of operators, revolute and prismatic joints, followers on the way."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from cellplan.geometry.shapes import Sphere
-from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
+from cellplan.geometry.transforms import Array, pose_from, rotation_exp
 from cellplan.model.cell import (
     Cell,
     CheckSettings,
@@ -22,8 +20,6 @@ from cellplan.model.cell import (
 )
 from cellplan.model.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
 from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
-
-CellMaker = Callable[..., Cell]
 
 
 def random_pose(rng: np.random.Generator) -> Array:
@@ -96,65 +92,44 @@ def make_task(robot: str, **changes: object) -> Task:
     return replace(task, **changes)  # type: ignore[arg-type]
 
 
-@pytest.fixture(scope="session")
-def random_cell() -> CellMaker:
-    """A maker of cells: ``random_cell(seed, operators=3, held=True, with_follower=False)``."""
-
-    def make(seed: int, *, operators: int, held: bool = True, with_follower: bool = False) -> Cell:
-        rng = np.random.default_rng(seed)
-        names = ["holder", *(f"op{i}" for i in range(operators))]
-        robots = tuple(
-            Robot(
-                name=name,
-                model=random_model(rng, int(rng.integers(5, 8)), with_follower=with_follower),
-                X_WB=random_pose(rng),
-                tool=Tool(X_FT=random_pose(rng), bodies=()),
-                start=None,
-                weights=np.ones(0),
-            )
-            for name in names
+def random_cell(seed: int, *, operators: int, held: bool = True, with_follower: bool = False) -> Cell:
+    """A holder and operators with random axes, bases and tools; every third joint slides."""
+    rng = np.random.default_rng(seed)
+    names = ["holder", *(f"op{i}" for i in range(operators))]
+    robots = tuple(
+        Robot(
+            name=name,
+            model=random_model(rng, int(rng.integers(5, 8)), with_follower=with_follower),
+            X_WB=random_pose(rng),
+            tool=Tool(X_FT=random_pose(rng), bodies=()),
+            start=None,
+            weights=np.ones(0),
         )
-        robots = tuple(replace(r, weights=rng.uniform(0.5, 2.0, len(r.model.joints))) for r in robots)
-        grasp = Grasp(robot="holder", X_PT=random_pose(rng))
-        part = Part(
-            shape=Sphere(0.1),
-            X_PS=np.eye(4),
-            held_by=(grasp,) if held else (),
-            X_WP=None if held else random_pose(rng),
-        )
-        return Cell(
-            name="random",
-            robots=robots,
-            part=part,
-            tasks=tuple(make_task(name) for name in names[1:]),
-            obstacles=(),
-            motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=1.0, step=1e-3),
-            solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
-            checks=CheckSettings(clearance=0.005, contact_zone=0.02),
-            origin=Origin(),
-            inputs={},
-        )
-
-    return make
-
-
-@pytest.fixture
-def moved() -> Callable[[Cell, Array], Cell]:
-    """Move a whole cell by a rigid motion of the world."""
-
-    def move(cell: Cell, X: Array) -> Cell:
-        part = cell.part if cell.part.X_WP is None else replace(cell.part, X_WP=X @ cell.part.X_WP)
-        robots = tuple(replace(robot, X_WB=X @ robot.X_WB) for robot in cell.robots)
-        return replace(cell, robots=robots, part=part)
-
-    return move
+        for name in names
+    )
+    robots = tuple(replace(r, weights=rng.uniform(0.5, 2.0, len(r.model.joints))) for r in robots)
+    grasp = Grasp(robot="holder", X_PT=random_pose(rng))
+    part = Part(
+        shape=Sphere(0.1),
+        X_PS=np.eye(4),
+        held_by=(grasp,) if held else (),
+        X_WP=None if held else random_pose(rng),
+    )
+    return Cell(
+        name="random",
+        robots=robots,
+        part=part,
+        tasks=tuple(make_task(name) for name in names[1:]),
+        obstacles=(),
+        motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=1.0, step=1e-3),
+        solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
+        checks=CheckSettings(clearance=0.005, contact_zone=0.02),
+        origin=Origin(),
+        inputs={},
+    )
 
 
-@pytest.fixture(scope="session")
-def task_maker() -> Callable[..., Task]:
-    return make_task
-
-
-@pytest.fixture
-def some_pose() -> Array:
-    return pose([1.0, -2.0, 0.5], [0.3, -0.8, 2.0])
+def moved(cell: Cell, X: Array) -> Cell:
+    """The whole cell carried along by a rigid motion of the world."""
+    part = cell.part if cell.part.X_WP is None else replace(cell.part, X_WP=X @ cell.part.X_WP)
+    return replace(cell, robots=tuple(replace(robot, X_WB=X @ robot.X_WB) for robot in cell.robots), part=part)

@@ -1,0 +1,60 @@
+"""Singular values of the report against those of the planner's matrix, which shares no code with them."""
+
+import numpy as np
+import pytest
+from random_cells import make_task, random_cell
+
+from cellplan.checks.conditioning import conditioning
+from cellplan.checks.tracking import part_poses
+from cellplan.kinematics.combined import CombinedModel
+from cellplan.kinematics.screws import ScrewChain
+from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian
+
+N = 5
+
+
+def planners_values(cell, schedule, q, moving):
+    model = CombinedModel(cell)
+    names = [r.name for r in cell.robots]
+    tasks = [scheduled.task for scheduled in schedule.tasks]
+    signs = column_signs(cell, model, tasks, moving)
+    values = []
+    for k in range(N):
+        state = model.state(q[k])
+        p_WT = state.X_WT[[names.index(t.robot) for t in tasks], :3, 3]
+        J = cooperation_jacobian(state, p_WT, signs)
+        rows = [constraint_rows(s.task, s.X_PT)[k] for s in schedule.tasks]
+        stacked = np.concatenate([pick @ block for pick, block in zip(rows, J, strict=True)])
+        active = stacked[:, np.abs(stacked).max(axis=0) > 0]
+        values.append(np.linalg.svd(active, compute_uv=False)[-1] if active.shape[1] >= len(stacked) else 0.0)
+    return np.array(values)
+
+
+@pytest.mark.parametrize("options", [{}, {"is_spin_free": True}, {"axes": (0, 1, 5)}], ids=["whole", "spin", "planar"])
+@pytest.mark.parametrize("at_rest", [False, True])
+def test_smallest_singular_value_of_the_stack(options, at_rest):
+    cell = random_cell(21, operators=2, with_follower=True)
+    tasks = [make_task(task.robot, **options) for task in cell.tasks]
+    q = np.random.default_rng(0).uniform(-1, 1, (N, cell.joint_count))
+    chains = {r.name: ScrewChain(r) for r in cell.robots}
+    by_name = {r.name: q[:, cell.columns(r.name)] for r in cell.robots}
+    X_WP = part_poses(cell, chains, by_name)
+    scheduled = tuple(
+        TaskSchedule(
+            task=task,
+            X_PT=np.linalg.inv(X_WP) @ chains[task.robot].tool_poses(by_name[task.robot]),
+            V_PT_P=np.zeros((N, 6)),
+            travelled=np.zeros(N),
+            length=1.0,
+            end=1.0,
+        )
+        for task in tasks
+    )
+    schedule = Schedule(times=np.arange(N) * 1e-3, tasks=scheduled)
+    moving = [t.robot for t in tasks] if at_rest else [r.name for r in cell.robots]
+
+    found = conditioning(cell, schedule, chains, q=by_name, X_WP=X_WP, moving=moving)
+
+    np.testing.assert_allclose(found.stack, planners_values(cell, schedule, q, moving), atol=1e-12)
+    assert ("holder" in found.robots) is not at_rest
