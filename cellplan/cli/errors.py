@@ -1,0 +1,54 @@
+"""How a command ends when it cannot do its work: plain lines on the error stream and one exit status."""
+
+import contextlib
+import os
+import sys
+import traceback
+
+from cellplan.errors import CellplanError, ExitStatus, InvalidFileError
+
+DEBUG_VARIABLE = "CELLPLAN_DEBUG"  # set to 1 to see the traceback of an internal error
+
+
+class OutputError(CellplanError):
+    """What a command had to say could not be written to its standard output."""
+
+
+def exit_status(error: BaseException) -> ExitStatus:
+    """Exit status that an exception ends the program with."""
+    if isinstance(error, KeyboardInterrupt):
+        return ExitStatus.INTERRUPTED
+    return error.status if isinstance(error, CellplanError) else ExitStatus.INTERNAL
+
+
+def error_lines(error: BaseException) -> list[str]:
+    """What went wrong, one complaint per line; a complaint about a file begins with ``FILE:LINE:``."""
+    if isinstance(error, KeyboardInterrupt):
+        return ["interrupted: nothing was written"]
+    if isinstance(error, InvalidFileError):
+        return [_one_line(str(complaint)) for complaint in error.complaints]
+    if isinstance(error, CellplanError):
+        return [f"error: {_one_line(str(error))}"]
+    what = _one_line(str(error)) or "no further words"
+    return [f"internal error: {type(error).__name__}: {what} (set {DEBUG_VARIABLE}=1 to see where)"]
+
+
+def tell(line: str) -> None:
+    """Write one line to the error stream; nobody is left to hear of it when that stream is closed."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        sys.stderr.write(f"{line}\n")
+        sys.stderr.flush()
+
+
+def report_failure(error: BaseException) -> ExitStatus:
+    """Tell the user why the command ends, and give the exit status."""
+    if not isinstance(error, CellplanError | KeyboardInterrupt) and os.environ.get(DEBUG_VARIABLE) == "1":
+        tell("".join(traceback.format_exception(error)).rstrip())
+    for line in error_lines(error):
+        tell(line)
+    return exit_status(error)
+
+
+def _one_line(text: str) -> str:
+    """The text with line breaks and control characters made visible, so that a message stays one harmless line."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text.strip())

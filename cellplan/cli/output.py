@@ -1,0 +1,62 @@
+"""Standard output: results for people, or one JSON object for machines."""
+
+import contextlib
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping
+
+from cellplan.cli.errors import OutputError, error_lines, exit_status
+
+
+def say(text: str) -> None:
+    """Write a result to standard output, all of it or an error.
+
+    Raises:
+        OutputError: Standard output is closed or cannot take the text.
+    """
+    if sys.stdout is None:
+        raise OutputError("standard output: expected an open stream, got a closed one; the result was not shown")
+    try:
+        sys.stdout.write(f"{text}\n")
+        sys.stdout.flush()
+    except UnicodeEncodeError:
+        _say_escaped(text)
+    except (OSError, ValueError) as error:
+        _abandon_stdout()
+        why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise OutputError(f"standard output: the result was not shown: {why.lower()}") from error
+
+
+def say_json(value: Mapping[str, object]) -> None:
+    """Write one JSON object to standard output; figures that are not finite are refused, for JSON has none."""
+    say(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+@contextlib.contextmanager
+def json_failure(schema: str, *, wanted: bool) -> Iterator[None]:
+    """Give a machine one JSON object also when the command cannot do its work; the error goes on upwards."""
+    try:
+        yield
+    except OutputError:
+        raise
+    except (Exception, KeyboardInterrupt) as error:
+        if wanted and not hasattr(error, "exit_code"):  # typer ends commands by exceptions with an exit code
+            lines = error_lines(error)
+            say_json({"schema": schema, "status": "error", "exit": int(exit_status(error)), "errors": lines})
+        raise
+
+
+def _say_escaped(text: str) -> None:
+    """Write what the terminal's encoding lacks as escapes."""
+    encoding = sys.stdout.encoding or "ascii"
+    sys.stdout.write(text.encode(encoding, errors="backslashreplace").decode(encoding) + "\n")
+    sys.stdout.flush()
+
+
+def _abandon_stdout() -> None:
+    """Lead the rest of the stream nowhere, or the interpreter would complain once more on its way out."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

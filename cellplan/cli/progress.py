@@ -1,0 +1,59 @@
+"""Progress of long commands on the error stream: a bar on a terminal, a rare line elsewhere, nothing when quiet."""
+
+import contextlib
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+from cellplan.cli.errors import tell
+
+LINE_EVERY_S = 10.0  # [s] often enough to show life in a log, rare enough not to fill it
+
+Listener = Callable[[str, float], None]
+
+
+@contextlib.contextmanager
+def progress_listener(*, quiet: bool) -> Iterator[Listener]:
+    """Listen to the progress of stages for as long as the block runs."""
+    if quiet:
+        yield lambda _stage, _share: None
+    elif _is_screen():
+        with _bar() as listener:
+            yield listener
+    else:
+        yield _lines()
+
+
+def _is_screen() -> bool:
+    """Whether someone watches a terminal that can redraw a line."""
+    return sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb"
+
+
+@contextlib.contextmanager
+def _bar() -> Iterator[Listener]:
+    """Draw one bar that is gone when the work is done; colours follow NO_COLOR."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
+    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=1.0)
+
+        def listen(stage: str, share: float) -> None:
+            bar.update(task, description=stage, completed=share)
+
+        yield listen
+
+
+def _lines() -> Listener:
+    """Write a line whenever enough time has passed."""
+    last = time.monotonic()
+
+    def listen(stage: str, share: float) -> None:
+        nonlocal last
+        if time.monotonic() - last >= LINE_EVERY_S:
+            last = time.monotonic()
+            tell(f"{stage}: {100.0 * share:.0f} %")
+
+    return listen
