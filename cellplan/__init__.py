@@ -1,8 +1,71 @@
-"""cellplan: offline programming and cell layout for cooperative robots that work on one moving part."""
+"""cellplan: offline programming and cell layout for cooperative robots that work on one moving part.
+
+The names below are the public interface; anything else may change without notice. They are imported when first used,
+so that ``import cellplan`` and the command line's help stay instant.
+"""
 
 import os
+from importlib import import_module
+from typing import TYPE_CHECKING, Final
 
 for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # the matrices are small; before numpy is imported, or it has no effect
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from cellplan.errors import CellplanError
+    from cellplan.io.cell_file import load_cell
+    from cellplan.model.cell import Cell, Part, Robot
+    from cellplan.model.motion import Motion, Program
+    from cellplan.model.report import Check, Report
+    from cellplan.model.task import Task
+    from cellplan.model.toolpath import Toolpath
+    from cellplan.pipeline.solution import Solution
+    from cellplan.pipeline.solve import solve
+    from cellplan.pipeline.verify import verify
+    from cellplan.pipeline.write_run import write_run
+
+_HOME: Final = {
+    "Cell": "model.cell",
+    "CellplanError": "errors",
+    "Check": "model.report",
+    "Motion": "model.motion",
+    "Part": "model.cell",
+    "Program": "model.motion",
+    "Report": "model.report",
+    "Robot": "model.cell",
+    "Solution": "pipeline.solution",
+    "Task": "model.task",
+    "Toolpath": "model.toolpath",
+    "load_cell": "io.cell_file",
+    "solve": "pipeline.solve",
+    "verify": "pipeline.verify",
+    "write_run": "pipeline.write_run",
+}
+
+__all__ = [
+    "Cell",
+    "CellplanError",
+    "Check",
+    "Motion",
+    "Part",
+    "Program",
+    "Report",
+    "Robot",
+    "Solution",
+    "Task",
+    "Toolpath",
+    "__version__",
+    "load_cell",
+    "solve",
+    "verify",
+    "write_run",
+]
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name when it is first asked for."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'cellplan' has no attribute '{name}'")
+    return getattr(import_module(f"cellplan.{_HOME[name]}"), name)

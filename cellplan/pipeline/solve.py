@@ -40,7 +40,7 @@ def solve(cell: Cell, *, progress: Progress = silent) -> Solution:
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
     examine_given_starts(cell, toolpaths)
     start = find_start(scene, toolpaths, progress=progress)
-    solved = _with_start(cell, start)
+    solved = with_start(cell, start)
     runs = tuple(_run(scene, toolpaths, plan, start=start, progress=progress) for plan in plan_runs(cell))
     return Solution(cell=solved, runs=runs)
 
@@ -92,7 +92,7 @@ def _digests(cell: Cell, program: Program) -> dict[str, str]:
     return of_cell | {"program": program_digest(program.tables)}
 
 
-def _with_start(cell: Cell, start: Array) -> Cell:
+def with_start(cell: Cell, start: Array) -> Cell:
     """The cell with every start posture filled in."""
     robots = tuple(replace(robot, start=np.array(start[cell.columns(robot.name)])) for robot in cell.robots)
     return replace(cell, robots=robots)

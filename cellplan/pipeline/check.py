@@ -1,0 +1,67 @@
+"""Check a cell without solving it: files, robots, paths, reach and collisions at the start."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from cellplan.model.cell import Cell
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report import Check
+from cellplan.pipeline.solve import with_start
+from cellplan.planning.given_starts import examine_given_starts
+from cellplan.planning.start_search import find_start
+from cellplan.planning.toolpaths import build_toolpath
+from cellplan.scene.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CellCheck:
+    """What can be said of a cell before it is solved.
+
+    Attributes:
+        cell: The cell with every start posture filled in.
+        found: Names of the robots whose start posture was searched for.
+        path_lengths: Length of each task's path on the surface in [m].
+        checks: The verified statements.
+    """
+
+    cell: Cell
+    found: tuple[str, ...]
+    path_lengths: Mapping[str, float]
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check passed."""
+        return all(check.passed for check in self.checks)
+
+
+def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
+    """Lay the paths on the part, examine or find the start postures, and look for collisions there.
+
+    Raises:
+        InputError: A path misses the part, or a given start is out of limits or off its task.
+        NoSolutionError: No start posture was found.
+    """
+    scene = Scene.from_cell(cell)
+    toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    examine_given_starts(cell, toolpaths)
+    start = find_start(scene, toolpaths, progress=progress)
+    pair = scene.touching(start)
+    found = tuple(robot.name for robot in cell.robots if robot.start is None)
+    words = "nothing touches at the start" if pair is None else f"'{pair[0]}' touches '{pair[1]}' at the start"
+    at_start = Check(
+        name="start_collision",
+        subject="cell" if pair is None else f"{pair[0]} - {pair[1]}",
+        passed=pair is None,
+        value=0.0 if pair is None else 1.0,
+        limit=0.0,
+        unit="pairs",
+        at_s=0.0,
+        message=words,
+    )
+    return CellCheck(
+        cell=with_start(cell, start),
+        found=found,
+        path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
+        checks=(at_start,),
+    )

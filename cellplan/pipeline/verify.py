@@ -1,0 +1,36 @@
+"""Verify joint tables against their cell, without planning anything."""
+
+from collections.abc import Mapping
+
+from cellplan.checks.verify import verify as verify_tables
+from cellplan.errors import InputError
+from cellplan.io.tables import parse_table
+from cellplan.model.cell import Cell
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report import Report
+from cellplan.planning.modes import plan_runs
+from cellplan.planning.schedule import schedule_tasks
+from cellplan.planning.toolpaths import build_toolpath
+from cellplan.scene.scene import Scene
+
+
+def verify(cell: Cell, tables: Mapping[str, str], *, run: str | None = None, progress: Progress = silent) -> Report:
+    """Recompute tool errors, joint limits and clearance from the text of joint tables.
+
+    Args:
+        cell: The cell the tables were made for.
+        tables: Text of one joint table per robot, by robot name.
+        run: Name of the run, for a cell whose mode has one per task.
+        progress: Who wants to know how far it is.
+
+    Raises:
+        InputError: A table is missing, unreadable, or does not fit the cell; there is no such run.
+    """
+    plans = {plan.name: plan for plan in plan_runs(cell)}
+    if run not in plans:
+        raise InputError(f"run: expected one of {', '.join(str(name) for name in plans)}, got {run}")
+    plan = plans[run]
+    toolpaths = [build_toolpath(cell.task(name), cell.part, cell.origin) for name in plan.tasks]
+    parsed = [parse_table(text, f"tables/{name}.csv") for name, text in tables.items()]
+    schedule = schedule_tasks(cell, toolpaths)
+    return verify_tables(Scene.from_cell(cell), schedule, parsed, moving=plan.moving, progress=progress)
