@@ -1,0 +1,159 @@
+"""Solids prepared for distance questions: what bounds them, what their surface is, what lies inside them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import CellplanError, InputError
+from cellplan.geometry.convex_hull import convex_hull
+from cellplan.geometry.mesh_topology import components, mesh_volume
+from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, bounding_sphere
+from cellplan.geometry.tessellation import tessellate
+from cellplan.geometry.transforms import Array, is_rigid, pose_from
+
+POINT_SIZE: Final = 1e-7  # [m] size given to a point or a line, so that the engine sees a triangle: far below 0.1 mm
+SURFACE_TOLERANCE: Final = 2e-5  # [m] a tessellated cylinder lies outside the true one by no more than this
+CONVEX_SHARE: Final = 1e-9  # [-] of its volume by which a convex mesh may differ from its hull: rounding
+HULL_ROOM: Final = 2e-7  # [-] of its radius by which a vertex may stick out of a mesh's hull (see convex_hull)
+RIGID_CHUNK: Final = 20_000  # [-] poses checked at once: about 10 MB
+FLAT_PADDING: Final = 1e-6  # [m] thickness given to the box round a flat surface
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CollisionBody:
+    """One solid and the simpler shapes that stand for it.
+
+    Attributes:
+        name: Name in reports.
+        shape: The solid itself.
+        hull: A convex solid that holds it: the solid itself, or the convex hull of its mesh.
+        looseness: What points of the solid may stick out of the hull in [m], by rounding.
+        is_convex: Whether ``hull`` is the solid and not only a bound.
+        core: A surface; the solid is everything within ``inflation`` of it.
+        inflation: In [m]; a capsule is an inflated line, a sphere an inflated point.
+        centre: Centre of a sphere that holds the solid, in its own frame in [m], shape (3,).
+        radius: Radius of that sphere in [m].
+        witnesses: One point of each connected piece of the solid, shape (C, 3).
+    """
+
+    name: str
+    shape: Solid
+    hull: Solid
+    looseness: float
+    is_convex: bool
+    core: Mesh
+    inflation: float
+    centre: Array
+    radius: float
+    witnesses: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyPoses:
+    """Where bodies are at each of n samples; made by ``checked_poses`` only.
+
+    Attributes:
+        R: Rotations in the world, shape (B, n, 3, 3).
+        p: Positions in the world in [m], shape (B, n, 3).
+    """
+
+    R: Array
+    p: Array
+
+
+def prepare(name: str, shape: Solid) -> CollisionBody:
+    """Make a solid ready for distance questions."""
+    hull, is_convex = _hull(shape)
+    core, inflation = _core(shape)
+    centre, radius = bounding_sphere(shape)
+    return CollisionBody(
+        name=name,
+        shape=shape,
+        hull=hull,
+        looseness=HULL_ROOM * radius if isinstance(shape, Mesh) else 0.0,
+        is_convex=is_convex,
+        core=core,
+        inflation=inflation,
+        centre=centre,
+        radius=radius,
+        witnesses=_witnesses(shape),
+    )
+
+
+def checked_poses(poses: Sequence[Array]) -> BodyPoses:
+    """Poses of bodies, shape (n, 4, 4) each, refused unless all of them are finite and rigid.
+
+    The engine answers "free" to a pose that is not a number, and takes a scaled rotation for a rotation.
+
+    Raises:
+        CellplanError: A pose is not a rigid displacement.
+    """
+    count = len(poses[0]) if poses else 0
+    R, p = np.empty((len(poses), count, 3, 3)), np.empty((len(poses), count, 3))
+    for body, X in enumerate(poses):
+        R[body], p[body] = X[:, :3, :3], X[:, :3, 3]
+    step = max(1, RIGID_CHUNK // max(1, count))
+    for first in range(0, len(poses), step):
+        if not is_rigid(pose_from(R[first : first + step], p[first : first + step])):
+            raise CellplanError("collision: the pose of a body is not finite or not a rigid displacement")
+    return BodyPoses(R, p)
+
+
+def _hull(shape: Solid) -> tuple[Solid, bool]:
+    """A convex solid that holds the shape, and whether it is the shape."""
+    if not isinstance(shape, Mesh):
+        return shape, True
+    try:
+        hull = convex_hull(shape)
+    except InputError:  # flat: it has no hull with a volume
+        return _box_round(shape), False
+    volume = mesh_volume(hull)
+    return hull, shape.is_closed and abs(mesh_volume(shape) - volume) <= CONVEX_SHARE * volume
+
+
+def _box_round(mesh: Mesh) -> Mesh:
+    """The box along the axes that holds a mesh, itself as a mesh."""
+    low, high = mesh.vertices.min(axis=0) - FLAT_PADDING, mesh.vertices.max(axis=0) + FLAT_PADDING
+    x, y, z = (high - low).tolist()
+    box = tessellate(Box((x, y, z)))
+    return Mesh(vertices=box.vertices + 0.5 * (low + high), faces=box.faces, source=mesh.source, is_closed=True)
+
+
+def _core(shape: Solid) -> tuple[Mesh, float]:
+    """A surface and the distance by which it must be inflated to give the shape."""
+    match shape:
+        case Sphere(radius):
+            return _thin_triangle(0.0), radius
+        case Capsule(radius, length):
+            return _thin_triangle(length), radius
+        case Cylinder(radius):
+            return tessellate(shape, fine_segments(radius)), 0.0
+        case Box():
+            return tessellate(shape), 0.0
+        case Mesh():
+            return shape, 0.0
+
+
+def fine_segments(radius: float) -> int:
+    """Sides of a prism round a cylinder that keep it within ``SURFACE_TOLERANCE`` of the cylinder."""
+    return max(8, int(np.ceil(np.pi / np.arccos(radius / (radius + SURFACE_TOLERANCE)))))
+
+
+def _thin_triangle(length: float) -> Mesh:
+    """A line along z, or a point, as one very thin triangle that holds it."""
+    half = 0.5 * length
+    vertices = np.array([[0.0, 0.0, -half], [0.0, 0.0, half], [POINT_SIZE, 0.0, 0.0]])
+    vertices[1, 1] += POINT_SIZE
+    vertices[0, 1] -= POINT_SIZE
+    return Mesh(vertices=vertices, faces=np.array([[0, 1, 2]]), source="line", is_closed=False)
+
+
+def _witnesses(shape: Solid) -> Array:
+    """One point of each connected piece."""
+    if not isinstance(shape, Mesh):
+        return np.zeros((1, 3))
+    edges = np.concatenate([shape.faces[:, :2], shape.faces[:, 1:]])
+    piece = components(len(shape.vertices), edges)
+    return shape.vertices[np.unique(piece[shape.faces[:, 0]])]

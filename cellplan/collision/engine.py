@@ -1,0 +1,97 @@
+"""The door to FCL: which of two solids touch, and how far apart their convex hulls or surfaces are.
+
+FCL's yes and no are trusted; of its distances only those between two surfaces of triangles. Every other distance is a
+proposal that ``certificate`` has to prove. Poses are checked before they come here (``bodies.checked_poses``), requests
+and results are new for each question because FCL leaves old values in them.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import fcl
+import numpy as np
+
+from cellplan.collision.bodies import BodyPoses, CollisionBody
+from cellplan.errors import CellplanError
+from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
+from cellplan.geometry.transforms import Array
+
+NO_ANSWER: Final = "collision: the engine gave a distance that is not a number between '{}' and '{}'"
+
+
+class Engine:
+    """A set of bodies that can be asked about in pairs; built once, safe to send to another process."""
+
+    def __init__(self, bodies: Sequence[CollisionBody]) -> None:
+        """Take the bodies; what FCL needs of each is built when it is first asked for."""
+        self.bodies = tuple(bodies)
+        self._objects: dict[tuple[str, int], Any] = {}
+
+    def __reduce__(self) -> tuple[type["Engine"], tuple[tuple[CollisionBody, ...]]]:
+        """Leave FCL's own objects behind; the other side builds them anew."""
+        return Engine, (self.bodies,)
+
+    def touch(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> bool:
+        """Say whether two bodies touch at a sample. A mesh is its surface here; what lies inside is asked elsewhere."""
+        a, b = self._placed("solid", first, poses, sample), self._placed("solid", second, poses, sample)
+        return bool(fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0)
+
+    def proposed_direction(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[float, Array]:
+        """FCL's distance in [m] between the hulls of two bodies and the direction from first to second: unproven."""
+        a, b = self._placed("hull", first, poses, sample), self._placed("hull", second, poses, sample)
+        result = fcl.DistanceResult()
+        distance = fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
+        p, q = result.nearest_points
+        return float(distance), np.subtract(q, p)
+
+    def surface_distance(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> float:
+        """Distance in [m] between two bodies that do not touch, never above the truth; exact but slow.
+
+        Raises:
+            CellplanError: The engine's answer is not a number.
+        """
+        a, b = self._placed("core", first, poses, sample), self._placed("core", second, poses, sample)
+        distance = float(fcl.distance(a, b, fcl.DistanceRequest(), fcl.DistanceResult()))
+        if not np.isfinite(distance):
+            raise CellplanError(NO_ANSWER.format(self.bodies[first].name, self.bodies[second].name))
+        return max(0.0, distance - self.bodies[first].inflation - self.bodies[second].inflation)
+
+    def _placed(self, kind: str, index: int, poses: BodyPoses, sample: int) -> Any:
+        """FCL's object for the solid, hull or core of a body, moved to its pose."""
+        found = self._objects.get((kind, index))
+        if found is None:
+            found = self._objects[kind, index] = self._built(kind, index)
+        found.setTransform(fcl.Transform(poses.R[index, sample], poses.p[index, sample]))
+        return found
+
+    def _built(self, kind: str, index: int) -> Any:
+        """FCL's object for the solid, hull or core of a body."""
+        body = self.bodies[index]
+        if kind == "hull" and isinstance(body.hull, Mesh):
+            return fcl.CollisionObject(_convex(body.hull))
+        return fcl.CollisionObject(_geometry(body.core if kind == "core" else body.shape))
+
+
+def _geometry(shape: Solid) -> Any:
+    """FCL's geometry of a solid; a mesh becomes a tree of triangles."""
+    match shape:
+        case Box(size):
+            return fcl.Box(*size)
+        case Cylinder(radius, length):
+            return fcl.Cylinder(radius, length)
+        case Capsule(radius, length):
+            return fcl.Capsule(radius, length)
+        case Sphere(radius):
+            return fcl.Sphere(radius)
+        case Mesh(vertices, faces):
+            tree = fcl.BVHModel()
+            tree.beginModel(len(vertices), len(faces))
+            tree.addSubModel(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
+            tree.endModel()
+            return tree
+
+
+def _convex(hull: Mesh) -> Any:
+    """FCL's convex polytope."""
+    corners = np.column_stack([np.full(len(hull.faces), 3), hull.faces]).ravel()
+    return fcl.Convex(np.ascontiguousarray(hull.vertices), len(hull.faces), corners)

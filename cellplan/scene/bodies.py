@@ -1,0 +1,141 @@
+"""Everything solid in a cell: links, tools, the part and the surroundings, each with what moves it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.shapes import HalfSpace, Shape
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.kinematics.screws import ScrewChain
+from cellplan.model.cell import Cell, Part, Robot
+from cellplan.model.robot import BASE
+
+
+class Kind(StrEnum):
+    """What a body belongs to."""
+
+    LINK = "link"
+    TOOL = "tool"
+    PART = "part"
+    OBSTACLE = "obstacle"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SceneBody:
+    """One solid of the cell.
+
+    Attributes:
+        name: ``<robot>/<body>``, ``<robot>/tool``, ``part`` or the name of a thing in the surroundings.
+        kind: What it belongs to.
+        shape: The solid, in its own frame S.
+        robot: The robot that moves it; None when it is fixed in the world.
+        link: The link of that robot it is fixed to.
+        X_BS: Its pose at the reference posture in the robot's base frame; in the world when no robot moves it.
+    """
+
+    name: str
+    kind: Kind
+    shape: Shape
+    robot: str | None
+    link: int
+    X_BS: Array
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether it never moves: the surroundings, a fixed part, the foot of a robot."""
+        return self.robot is None or self.link == BASE
+
+
+def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
+    """All solids of a cell: robot by robot links before tools, then the part, then the surroundings.
+
+    Raises:
+        InputError: Two bodies have the same name.
+    """
+    bodies = [body for robot in cell.robots for body in _robot_bodies(robot)]
+    bodies.append(_part_body(cell, cell.part))
+    bodies += [_fixed(thing.name, Kind.OBSTACLE, shape=thing.shape, X_WS=thing.X_WS) for thing in cell.obstacles]
+    seen: set[str] = set()
+    for body in bodies:
+        if body.name in seen:
+            raise InputError(f"{cell.origin.file}: two bodies are called '{body.name}': rename one of them")
+        seen.add(body.name)
+    return tuple(bodies)
+
+
+def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> list[Array]:
+    """Poses of all bodies in the world, shape (N, 4, 4) each.
+
+    Args:
+        bodies: The bodies.
+        chains: The chain of each robot.
+        q: Joint positions in [rad] or [m] by robot, shape (N, n) each.
+    """
+    count = len(next(iter(q.values()))) if q else 1
+    D = {name: chains[name].link_displacements(positions) for name, positions in q.items()}
+    poses = []
+    for body in bodies:
+        if body.robot is None:
+            poses.append(np.broadcast_to(body.X_BS, (count, 4, 4)))
+        else:
+            poses.append(D[body.robot][:, body.link + 1] @ body.X_BS)
+    return poses
+
+
+def is_ground(body: SceneBody) -> bool:
+    """Whether a body is a half-space, which has no surface to ask the engine about."""
+    return isinstance(body.shape, HalfSpace)
+
+
+def _robot_bodies(robot: Robot) -> list[SceneBody]:
+    """Links and tools of one robot."""
+    model = robot.model
+    bodies = [
+        SceneBody(
+            name=f"{robot.name}/{body.name}",
+            kind=Kind.LINK,
+            shape=body.shape,
+            robot=robot.name,
+            link=body.link,
+            X_BS=body.X_BS,
+        )
+        for body in model.bodies
+    ]
+    for number, body in enumerate(robot.tool.bodies, start=1):
+        bodies.append(
+            SceneBody(
+                name=f"{robot.name}/tool" if number == 1 else f"{robot.name}/tool_{number}",
+                kind=Kind.TOOL,
+                shape=body.shape,
+                robot=robot.name,
+                link=model.flange_link,
+                X_BS=model.X_BF @ body.X_BS,
+            )
+        )
+    return bodies
+
+
+def _part_body(cell: Cell, part: Part) -> SceneBody:
+    """The part, carried by the first of its holders or fixed in the world."""
+    if not part.held_by:
+        if part.X_WP is None:
+            raise InputError(f"{cell.origin.at('part')}: nobody holds the part and it has no place in the world")
+        return _fixed("part", Kind.PART, shape=part.shape, X_WS=part.X_WP @ part.X_PS)
+    grasp = part.held_by[0]
+    holder = cell.robot(grasp.robot)
+    return SceneBody(
+        name="part",
+        kind=Kind.PART,
+        shape=part.shape,
+        robot=holder.name,
+        link=holder.model.flange_link,
+        X_BS=holder.model.X_BF @ holder.tool.X_FT @ inverse(grasp.X_PT) @ part.X_PS,
+    )
+
+
+def _fixed(name: str, kind: Kind, *, shape: Shape, X_WS: Array) -> SceneBody:
+    """A body fixed in the world."""
+    return SceneBody(name=name, kind=kind, shape=shape, robot=None, link=BASE, X_BS=X_WS)

@@ -1,0 +1,155 @@
+"""Which bodies must keep apart, in which class, and which pairs are left out for what reason."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from enum import StrEnum
+from itertools import combinations
+
+from cellplan.errors import InputError
+from cellplan.model.cell import Cell
+from cellplan.model.report import ClearanceClass
+from cellplan.model.robot import BASE
+from cellplan.scene.bodies import Kind, SceneBody
+from cellplan.scene.links import NO_BODY, LinkTree
+
+ATTACHED = (Kind.TOOL, Kind.PART)  # bodies that a flange carries
+
+
+class Rule(StrEnum):
+    """What is asked of a pair."""
+
+    CLEARANCE = "clearance"  # keep the distance that the cell demands
+    CONTACT = "contact"  # do not touch; the distance between them is the robot's own design
+    PROCESS = "process"  # touch inside the contact zone only
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenePair:
+    """Two bodies that are watched.
+
+    Attributes:
+        first: Index of the one body of the scene.
+        second: Index of the other; a half-space is always the second.
+        clearance_class: What keeps its distance from what.
+        rule: What is asked of them.
+        reason: Why less than the full distance is asked; empty for the rule ``clearance``.
+    """
+
+    first: int
+    second: int
+    clearance_class: ClearanceClass
+    rule: Rule
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Excluded:
+    """Two bodies that are not watched, and why."""
+
+    first: int
+    second: int
+    reason: str
+
+
+def sort_pairs(cell: Cell, bodies: Sequence[SceneBody]) -> tuple[list[ScenePair], list[Excluded]]:
+    """All pairs of bodies, those that are joined or mounted and those the user named left out.
+
+    Raises:
+        InputError: An exclusion of the cell names something that is no body.
+    """
+    trees = {robot.name: LinkTree(robot.model) for robot in cell.robots}
+    by_user = _user_exclusions(cell, bodies)
+    watched, excluded = [], []
+    for i, j in _index_pairs(bodies):
+        reason = by_user.get((i, j)) or _mounting(bodies[i], bodies[j], cell=cell, trees=trees)
+        if reason:
+            excluded.append(Excluded(i, j, reason))
+        else:
+            kind = clearance_class(bodies[i], bodies[j])
+            watched.append(ScenePair(first=i, second=j, clearance_class=kind, rule=Rule.CLEARANCE))
+    return watched, excluded
+
+
+def clearance_class(first: SceneBody, second: SceneBody) -> ClearanceClass:
+    """Class of a pair: anything against the surroundings, then the part, then the robot itself, then robots."""
+    kinds = (first.kind, second.kind)
+    if Kind.OBSTACLE in kinds:
+        return ClearanceClass.ENVIRONMENT
+    if Kind.PART in kinds:
+        return ClearanceClass.PART
+    return ClearanceClass.SELF if first.robot == second.robot else ClearanceClass.ROBOT_ROBOT
+
+
+def near_in_chain(pair: ScenePair, bodies: Sequence[SceneBody], *, cell: Cell) -> bool:
+    """Whether a pair belongs to one robot and moves against each other by no more than two joints."""
+    a, b = bodies[pair.first], bodies[pair.second]
+    if a.robot is None or a.robot != b.robot:
+        return False
+    tree = LinkTree(cell.robot(a.robot).model)
+    return tree.joints_between(_joined_to(a, tree), _joined_to(b, tree)) <= 2
+
+
+def stands_on(pair: ScenePair, bodies: Sequence[SceneBody], *, cell: Cell) -> bool:
+    """Whether a pair is the first link with a body, of a robot whose foot has none, and the surroundings."""
+    a, b = bodies[pair.first], bodies[pair.second]
+    if a.kind is not Kind.LINK or b.kind is not Kind.OBSTACLE or a.robot is None or a.link == BASE:
+        return False
+    return LinkTree(cell.robot(a.robot).model).parent(a.link) == NO_BODY
+
+
+def _index_pairs(bodies: Sequence[SceneBody]) -> Iterator[tuple[int, int]]:
+    """Indices of all pairs but those of two things of the surroundings."""
+    for i, j in combinations(range(len(bodies)), 2):
+        if not bodies[i].kind is bodies[j].kind is Kind.OBSTACLE:
+            yield i, j
+
+
+def _user_exclusions(cell: Cell, bodies: Sequence[SceneBody]) -> dict[tuple[int, int], str]:
+    """Reasons of the pairs that the cell leaves out, by their indices in order."""
+    index = {body.name: i for i, body in enumerate(bodies)}
+    reasons = {}
+    for number, exclusion in enumerate(cell.checks.exclusions):
+        where = cell.origin.at(f"checks.exclude[{number}].bodies")
+        for name in exclusion.bodies:
+            if name not in index:
+                near = get_close_matches(name, index, n=1)
+                hint = f"; did you mean '{near[0]}'?" if near else f"; the bodies are {', '.join(index)}"
+                raise InputError(f"{where}: expected names of two bodies, got '{name}'{hint}")
+        i, j = sorted(index[name] for name in exclusion.bodies)
+        if i == j:
+            raise InputError(f"{where}: expected two different bodies, got '{exclusion.bodies[0]}' twice")
+        reasons[i, j] = exclusion.reason
+    return reasons
+
+
+def _mounting(a: SceneBody, b: SceneBody, *, cell: Cell, trees: Mapping[str, LinkTree]) -> str | None:
+    """Why two bodies are joined by their mounting, or None."""
+    if Kind.OBSTACLE in (a.kind, b.kind):
+        return "both stand still: one is mounted among the other" if a.is_at_rest and b.is_at_rest else None
+    if Kind.PART in (a.kind, b.kind):
+        other = a if b.kind is Kind.PART else b
+        if other.robot in cell.positioners and other.link == cell.robot(str(other.robot)).model.flange_link:
+            return "holds the part"
+    if a.robot is None or a.robot != b.robot:
+        return None
+    return _joined(a, b, trees[a.robot], has_tool=bool(cell.robot(a.robot).tool.bodies))
+
+
+def _joined(a: SceneBody, b: SceneBody, tree: LinkTree, *, has_tool: bool) -> str | None:
+    """Why two bodies of one robot cannot come apart, or None."""
+    if a.link == b.link:
+        return "fixed to the same link"
+    if a.kind is b.kind is Kind.LINK:
+        child, parent = (a, b) if tree.parent(a.link) == b.link else (b, a)
+        return f"joined by joint {tree.joint_name(child.link)}" if tree.parent(child.link) == parent.link else None
+    attached, link = (a, b) if a.kind in ATTACHED else (b, a)
+    is_outermost = attached.kind is Kind.TOOL or not has_tool
+    if is_outermost and link.kind is Kind.LINK and tree.carrier(attached.link) == link.link:
+        return "mounted on it"
+    return None
+
+
+def _joined_to(body: SceneBody, tree: LinkTree) -> int:
+    """The link that a body is, or is mounted on."""
+    return body.link if body.kind is Kind.LINK else tree.carrier(body.link)

@@ -1,0 +1,157 @@
+"""Scene: a cell made computable, built once: its kinematic chains, its bodies and the pairs that must keep apart."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from cellplan.collision.bodies import BodyPoses, CollisionBody, checked_poses, prepare
+from cellplan.collision.certificate import heights
+from cellplan.collision.engine import Engine
+from cellplan.collision.self_test import prove_engine
+from cellplan.collision.sweep import Pair, first_touching
+from cellplan.collision.zone import outside_zone
+from cellplan.geometry.shapes import HalfSpace
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.kinematics.screws import ScrewChain
+from cellplan.model.cell import Cell, Robot
+from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, scene_bodies
+from cellplan.scene.by_design import apply_design
+from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Scene:
+    """A cell made computable; safe to send to another process.
+
+    Attributes:
+        cell: The cell.
+        chains: Kinematic chain of each robot, by name.
+        bodies: All solids, half-spaces last.
+        pairs: Pairs that are watched.
+        watched: For each pair the two engine bodies that must not touch: the bodies themselves, or what sticks out of
+            the contact zone of a tool at work against the part; None for a half-space and where nothing sticks out.
+        exclusions: Pairs that are not watched, as (first, second, reason).
+        engine: The solid bodies in the order of ``bodies``, then what of tools lies outside their contact zones.
+        cut_from: The tool body that each of these last ones is cut from.
+    """
+
+    cell: Cell
+    chains: Mapping[str, ScrewChain]
+    bodies: tuple[SceneBody, ...]
+    pairs: tuple[ScenePair, ...]
+    watched: tuple[Pair | None, ...]
+    exclusions: tuple[tuple[str, str, str], ...]
+    engine: Engine
+    cut_from: tuple[int, ...]
+
+    @classmethod
+    def from_cell(cls, cell: Cell) -> "Scene":
+        """Build the chains and bodies of a cell and sort its pairs.
+
+        Raises:
+            InputError: Two bodies share a name, or an exclusion names something that is no body.
+            SelfTestError: The collision engine fails a test with a known answer.
+        """
+        prove_engine()
+        chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
+        bodies = tuple(sorted(scene_bodies(cell), key=is_ground))
+        solids = [prepare(body.name, body.shape) for body in bodies if not isinstance(body.shape, HalfSpace)]
+        pairs, excluded = sort_pairs(cell, bodies)
+        kept, by_design = apply_design(cell, bodies, pairs, engine=Engine(solids), chains=chains)
+        watch = _at_work(cell, bodies, kept, solids=len(solids))
+        return cls(
+            cell=cell,
+            chains=chains,
+            bodies=bodies,
+            pairs=tuple(watch.pairs),
+            watched=tuple(watch.watched),
+            exclusions=_named(bodies, [*excluded, *by_design]),
+            engine=Engine([*solids, *(body for _, body in watch.cut)]),
+            cut_from=tuple(tool for tool, _ in watch.cut),
+        )
+
+    def body_poses(self, q: Array) -> BodyPoses:
+        """Poses of the engine's bodies for stacked joint positions in [rad] or [m], shape (N, nq)."""
+        own = {robot.name: q[:, self.cell.columns(robot.name)] for robot in self.cell.robots}
+        poses = body_poses([body for body in self.bodies if not is_ground(body)], self.chains, own)
+        return checked_poses([*poses, *(poses[tool] for tool in self.cut_from)])
+
+    def is_on_ground(self, pair: ScenePair) -> bool:
+        """Whether the second body of a pair is a half-space."""
+        return is_ground(self.bodies[pair.second])
+
+    def ground_heights(self, pair: ScenePair, poses: BodyPoses) -> Array:
+        """Distance of a solid above a half-space at each sample in [m], shape (N,); zero or less where they touch."""
+        body = self.engine.bodies[pair.first]
+        above = heights(body.hull, poses.R[pair.first], poses.p[pair.first], X_WS=self.bodies[pair.second].X_BS)
+        return above - body.looseness
+
+    def touching(self, q: Array) -> tuple[str, str] | None:
+        """Names of the first two bodies that must not touch but do, at one stacked posture of shape (nq,)."""
+        poses = self.body_poses(q[None])
+        for pair in self.pairs:
+            if self.is_on_ground(pair) and self.ground_heights(pair, poses)[0] <= 0.0:
+                return self.names(pair)
+        solid = [(pair, watched) for pair, watched in zip(self.pairs, self.watched, strict=True) if watched is not None]
+        found = first_touching(self.engine, [watched for _, watched in solid], poses, sample=0)
+        return None if found is None else self.names(solid[found][0])
+
+    def names(self, pair: ScenePair) -> tuple[str, str]:
+        """Names of the two bodies of a pair."""
+        return self.bodies[pair.first].name, self.bodies[pair.second].name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Watch:
+    """Watched pairs, what the engine watches of each, and the bodies cut from tools with the tools' indices."""
+
+    pairs: list[ScenePair]
+    watched: list[Pair | None]
+    cut: list[tuple[int, CollisionBody]]
+
+
+def _at_work(cell: Cell, bodies: tuple[SceneBody, ...], pairs: list[ScenePair], *, solids: int) -> _Watch:
+    """Say what the engine watches of each pair, and give tools at work on the part the rule of the contact zone."""
+    watch = _Watch(pairs=[], watched=[], cut=[])
+    for pair in pairs:
+        if _is_tool_at_work(cell, bodies, pair):
+            _watch_tool(watch, cell, bodies, pair=pair, next_index=solids + len(watch.cut))
+            continue
+        watch.pairs.append(pair)
+        watch.watched.append(None if is_ground(bodies[pair.second]) else (pair.first, pair.second))
+    return watch
+
+
+def _is_tool_at_work(cell: Cell, bodies: tuple[SceneBody, ...], pair: ScenePair) -> bool:
+    """Whether a pair is the tool of a robot that has a task, and the part."""
+    kinds = {bodies[index].kind: bodies[index] for index in (pair.first, pair.second)}
+    return set(kinds) == {Kind.TOOL, Kind.PART} and kinds[Kind.TOOL].robot in {task.robot for task in cell.tasks}
+
+
+def _watch_tool(watch: _Watch, cell: Cell, bodies: tuple[SceneBody, ...], *, pair: ScenePair, next_index: int) -> None:
+    """Watch what sticks out of the contact zone; a tool body that does not reach into the zone is like any other."""
+    tool, part = sorted((pair.first, pair.second), key=lambda index: bodies[index].kind is Kind.PART)
+    body, zone = bodies[tool], cell.checks.contact_zone
+    outside, is_in_zone = None, False
+    if not isinstance(body.shape, HalfSpace):
+        outside, is_in_zone = outside_zone(body.shape, _tip(cell.robot(str(body.robot)), body), zone)
+    if not is_in_zone:
+        watch.pairs.append(pair)
+        watch.watched.append((tool, part))
+        return
+    reason = f"at work: may touch within {1e3 * zone:g} mm of the tool tip; checked for contact outside it"
+    watch.pairs.append(replace(pair, rule=Rule.PROCESS, reason=reason))
+    watch.watched.append(None if outside is None else (next_index, part))
+    if outside is not None:
+        watch.cut.append((tool, prepare(body.name, outside)))
+
+
+def _tip(robot: Robot, body: SceneBody) -> Array:
+    """Tool tip in the frame of one of the tool's solids, shape (3,)."""
+    tip: Array = (inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT)[:3, 3]
+    return tip
+
+
+def _named(bodies: tuple[SceneBody, ...], excluded: list[Excluded]) -> tuple[tuple[str, str, str], ...]:
+    """Exclusions by name, in the order of the bodies."""
+    ordered = sorted(excluded, key=lambda pair: (pair.first, pair.second))
+    return tuple((bodies[pair.first].name, bodies[pair.second].name, pair.reason) for pair in ordered)
