@@ -1,0 +1,90 @@
+"""What a run shows on the screen: verdict, cycle time, worst figures, failed checks, and where the report is."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+Record = dict[str, Any]
+
+
+def read_record(folder: Path) -> Record:
+    """The report of a run as it stands on disk."""
+    record: Record = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    return record
+
+
+def summary_lines(record: Record, folder: Path) -> list[str]:
+    """Lines for people about one run folder."""
+    return [
+        f"{record['cell']}: {record['status']}",
+        f"  mode {record['mode']}, {record['cycle_time_s']:g} s",
+        *_task_lines(record["tasks"]),
+        *_margin_lines(record["joints"]),
+        *_speed_lines(record["joints"]),
+        *_clearance_lines(record["clearance"]["whole"]),
+        *_failure_lines(record["checks"]),
+        *_place_lines(record, folder),
+    ]
+
+
+def _task_lines(tasks: Record) -> Iterator[str]:
+    for name, task in tasks.items():
+        position, orientation = task["max_position_error_mm"], task["max_orientation_error_deg"]
+        yield f"  task {name} ({task['robot']}): largest error {_short(position)} mm, {_short(orientation)} deg"
+
+
+def _margin_lines(joints: Record) -> Iterator[str]:
+    """The tightest joint of each kind: degrees and millimetres do not compare."""
+    for unit in ("deg", "mm"):
+        bounded = [
+            (use["margin"], f"{robot} {joint}", use["margin_at_s"])
+            for robot, uses in joints.items()
+            for joint, use in uses.items()
+            if use["unit"] == unit and use["margin"] is not None
+        ]
+        if bounded:
+            margin, joint, at_s = min(bounded)
+            yield f"  smallest joint margin {margin:.4g} {unit}: {joint}{_instant(at_s)}"
+
+
+def _speed_lines(joints: Record) -> Iterator[str]:
+    driven = [
+        (use["velocity_ratio"], f"{robot} {joint}", use["peak_velocity_at_s"])
+        for robot, uses in joints.items()
+        for joint, use in uses.items()
+        if use["velocity_ratio"] is not None
+    ]
+    if driven:
+        ratio, joint, at_s = max(driven)
+        yield f"  largest joint speed {100.0 * ratio:.4g} % of its limit: {joint}{_instant(at_s)}"
+
+
+def _clearance_lines(whole: Record) -> Iterator[str]:
+    if whole["minimum_mm"] is not None and whole["pair"]:
+        first, second = whole["pair"]
+        yield f"  smallest clearance {whole['minimum_mm']:.4g} mm: {first} - {second}{_instant(whole['at_s'])}"
+
+
+def _failure_lines(checks: list[Record]) -> Iterator[str]:
+    for check in checks:
+        if not check["passed"]:
+            run = f"{check['run']}: " if check.get("run") else ""
+            yield f"  FAILED {run}{check['message']}"
+
+
+def _place_lines(record: Record, folder: Path) -> Iterator[str]:
+    yield f"report: {folder / 'report.html'}"
+    runs = list(record.get("runs", {}))
+    for place in [folder / run for run in runs] or [folder]:
+        for tables in (place / "tables", place / "rejected"):
+            if tables.is_dir():
+                yield f"tables: {tables}"
+
+
+def _short(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.2g}"
+
+
+def _instant(at_s: float | None) -> str:
+    return "" if at_s is None else f" at {at_s:.3f} s"

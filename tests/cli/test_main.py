@@ -1,0 +1,88 @@
+"""The program as a shell sees it: streams and exit statuses."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import cellplan
+from cellplan.cli.main import run
+
+PROGRAM = [sys.executable, "-m", "cellplan"]
+
+
+def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    status = run(["--version"])
+
+    assert (status, capsys.readouterr().out) == (0, f"cellplan {cellplan.__version__}\n")
+
+
+def test_help_names_every_command_and_nothing_unfinished(capsys: pytest.CaptureFixture[str]) -> None:
+    status = run(["--help"])
+
+    told = capsys.readouterr().out
+    assert status == 0
+    commands = [line.split()[0] for line in told.partition("Commands:")[2].splitlines() if line.strip()]
+    assert commands == ["check", "solve", "robots", "schema"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["slove"], ["solve"], ["solve", "a.yaml", "b.yaml"], ["solve", "a.yaml", "--duration", "long"], ["--bad"]],
+    ids=" ".join,
+)
+def test_wrong_usage_ends_with_two(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    status = run(arguments)
+
+    out, err = capsys.readouterr()
+    assert status == 2
+    assert "Usage: cellplan" in out + err
+    assert "Traceback" not in err
+
+
+def test_a_missing_cell_file_is_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    status = run(["solve", str(tmp_path / "absent.yaml")])
+
+    out, err = capsys.readouterr()
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert "absent.yaml" in err
+
+
+def test_a_reader_that_goes_away_is_told_in_one_line() -> None:
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+
+    ended = subprocess.run([*PROGRAM, "--version"], stdout=write_end, stderr=subprocess.PIPE, text=True, check=False)
+
+    os.close(write_end)
+    assert ended.returncode == 4
+    assert ended.stderr == "error: standard output: the result was not shown: broken pipe\n"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_a_full_disk_is_told_in_one_line() -> None:
+    with Path("/dev/full").open("w") as full:
+        ended = subprocess.run([*PROGRAM, "--version"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+
+    assert ended.returncode == 4
+    assert ended.stderr == "error: standard output: the result was not shown: no space left on device\n"
+
+
+def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    command = [*PROGRAM, "solve", str(cells / "four_robots.yaml"), "-o", str(folder)]
+
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(2.0)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=10)
+
+    assert process.returncode == 130
+    assert out == ""
+    assert err.splitlines()[-1] == "interrupted: nothing was written"
+    assert list(tmp_path.iterdir()) == []
