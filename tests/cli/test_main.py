@@ -75,7 +75,7 @@ def test_a_full_disk_is_told_in_one_line() -> None:
 
 def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    command = [*PROGRAM, "solve", str(cells / "four_robots.yaml"), "-o", str(folder)]
+    command = [*PROGRAM, "solve", str(cells / "four_robots.yaml"), "-o", str(folder), "--duration", "60"]
 
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     time.sleep(2.0)
