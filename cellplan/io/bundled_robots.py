@@ -1,0 +1,39 @@
+"""Robots that come with the program, as joint-axis tables."""
+
+from pathlib import Path
+from typing import Final
+
+from cellplan.errors import InputError
+from cellplan.io.complaints import did_you_mean, listed
+from cellplan.io.reach import Reach
+from cellplan.io.robot_table import RobotTable, load_robot_table
+from cellplan.model.robot import RobotModel
+
+FOLDER: Final = Path(__file__).resolve().parent.parent / "robots"
+
+
+def bundled_names() -> tuple[str, ...]:
+    """Names of all bundled robots, in alphabetical order."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
+
+
+def load_bundled(name: str) -> RobotModel:
+    """A bundled robot.
+
+    Raises:
+        InputError: There is none of that name.
+    """
+    return load_bundled_table(name).model
+
+
+def load_bundled_table(name: str) -> RobotTable:
+    """A bundled robot with the digest of its table.
+
+    Raises:
+        InputError: There is none of that name.
+    """
+    names = bundled_names()
+    if name not in names:
+        hint = did_you_mean(name, names)
+        raise InputError(f"expected a bundled robot ({listed(names)}) or a .urdf or .yaml file, got '{name}'{hint}")
+    return load_robot_table(FOLDER / f"{name}.yaml", file=f"bundled:{name}", reach=Reach(folder=FOLDER))

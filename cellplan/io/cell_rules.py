@@ -1,0 +1,133 @@
+"""Rules between the entries of a cell file: names that must exist, times that must fit, what goes with what."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from cellplan.io.complaints import Complaint, did_you_mean, listed
+from cellplan.io.schema.pieces import Pieces
+from cellplan.io.schema.task import TaskEntry
+from cellplan.io.yaml_reader import YamlDocument
+
+TIME_ROOM: Final = 1e-9  # [-] of the duration: rounding of start_s + duration_s
+ORIENTATION_AXES: Final = frozenset({"rx", "ry", "rz"})
+FEEDBACK_LIMIT: Final = 2.0  # gain_per_s * step_s at which Euler's steps begin to swing ever wider
+ANGLE_RANGES: Final = ("base", "start_deg", "start")
+
+
+def rule_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """Everything in a cell file that contradicts something else in it."""
+    yield from _clashing_names(pieces, document)
+    yield from _holders(pieces, document)
+    yield from _operators(pieces, document)
+    for name, task in pieces.tasks.items():
+        yield from _times(pieces, document, name)
+        yield from _tool_axis(task, document, name)
+    yield from _feedback(pieces, document)
+    yield from _layout(pieces, document)
+
+
+def _clashing_names(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """Names of files and folders that some systems cannot tell apart, and names that mean two bodies."""
+    for section in ("robots", "tasks"):
+        seen: dict[str, str] = {}
+        for name in pieces.names[section]:
+            other = seen.setdefault(name.lower(), name)
+            if other != name:
+                text = f"expected a name that differs from '{other}' by more than upper and lower case"
+                yield document.key_complaint((section, name), text)
+    if "part" in pieces.names["environment"]:
+        yield document.key_complaint(("environment", "part"), "expected another name, 'part' means the workpiece")
+
+
+def _holders(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """The part is held by a robot of the cell."""
+    for index, grasp in enumerate(pieces.part.held_by if pieces.part else ()):
+        yield from _known_robot(grasp.robot, pieces, document, ("part", "held_by", index, "robot"))
+
+
+def _operators(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """Each task has a robot of its own that does not hold the part."""
+    holders = {grasp.robot for grasp in pieces.part.held_by} if pieces.part else set()
+    busy: dict[str, str] = {}
+    for name, task in pieces.tasks.items():
+        path = ("tasks", name, "robot")
+        yield from _known_robot(task.robot, pieces, document, path)
+        if task.robot in holders:
+            text = f"expected a robot that does not hold the part, got the positioner '{task.robot}'"
+            yield document.complaint(path, text)
+        other = busy.setdefault(task.robot, name)
+        if other != name:
+            text = f"expected a robot without another task, got '{task.robot}', which does '{other}'"
+            yield document.complaint(path, text)
+
+
+def _known_robot(
+    robot: str, pieces: Pieces, document: YamlDocument, path: tuple[str | int, ...]
+) -> Iterator[Complaint]:
+    """A robot that the cell has."""
+    known = pieces.names["robots"]
+    if robot not in known:
+        hint = did_you_mean(robot, known)
+        yield document.complaint(path, f"expected a robot of this cell ({listed(known)}), got '{robot}'{hint}")
+
+
+def _times(pieces: Pieces, document: YamlDocument, name: str) -> Iterator[Complaint]:
+    """A task starts and ends within the common clock."""
+    if pieces.motion is None:
+        return
+    task, clock = pieces.tasks[name], pieces.motion.duration_s
+    if task.start_s >= clock:
+        text = f"expected a start before the end of the clock (motion.duration_s = {clock:g}), got {task.start_s:g}"
+        yield document.complaint(("tasks", name, "start_s"), text)
+    elif task.duration_s is not None and task.start_s + task.duration_s > clock * (1.0 + TIME_ROOM):
+        text = (
+            f"expected an end within the clock (motion.duration_s = {clock:g}), "
+            f"got start_s + duration_s = {task.start_s + task.duration_s:g}"
+        )
+        yield document.complaint(("tasks", name, "duration_s"), text)
+
+
+def needs_surface(task: TaskEntry) -> bool:
+    """Whether the tool's axis can come from nothing but the part's surface or the file of the path."""
+    turns = ORIENTATION_AXES & set(task.axes)
+    return task.tool_axis == "normal" or (task.tool_axis is None and bool(turns))
+
+
+def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Complaint]:
+    """A normal needs a surface; of a file it is known only later whether it brings orientations."""
+    if needs_surface(task) and task.path.project is None and task.path.csv is None:
+        text = (
+            "tool_axis: normal needs a path that is laid on the part: "
+            "add project: +z (or another side), or give tool_axis a direction"
+        )
+        key = "path" if task.tool_axis is None else "tool_axis"
+        yield document.complaint(("tasks", name, key), text)
+
+
+def _feedback(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """The error feedback dies away with Euler's steps."""
+    if pieces.motion is None or pieces.solver is None or pieces.solver.gain_per_s is None:
+        return
+    gain, step = pieces.solver.gain_per_s, pieces.motion.step_s
+    if gain * step >= FEEDBACK_LIMIT:
+        text = (
+            f"expected a gain below {FEEDBACK_LIMIT / step:g} (2 / step_s), got {gain:g}; "
+            "the error feedback would swing ever wider"
+        )
+        yield document.complaint(("solver", "gain_per_s"), text)
+
+
+def _layout(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """What a layout search may change exists."""
+    for key, value in (pieces.layout.vary if pieces.layout else {}).items():
+        path = ("layout", "vary", key)
+        robot, _, what = key.rpartition(".")
+        if what not in ANGLE_RANGES or not robot:
+            text = f"expected ROBOT.base, ROBOT.start_deg or ROBOT.start{did_you_mean(what, ANGLE_RANGES)}"
+            yield document.key_complaint(path, text)
+        elif robot not in pieces.names["robots"]:
+            known = pieces.names["robots"]
+            hint = did_you_mean(robot, known)
+            yield document.key_complaint(path, f"expected a robot of this cell ({listed(known)}), got '{robot}'{hint}")
+        elif (what == "base") == (value is True):
+            yield document.complaint(path, "expected ranges for a base and true for a start posture")

@@ -1,0 +1,88 @@
+"""Complaints about a file: where, what, got, allowed, in the order of the file."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Final
+
+from cellplan.errors import InputError, InvalidFileError
+
+COMPLAINT_LIMIT: Final = 100  # a file with more is told so; nobody reads on
+SHOWN_LENGTH: Final = 40  # characters of a wrong text that are repeated in a message
+
+KeyPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Complaint:
+    """One thing that is wrong in a file.
+
+    Attributes:
+        line: Line from 1; 0 when the complaint is about the whole file.
+        key: Key path as the user would write it; empty for the whole file.
+        text: What is wrong, what was found and what is allowed.
+    """
+
+    line: int
+    key: str
+    text: str
+
+    def to_error(self, file: str) -> InputError:
+        """The complaint as one line: ``file:line: key: text``."""
+        where = f"{file}:{self.line}" if self.line else file
+        return InputError(": ".join(part for part in (where, self.key, self.text) if part))
+
+
+def raise_complaints(file: str, complaints: Iterable[Complaint], others: Sequence[InputError] = ()) -> None:
+    """Raise all complaints about a file at once, sorted by line, then those about the files it names.
+
+    Raises:
+        InvalidFileError: When there is at least one complaint.
+    """
+    ordered = sorted(dict.fromkeys(complaints), key=lambda complaint: complaint.line)
+    errors = [complaint.to_error(file) for complaint in ordered[:COMPLAINT_LIMIT]]
+    if len(ordered) > COMPLAINT_LIMIT:
+        errors.append(InputError(f"{file}: and {len(ordered) - COMPLAINT_LIMIT} more complaints"))
+    for other in others:
+        errors.extend(other.complaints if isinstance(other, InvalidFileError) else [other])
+    if errors:
+        raise InvalidFileError(errors)
+
+
+def key_text(path: KeyPath) -> str:
+    """Key path as text: ``robots.kuka.start_deg[2]``."""
+    text = ""
+    for key in path:
+        if isinstance(key, int):
+            text += f"[{key}]"
+        else:
+            text += f".{key}" if text else key
+    return text
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """``, did you mean 'base'?`` when a known word is near, else nothing."""
+    near = get_close_matches(word[:SHOWN_LENGTH], list(known), n=1, cutoff=0.6)
+    return f", did you mean '{near[0]}'?" if near else ""
+
+
+def listed(words: Iterable[str]) -> str:
+    """Words joined by commas, or ``none``."""
+    return ", ".join(words) or "none"
+
+
+def shown(value: object) -> str:
+    """A value found in a file as a message repeats it: short, on one line, plain characters only."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, tuple | list):
+        return f"a list of {len(value)}"
+    if isinstance(value, int | float):
+        return repr(value).removesuffix(".0")
+    text = str(value)
+    short = text if len(text) <= SHOWN_LENGTH else text[: SHOWN_LENGTH - 1] + "…"
+    return repr(short)

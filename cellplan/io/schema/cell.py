@@ -1,0 +1,182 @@
+"""A whole cell file: robots, part, tasks, surroundings, motion, solver and checks."""
+
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import AfterValidator, Field, Tag, model_validator
+
+from cellplan.io.schema.common import Angle, Coordinate, Entry, Name, PoseEntry, Text, by_kind, rule
+from cellplan.io.schema.robot import RobotEntry
+from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
+from cellplan.io.schema.task import CornerChoice, Seconds, TaskEntry, TimeLawChoice
+
+SCHEMA_VERSION: Final = 1
+ROBOT_LIMIT: Final = 16
+TASK_LIMIT: Final = 200
+OBSTACLE_LIMIT: Final = 500
+SAMPLE_LIMIT: Final = 2_000_000  # tables longer than this fill disks, not controllers
+LARGEST_SEED: Final = 2**32 - 1
+DAMPING_WORDS: Final = "auto or a number of at least 0"
+
+Method = Literal["weighted_pseudo_inverse"]
+DampingChoice = Annotated[
+    Annotated[Literal["auto"], Tag(f"<{DAMPING_WORDS}>")]
+    | Annotated[Annotated[float, Field(ge=0.0, le=1e6)], Tag("<number>")],
+    by_kind(DAMPING_WORDS, number=(int, float)),
+]
+
+
+class GraspEntry(Entry):
+    """A robot that holds the part."""
+
+    robot: Name = Field(description="Robot that holds the part (the positioner).")
+    at: PoseEntry = Field(PoseEntry(), description="Pose of the holder's tool tip in the part frame.")
+
+
+def _one_holder(holders: tuple[GraspEntry, ...]) -> tuple[GraspEntry, ...]:
+    """Refuse load sharing."""
+    if len(holders) > 1:
+        raise rule(f"expected at most one holder, got {len(holders)}; load sharing is not available in this version")
+    return holders
+
+
+Holders = Annotated[tuple[GraspEntry, ...], AfterValidator(_one_holder)]
+
+
+class PartEntry(Entry):
+    """The workpiece; somebody holds it, or it is fixed in the world."""
+
+    geometry: PartShapeEntry = Field(description="Shape of the part.")
+    held_by: Holders = Field((), description="The robot that holds the part; none: fixed in the world.")
+    at: PoseEntry | None = Field(
+        None, description="Pose of the part frame in the world; required exactly when nobody holds the part."
+    )
+
+    @model_validator(mode="after")
+    def _stands_somewhere(self) -> Self:
+        """Held by one robot, or placed in the world."""
+        if self.held_by and self.at is not None:
+            raise rule("unexpected key, the part is placed by the robot that holds it", "at")
+        if not self.held_by and self.at is None:
+            raise rule("missing, expected the pose of the part in the world, or a robot under held_by", "at")
+        return self
+
+
+class MotionEntry(Entry):
+    """Who moves, and the common clock."""
+
+    mode: Literal["simultaneous", "pairwise", "part_at_rest"] = Field(
+        "simultaneous",
+        description="Who moves: all robots; the positioner and one operator at a time; the operators only.",
+    )
+    duration_s: Seconds = Field(description="Length of the common clock; every task ends within it.")
+    step_s: Seconds = Field(0.001, description="Time between two samples.")
+    time_law: TimeLawChoice = Field("quintic", description="Law of each stretch of path between stops.")
+    corners: CornerChoice = Field("stop", description="Stop at corners, or round them.")
+
+    @model_validator(mode="after")
+    def _has_a_sensible_clock(self) -> Self:
+        """At least one step, and not more samples than anybody can use."""
+        if self.step_s > self.duration_s:
+            raise rule(f"expected a step of at most duration_s = {self.duration_s:g}, got {self.step_s:g}", "step_s")
+        if self.duration_s / self.step_s > SAMPLE_LIMIT:
+            steps = self.duration_s / self.step_s
+            raise rule(f"expected at most {SAMPLE_LIMIT} samples (duration_s / step_s), got {steps:.0f}", "step_s")
+        return self
+
+
+class SolverEntry(Entry):
+    """How joint speeds are found."""
+
+    method: Method = Field("weighted_pseudo_inverse", description="Resolution method.")
+    gain_per_s: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
+        None, description="Gain of the pose-error feedback; 0.5 / step_s when absent. gain_per_s * step_s is below 2."
+    )
+    damping: DampingChoice = Field(
+        "auto", description="Largest damping factor; auto lets the smallest singular value decide, 0 turns it off."
+    )
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(0, description="Seed of every random search.")
+
+
+class ExclusionEntry(Entry):
+    """A pair of bodies that the collision check leaves out."""
+
+    bodies: tuple[Text, Text] = Field(
+        description="Two bodies: ROBOT/LINK, ROBOT/tool, ROBOT/tool_2, part or the name of something in the environment."
+    )
+    reason: Text = Field(description="Why they may touch; it is repeated in the report.")
+
+    @model_validator(mode="after")
+    def _names_a_pair(self) -> Self:
+        """Two different bodies."""
+        if self.bodies[0] == self.bodies[1]:
+            raise rule("expected two different bodies, got the same twice", "bodies[1]")
+        return self
+
+
+class ChecksEntry(Entry):
+    """What the checks demand."""
+
+    clearance_mm: Annotated[float, Field(ge=0.0, le=10_000.0)] = Field(
+        5.0, description="Smallest allowed distance between things that must not touch."
+    )
+    contact_zone_mm: Annotated[float, Field(ge=0.0, le=10_000.0)] = Field(
+        20.0, description="Radius round the tool tip within which tool and part may touch."
+    )
+    exclude: tuple[ExclusionEntry, ...] = Field((), description="Pairs left out of the collision check.")
+
+
+LengthRange = tuple[Coordinate, Coordinate]
+AngleRange = tuple[Angle, Angle]
+
+
+class BaseRangeEntry(Entry):
+    """Ranges in which a base may be placed."""
+
+    x_mm: LengthRange | None = Field(None, description="Lowest and highest x.")
+    y_mm: LengthRange | None = Field(None, description="Lowest and highest y.")
+    z_mm: LengthRange | None = Field(None, description="Lowest and highest z.")
+    roll_deg: AngleRange | None = Field(None, description="Lowest and highest roll.")
+    pitch_deg: AngleRange | None = Field(None, description="Lowest and highest pitch.")
+    yaw_deg: AngleRange | None = Field(None, description="Lowest and highest yaw.")
+
+    @model_validator(mode="after")
+    def _is_ordered(self) -> Self:
+        """Low before high."""
+        for name, bounds in self.model_dump(exclude_none=True).items():
+            if not bounds[0] < bounds[1]:
+                raise rule(f"expected a number above {bounds[0]:g}, got {bounds[1]:g}", f"{name}[1]")
+        return self
+
+
+VARY_WORDS: Final = "true or a mapping of ranges (x_mm, y_mm, z_mm, roll_deg, pitch_deg, yaw_deg)"
+VaryChoice = Annotated[
+    Annotated[Literal[True], Tag(f"<{VARY_WORDS}>")] | Annotated[BaseRangeEntry, Tag("<mapping>")],
+    by_kind(VARY_WORDS, **{VARY_WORDS: bool}, mapping=dict),
+]
+
+
+class LayoutEntry(Entry):
+    """What a layout search may change."""
+
+    vary: dict[str, VaryChoice] = Field(
+        {}, description="Ranges by ROBOT.base, and true by ROBOT.start_deg for start postures that may be changed."
+    )
+
+
+class CellDocument(Entry):
+    """A whole cell file."""
+
+    cellplan: Literal[1] = Field(description="Version of the file format.")
+    name: Name = Field(description="Name of the cell and of its output folder.")
+    robots: dict[Name, RobotEntry] = Field(
+        min_length=1, max_length=ROBOT_LIMIT, description="Robots by name; their order is the order of the joints."
+    )
+    part: PartEntry = Field(description="The workpiece.")
+    tasks: dict[Name, TaskEntry] = Field(min_length=1, max_length=TASK_LIMIT, description="Tasks by name.")
+    environment: dict[Name, ObstacleEntry] = Field(
+        {}, max_length=OBSTACLE_LIMIT, description="Fixed things in the cell by name."
+    )
+    motion: MotionEntry = Field(description="Who moves, and the common clock.")
+    solver: SolverEntry = Field(SolverEntry(), description="How joint speeds are found.")
+    checks: ChecksEntry = Field(ChecksEntry(), description="What the checks demand.")
+    layout: LayoutEntry | None = Field(None, description="What a layout search may change; not used by solve.")

@@ -1,0 +1,101 @@
+"""Building blocks of all files: strict entries, numbers with bounds, poses, directions and choices."""
+
+from collections.abc import Iterable
+from typing import Annotated, Any, ClassVar, Final, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, StringConstraints
+from pydantic_core import PydanticCustomError
+
+NAME_PATTERN: Final = "^[A-Za-z0-9_][A-Za-z0-9_-]{0,39}$"
+NAME_WORDS: Final = "a name of 1 to 40 letters, digits, '_' or '-' that does not start with '-'"
+
+FARTHEST_MM: Final = 100_000.0  # nothing in a cell is farther away than 100 m
+THINNEST_MM: Final = 0.001  # nothing solid is thinner than a micrometre
+LARGEST_TURN_DEG: Final = 3_600.0  # ten turns: more is a slip of the unit
+
+Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN)]
+Coordinate = Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)]
+Size = Annotated[float, Field(ge=THINNEST_MM, le=FARTHEST_MM)]
+Angle = Annotated[float, Field(ge=-LARGEST_TURN_DEG, le=LARGEST_TURN_DEG)]
+
+Coordinates = tuple[Coordinate, Coordinate, Coordinate]
+PlaneCoordinates = tuple[Coordinate, Coordinate]
+Angles = tuple[Angle, Angle, Angle]
+
+SHORTEST_DIRECTION: Final = 1e-6  # [-] a shorter vector is a slip, not a direction
+
+
+def rule(text: str, key: str = "") -> PydanticCustomError:
+    """Complaint of a rule between several keys; ``key`` is added to the path of the entry that is checked."""
+    return PydanticCustomError("rule", "{text}", {"text": text, "key": key})
+
+
+def _one_line(text: str) -> str:
+    """Text with all white space as single blanks."""
+    words = " ".join(text.split())
+    if not words:
+        raise rule("expected some text, got an empty one")
+    return words
+
+
+def _has_direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Refuse a vector too short to point anywhere."""
+    if sum(component * component for component in vector) < SHORTEST_DIRECTION**2:
+        raise rule("expected a direction that is not zero, got a vector of no length")
+    return vector
+
+
+Text = Annotated[str, AfterValidator(_one_line)]
+Component = Annotated[float, Field(ge=-1e6, le=1e6)]
+Vector = Annotated[tuple[Component, Component, Component], AfterValidator(_has_direction)]
+AxisName = Literal["x", "y", "z"]
+SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+
+
+def one_of_keys(*names: str) -> dict[str, Any]:
+    """JSON Schema of "exactly one of these keys"."""
+    return {"oneOf": [{"required": [name]} for name in names]}
+
+
+def require_one(entry: BaseModel, names: Iterable[str]) -> None:
+    """Refuse an entry that does not give exactly one of the keys."""
+    names = tuple(names)
+    given = [name for name in names if getattr(entry, name) is not None]
+    if len(given) != 1:
+        raise rule(f"expected exactly one of the keys {', '.join(names)}, got {' and '.join(given) or 'none'}")
+
+
+def by_kind(words: str, **kinds: type | tuple[type, ...]) -> Discriminator:
+    """Choice by the kind of value: a text takes the branch tagged ``<words>``, others the branch tagged by kind.
+
+    Args:
+        words: What is allowed, in words; also the tag of the branch for texts, so that its complaints can say it.
+        **kinds: Types of value by the tag of their branch, without angle brackets.
+    """
+
+    def tag(value: object) -> str | None:
+        """Tag of the branch that a value belongs to."""
+        if isinstance(value, str):
+            return f"<{words}>"
+        value_type = dict if isinstance(value, BaseModel) else type(value)
+        for name, kind in kinds.items():
+            if issubclass(value_type, kind) and (value_type is bool) == (kind is bool):
+                return f"<{name}>"
+        return None
+
+    return Discriminator(tag, custom_error_type="choice", custom_error_message=words)
+
+
+class Entry(BaseModel):
+    """A mapping of a file: unknown keys, converted types and numbers that are not finite are refused."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class PoseEntry(Entry):
+    """A pose: where a frame stands and how it is turned."""
+
+    xyz_mm: Coordinates = Field((0.0, 0.0, 0.0), description="Position.")
+    rpy_deg: Angles = Field(
+        (0.0, 0.0, 0.0), description="Roll, pitch and yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF."
+    )

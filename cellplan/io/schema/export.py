@@ -1,0 +1,30 @@
+"""The cell file format as a JSON Schema, for editors."""
+
+from typing import Any
+
+from cellplan.io.schema.cell import CellDocument
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of the cell file."""
+    schema = CellDocument.model_json_schema()
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "cellplan cell file, version 1",
+        **_without_null({key: value for key, value in schema.items() if key != "title"}),
+    }
+
+
+def _without_null(node: Any) -> Any:
+    """The schema without the "or null" that stands for an absent key: a file never holds null."""
+    if isinstance(node, list):
+        return [_without_null(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    kept = {key: _without_null(value) for key, value in node.items() if value is not None}
+    arms = kept.get("anyOf")
+    if isinstance(arms, list) and {"type": "null"} in arms:
+        rest = [arm for arm in arms if arm != {"type": "null"}]
+        others = {key: value for key, value in kept.items() if key != "anyOf"}
+        return {**rest[0], **others} if len(rest) == 1 else {**others, "anyOf": rest}
+    return kept

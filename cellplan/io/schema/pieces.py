@@ -1,0 +1,90 @@
+"""What of a cell file can be understood, so that one mistake does not hide the others."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from cellplan.io.complaints import Complaint
+from cellplan.io.schema.cell import (
+    CellDocument,
+    ChecksEntry,
+    LayoutEntry,
+    MotionEntry,
+    PartEntry,
+    SolverEntry,
+)
+from cellplan.io.schema.common import Entry
+from cellplan.io.schema.messages import validate
+from cellplan.io.schema.robot import RobotEntry
+from cellplan.io.schema.shapes import ObstacleEntry
+from cellplan.io.schema.task import TaskEntry
+from cellplan.io.yaml_reader import YamlDocument
+
+AnyEntry = TypeVar("AnyEntry", bound=Entry)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pieces:
+    """The sound parts of a cell file.
+
+    Attributes:
+        whole: The whole file; None when anything in it is not understood.
+        robots: Robots that are understood, by name.
+        tasks: Tasks that are understood, by name.
+        environment: Fixed things that are understood, by name.
+        part: The part, if understood.
+        motion: The motion, if understood.
+        solver: The solver's settings, if understood.
+        checks: The checks, if understood.
+        layout: The layout, if given and understood.
+        names: All names that the file gives in each section, understood or not.
+    """
+
+    whole: CellDocument | None
+    robots: Mapping[str, RobotEntry]
+    tasks: Mapping[str, TaskEntry]
+    environment: Mapping[str, ObstacleEntry]
+    part: PartEntry | None
+    motion: MotionEntry | None
+    solver: SolverEntry | None
+    checks: ChecksEntry | None
+    layout: LayoutEntry | None
+    names: Mapping[str, tuple[str, ...]]
+
+
+def read_pieces(document: YamlDocument) -> tuple[Pieces, list[Complaint]]:
+    """Understand a cell file as far as possible; the complaints tell the rest."""
+    whole, complaints = validate(CellDocument, document)
+    pieces = Pieces(
+        whole=whole,
+        robots=_named(RobotEntry, document, "robots"),
+        tasks=_named(TaskEntry, document, "tasks"),
+        environment=_named(ObstacleEntry, document, "environment"),
+        part=_single(PartEntry, document, "part"),
+        motion=_single(MotionEntry, document, "motion"),
+        solver=_single(SolverEntry, document, "solver"),
+        checks=_single(ChecksEntry, document, "checks"),
+        layout=_single(LayoutEntry, document, "layout"),
+        names={key: tuple(_section(document, key)) for key in ("robots", "tasks", "environment")},
+    )
+    return pieces, complaints
+
+
+def _section(document: YamlDocument, key: str) -> Mapping[str, Any]:
+    """Entries of a section by name; none when it is something else."""
+    section = document.root.get(key)
+    return section if isinstance(section, dict) else {}
+
+
+def _named(model: type[AnyEntry], document: YamlDocument, key: str) -> dict[str, AnyEntry]:
+    """Entries of a section that are understood."""
+    found = {name: validate(model, document, (key, name))[0] for name in _section(document, key)}
+    return {name: entry for name, entry in found.items() if entry is not None}
+
+
+def _single(model: type[AnyEntry], document: YamlDocument, key: str) -> AnyEntry | None:
+    """A section that is one entry; its defaults when it is absent and may be."""
+    if key not in document.root:
+        return None if key in {"part", "motion", "layout"} else model()
+    entry: AnyEntry | None = validate(model, document, (key,))[0]
+    return entry

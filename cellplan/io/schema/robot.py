@@ -1,0 +1,119 @@
+"""Robots of a cell: model, place, tool, start posture, weights and limits."""
+
+from typing import Annotated, Any, Final, Literal, Self
+
+from pydantic import Field, Tag, model_validator
+
+from cellplan.io.schema.common import Angle, Coordinate, Entry, PoseEntry, Text, by_kind, rule
+from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
+
+LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a slip of the unit
+FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a slip of the unit
+FASTEST_MM_S: Final = 10_000.0  # 10 m/s: faster is a slip of the unit
+WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses all its digits
+AXIS_LIMIT: Final = 64  # joints of one robot
+
+JointAngle = Annotated[float, Field(ge=-LARGEST_JOINT_DEG, le=LARGEST_JOINT_DEG)]
+TurningSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_DEG_S)]
+SlidingSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_MM_S)]
+Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
+JointPosition = Annotated[float, Field(ge=-100_000.0, le=100_000.0)]
+
+POSTURE_WORDS: Final = "auto or a list of joint angles"
+POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
+
+Posture = Annotated[
+    Annotated[Literal["auto"], Tag(f"<{POSTURE_WORDS}>")]
+    | Annotated[tuple[Annotated[Angle, Field()], ...], Tag("<list>")],
+    by_kind(POSTURE_WORDS, list=tuple),
+]
+NamedPosture = Annotated[
+    Annotated[Literal["auto"], Tag(f"<{POSITION_WORDS}>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
+    by_kind(POSITION_WORDS, mapping=dict),
+]
+
+
+class ToolEntry(PoseEntry):
+    """A tool: its tip in the flange frame, z out of the tool, and its solids."""
+
+    geometry: ToolShapeEntry | None = Field(None, description="Shape that ends at the tool tip; none when absent.")
+    bodies: tuple[ToolBodyEntry, ...] = Field((), description="Further solids, placed in the flange frame.")
+
+
+class LimitsEntry(Entry):
+    """Limits of one joint: they tighten those of the model, or supply what it lacks."""
+
+    lower_deg: JointAngle | None = Field(None, description="Lowest angle of a revolute joint.")
+    upper_deg: JointAngle | None = Field(None, description="Highest angle of a revolute joint.")
+    velocity_deg_s: TurningSpeed | None = Field(None, description="Largest speed of a revolute joint.")
+    lower_mm: Coordinate | None = Field(None, description="Lowest position of a prismatic joint.")
+    upper_mm: Coordinate | None = Field(None, description="Highest position of a prismatic joint.")
+    velocity_mm_s: SlidingSpeed | None = Field(None, description="Largest speed of a prismatic joint.")
+    wrap: bool = Field(False, description="Whether a continuous joint may turn without end.")
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        """One unit, lower below upper, and either limits or none."""
+        turning = [name for name in ("lower_deg", "upper_deg", "velocity_deg_s") if getattr(self, name) is not None]
+        sliding = [name for name in ("lower_mm", "upper_mm", "velocity_mm_s") if getattr(self, name) is not None]
+        if turning and sliding:
+            raise rule(f"expected degrees or millimetres, got both ({turning[0]} and {sliding[0]})", sliding[0])
+        for unit in ("deg", "mm"):
+            lower, upper = getattr(self, f"lower_{unit}"), getattr(self, f"upper_{unit}")
+            if lower is not None and upper is not None and not lower < upper:
+                raise rule(f"expected a number above lower_{unit} = {lower:g}, got {upper:g}", f"upper_{unit}")
+            if self.wrap and (lower is not None or upper is not None):
+                raise rule("expected either lower and upper limits or wrap: true, got both", "wrap")
+        return self
+
+    @property
+    def unit(self) -> str | None:
+        """``deg`` or ``mm``; None when neither occurs."""
+        given = self.model_dump(exclude_none=True, exclude={"wrap"})
+        return None if not given else "mm" if any("_mm" in name for name in given) else "deg"
+
+
+class RobotEntry(Entry):
+    """A robot placed in the cell."""
+
+    model: Text = Field(
+        description="Bundled robot, or path of a URDF (.urdf) or a joint-axis table (.yaml) below the cell file's folder."
+    )
+    package_dirs: tuple[Text, ...] = Field(
+        (), description="Folders in which package://NAME/... of a URDF is looked up as FOLDER/NAME/...."
+    )
+    flange: Text | None = Field(
+        None, description="URDF link taken as the flange; when absent tool0, else flange, else the only last link."
+    )
+    base: PoseEntry = Field(PoseEntry(), description="Pose of the robot's base (root link of a URDF) in the world.")
+    tool: ToolEntry = Field(ToolEntry(), description="What the robot carries; without it the flange is the tool tip.")
+    start_deg: Posture | None = Field(
+        None, description="Start posture, one angle per joint, for robots with revolute joints only; auto finds one."
+    )
+    start: NamedPosture | None = Field(
+        None, description="Start posture, one key per joint with its unit (a1_deg, rail_mm); excludes start_deg."
+    )
+    weights: tuple[Weight, ...] | None = Field(
+        None, description="One positive weight per joint, ones when absent; a larger weight moves that joint less."
+    )
+    limits: dict[str, LimitsEntry] = Field({}, description="Limits by joint name, beside those of the model.")
+    locked: dict[str, JointPosition] = Field(
+        {},
+        description="Positions of URDF joints that do not lead to the flange, by joint name with its unit (finger_mm).",
+    )
+
+    @model_validator(mode="after")
+    def _starts_once(self) -> Self:
+        """The start posture is given at most once; locked joints name their unit."""
+        if self.start_deg is not None and self.start is not None:
+            raise rule("expected either start_deg or start, got both", "start")
+        for key in self.locked:
+            if not key.endswith(("_deg", "_mm")):
+                raise rule("expected a joint name with its unit, such as finger_mm or flap_deg", f"locked.{key}")
+        return self
+
+    @property
+    def given_start(self) -> tuple[float, ...] | dict[str, Any] | None:
+        """Start posture that was written down; None when it is to be found."""
+        given = self.start_deg if self.start_deg is not None else self.start
+        return None if given is None or isinstance(given, str) else given

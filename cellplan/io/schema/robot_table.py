@@ -1,0 +1,137 @@
+"""A robot as a table of joint axes at its reference posture, with the solids of its links."""
+
+from typing import Annotated, ClassVar, Final, Literal, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from cellplan.io.schema.common import (
+    Angles,
+    Coordinate,
+    Coordinates,
+    Entry,
+    Name,
+    PoseEntry,
+    Size,
+    Text,
+    Vector,
+    one_of_keys,
+    require_one,
+    rule,
+)
+from cellplan.io.schema.robot import AXIS_LIMIT, JointAngle, SlidingSpeed, TurningSpeed
+from cellplan.io.schema.shapes import SOLID_SHAPES, MeshUnit, SphereEntry
+
+Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+UNIT_ROOM: Final = 1e-3  # [-] room for axes written with four digits
+TURNING_KEYS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
+SLIDING_KEYS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
+
+
+class JointEntry(Entry):
+    """One joint: its axis in the base frame at the reference posture, and its limits."""
+
+    type: Literal["revolute", "prismatic"] = Field(description="How the joint moves.")
+    axis: Vector = Field(description="Unit direction of the axis.")
+    point_mm: Coordinates = Field((0.0, 0.0, 0.0), description="A point on the axis; required for a revolute joint.")
+    lower_deg: JointAngle | None = Field(None, description="Lowest angle of a revolute joint.")
+    upper_deg: JointAngle | None = Field(None, description="Highest angle of a revolute joint.")
+    velocity_deg_s: TurningSpeed | None = Field(None, description="Largest speed of a revolute joint.")
+    acceleration_deg_s2: Positive | None = Field(
+        None, description="Largest acceleration of a revolute joint, if known."
+    )
+    jerk_deg_s3: Positive | None = Field(None, description="Largest jerk of a revolute joint, if known.")
+    lower_mm: Coordinate | None = Field(None, description="Lowest position of a prismatic joint.")
+    upper_mm: Coordinate | None = Field(None, description="Highest position of a prismatic joint.")
+    velocity_mm_s: SlidingSpeed | None = Field(None, description="Largest speed of a prismatic joint.")
+    acceleration_mm_s2: Positive | None = Field(
+        None, description="Largest acceleration of a prismatic joint, if known."
+    )
+    jerk_mm_s3: Positive | None = Field(None, description="Largest jerk of a prismatic joint, if known.")
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        """Keys of the joint's own unit, all of them, lower below upper."""
+        own, other = (TURNING_KEYS, SLIDING_KEYS) if self.type == "revolute" else (SLIDING_KEYS, TURNING_KEYS)
+        for name in other:
+            if getattr(self, name) is not None:
+                raise rule(f"unexpected key, a {self.type} joint has {', '.join(own)}", name)
+        for name in own[:3]:
+            if getattr(self, name) is None:
+                raise rule(f"missing, a {self.type} joint needs {', '.join(own[:3])}", name)
+        if self.type == "revolute" and "point_mm" not in self.model_fields_set:
+            raise rule("missing, expected a point on the axis", "point_mm")
+        lower, upper = getattr(self, own[0]), getattr(self, own[1])
+        if not lower < upper:
+            raise rule(f"expected a number above {own[0]} = {lower:g}, got {upper:g}", own[1])
+        length = sum(component * component for component in self.axis) ** 0.5
+        if abs(length - 1.0) > UNIT_ROOM:
+            raise rule(f"expected a vector of length 1, got one of length {length:.6g}", "axis")
+        return self
+
+
+class SegmentEntry(Entry):
+    """A round solid along a segment in the base frame at the reference posture."""
+
+    from_mm: Coordinates = Field(description="One end of the middle line.")
+    to_mm: Coordinates = Field(description="Other end of the middle line.")
+    radius_mm: Size = Field(description="Radius.")
+
+
+class PlacedBoxEntry(Entry):
+    """A cuboid in the base frame at the reference posture."""
+
+    size_mm: tuple[Size, Size, Size] = Field(description="Edge lengths along its own x, y, z.")
+    center_mm: Coordinates = Field(description="Centre.")
+    rpy_deg: Angles = Field((0.0, 0.0, 0.0), description="Roll, pitch and yaw about fixed axes.")
+
+
+class PlacedSphereEntry(SphereEntry):
+    """A ball in the base frame at the reference posture."""
+
+    center_mm: Coordinates = Field(description="Centre.")
+
+
+class PlacedMeshEntry(Entry):
+    """A mesh in the base frame at the reference posture."""
+
+    file: Text = Field(description="STL, OBJ or PLY file, relative to the table.")
+    unit: MeshUnit = Field(description="Unit of the file.")
+    at: PoseEntry = Field(PoseEntry(), description="Pose of the drawing in the base frame.")
+
+
+class LinkBodyEntry(Entry):
+    """A solid fixed to one link."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
+
+    link: Text = Field(description="The word base, or the joint that carries the solid.")
+    name: Name | None = Field(None, description="Name in reports; the link's name, numbered, when absent.")
+    box: PlacedBoxEntry | None = Field(None, description="Cuboid.")
+    cylinder: SegmentEntry | None = Field(None, description="Cylinder with flat ends.")
+    capsule: SegmentEntry | None = Field(None, description="Cylinder with round ends beyond the segment.")
+    sphere: PlacedSphereEntry | None = Field(None, description="Ball.")
+    mesh: PlacedMeshEntry | None = Field(None, description="Mesh from a file.")
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Self:
+        """Exactly one shape, and a cylinder with two ends."""
+        require_one(self, SOLID_SHAPES)
+        if self.cylinder is not None and self.cylinder.from_mm == self.cylinder.to_mm:
+            raise rule("expected another point than from_mm, got the same", "cylinder.to_mm")
+        return self
+
+
+class RobotTableDocument(Entry):
+    """A whole robot file."""
+
+    robot: Name = Field(description="Name of the robot model.")
+    source: Text = Field("not stated", description="Where the figures come from.")
+    joints: dict[Name, JointEntry] = Field(
+        min_length=1, max_length=AXIS_LIMIT, description="Joints by name, from the base to the flange."
+    )
+    flange: PoseEntry = Field(
+        description="Flange (mechanical interface) in the base frame at the reference posture, z out of the flange."
+    )
+    bodies: tuple[LinkBodyEntry, ...] = Field(
+        (), max_length=200, description="Solids of the links, in the base frame at the reference posture."
+    )

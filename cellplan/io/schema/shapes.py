@@ -1,0 +1,178 @@
+"""Shapes of parts, tools and surroundings as they are written in a cell file."""
+
+from typing import ClassVar, Literal, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from cellplan.io.schema.common import (
+    AxisName,
+    Coordinate,
+    Entry,
+    PoseEntry,
+    Size,
+    Text,
+    one_of_keys,
+    require_one,
+    rule,
+)
+
+PART_SHAPES = ("box", "cylinder", "sphere", "mesh")
+SOLID_SHAPES = ("box", "cylinder", "capsule", "sphere", "mesh")
+OBSTACLE_SHAPES = ("plane", *SOLID_SHAPES)
+
+
+class BoxEntry(Entry):
+    """A cuboid centred on its frame."""
+
+    size_mm: tuple[Size, Size, Size] = Field(description="Edge lengths along x, y, z.")
+
+
+class CylinderEntry(Entry):
+    """A circular cylinder centred on its frame."""
+
+    radius_mm: Size = Field(description="Radius.")
+    length_mm: Size = Field(description="Length along its axis.")
+    axis: AxisName = Field("z", description="Direction of its axis.")
+
+
+class CapsuleEntry(Entry):
+    """A cylinder with round ends, centred on its frame."""
+
+    radius_mm: Size = Field(description="Radius.")
+    length_mm: Size = Field(description="Length from end to end, round ends included.")
+    axis: AxisName = Field("z", description="Direction of its axis.")
+
+    @model_validator(mode="after")
+    def _has_round_ends(self) -> Self:
+        """The round ends need room."""
+        if self.length_mm < 2.0 * self.radius_mm:
+            raise rule(f"expected a length of at least {2.0 * self.radius_mm:g} (two radii)", "length_mm")
+        return self
+
+
+class SphereEntry(Entry):
+    """A ball centred on its frame."""
+
+    radius_mm: Size = Field(description="Radius.")
+
+
+class ToolRoundEntry(Entry):
+    """A round tool along its z axis, from -length to 0, so that it ends at the tip."""
+
+    radius_mm: Size = Field(description="Radius.")
+    length_mm: Size = Field(description="Length from end to end.")
+
+
+class ToolCapsuleEntry(ToolRoundEntry):
+    """A round tool with round ends along its z axis, from -length to 0, so that it ends at the tip."""
+
+    @model_validator(mode="after")
+    def _has_round_ends(self) -> Self:
+        """The round ends need room."""
+        if self.length_mm < 2.0 * self.radius_mm:
+            raise rule(f"expected a length of at least {2.0 * self.radius_mm:g} (two radii)", "length_mm")
+        return self
+
+
+class PlaneEntry(Entry):
+    """A floor: everything below it is solid."""
+
+    z_mm: Coordinate = Field(description="Height of the floor in the world.")
+
+
+MeshUnit = Literal["mm", "m", "inch"]
+_UNIT_RULE = "missing, expected the unit of the mesh: mm, m or inch"
+
+
+def require_unit(mesh: str | None, unit: str | None) -> None:
+    """A mesh file does not say its unit, so the cell must; nothing else may."""
+    if mesh is not None and unit is None:
+        raise rule(_UNIT_RULE, "unit")
+    if mesh is None and unit is not None:
+        raise rule("unexpected key, a unit goes with a mesh only", "unit")
+
+
+class PartShapeEntry(Entry):
+    """Exactly one of box, cylinder, sphere and mesh."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PART_SHAPES))
+
+    box: BoxEntry | None = Field(None, description="Cuboid centred on the part frame.")
+    cylinder: CylinderEntry | None = Field(None, description="Circular cylinder centred on the part frame.")
+    sphere: SphereEntry | None = Field(None, description="Ball centred on the part frame.")
+    mesh: Text | None = Field(None, description="STL, OBJ or PLY file of a closed surface, drawn in the part frame.")
+    unit: MeshUnit | None = Field(None, description="Unit of the mesh file; required with a mesh.")
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Self:
+        """Exactly one shape."""
+        require_one(self, PART_SHAPES)
+        require_unit(self.mesh, self.unit)
+        return self
+
+
+class ToolShapeEntry(Entry):
+    """Exactly one of box, cylinder, capsule, sphere and mesh; it ends at the tool tip."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
+
+    box: BoxEntry | None = Field(None, description="Cuboid; along the tool's z axis it reaches from -size to 0.")
+    cylinder: ToolRoundEntry | None = Field(None, description="Cylinder along the tool's z axis, from -length to 0.")
+    capsule: ToolCapsuleEntry | None = Field(None, description="Capsule along the tool's z axis, from -length to 0.")
+    sphere: SphereEntry | None = Field(None, description="Ball that touches the tool tip from behind.")
+    mesh: Text | None = Field(None, description="STL, OBJ or PLY file, drawn in the flange frame.")
+    unit: MeshUnit | None = Field(None, description="Unit of the mesh file; required with a mesh.")
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Self:
+        """Exactly one shape."""
+        require_one(self, SOLID_SHAPES)
+        require_unit(self.mesh, self.unit)
+        return self
+
+
+class ToolBodyEntry(Entry):
+    """A further solid of a tool, given in the flange frame."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
+
+    box: BoxEntry | None = Field(None, description="Cuboid.")
+    cylinder: CylinderEntry | None = Field(None, description="Circular cylinder.")
+    capsule: CapsuleEntry | None = Field(None, description="Cylinder with round ends.")
+    sphere: SphereEntry | None = Field(None, description="Ball.")
+    mesh: Text | None = Field(None, description="STL, OBJ or PLY file.")
+    unit: MeshUnit | None = Field(None, description="Unit of the mesh file; required with a mesh.")
+    at: PoseEntry = Field(PoseEntry(), description="Pose of the solid in the flange frame.")
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Self:
+        """Exactly one shape."""
+        require_one(self, SOLID_SHAPES)
+        require_unit(self.mesh, self.unit)
+        return self
+
+
+class ObstacleEntry(Entry):
+    """A fixed thing in the cell: exactly one shape and its pose."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*OBSTACLE_SHAPES))
+
+    plane: PlaneEntry | None = Field(None, description="Floor of the cell.")
+    box: BoxEntry | None = Field(None, description="Cuboid.")
+    cylinder: CylinderEntry | None = Field(None, description="Circular cylinder.")
+    capsule: CapsuleEntry | None = Field(None, description="Cylinder with round ends.")
+    sphere: SphereEntry | None = Field(None, description="Ball.")
+    mesh: Text | None = Field(None, description="STL, OBJ or PLY file.")
+    unit: MeshUnit | None = Field(None, description="Unit of the mesh file; required with a mesh.")
+    at: PoseEntry | None = Field(
+        None, description="Pose of the shape in the world; the world frame when absent. Not with a plane."
+    )
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Self:
+        """Exactly one shape; a floor has its height and no pose."""
+        require_one(self, OBSTACLE_SHAPES)
+        require_unit(self.mesh, self.unit)
+        if self.plane is not None and self.at is not None:
+            raise rule("unexpected key, a plane is placed by z_mm only", "at")
+        return self

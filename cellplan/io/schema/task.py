@@ -1,0 +1,247 @@
+"""Tasks of a cell: what each operator does on the part, where and when."""
+
+from typing import Annotated, ClassVar, Final, Literal, Self
+
+from pydantic import ConfigDict, Field, Tag, model_validator
+
+from cellplan.io.schema.common import (
+    Angle,
+    Coordinate,
+    Entry,
+    Name,
+    PlaneCoordinates,
+    SignedAxis,
+    Size,
+    Text,
+    Vector,
+    by_kind,
+    one_of_keys,
+    require_one,
+    rule,
+)
+from cellplan.io.schema.robot import SlidingSpeed
+
+PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
+SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
+LONGEST_S: Final = 1e6  # [s] eleven days: longer is a slip of the unit
+
+PlaneWord = Literal["xy", "yz", "xz"]
+Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
+
+DIRECTION_WORDS: Final = "+x, -x, +y, -y, +z, -z or a direction [x, y, z]"
+TOOL_AXIS_WORDS: Final = f"normal, {DIRECTION_WORDS}"
+LAW_WORDS: Final = "constant, trapezoid, quintic or {trapezoid: {ramp: 0.25}}"
+CORNER_WORDS: Final = "stop or {blend_mm: 2}"
+CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
+
+
+class CircleEntry(Entry):
+    """A circle; it starts on the plane's first axis."""
+
+    radius_mm: Size = Field(description="Radius.")
+    plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
+    center_mm: PlaneCoordinates = Field((0.0, 0.0), description="Centre on the plane's two axes.")
+
+
+class RectangleEntry(Entry):
+    """A rectangle; it starts at the (+, +) corner."""
+
+    sides_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
+    plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
+    center_mm: PlaneCoordinates = Field((0.0, 0.0), description="Centre on the plane's two axes.")
+    angle_deg: Angle = Field(0.0, description="Turn in the plane, from the first axis towards the second.")
+
+
+class RhombusEntry(Entry):
+    """A rhombus; it starts on the first axis."""
+
+    diagonals_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
+    plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
+    center_mm: PlaneCoordinates = Field((0.0, 0.0), description="Centre on the plane's two axes.")
+    angle_deg: Angle = Field(0.0, description="Turn in the plane, from the first axis towards the second.")
+
+
+class PolylineEntry(Entry):
+    """Points joined by straight sides: two coordinates each in a plane, or three in space."""
+
+    points_mm: tuple[tuple[Coordinate, ...], ...] = Field(
+        min_length=2, description="Points, all [u, v] on the plane's axes or all [x, y, z] in the part frame."
+    )
+    plane: PlaneWord | None = Field(
+        None, description="Plane of the part frame; required with [u, v], not with [x, y, z]."
+    )
+    closed: bool = Field(False, description="Whether the last point is joined to the first.")
+
+    @model_validator(mode="after")
+    def _is_drawable(self) -> Self:
+        """Points of one dimension, a plane where one is needed, no side without length."""
+        sizes = [len(point) for point in self.points_mm]
+        for index, size in enumerate(sizes):
+            if size not in {2, 3} or size != sizes[0]:
+                allowed = sizes[0] if sizes[0] in {2, 3} else "2 or 3"
+                raise rule(f"expected a list of {allowed} numbers, got {size}", f"points_mm[{index}]")
+        if sizes[0] == 2 and self.plane is None:
+            raise rule("missing, expected the plane of the points: xy, yz or xz", "plane")
+        if sizes[0] == 3 and self.plane is not None:
+            raise rule("unexpected key, points [x, y, z] need no plane", "plane")
+        if self.closed and len(sizes) < 3:
+            raise rule(f"expected at least 3 points for a closed path, got {len(sizes)}", "points_mm")
+        self._require_sides()
+        return self
+
+    def _require_sides(self) -> None:
+        """Refuse equal neighbours, and on a closed path a last point on the first."""
+        points = self.points_mm
+        pairs = list(zip(points, points[1:], range(1, len(points)), strict=False))
+        if self.closed:
+            pairs.append((points[0], points[-1], len(points) - 1))
+        for a, b, index in pairs:
+            if sum((u - v) ** 2 for u, v in zip(a, b, strict=True)) < SHORTEST_SIDE_MM**2:
+                other = "first" if self.closed and a is points[0] and index == len(points) - 1 else "point before"
+                raise rule(f"expected another point than the {other}, got the same", f"points_mm[{index}]")
+
+
+class CsvEntry(Entry):
+    """Tool targets from a CSV file."""
+
+    file: Text = Field(description="File with the header x_mm,y_mm,z_mm and optionally i,j,k or qw,qx,qy,qz.")
+    smooth: bool = Field(True, description="Whether a curve is laid through the points instead of straight sides.")
+    closed: bool = Field(False, description="Whether the last point is joined to the first.")
+
+
+CsvChoice = Annotated[
+    Annotated[Text, Tag(f"<{CSV_WORDS}>")] | Annotated[CsvEntry, Tag("<mapping>")],
+    by_kind(CSV_WORDS, mapping=dict),
+]
+Direction = Annotated[
+    Annotated[SignedAxis, Tag(f"<{DIRECTION_WORDS}>")] | Annotated[Vector, Tag("<list>")],
+    by_kind(DIRECTION_WORDS, list=tuple),
+]
+ToolAxis = Annotated[
+    Annotated[Literal["normal", "+x", "-x", "+y", "-y", "+z", "-z"], Tag(f"<{TOOL_AXIS_WORDS}>")]
+    | Annotated[Vector, Tag("<list>")],
+    by_kind(TOOL_AXIS_WORDS, list=tuple),
+]
+
+
+class RampEntry(Entry):
+    """Settings of the trapezoid law."""
+
+    ramp: Annotated[float, Field(gt=0.0, le=0.5)] = Field(
+        0.25, description="Share of the time of each stretch spent speeding up, and the same slowing down."
+    )
+
+
+class TrapezoidEntry(Entry):
+    """The trapezoid law with its ramp."""
+
+    trapezoid: RampEntry = Field(description="Settings of the trapezoid law.")
+
+
+class BlendEntry(Entry):
+    """Rounded corners."""
+
+    blend_mm: Size = Field(description="Distance from a corner at which its rounding begins.")
+
+
+TimeLawChoice = Annotated[
+    Annotated[Literal["constant", "trapezoid", "quintic"], Tag(f"<{LAW_WORDS}>")]
+    | Annotated[TrapezoidEntry, Tag("<mapping>")],
+    by_kind(LAW_WORDS, mapping=dict),
+]
+CornerChoice = Annotated[
+    Annotated[Literal["stop"], Tag(f"<{CORNER_WORDS}>")] | Annotated[BlendEntry, Tag("<mapping>")],
+    by_kind(CORNER_WORDS, mapping=dict),
+]
+
+
+class PathEntry(Entry):
+    """Exactly one path, and how it is laid on the part."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PATHS))
+
+    circle: CircleEntry | None = Field(None, description="Circle.")
+    rectangle: RectangleEntry | None = Field(None, description="Rectangle.")
+    rhombus: RhombusEntry | None = Field(None, description="Rhombus.")
+    polyline: PolylineEntry | None = Field(None, description="Points joined by straight sides.")
+    csv: CsvChoice | None = Field(None, description="Tool targets from a file.")
+    project: Direction | None = Field(
+        None, description="Side of the part that the path is laid on, seen from the part frame; absent: used as drawn."
+    )
+    offset_mm: Coordinate | None = Field(
+        None, description="Shift of a planar path that is not projected along the plane's normal axis; 0 when absent."
+    )
+
+    @model_validator(mode="after")
+    def _is_one_path(self) -> Self:
+        """Exactly one path; an offset goes with a planar path that is used as drawn."""
+        require_one(self, PATHS)
+        if self.offset_mm is not None and not self.is_planar:
+            raise rule("unexpected key, only a path in a plane has an offset", "offset_mm")
+        if self.offset_mm is not None and self.project is not None:
+            raise rule("unexpected key, a projected path lies on the surface", "offset_mm")
+        return self
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether the path is drawn in a plane of the part frame."""
+        if self.polyline is not None:
+            return self.polyline.plane is not None
+        return self.csv is None
+
+
+class ToleranceEntry(Entry):
+    """Largest allowed tool error on the part."""
+
+    position_mm: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(0.1, description="Largest position error.")
+    orientation_deg: Annotated[float, Field(gt=0.0, le=180.0)] = Field(0.01, description="Largest orientation error.")
+
+
+TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
+
+
+class TaskEntry(Entry):
+    """One operator's work on the part."""
+
+    robot: Name = Field(description="Robot that does the task; a robot has at most one.")
+    path: PathEntry = Field(description="Path of the tool tip on the part.")
+    tool_axis: ToolAxis | None = Field(
+        None,
+        description="Direction of the tool's z axis in the part frame; normal, the default, points into the surface or "
+        "takes the file's orientations.",
+    )
+    tool_x: Direction = Field("+x", description="Direction in the part frame that the tool's x axis leans to.")
+    tool_turn_deg: Angle = Field(
+        0.0, description="Angle by which the tool turns about its own z axis, evenly over the length of the path."
+    )
+    axes: tuple[TaskAxis, ...] = Field(
+        ("x", "y", "z", "rx", "ry", "rz"),
+        min_length=1,
+        description="Components of the motion that are prescribed, in the part frame.",
+    )
+    free: tuple[Literal["spin"], ...] = Field(
+        (), description="[spin] leaves the rotation about the tool's z axis open."
+    )
+    tolerance: ToleranceEntry = Field(ToleranceEntry(), description="Largest allowed tool error.")
+    start_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(0.0, description="Start on the common clock.")
+    duration_s: Seconds | None = Field(
+        None, description="Time for the whole path; the rest of the motion's duration when absent. Excludes feed_mm_s."
+    )
+    feed_mm_s: SlidingSpeed | None = Field(
+        None, description="Largest speed along the path on the surface; excludes duration_s."
+    )
+    time_law: TimeLawChoice | None = Field(
+        None, description="Law of each stretch between stops; the motion's when absent."
+    )
+    corners: CornerChoice | None = Field(None, description="Stop at corners or round them; the motion's when absent.")
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        """Duration or feed; each axis once; a free spin leaves an axis to point."""
+        if self.duration_s is not None and self.feed_mm_s is not None:
+            raise rule("expected either duration_s or feed_mm_s, got both", "feed_mm_s")
+        for name, words in (("axes", self.axes), ("free", self.free)):
+            for index, word in enumerate(words):
+                if word in words[:index]:
+                    raise rule(f"expected each word once, got '{word}' twice", f"{name}[{index}]")
+        return self
