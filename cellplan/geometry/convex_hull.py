@@ -11,13 +11,24 @@ from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 
 FLAT: Final = 1e-9  # [-] of the extent: thinner meshes have no hull with an inside
-OUTSIDE_STEPS: Final = (1e-11, 1e-9, 1e-7)  # [-] of the extent: points nearer than this to a face count as on it
+OUTSIDE_STEPS: Final = (
+    1e-11,
+    1e-13,
+    1e-12,
+    1e-10,
+)  # [-] of the extent: nearer points count as on a face; tried in turn
+HULL_ROOM: Final = 1e-7  # [-] of the extent by which a vertex may stick out of the finished hull
+MAX_CORNERS: Final = 2000  # the work grows with the square of their number
+ROWS: Final = 1000  # points tested against all faces at once
 
 Indices = NDArray[np.int64]
 
 
 def convex_hull(mesh: Mesh) -> Mesh:
     """Smallest convex mesh that holds all vertices, up to 1e-7 of the extent; closed, facing outward.
+
+    Very fine round meshes get a slightly larger one: a hull over some 2000 of their vertices, blown up until it holds
+    the others too.
 
     Raises:
         InputError: The mesh is flat.
@@ -29,8 +40,9 @@ def convex_hull(mesh: Mesh) -> Mesh:
         raise InputError(f"{mesh.source}: expected a body with a volume, got a flat one")
     for step in OUTSIDE_STEPS:
         faces = _grow(points, first, room=step * extent)
-        if count_edges(faces).is_closed:
-            return make_mesh(points, faces, source=mesh.source)
+        hull_points = _blown_up(points, faces)
+        if count_edges(faces).is_closed and _holds(hull_points, faces, points, room=HULL_ROOM * extent):
+            return make_mesh(hull_points, faces, source=mesh.source)
     raise InputError(f"{mesh.source}: expected a mesh with a convex hull, got one too ill-shaped for it")
 
 
@@ -54,10 +66,12 @@ def _first_tetrahedron(points: Array, room: float) -> Indices | None:
 
 
 def _grow(points: Array, faces: Indices, *, room: float) -> Indices:
-    """Take in the farthest outside point until none lies more than ``room`` outside."""
+    """Take in the farthest outside point until none lies more than ``room`` outside, or the hull is fine enough."""
     normals, offsets = _planes(points, faces)
     owner, height = _assign(points, np.arange(len(points)), normals, offsets)
-    while height.max() > room:
+    corners = 4
+    while height.max() > room and corners < MAX_CORNERS:
+        corners += 1
         apex = int(np.argmax(height))
         seen = _seen_faces(faces, normals @ points[apex] - offsets > room, start=int(owner[apex]))
         horizon = _horizon(faces[seen])
@@ -77,6 +91,31 @@ def _grow(points: Array, faces: Indices, *, room: float) -> Indices:
         owner[loose] += len(faces) - len(fresh)
         height[loose[height[loose] <= room]] = -np.inf  # inside for good: the hull only grows
     return faces
+
+
+def _blown_up(points: Array, faces: Indices) -> Array:
+    """Vertices moved away from the middle of an unfinished hull until its faces hold all points."""
+    corners = np.unique(faces)
+    if len(corners) < MAX_CORNERS:
+        return points
+    middle = points[corners].mean(axis=0)
+    normals, offsets = _planes(points, faces)
+    depth = offsets - normals @ middle
+    share = max(
+        float(((points[first : first + ROWS] - middle) @ normals.T / depth).max())
+        for first in range(0, len(points), ROWS)
+    )
+    grown: Array = middle + max(share, 1.0) * (points - middle)
+    return grown
+
+
+def _holds(hull: Array, faces: Indices, points: Array, *, room: float) -> bool:
+    """Whether no point sticks out of any face by more than the room: proof of the result, however it was found."""
+    normals, offsets = _planes(hull, faces)
+    return all(
+        bool(np.all(points[first : first + ROWS] @ normals.T - offsets <= room))
+        for first in range(0, len(points), ROWS)
+    )
 
 
 def _planes(points: Array, faces: Indices) -> tuple[Array, Array]:
