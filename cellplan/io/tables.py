@@ -2,7 +2,7 @@
 
 A table is ASCII-plain text: header lines that start with ``#``, one line of column names with their units, one row per
 sample. The written number is the truth: angles and lengths are rounded to twelve decimals of a degree or a millimetre,
-written so that they read back to that very number, and everything that is verified is verified on what was read back.
+and every number is written so that it reads back to itself; what is verified is what was read back.
 """
 
 import hashlib
@@ -16,21 +16,19 @@ from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 from cellplan.model.motion import JointTable
+from cellplan.model.report import CAUTION
 
 TITLE = "cellplan joint table v1"
-CAUTION = (
-    "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
-)
 NOT_CHECKED = "not checked"
 
-DECIMALS = 12  # [-] of a degree, a millimetre or a second: far below the noise of the arithmetic, exact to read back
+DECIMALS = 12  # [-] of a degree or a millimetre: far below the noise of the arithmetic, and pleasant to read
 MM_PER_M = 1e3  # [mm/m]
 CLOCK_TOL = 1e-6  # [s] room for steps that are not whole decimals, such as 1/3000 s
 MAX_NUMBER = 1e9  # [deg], [mm] or [s]: beyond it twelve decimals would be pretence
 
 Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
-_NUMBER = r"-?[0-9]{1,20}(?:\.[0-9]{1,40})?"
+_NUMBER = r"-?[0-9]{1,20}(?:\.[0-9]{1,400})?"
 _FIELD = re.compile(_NUMBER)
 _UNITS = ("deg", "mm")
 _SHA256 = "sha256 "
@@ -158,18 +156,18 @@ def _render_rows(robot: Robot, times: Array, q: Array) -> str:
             )
     names = ",".join(["time_s", *(f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in joints)])
     scaled = (np.rad2deg(q[:, i]) if joint.is_revolute else q[:, i] * MM_PER_M for i, joint in enumerate(joints))
-    written = (_plain_decimals(column) for column in (times, *scaled))
+    written = (_plain_decimals(column) for column in (times, *(np.round(column, DECIMALS) for column in scaled)))
     return "\n".join([names, *map(",".join, zip(*written, strict=True))]) + "\n"
 
 
 def _plain_decimals(column: Array) -> list[str]:
-    """The shortest text of each number, rounded to ``DECIMALS``, that reads back to the rounded number."""
+    """The shortest text of each number that reads back to it, without exponents and without -0."""
     if not np.all(np.abs(column) < MAX_NUMBER):
         raise ValueError("joint table: a number is not finite or absurdly large")
-    rounded = np.round(column, DECIMALS) + 0.0  # + 0.0 turns -0.0 into 0.0
-    texts = [repr(number) for number in rounded.tolist()]
-    for index in np.flatnonzero((np.abs(rounded) < 1e-3) & (rounded != 0.0)):  # repr would use an exponent here
-        texts[index] = f"{rounded[index]:.{DECIMALS}f}".rstrip("0")
+    numbers = column + 0.0  # turns -0.0 into 0.0
+    texts = [repr(number) for number in numbers.tolist()]
+    for index in np.flatnonzero((np.abs(numbers) < 1e-3) & (numbers != 0.0)):  # repr would use an exponent here
+        texts[index] = np.format_float_positional(numbers[index], trim="0")
     return texts
 
 

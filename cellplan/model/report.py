@@ -6,6 +6,10 @@ from enum import StrEnum
 
 from cellplan.geometry.transforms import Array
 
+CAUTION = (
+    "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
+)
+
 
 class ClearanceClass(StrEnum):
     """What keeps its distance from what."""

@@ -1,0 +1,260 @@
+"""``report.html``: the verdict of a run and everything behind it, as one page that needs nothing but itself."""
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from functools import cache
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from cellplan.model.cell import Cell
+from cellplan.model.report import Check, Report
+from cellplan.report.json_report import summary_record
+from cellplan.report.palette import ROBOTS, robot_colours
+from cellplan.report.record import Provenance, Record, report_record
+
+MODES = {
+    "simultaneous": "all robots move",
+    "pairwise": "the positioner and one operator move at a time",
+    "part_at_rest": "the positioner stands still",
+}
+CHECKS = {
+    "joint_position": "joint positions within their limits",
+    "joint_velocity": "joint velocities within their limits",
+    "joint_acceleration": "joint accelerations within their limits",
+    "position_error": "tool position on the part within tolerance",
+    "orientation_error": "tool orientation on the part within tolerance",
+    "clearance": "required clearance kept",
+    "collision": "no collision",
+}
+CLASSES = {
+    "whole": "whole cell",
+    "robot_robot": "robot to robot",
+    "self": "robot to itself",
+    "part": "part",
+    "environment": "environment",
+}
+NARROW = 0.05  # [-] of the half range: a joint whose margin is smaller is marked
+FAST = 0.95  # [-] of the speed limit: likewise
+ROUNDING = 1e-9  # [-] of a tenth: lets 37.0 that is stored as 36.99999999999 stay 37.0
+SMALLEST_SHOWN = 1e-6  # [mm] or [deg]: below it more digits tell nothing
+
+
+def report_html(report: Report, *, cell: Cell, provenance: Provenance, plots: Mapping[str, bytes]) -> str:
+    """The page of one run.
+
+    Args:
+        report: The run.
+        cell: Its cell.
+        provenance: Where the result comes from.
+        plots: SVG pictures by file name, as ``draw_plots`` returns them; others are ignored.
+    """
+    record = report_record(report, cell=cell, provenance=provenance)
+    return _render(
+        "report.html",
+        record,
+        cell,
+        {
+            "figures": _figures(record),
+            "check_groups": _check_groups(report.checks),
+            "shares": _shares(record),
+            "excluded": _by_reason(record["exclusions"]),
+            "plots": _inline_plots(plots),
+        },
+    )
+
+
+def overview_html(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> str:
+    """The page of a job done in several runs, with a link to the page of each; see ``summary_record``."""
+    record = summary_record(reports, cell=cell, provenance=provenance)
+    return _render("overview.html", record, cell, {"figures": _figures(record)})
+
+
+def _render(template: str, record: Record, cell: Cell, parts: Mapping[str, object]) -> str:
+    words = {"modes": MODES, "classes": CLASSES, "narrow": NARROW, "fast": FAST}
+    colours = robot_colours(cell)
+    return _environment().get_template(template).render(r=record, colours=colours, ink=ROBOTS[-1], **words, **parts)
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("cellplan.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "fixed": _fixed,
+        "small": _small,
+        "percent": _percent,
+        "floored": _floored,
+        "range_bar": _range_bar,
+    }
+    return environment
+
+
+def _fixed(value: float | None, digits: int = 1) -> str:
+    """The value with so many decimals; a dash where there is none."""
+    if value is None:
+        return "–"
+    text = f"{value:.{digits}f}"
+    return f"{0.0:.{digits}f}" if float(text) == 0.0 else text.replace("-", "−")
+
+
+def _small(value: float | None) -> str:
+    """The value with three telling digits, never with an exponent."""
+    if value is None:
+        return "–"
+    if value == 0.0:
+        return "0"
+    if abs(value) < SMALLEST_SHOWN:
+        return f"< {SMALLEST_SHOWN:.6f}"
+    text = f"{float(f'{value:.3g}'):.9f}".rstrip("0").rstrip(".")
+    return text.replace("-", "−")
+
+
+def _floored(value: float | None) -> str:
+    """The value with one decimal, rounded down: never more clearance or margin than there is."""
+    return "–" if value is None else _fixed(math.floor(10.0 * value + ROUNDING) / 10.0, 1)
+
+
+def _percent(value: float | None, digits: int = 0) -> str:
+    """A share as a percentage, with more digits where rounding would hide on which side of the whole it lies."""
+    if value is None:
+        return "–"
+    return f"{_fixed(100.0 * value, 2 if value != 1.0 and abs(value - 1.0) < 0.01 else digits)} %"
+
+
+def _range_bar(joint: Record) -> Record | None:
+    """Where the limits and the reached range of a joint lie on a bar from 0 to 100; None for an endless joint."""
+    lower, upper = joint["lower"], joint["upper"]
+    if lower is None or upper is None:
+        return None
+    left, right = min(lower, joint["min"]), max(upper, joint["max"])
+    scale = 100.0 / ((right - left) or 1.0)
+    places = {"lower": lower, "upper": upper, "min": joint["min"], "max": joint["max"]}
+    return {name: round(scale * (value - left), 2) for name, value in places.items()}
+
+
+def _figures(record: Record) -> list[Record]:
+    """The key figures: what is worst, where and when."""
+    cycle = {
+        "label": "Cycle time",
+        "value": _fixed(record["cycle_time_s"], 2),
+        "unit": "s",
+        "detail": f"{record['samples']} samples, {_small(1e3 * record['step_s'])} ms apart"
+        if "samples" in record
+        else f"{len(record['runs'])} runs, one after another",
+    }
+    return [cycle, *_error_figures(record["tasks"]), *_joint_figures(record["joints"]), _clearance_figure(record)]
+
+
+def _error_figures(tasks: Record) -> list[Record]:
+    """Largest position and orientation error of all tasks."""
+    return [_error_figure(tasks, "position", "mm"), _error_figure(tasks, "orientation", "deg")] if tasks else []
+
+
+def _error_figure(tasks: Record, name: str, unit: str) -> Record:
+    key = f"max_{name}_error_{unit}"
+    task = max(tasks, key=lambda task: tasks[task][key])
+    worst, allowed = tasks[task], tasks[task]["tolerance"][f"{name}_{unit}"]
+    return {
+        "label": f"Largest {name} error",
+        "value": _small(worst[key]),
+        "unit": unit,
+        "detail": f"{task} ({worst['robot']}) at {_fixed(worst[f'max_{name}_error_at_s'], 3)} s; "
+        f"allowed {_small(allowed)} {unit}",
+        "is_bad": worst[key] > allowed,
+    }
+
+
+def _joint_figures(joints: Record) -> list[Record]:
+    """Smallest joint margin, of turning joints where there are any, and highest share of a speed limit."""
+    uses = [(robot, name, joint) for robot, named in joints.items() for name, joint in named.items()]
+    figures = []
+    bounded = [use for use in uses if use[2]["margin"] is not None]
+    turning = [use for use in bounded if use[2]["unit"] == "deg"]
+    if bounded:
+        robot, name, joint = min(turning or bounded, key=lambda use: use[2]["margin"])
+        figures.append(
+            {
+                "label": "Smallest joint margin",
+                "value": _floored(joint["margin"]),
+                "unit": joint["unit"],
+                "detail": f"{robot} {name} at {_fixed(joint['margin_at_s'], 3)} s; "
+                f"allowed {_fixed(joint['lower'], 1)} to {_fixed(joint['upper'], 1)} {joint['unit']}",
+                "is_bad": joint["margin"] < 0.0,
+            }
+        )
+    moving = [use for use in uses if use[2]["velocity_ratio"] is not None]
+    if moving:
+        robot, name, joint = max(moving, key=lambda use: use[2]["velocity_ratio"])
+        figures.append(
+            {
+                "label": "Highest joint speed",
+                "value": _percent(joint["velocity_ratio"]).removesuffix(" %"),
+                "unit": "% of limit",
+                "detail": f"{robot} {name} at {_fixed(joint['peak_velocity_at_s'], 3)} s; "
+                f"{_fixed(joint['peak_velocity'], 1)} of {_fixed(joint['velocity_limit'], 1)} {joint['unit']}/s",
+                "is_bad": joint["velocity_ratio"] > 1.0,
+            }
+        )
+    return figures
+
+
+def _clearance_figure(record: Record) -> Record:
+    whole = record["clearance"]["whole"]
+    required = f"required {_small(record['required_clearance_mm'])} mm"
+    figure = {"label": "Smallest clearance", "value": _floored(whole["minimum_mm"]), "unit": "mm", "detail": required}
+    if whole["minimum_mm"] is not None:
+        where = " and ".join(whole["pair"] or ())
+        figure["detail"] = f"{where} at {_fixed(whole['at_s'], 3)} s; {required}"
+        figure["is_bad"] = whole["minimum_mm"] < record["required_clearance_mm"]
+    return figure
+
+
+def _check_groups(checks: Iterable[Check]) -> list[Record]:
+    """How many checks of each kind passed, in the order in which they were made."""
+    groups: dict[str, Record] = {}
+    for check in checks:
+        title = CHECKS.get(check.name, check.name.replace("_", " "))
+        group = groups.setdefault(check.name, {"title": title, "count": 0, "passed": 0})
+        group["count"] += 1
+        group["passed"] += check.passed
+    return list(groups.values())
+
+
+def _shares(record: Record) -> list[Record]:
+    """Share of all motion of the positioner and of the operators together."""
+    totals = {"positioner": 0.0, "operator": 0.0, "idle": 0.0}
+    for entry in record["motion_share"].values():
+        totals[entry["role"]] += entry["share"] or 0.0
+    names = {"positioner": "positioner", "operator": "operators", "idle": "robots without a task"}
+    return [{"name": names[role], "share": share} for role, share in totals.items() if share > 0.0]
+
+
+def _by_reason(exclusions: Iterable[Record]) -> dict[str, list[str]]:
+    """Pairs that were not checked, by reason."""
+    groups: dict[str, list[str]] = {}
+    for exclusion in exclusions:
+        groups.setdefault(exclusion["reason"], []).append(" – ".join(exclusion["pair"]))
+    return groups
+
+
+def _inline_plots(plots: Mapping[str, bytes]) -> dict[str, str]:
+    """SVG pictures ready to stand in the page, by file name without its ending."""
+    drawings = {name.removesuffix(".svg"): data for name, data in plots.items() if name.endswith(".svg")}
+    return {name: _inline_svg(data.decode(), prefix=f"p{i}-") for i, (name, data) in enumerate(drawings.items())}
+
+
+def _inline_svg(text: str, *, prefix: str) -> str:
+    """The drawing without its file header, with names of its own so that several can share a page."""
+    body = text[text.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)
+    head, rest = body.split(">", 1)
+    head = re.sub(r'\s(?:width|height)="[^"]*"', "", head) + ' aria-hidden="true" focusable="false"'
+    rest = re.sub(r'\bid="', f'id="{prefix}', rest)
+    rest = re.sub(r'(url\(|href=")#', rf"\g<1>#{prefix}", rest)
+    return f"{head}>{rest}"

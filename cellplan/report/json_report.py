@@ -1,0 +1,117 @@
+"""``report.json``: the record of a run for scripts; plain JSON in printed units, the same bytes for the same run."""
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from cellplan.model.cell import Cell
+from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, JointUse, Report
+from cellplan.report.record import (
+    SCHEMA,
+    Provenance,
+    Record,
+    check_record,
+    clearance_record,
+    joints_record,
+    number,
+    origin_record,
+    report_record,
+    status,
+    tasks_record,
+)
+
+
+def report_json(report: Report, *, cell: Cell, provenance: Provenance) -> str:
+    """The record of one run as text; values without a finite number are null."""
+    return _as_text(report_record(report, cell=cell, provenance=provenance))
+
+
+def summary_json(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> str:
+    """The record of a job done in several runs, one after another, as text; see ``summary_record``."""
+    return _as_text(summary_record(reports, cell=cell, provenance=provenance))
+
+
+def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> Record:
+    """The record of a job done in several runs, one after another.
+
+    Tasks, joints and clearance are merged over the runs, the worst counts; everything else stands in the report of
+    each run.
+
+    Args:
+        reports: Report by the name of the run, which is its task and its folder.
+        cell: The cell.
+        provenance: Where the result comes from.
+    """
+    runs = list(reports.values())
+    minima = _merge_minima(runs)
+    return {
+        "schema": SCHEMA,
+        "cell": cell.name,
+        "status": "passed" if all(report.passed for report in runs) else "failed",
+        "mode": runs[0].mode,
+        "cycle_time_s": number(sum(report.cycle_time for report in runs)),
+        "runs": {name: _run_record(name, report, cell) for name, report in reports.items()},
+        "tasks": {name: record for report in runs for name, record in tasks_record(report, cell).items()},
+        "joints": joints_record(merge_joint_uses(use for report in runs for use in report.joints)),
+        "clearance": clearance_record(minima),
+        "required_clearance_mm": number(1e3 * cell.checks.clearance),
+        "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
+        **origin_record(cell, provenance),
+        "caution": CAUTION,
+    }
+
+
+def _run_record(name: str, report: Report, cell: Cell) -> Record:
+    """What the summary says about one run."""
+    errors = (
+        "robot",
+        "max_position_error_mm",
+        "max_position_error_at_s",
+        "max_orientation_error_deg",
+        "max_orientation_error_at_s",
+    )
+    record: Record = {"status": status(report), "folder": name, "cycle_time_s": number(report.cycle_time)}
+    for task in tasks_record(report, cell).values():
+        record |= {key: task[key] for key in errors}
+    return record
+
+
+def merge_joint_uses(uses: Iterable[JointUse]) -> list[JointUse]:
+    """One entry per joint over several runs: the widest range, the smallest margin, the highest speed, all travel."""
+    merged: dict[tuple[str, str], JointUse] = {}
+    for use in uses:
+        key = (use.robot, use.joint)
+        merged[key] = _merge_two(merged[key], use) if key in merged else use
+    return list(merged.values())
+
+
+def _merge_two(first: JointUse, second: JointUse) -> JointUse:
+    tighter = min(first, second, key=lambda use: use.margin)
+    faster = max(first, second, key=lambda use: use.peak_velocity)
+    return replace(
+        first,
+        min=min(first.min, second.min),
+        max=max(first.max, second.max),
+        margin=tighter.margin,
+        margin_at_s=tighter.margin_at_s,
+        peak_velocity=faster.peak_velocity,
+        peak_velocity_at_s=faster.peak_velocity_at_s,
+        travel=first.travel + second.travel,
+    )
+
+
+def _merge_minima(runs: list[Report]) -> dict[ClearanceClass, ClearanceMinimum]:
+    """The smallest distance of each class over several runs, certified when every run's is."""
+    merged = {}
+    for kind in ClearanceClass:
+        found = [run.clearance.minima[kind] for run in runs if kind in run.clearance.minima]
+        measured = [minimum for minimum in found if minimum.minimum is not None]
+        if measured:
+            smallest = min(measured, key=lambda minimum: math.inf if minimum.minimum is None else minimum.minimum)
+            merged[kind] = replace(smallest, certified=all(minimum.certified for minimum in measured))
+    return merged
+
+
+def _as_text(record: Record) -> str:
+    return json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

@@ -1,0 +1,199 @@
+"""Plots of a run: task errors, joint positions and speeds with their limits drawn, clearance over time."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.report import ClearanceClass, JointUse, Report, TaskAccuracy
+from cellplan.report import palette
+from cellplan.report.palette import INK, LIMIT
+from cellplan.report.plots_canvas import Sheet, pictures, style
+
+JOINT_COLUMNS = 3
+CLASS_TITLES: Mapping[ClearanceClass, str] = {
+    ClearanceClass.ROBOT_ROBOT: "robot to robot",
+    ClearanceClass.SELF: "robot to itself",
+    ClearanceClass.PART: "part",
+    ClearanceClass.ENVIRONMENT: "environment",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorKind:
+    """How an error is shown: its name, units from large to small as (name, factor from SI), and axis names."""
+
+    name: str
+    units: tuple[tuple[str, float], ...]
+    axes: tuple[str, str, str]
+
+
+POSITION = ErrorKind(
+    name="position error", units=(("mm", 1e3), ("µm", 1e6), ("nm", 1e9), ("pm", 1e12)), axes=("x", "y", "z")
+)
+ORIENTATION = ErrorKind(
+    name="orientation error",
+    units=(
+        ("deg", math.degrees(1.0)),
+        ("10⁻³ deg", math.degrees(1e3)),
+        ("10⁻⁶ deg", math.degrees(1e6)),
+        ("10⁻⁹ deg", math.degrees(1e9)),
+        ("10⁻¹² deg", math.degrees(1e12)),
+    ),
+    axes=("rx", "ry", "rz"),
+)
+
+
+def draw_plots(report: Report, *, cell: Cell) -> dict[str, bytes]:
+    """All plots of one run as SVG and PNG, by file name (``task_<task>``, ``positions_<robot>``, …).
+
+    Args:
+        report: What is drawn.
+        cell: Where tolerances, the required clearance and the order of the robots come from.
+    """
+    files: dict[str, bytes] = {}
+    colours = palette.robot_colours(cell)
+    with style():
+        for accuracy in report.accuracy:
+            files |= _draw_task(accuracy, report.times, cell)
+        for robot in report.q:
+            uses = [use for use in report.joints if use.robot == robot]
+            files |= _draw_positions(robot, uses, report, colours[robot])
+            files |= _draw_velocities(robot, uses, report, colours[robot])
+        files |= _draw_clearance(report, cell.checks.clearance)
+    return files
+
+
+def _draw_task(accuracy: TaskAccuracy, times: Array, cell: Cell) -> dict[str, bytes]:
+    """Total and per-axis error of position and orientation."""
+    tolerance = cell.task(accuracy.task).tolerance
+    sheet = Sheet(f"{accuracy.task} ({accuracy.robot}): tool error on the part", rows=2, columns=2, times=times)
+    _draw_error(sheet, 0, accuracy.position_error, allowed=tolerance.position, kind=POSITION)
+    _draw_error(sheet, 1, accuracy.orientation_error, allowed=tolerance.orientation, kind=ORIENTATION)
+    return pictures(sheet, f"task_{accuracy.task}")
+
+
+def _draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: ErrorKind) -> None:
+    """One row: the total, with the tolerance where it lies within the picture, and the three axes beside it."""
+    total = np.linalg.norm(error, axis=1)
+    largest = float(total.max())
+    unit, scale = _readable_unit(largest, kind.units)
+    main_unit, main_scale = kind.units[0]
+    is_in_sight = allowed <= 4.0 * largest
+    span = (0.0, scale * (max(largest, allowed) if is_in_sight else largest) or 1.0)
+    note = f"tolerance {allowed * main_scale:.6g} {main_unit}"
+    panel = sheet.panel(2 * row, f"{kind.name}, total, in {unit}", note=note, span=span, is_floored=True)
+    if is_in_sight:
+        sheet.limit(panel, scale * allowed)
+    sheet.curve(panel, sheet.times, scale * total, colour=INK)
+    sheet.dot(panel, float(sheet.times[total.argmax()]), scale * largest, colour=LIMIT if largest > allowed else INK)
+
+    reach = scale * float(np.abs(error).max()) or 1.0
+    panel = sheet.panel(2 * row + 1, f"{kind.name} by axis, in {unit}", span=(-reach, reach))
+    for i, (axis, colour) in enumerate(zip(kind.axes, palette.AXES, strict=True)):
+        sheet.curve(panel, sheet.times, scale * error[:, i], colour=colour, width=1.1)
+        x, y = panel.left + panel.width - 0.25 * (2 - i), panel.bottom + panel.height + 0.07
+        sheet.write(x, y, axis, size=8.5, color=colour, weight="bold", ha="right")
+
+
+def _readable_unit(largest: float, units: tuple[tuple[str, float], ...]) -> tuple[str, float]:
+    """The largest unit in which the value is at least one half; the first of all for zero."""
+    if largest == 0.0:
+        return units[0]
+    return next((unit for unit in units if largest * unit[1] >= 0.5), units[-1])
+
+
+def _draw_positions(robot: str, uses: list[JointUse], report: Report, colour: str) -> dict[str, bytes]:
+    """Joint positions between their limits; a dot where the margin is smallest."""
+    sheet = _joint_sheet(f"{robot}: joint positions", len(uses), report.times)
+    for i, use in enumerate(uses):
+        unit, scale = ("deg", math.degrees(1.0)) if use.is_revolute else ("mm", 1e3)
+        is_endless = not math.isfinite(use.margin)
+        margin = f"margin {scale * use.margin:.1f}" if use.margin >= 0.0 else f"outside by {-scale * use.margin:.3g}"
+        note = "turns without end" if is_endless else f"{margin} at {use.margin_at_s:.2f} s"
+        curve = _JointCurve(
+            title=f"{use.joint}, in {unit}",
+            note=note,
+            times=report.times,
+            values=scale * report.q[robot][:, i],
+            lower=scale * use.lower,
+            upper=scale * use.upper,
+        )
+        _draw_joint(sheet, i, curve, colour=colour, worst_at_s=None if is_endless else use.margin_at_s)
+    return pictures(sheet, f"positions_{robot}")
+
+
+def _draw_velocities(robot: str, uses: list[JointUse], report: Report, colour: str) -> dict[str, bytes]:
+    """Joint speeds between their limits; a dot where the speed is largest."""
+    sheet = _joint_sheet(f"{robot}: joint velocities", len(uses), report.times)
+    for i, use in enumerate(uses):
+        unit, scale = ("deg/s", math.degrees(1.0)) if use.is_revolute else ("mm/s", 1e3)
+        curve = _JointCurve(
+            title=f"{use.joint}, in {unit}",
+            note=f"peak {scale * use.peak_velocity:.1f} at {use.peak_velocity_at_s:.2f} s",
+            times=0.5 * (report.times[1:] + report.times[:-1]),
+            values=scale * report.qd[robot][:, i],
+            lower=-scale * use.velocity_limit,
+            upper=scale * use.velocity_limit,
+        )
+        _draw_joint(sheet, i, curve, colour=colour, worst_at_s=use.peak_velocity_at_s)
+    return pictures(sheet, f"velocities_{robot}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _JointCurve:
+    """One joint's position or speed over time in printed units, with its limits."""
+
+    title: str
+    note: str
+    times: Array
+    values: Array
+    lower: float
+    upper: float
+
+
+def _joint_sheet(title: str, joint_count: int, times: Array) -> Sheet:
+    columns = min(JOINT_COLUMNS, max(joint_count, 1))
+    return Sheet(title, rows=max(1, math.ceil(joint_count / columns)), columns=columns, times=times)
+
+
+def _draw_joint(sheet: Sheet, index: int, curve: _JointCurve, *, colour: str, worst_at_s: float | None) -> None:
+    """One panel that shows the whole allowed range and whatever lies outside it."""
+    limits = [limit for limit in (curve.lower, curve.upper) if math.isfinite(limit)]
+    span = (min([float(curve.values.min()), *limits]), max([float(curve.values.max()), *limits]))
+    panel = sheet.panel(index, curve.title, note=curve.note, span=span)
+    for limit in limits:
+        sheet.limit(panel, limit, label=f"{limit:.6g}", is_upper=limit == curve.upper)
+    sheet.curve(panel, curve.times, curve.values, colour=colour)
+    if worst_at_s is not None:
+        worst = int(np.argmin(np.abs(curve.times - worst_at_s)))
+        value = float(curve.values[worst])
+        is_outside = not curve.lower <= value <= curve.upper
+        sheet.dot(panel, float(curve.times[worst]), value, colour=LIMIT if is_outside else INK)
+
+
+def _draw_clearance(report: Report, required: float) -> dict[str, bytes]:
+    """Smallest distance of each class over time, with the required clearance."""
+    sheet = Sheet("clearance over time", rows=2, columns=2, times=report.times)
+    for index, (kind, title) in enumerate(CLASS_TITLES.items()):
+        curve = 1e3 * report.clearance.curves.get(kind, np.empty(0))
+        known = np.isfinite(curve)
+        minimum = report.clearance.minima.get(kind)
+        if not known.any() or minimum is None or minimum.minimum is None or minimum.at_s is None:
+            sheet.panel(index, title, note="no such pair", span=(0.0, 1.0), is_floored=True)
+            continue
+        smallest = 1e3 * minimum.minimum
+        panel = sheet.panel(
+            index,
+            f"{title}, in mm",
+            note=f"smallest {smallest:.1f} at {minimum.at_s:.2f} s, required {1e3 * required:g}",
+            span=(0.0, max(float(curve[known].max()), 1e3 * required) or 1.0),
+            is_floored=True,
+        )
+        sheet.limit(panel, 1e3 * required, is_upper=False)
+        sheet.curve(panel, report.clearance.curve_times[known], curve[known], colour=palette.CLASSES[index])
+        sheet.dot(panel, minimum.at_s, smallest, colour=LIMIT if smallest < 1e3 * required else INK)
+    return pictures(sheet, "clearance")
