@@ -5,7 +5,7 @@ import pytest
 
 from cellplan.geometry.transforms import pose
 from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
-from cellplan.pipeline.reach import reach
+from cellplan.pipeline.arm_reach import arm_reach
 
 ROUNDING = 1e-9  # [m] the search ends on a grid far below this; errors grow with its square
 
@@ -32,19 +32,19 @@ def turning(parent: int, point: tuple[float, float, float], *, lower: float = -3
 def test_a_planar_arm_reaches_as_far_as_its_links_are_long() -> None:
     model = arm(turning(BASE, (0, 0, 0)), turning(0, (0.5, 0, 0)), turning(1, (0.9, 0, 0)), flange=(0.9, 0.2, 0.3))
 
-    assert reach(model) == pytest.approx(0.5 + 0.4 + 0.2, abs=ROUNDING)
+    assert arm_reach(model) == pytest.approx(0.5 + 0.4 + 0.2, abs=ROUNDING)
 
 
 def test_a_limit_keeps_an_arm_from_stretching() -> None:
     model = arm(turning(BASE, (0, 0, 0)), turning(0, (0.5, 0, 0), lower=1.0, upper=2.0), flange=(0.8, 0, 0))
 
-    assert reach(model) == pytest.approx(np.sqrt(0.5**2 + 0.3**2 + 2 * 0.5 * 0.3 * np.cos(1.0)), abs=ROUNDING)
+    assert arm_reach(model) == pytest.approx(np.sqrt(0.5**2 + 0.3**2 + 2 * 0.5 * 0.3 * np.cos(1.0)), abs=ROUNDING)
 
 
 def test_a_joint_without_end_may_turn_all_the_way() -> None:
     model = arm(turning(BASE, (0, 0, 0)), turning(0, (0.5, 0, 0), lower=-np.inf, upper=np.inf), flange=(0.2, 0, 0))
 
-    assert reach(model) == pytest.approx(0.8, abs=ROUNDING)
+    assert arm_reach(model) == pytest.approx(0.8, abs=ROUNDING)
 
 
 def test_a_rail_counts_its_own_length() -> None:
@@ -60,4 +60,4 @@ def test_a_rail_counts_its_own_length() -> None:
     )
     model = arm(rail, turning(0, (0, 0, 0)), flange=(0.5, 0, 0))
 
-    assert reach(model) == pytest.approx(2.5, abs=ROUNDING)
+    assert arm_reach(model) == pytest.approx(2.5, abs=ROUNDING)

@@ -16,7 +16,7 @@ SWEEPS: Final = 24  # rounds over all joints; the grid shrinks by half in each, 
 ENDLESS: Final = 2.0 * np.pi  # [rad] range of a joint that may turn without end
 
 
-def reach(model: RobotModel) -> float:
+def arm_reach(model: RobotModel) -> float:
     """Largest distance in [m] of the flange from the first joint's axis, within the joint limits.
 
     One joint after the other is moved to its best position on a grid that gets finer in each round, from several
@@ -35,7 +35,9 @@ def reach(model: RobotModel) -> float:
 
     def distances(q: Array) -> Array:
         from_point = chain.flange_poses(q)[:, :3, 3] - first.point_B
-        return np.linalg.norm(np.cross(from_point, first.axis_B) if first.is_revolute else from_point, axis=1)
+        lever = np.cross(from_point, first.axis_B) if first.is_revolute else from_point
+        lengths: Array = np.sqrt(np.sum(lever**2, axis=1))
+        return lengths
 
     lower = np.where(np.isfinite(model.lower), model.lower, -0.5 * ENDLESS)
     upper = np.where(np.isfinite(model.upper), model.upper, 0.5 * ENDLESS)

@@ -1,0 +1,77 @@
+"""``cellplan check``: read and validate a cell without solving it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet
+from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.progress import progress_listener
+from cellplan.errors import ExitStatus
+
+if TYPE_CHECKING:
+    from cellplan.model.cell import Robot
+    from cellplan.pipeline.check import CellCheck
+
+SCHEMA = "cellplan.check/1"
+
+
+def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_dir: AllowDirs = None) -> None:
+    """Read and validate everything without solving: files, robots, paths, reach and collisions at the start.
+
+    Exit status: 0 sound, 1 a collision at the start, 2 bad input, 3 no start posture found, 4 internal error.
+    """
+    with json_failure(SCHEMA, wanted=as_json):
+        from cellplan.io.cell_file import load_cell
+        from cellplan.pipeline.check import check as check_cell
+
+        with progress_listener(quiet=quiet) as progress:
+            result = check_cell(load_cell(cell, allow_dirs=allow_dir or ()), progress=progress)
+    status = ExitStatus.PASSED if result.passed else ExitStatus.CHECK_FAILED
+    record = _record(result)
+    if as_json:
+        say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **record})
+    else:
+        say("\n".join(_lines(record)))
+    raise typer.Exit(status)
+
+
+def _record(result: CellCheck) -> dict[str, Any]:
+    """What was found, in printed units."""
+    from cellplan.report.record import check_record, number
+
+    return {
+        "cell": result.cell.name,
+        "status": "passed" if result.passed else "failed",
+        "start": {robot.name: _start(robot) for robot in result.cell.robots},
+        "start_found": list(result.found),
+        "path_length_mm": {name: number(1e3 * length) for name, length in result.path_lengths.items()},
+        "checks": [check_record(each) for each in result.checks],
+    }
+
+
+def _start(robot: Robot) -> dict[str, float | None]:
+    """Start posture by joint with its unit, as the column names of the tables have it."""
+    from cellplan.report.record import number
+
+    if robot.start is None:
+        return {}
+    return {
+        f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}": number(
+            position * (math.degrees(1.0) if joint.is_revolute else 1e3)
+        )
+        for joint, position in zip(robot.model.joints, robot.start, strict=True)
+    }
+
+
+def _lines(record: dict[str, Any]) -> list[str]:
+    """What was found, for people."""
+    lines = [f"{record['cell']}: {'sound' if record['status'] == 'passed' else 'not sound'}"]
+    for robot, start in record["start"].items():
+        posture = ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
+        lines.append(f"  start of {robot} ({'found' if robot in record['start_found'] else 'given'}): {posture}")
+    lines += [f"  task {name}: path of {length:.4g} mm" for name, length in record["path_length_mm"].items()]
+    return lines + [f"  {'' if each['passed'] else 'FAILED '}{each['message']}" for each in record["checks"]]

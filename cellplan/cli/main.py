@@ -1,0 +1,74 @@
+"""The program ``cellplan``: its commands, and the one place where errors become lines and exit statuses."""
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated, NoReturn
+
+import typer
+
+import cellplan
+from cellplan.cli.check import check
+from cellplan.cli.errors import OutputError, report_failure
+from cellplan.cli.output import say
+from cellplan.cli.robots import robots
+from cellplan.cli.schema import schema
+from cellplan.cli.solve import solve
+from cellplan.errors import ExitStatus
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        say(f"cellplan {cellplan.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def program(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and end.")
+    ] = False,
+) -> None:
+    """Offline programming for cooperative robots that work on one moving part."""
+
+
+app.command()(check)
+app.command()(solve)
+app.command()(robots)
+app.command()(schema)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and give its exit status; no exception leaves, no traceback is shown."""
+    try:
+        outcome = app(args=arguments, prog_name="cellplan", standalone_mode=False)
+    except SystemExit:  # what remains of a closed pipe below the help texts of typer
+        return report_failure(OutputError("standard output: the result was not shown: broken pipe"))
+    except typer.Abort:
+        return report_failure(KeyboardInterrupt())
+    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001
+        return _usage_status(error) or report_failure(error)
+    if outcome == ExitStatus.INTERRUPTED:  # typer has caught the signal
+        return report_failure(KeyboardInterrupt())
+    return outcome if isinstance(outcome, int) else ExitStatus.PASSED
+
+
+def _usage_status(error: BaseException) -> int | None:
+    """Show a wrong use of the command line; None when the error is of another kind."""
+    show, status = getattr(error, "show", None), getattr(error, "exit_code", None)
+    if show is None or status is None:
+        return None
+    show()
+    return ExitStatus.BAD_INPUT
+
+
+def main() -> NoReturn:
+    """Enter from the console."""
+    sys.exit(run())

@@ -1,0 +1,66 @@
+"""``cellplan robots``: the bundled robots with their reach, limits and source."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from cellplan.cli.options import AsJson
+from cellplan.cli.output import json_failure, say, say_json
+
+if TYPE_CHECKING:
+    from cellplan.model.robot import Joint, RobotModel
+
+SCHEMA = "cellplan.robots/1"
+
+
+def robots(as_json: AsJson = False) -> None:
+    """List the bundled robots with reach, limits and source."""
+    with json_failure(SCHEMA, wanted=as_json):
+        from cellplan.io.bundled_robots import bundled_names, load_bundled
+
+        records = [_record(name, load_bundled(name)) for name in bundled_names()]
+    if as_json:
+        say_json({"schema": SCHEMA, "robots": records})
+    else:
+        say("\n\n".join("\n".join(_lines(record)) for record in records))
+
+
+def _record(name: str, model: RobotModel) -> dict[str, Any]:
+    """What is known about one robot, in printed units."""
+    from cellplan.pipeline.arm_reach import arm_reach
+
+    return {
+        "name": name,
+        "source": model.source,
+        "reach_mm": round(1e3 * arm_reach(model), 1),
+        "bodies": len(model.bodies),
+        "joints": [_joint_record(joint) for joint in model.joints],
+    }
+
+
+def _joint_record(joint: Joint) -> dict[str, Any]:
+    scale, unit = (math.degrees(1.0), "deg") if joint.is_revolute else (1e3, "mm")
+    return {
+        "name": joint.name,
+        "type": str(joint.kind),
+        f"lower_{unit}": _figure(scale * joint.lower),
+        f"upper_{unit}": _figure(scale * joint.upper),
+        f"velocity_{unit}_s": _figure(scale * joint.velocity),
+    }
+
+
+def _figure(value: float) -> float | None:
+    """The figure of the data sheet again; None for a joint that may turn without end."""
+    return float(f"{value:.9g}") if math.isfinite(value) else None
+
+
+def _lines(record: dict[str, Any]) -> list[str]:
+    """One robot for people: joint, range, largest speed."""
+    lines = [record["name"], f"  reach {record['reach_mm']:g} mm from the first axis; {record['source']}"]
+    for joint in record["joints"]:
+        unit = "deg" if "lower_deg" in joint else "mm"
+        lower, upper = joint[f"lower_{unit}"], joint[f"upper_{unit}"]
+        limits = "without end" if lower is None or upper is None else f"{lower:g} … {upper:g} {unit}"
+        lines.append(f"  {joint['name']:<10} {limits:<22} {joint[f'velocity_{unit}_s']:g} {unit}/s")
+    return lines

@@ -1,0 +1,70 @@
+"""``cellplan solve``: plan a cell, check the result and write joint tables, report and plots."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet
+from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.progress import progress_listener
+from cellplan.errors import ExitStatus
+
+SCHEMA = "cellplan.solve/1"
+
+Output = Annotated[
+    Path | None, typer.Option("-o", "--output", metavar="DIR", help="Run folder (default: outputs/<cell name>).")
+]
+Mode = Annotated[
+    str | None,
+    typer.Option("--mode", metavar="MODE", help="Who moves: simultaneous, pairwise or part_at_rest."),
+]
+Method = Annotated[str | None, typer.Option("--method", metavar="NAME", help="How joint speeds are found.")]
+Duration = Annotated[float | None, typer.Option("--duration", metavar="S", help="Time for the job in seconds.")]
+TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Work on this task only.")]
+KeepRejected = Annotated[
+    bool, typer.Option("--keep-rejected", help="Write the tables of a failed run below rejected/.")
+]
+
+
+def solve(  # noqa: PLR0913, PLR0917 - the options of the command
+    cell: CellFile,
+    output: Output = None,
+    mode: Mode = None,
+    method: Method = None,
+    duration: Duration = None,
+    task: TaskName = None,
+    as_json: AsJson = False,
+    keep_rejected: KeepRejected = False,
+    quiet: Quiet = False,
+    allow_dir: AllowDirs = None,
+) -> None:
+    """Plan, check, and write joint tables, report and plots.
+
+    The tables are written only when every check passes. Exit status: 0 passed, 1 a check failed, 2 bad input,
+    3 no solution, 4 internal error.
+    """
+    with json_failure(SCHEMA, wanted=as_json):
+        from cellplan.cli.summary import read_record, summary_lines
+        from cellplan.io.cell_file import load_cell
+        from cellplan.io.run_folder import refuse_unless_replaceable
+        from cellplan.pipeline.overrides import with_overrides
+        from cellplan.pipeline.solve import solve as solve_cell
+        from cellplan.pipeline.write_run import write_run
+
+        asked = with_overrides(
+            load_cell(cell, allow_dirs=allow_dir or ()), mode=mode, method=method, duration=duration, task=task
+        )
+        folder = output or Path("outputs") / asked.name
+        refuse_unless_replaceable(folder)
+        with progress_listener(quiet=quiet) as progress:
+            solution = solve_cell(asked, progress=progress)
+            write_run(solution, folder, keep_rejected=keep_rejected)
+        record = read_record(folder)
+    status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
+    if as_json:
+        place = {"folder": str(folder), "report_path": str(folder / "report.html")}
+        say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "report": record})
+    else:
+        say("\n".join(summary_lines(record, folder)))
+    raise typer.Exit(status)

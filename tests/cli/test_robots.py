@@ -1,0 +1,41 @@
+"""The list of bundled robots."""
+
+import json
+
+import pytest
+
+from cellplan.cli.main import run
+
+
+def test_every_bundled_robot_is_listed_with_reach_limits_and_source(capsys: pytest.CaptureFixture[str]) -> None:
+    status = run(["robots"])
+
+    told = capsys.readouterr().out
+    assert status == 0
+    for name in ("abb_irb1600", "kuka_kr6", "reis_rv20_16", "staubli_rx90l", "staubli_rx90l_as_printed"):
+        assert f"{name}\n  reach " in told
+    assert "  B2         -155 … 35 deg          156 deg/s\n" in told
+    assert "Ribeiro 2010, table 5" in told
+
+
+def test_a_machine_gets_the_figures_of_the_data_sheet(capsys: pytest.CaptureFixture[str]) -> None:
+    status = run(["robots", "--json"])
+
+    listed = json.loads(capsys.readouterr().out)
+    assert (status, listed["schema"]) == (0, "cellplan.robots/1")
+    kuka = next(robot for robot in listed["robots"] if robot["name"] == "kuka_kr6")
+    assert kuka["joints"][1] == {
+        "name": "B2",
+        "type": "revolute",
+        "lower_deg": -155.0,
+        "upper_deg": 35.0,
+        "velocity_deg_s": 156.0,
+    }
+
+
+def test_a_robot_named_for_its_reach_has_it(capsys: pytest.CaptureFixture[str]) -> None:
+    run(["robots", "--json"])
+
+    listed = json.loads(capsys.readouterr().out)
+    reis = next(robot for robot in listed["robots"] if robot["name"] == "reis_rv20_16")
+    assert reis["reach_mm"] == 1600.0  # RV20-16: 20 kg, 1.6 m

@@ -1,0 +1,16 @@
+"""The JSON Schema on the command line."""
+
+import json
+
+import pytest
+
+from cellplan.cli.main import run
+
+
+def test_the_schema_is_one_json_object_with_the_keys_of_a_cell(capsys: pytest.CaptureFixture[str]) -> None:
+    status = run(["schema"])
+
+    schema = json.loads(capsys.readouterr().out)
+    assert status == 0
+    assert schema["$schema"].startswith("https://json-schema.org/")
+    assert {"cellplan", "name", "robots", "part", "tasks", "environment", "motion"} <= set(schema["properties"])
