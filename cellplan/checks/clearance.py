@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.collision.bodies import BodyPoses
+from cellplan.collision.measure import look, sharpen
 from cellplan.collision.nearest import NOTHING, Nearest
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
@@ -24,6 +25,7 @@ CHUNK_WORK: Final = 2_000_000  # [-] pairs times samples worked on at once: 16 M
 CHUNK_SAMPLES: Final = 2048  # [-] samples worked on at once: 20 MB of poses for forty bodies
 CURVE_POINTS: Final = 200  # [-] instants of the plotted curves, beside those of the minima
 SAME_CONTACT: Final = 0.010  # [s] touches with shorter breaks between them are one contact
+AT_SURFACE: Final = 1e-4  # [m] a tool at work nearer to the part than this counts as touching it
 MM: Final = 1e3
 
 Samples = NDArray[np.intp]
@@ -185,12 +187,23 @@ def _allowed(scene: Scene, schedule: Schedule, q: Array, *, rows: Sequence[int])
 
 
 def _touch_span(scene: Scene, row: int, poses: BodyPoses) -> tuple[int, int] | None:
-    """First and last sample at which the two bodies of a pair touch, found from both ends."""
-    pair, samples = (scene.pairs[row].first, scene.pairs[row].second), range(poses.p.shape[1])
-    first = next((k for k in samples if scene.engine.touch(*pair, poses, sample=k)), None)
+    """First and last sample at which a tool is at the surface of the part, found from both ends."""
+    samples = range(poses.p.shape[1])
+    first = next((k for k in samples if _is_at_surface(scene, row, poses, sample=k)), None)
     if first is None:
         return None
-    return first, next(k for k in reversed(samples) if scene.engine.touch(*pair, poses, sample=k))
+    return first, next(k for k in reversed(samples) if _is_at_surface(scene, row, poses, sample=k))
+
+
+def _is_at_surface(scene: Scene, row: int, poses: BodyPoses, *, sample: int) -> bool:
+    """Whether a tool touches the part, or very nearly so: tracking errors of a micrometre decide nothing here."""
+    pair = (scene.pairs[row].first, scene.pairs[row].second)
+    reading = look(scene.engine, pair, poses, sample=sample)
+    if reading.touches or reading.bound > AT_SURFACE:
+        return reading.touches
+    if not all(scene.engine.bodies[index].is_convex for index in pair):
+        return False
+    return sharpen(scene.engine, pair, poses, sample=sample, reading=reading).bound <= AT_SURFACE
 
 
 def _minimum(scene: Scene, times: Array, findings: _Findings, kind: ClearanceClass) -> ClearanceMinimum:

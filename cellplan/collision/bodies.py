@@ -8,14 +8,15 @@ import numpy as np
 
 from cellplan.errors import CellplanError, InputError
 from cellplan.geometry.convex_hull import convex_hull
-from cellplan.geometry.mesh_topology import components, mesh_volume
+from cellplan.geometry.mesh_topology import components
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, bounding_sphere
 from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import Array, is_rigid, pose_from
 
 POINT_SIZE: Final = 1e-7  # [m] size given to a point or a line, so that the engine sees a triangle: far below 0.1 mm
 SURFACE_TOLERANCE: Final = 2e-5  # [m] a tessellated cylinder lies outside the true one by no more than this
-CONVEX_SHARE: Final = 1e-9  # [-] of its volume by which a convex mesh may differ from its hull: rounding
+CONVEX_ROOM: Final = 2e-6  # [m] vertices of a convex mesh may stand out of a triangle's plane: single precision
+CONVEX_WORK: Final = 40_000_000  # [-] vertices times triangles up to which convexity is tested: half a second
 HULL_ROOM: Final = 2e-7  # [-] of its radius by which a vertex may stick out of a mesh's hull (see convex_hull)
 RIGID_CHUNK: Final = 20_000  # [-] poses checked at once: about 10 MB
 FLAT_PADDING: Final = 1e-6  # [m] thickness given to the box round a flat surface
@@ -72,7 +73,7 @@ def prepare(name: str, shape: Solid) -> CollisionBody:
         name=name,
         shape=shape,
         hull=hull,
-        looseness=HULL_ROOM * radius if isinstance(shape, Mesh) else 0.0,
+        looseness=0.0 if is_convex else HULL_ROOM * radius,
         is_convex=is_convex,
         core=core,
         inflation=inflation,
@@ -103,14 +104,31 @@ def checked_poses(poses: Sequence[Array]) -> BodyPoses:
 
 def _hull(shape: Solid) -> tuple[Solid, bool]:
     """A convex solid that holds the shape, and whether it is the shape."""
-    if not isinstance(shape, Mesh):
+    if not isinstance(shape, Mesh) or _is_convex(shape):
         return shape, True
     try:
-        hull = convex_hull(shape)
-    except InputError:  # flat: it has no hull with a volume
+        return convex_hull(shape), False
+    except InputError:  # flat or ill-shaped
         return _box_round(shape), False
-    volume = mesh_volume(hull)
-    return hull, shape.is_closed and abs(mesh_volume(shape) - volume) <= CONVEX_SHARE * volume
+
+
+def _is_convex(mesh: Mesh) -> bool:
+    """Whether a closed mesh has all its vertices behind the plane of each of its triangles, rounding aside.
+
+    Most collision meshes are convex hulls already. A mesh too large for this test counts as not convex, which costs
+    time but no accuracy.
+    """
+    if not mesh.is_closed or len(mesh.vertices) * len(mesh.faces) > CONVEX_WORK:
+        return False
+    corner = mesh.vertices[mesh.faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    offset = np.einsum("ij,ij->i", normal, corner[:, 0])
+    step = max(1, RIGID_CHUNK * 10 // len(mesh.vertices))
+    return all(
+        float((mesh.vertices @ normal[k : k + step].T - offset[k : k + step]).max()) <= CONVEX_ROOM
+        for k in range(0, len(normal), step)
+    )
 
 
 def _box_round(mesh: Mesh) -> Mesh:

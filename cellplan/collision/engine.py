@@ -25,11 +25,18 @@ class Engine:
     def __init__(self, bodies: Sequence[CollisionBody]) -> None:
         """Take the bodies; what FCL needs of each is built when it is first asked for."""
         self.bodies = tuple(bodies)
+        self.centres = np.array([body.centre for body in self.bodies]).reshape(-1, 3)
+        self.radii = np.array([body.radius for body in self.bodies])
         self._objects: dict[tuple[str, int], Any] = {}
 
     def __reduce__(self) -> tuple[type["Engine"], tuple[tuple[CollisionBody, ...]]]:
         """Leave FCL's own objects behind; the other side builds them anew."""
         return Engine, (self.bodies,)
+
+    def sphere_centres(self, poses: BodyPoses, *, sample: int) -> Array:
+        """Centres of the bounding spheres in the world at a sample in [m], shape (B, 3)."""
+        centres: Array = (poses.R[:, sample] @ self.centres[..., None])[..., 0] + poses.p[:, sample]
+        return centres
 
     def touch(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> bool:
         """Say whether two bodies touch at a sample. A mesh is its surface here; what lies inside is asked elsewhere."""

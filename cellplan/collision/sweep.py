@@ -21,6 +21,7 @@ from cellplan.geometry.transforms import Array
 WORTH_A_DISTANCE: Final = 16  # [-] samples left open from which on an exact distance pays against asking each of them
 
 Pair = tuple[int, int]
+PairIndices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 
 
@@ -50,20 +51,16 @@ def sweep(engine: Engine, pairs: list[Pair], poses: BodyPoses) -> Sweep:
     return Sweep(lower, touching)
 
 
-def first_touching(engine: Engine, pairs: list[Pair], poses: BodyPoses, *, sample: int) -> int | None:
-    """Place of the first of the pairs that touches at one sample, or None."""
-    if not pairs:
-        return None
-    index = np.array(pairs)
-    centres = np.array(
-        [R @ body.centre + p for body, R, p in zip(engine.bodies, poses.R[:, sample], poses.p[:, sample], strict=True)]
-    )
-    radii = np.array([body.radius for body in engine.bodies])
-    gap = np.linalg.norm(centres[index[:, 0]] - centres[index[:, 1]], axis=1) - radii[index].sum(axis=1)
-    for row in np.flatnonzero(gap <= SURELY_APART):
-        pair = pairs[row]
-        if engine.touch(*pair, poses, sample=sample) or is_inside(engine, pair, poses, sample=sample):
-            return int(row)
+def first_touching(engine: Engine, pairs: PairIndices, poses: BodyPoses, *, sample: int) -> int | None:
+    """Place of the first of the pairs, shape (P, 2), that touches at one sample, or None."""
+    centres = engine.sphere_centres(poses, sample=sample)
+    apart = centres[pairs[:, 0]] - centres[pairs[:, 1]]
+    reach = engine.radii[pairs[:, 0]] + engine.radii[pairs[:, 1]]
+    for place in np.flatnonzero(np.einsum("ij,ij->i", apart, apart) <= (reach + SURELY_APART) ** 2):
+        pair = (int(pairs[place, 0]), int(pairs[place, 1]))
+        reading = look(engine, pair, poses, sample=sample)
+        if reading.touches or (reading.bound <= SURELY_APART and is_inside(engine, pair, poses, sample=sample)):
+            return int(place)
     return None
 
 

@@ -10,14 +10,14 @@ from cellplan.geometry.shapes import Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import Array
 
-FINEST: Final = 1.0 / 32.0  # [-] of the zone's radius: triangles across its border are cut down to this
+FINEST: Final = 1.0 / 16.0  # [-] of the zone's radius: triangles across its border are cut down to this
 ROUND_SIDES: Final = 96  # [-] sides of a sphere or the caps of a capsule: 0.1 % of the radius
 
 
 def outside_zone(shape: Solid, centre: Array, radius: float) -> tuple[Mesh | None, bool]:
     """Surface of a solid outside a ball, and whether the ball holds any of it.
 
-    Triangles across the border are cut down to 1/32 of the radius and kept unless they lie wholly inside, so the
+    Triangles across the border are cut down to 1/16 of the radius and kept unless they lie wholly inside, so the
     surface reaches into the zone by no more than that: the strict side.
 
     Args:

@@ -3,11 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from cellplan.collision.bodies import BodyPoses, CollisionBody, checked_poses, prepare
 from cellplan.collision.certificate import heights
 from cellplan.collision.engine import Engine
 from cellplan.collision.self_test import prove_engine
-from cellplan.collision.sweep import Pair, first_touching
+from cellplan.collision.sweep import Pair, PairIndices, first_touching
 from cellplan.collision.zone import outside_zone
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import Array, inverse
@@ -27,8 +29,10 @@ class Scene:
         chains: Kinematic chain of each robot, by name.
         bodies: All solids, half-spaces last.
         pairs: Pairs that are watched.
-        watched: For each pair the two engine bodies that must not touch: the bodies themselves, or what sticks out of
-            the contact zone of a tool at work against the part; None for a half-space and where nothing sticks out.
+        solid_rows: Which of these pairs the engine watches, shape (S,), ascending.
+        solid_pairs: The two engine bodies that must not touch in each of them, shape (S, 2): the bodies themselves, or
+            what sticks out of the contact zone of a tool at work, and the part.
+        ground_rows: Which pairs are a solid and a half-space, shape (G,).
         exclusions: Pairs that are not watched, as (first, second, reason).
         engine: The solid bodies in the order of ``bodies``, then what of tools lies outside their contact zones.
         cut_from: The tool body that each of these last ones is cut from.
@@ -38,7 +42,9 @@ class Scene:
     chains: Mapping[str, ScrewChain]
     bodies: tuple[SceneBody, ...]
     pairs: tuple[ScenePair, ...]
-    watched: tuple[Pair | None, ...]
+    solid_rows: PairIndices
+    solid_pairs: PairIndices
+    ground_rows: PairIndices
     exclusions: tuple[tuple[str, str, str], ...]
     engine: Engine
     cut_from: tuple[int, ...]
@@ -63,7 +69,11 @@ class Scene:
             chains=chains,
             bodies=bodies,
             pairs=tuple(watch.pairs),
-            watched=tuple(watch.watched),
+            solid_rows=np.array([row for row, pair in enumerate(watch.watched) if pair is not None], dtype=np.intp),
+            solid_pairs=np.array([pair for pair in watch.watched if pair is not None], dtype=np.intp).reshape(-1, 2),
+            ground_rows=np.array(
+                [row for row, pair in enumerate(watch.pairs) if is_ground(bodies[pair.second])], dtype=np.intp
+            ),
             exclusions=_named(bodies, [*excluded, *by_design]),
             engine=Engine([*solids, *(body for _, body in watch.cut)]),
             cut_from=tuple(tool for tool, _ in watch.cut),
@@ -75,10 +85,6 @@ class Scene:
         poses = body_poses([body for body in self.bodies if not is_ground(body)], self.chains, own)
         return checked_poses([*poses, *(poses[tool] for tool in self.cut_from)])
 
-    def is_on_ground(self, pair: ScenePair) -> bool:
-        """Whether the second body of a pair is a half-space."""
-        return is_ground(self.bodies[pair.second])
-
     def ground_heights(self, pair: ScenePair, poses: BodyPoses) -> Array:
         """Distance of a solid above a half-space at each sample in [m], shape (N,); zero or less where they touch."""
         body = self.engine.bodies[pair.first]
@@ -88,12 +94,22 @@ class Scene:
     def touching(self, q: Array) -> tuple[str, str] | None:
         """Names of the first two bodies that must not touch but do, at one stacked posture of shape (nq,)."""
         poses = self.body_poses(q[None])
-        for pair in self.pairs:
-            if self.is_on_ground(pair) and self.ground_heights(pair, poses)[0] <= 0.0:
-                return self.names(pair)
-        solid = [(pair, watched) for pair, watched in zip(self.pairs, self.watched, strict=True) if watched is not None]
-        found = first_touching(self.engine, [watched for _, watched in solid], poses, sample=0)
-        return None if found is None else self.names(solid[found][0])
+        row = self._first_on_ground(poses)
+        if row is None:
+            place = first_touching(self.engine, self.solid_pairs, poses, sample=0)
+            row = None if place is None else int(self.solid_rows[place])
+        return None if row is None else self.names(self.pairs[row])
+
+    def _first_on_ground(self, poses: BodyPoses) -> int | None:
+        """The first pair of which the solid touches a half-space at the first sample, or None."""
+        centres = self.engine.sphere_centres(poses, sample=0)
+        for row in self.ground_rows:
+            pair = self.pairs[row]
+            X_WS = self.bodies[pair.second].X_BS
+            is_far = (centres[pair.first] - X_WS[:3, 3]) @ X_WS[:3, 2] > self.engine.radii[pair.first]
+            if not is_far and self.ground_heights(pair, poses)[0] <= 0.0:
+                return int(row)
+        return None
 
     def names(self, pair: ScenePair) -> tuple[str, str]:
         """Names of the two bodies of a pair."""

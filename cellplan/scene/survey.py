@@ -20,7 +20,7 @@ class Survey:
 
     Attributes:
         scene: The scene.
-        rows: Indices into ``Scene.pairs``, in the order of the arrays below.
+        rows: Indices into ``Scene.pairs``, ascending, in the order of the arrays below.
         poses: Where the bodies are.
         lower: Proved lower bounds of the distances in [m], shape (P, n); exact for half-spaces; inf where nothing of a
             tool sticks out of its contact zone.
@@ -34,14 +34,10 @@ class Survey:
     touching: NDArray[np.bool_]
 
     def solids(self, rows: Sequence[int]) -> tuple[list[int], list[Pair]]:
-        """Places in the arrays and engine bodies of those of the given pairs that the engine knows."""
-        places, pairs = [], []
-        for row in rows:
-            watched = self.scene.watched[row]
-            if watched is not None:
-                places.append(self.rows.index(row))
-                pairs.append(watched)
-        return places, pairs
+        """Places in the arrays and engine bodies of those of the given pairs, ascending, that the engine watches."""
+        chosen = np.isin(self.scene.solid_rows, rows)
+        places = np.searchsorted(self.rows, self.scene.solid_rows[chosen])
+        return places.tolist(), [(int(a), int(b)) for a, b in self.scene.solid_pairs[chosen]]
 
 
 def survey(scene: Scene, rows: Sequence[int], poses: BodyPoses) -> Survey:
@@ -62,10 +58,9 @@ def nearest(found: Survey, rows: Sequence[int], *, best: float) -> Nearest:
         best: A distance in [m] known from elsewhere; farther pairs are of no interest.
     """
     places, pairs = found.solids(rows)
-    own = [found.rows.index(row) for row in rows]
-    grounds = [place for place in own if place not in set(places)]
+    grounds = np.setdiff1d(np.searchsorted(found.rows, rows), places)
     lowest = Nearest(np.inf, best, -1, -1)
-    if grounds:
+    if grounds.size:
         place, sample = np.unravel_index(np.argmin(found.lower[grounds]), (len(grounds), found.lower.shape[1]))
         height = float(found.lower[grounds[place], sample])
         if height < best:
@@ -101,8 +96,6 @@ def distance_curve(scene: Scene, rows: Sequence[int], poses: BodyPoses, *, touch
 def _measured_grounds(scene: Scene, rows: Sequence[int], poses: BodyPoses) -> Survey:
     """A survey in which only the half-spaces are settled."""
     lower = np.full((len(rows), poses.p.shape[1]), np.inf)
-    for place, row in enumerate(rows):
-        pair = scene.pairs[row]
-        if scene.is_on_ground(pair):
-            lower[place] = scene.ground_heights(pair, poses)
+    for place in np.flatnonzero(np.isin(rows, scene.ground_rows)).tolist():
+        lower[place] = scene.ground_heights(scene.pairs[rows[place]], poses)
     return Survey(scene=scene, rows=tuple(rows), poses=poses, lower=lower, touching=lower <= 0.0)
