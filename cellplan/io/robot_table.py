@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -11,7 +12,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.meshes import read_mesh
 from cellplan.geometry.shapes import Mesh
-from cellplan.io.complaints import Complaint, did_you_mean, listed, raise_complaints
+from cellplan.io.complaints import Complaint, did_you_mean, listed, raise_complaints, shown
 from cellplan.io.reach import Reach
 from cellplan.io.schema import RobotTableDocument
 from cellplan.io.schema.messages import validate
@@ -118,6 +119,13 @@ class _Meshes:
         self._read[written, unit] = mesh
         return mesh
 
+    def known(self, written: str, unit: str, *, index: int) -> Mesh:
+        """A mesh that was read before."""
+        mesh = self.mesh(written, unit, index=index)
+        if mesh is None:
+            raise InputError(f"{self._document.file}: mesh {shown(written)} could not be read")
+        return mesh
+
 
 def _bodies(table: RobotTableDocument, meshes: _Meshes) -> Iterator[Body]:
     """Link bodies; one whose mesh cannot be read is left out after its complaint."""
@@ -128,15 +136,8 @@ def _bodies(table: RobotTableDocument, meshes: _Meshes) -> Iterator[Body]:
             continue
         name = entry.name or _free_name(entry.link, taken)
         taken.add(name)
-        shape, X_BS = link_solid(entry, lambda file, unit, i=index: _present(meshes.mesh(file, unit, index=i)))
+        shape, X_BS = link_solid(entry, partial(meshes.known, index=index))
         yield Body(name=name, link=links[entry.link], shape=shape, X_BS=X_BS)
-
-
-def _present(mesh: Mesh | None) -> Mesh:
-    """A mesh that was read before."""
-    if mesh is None:
-        raise ValueError("a mesh that could not be read")
-    return mesh
 
 
 def _free_name(link: str, taken: set[str]) -> str:

@@ -142,11 +142,11 @@ def _events(text: str, file: str) -> Iterator[Any]:
     line = 1
     try:
         for event in yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
-            line = event.start_mark.line + 1
+            line = _mark(event).line
             yield event
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        line = mark.line + 1 if mark else line
+        line = mark.line + 1 if mark is not None else line
         if mark and text[mark.index : mark.index + 1] == "\t":
             raise InputError(f"{file}:{line}: not valid YAML: a tab cannot indent, use spaces") from None
         problem = " ".join((error.problem or error.context or "cannot be read").split())

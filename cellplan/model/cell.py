@@ -25,10 +25,12 @@ class Origin:
     Attributes:
         file: File name as the user gave it.
         lines: Line number, from 1, of each key path (``robots.kuka.start_deg``).
+        document: The file as plain values in the file's units, every default filled in: what a written copy is made of.
     """
 
     file: str = "<cell>"
     lines: Mapping[str, int] = field(default_factory=dict)
+    document: Mapping[str, object] = field(default_factory=dict)
 
     def at(self, key: str) -> str:
         """``file:line: key`` for a key path; the nearest enclosing key gives the line when the key is a default."""

@@ -29,7 +29,7 @@ class GraspEntry(Entry):
     """A robot that holds the part."""
 
     robot: Name = Field(description="Robot that holds the part (the positioner).")
-    at: PoseEntry = Field(PoseEntry(), description="Pose of the holder's tool tip in the part frame.")
+    at: PoseEntry = Field(default=PoseEntry(), description="Pose of the holder's tool tip in the part frame.")
 
 
 def _one_holder(holders: tuple[GraspEntry, ...]) -> tuple[GraspEntry, ...]:
@@ -46,9 +46,9 @@ class PartEntry(Entry):
     """The workpiece; somebody holds it, or it is fixed in the world."""
 
     geometry: PartShapeEntry = Field(description="Shape of the part.")
-    held_by: Holders = Field((), description="The robot that holds the part; none: fixed in the world.")
+    held_by: Holders = Field(default=(), description="The robot that holds the part; none: fixed in the world.")
     at: PoseEntry | None = Field(
-        None, description="Pose of the part frame in the world; required exactly when nobody holds the part."
+        default=None, description="Pose of the part frame in the world; required exactly when nobody holds the part."
     )
 
     @model_validator(mode="after")
@@ -65,13 +65,13 @@ class MotionEntry(Entry):
     """Who moves, and the common clock."""
 
     mode: Literal["simultaneous", "pairwise", "part_at_rest"] = Field(
-        "simultaneous",
+        default="simultaneous",
         description="Who moves: all robots; the positioner and one operator at a time; the operators only.",
     )
     duration_s: Seconds = Field(description="Length of the common clock; every task ends within it.")
-    step_s: Seconds = Field(0.001, description="Time between two samples.")
-    time_law: TimeLawChoice = Field("quintic", description="Law of each stretch of path between stops.")
-    corners: CornerChoice = Field("stop", description="Stop at corners, or round them.")
+    step_s: Seconds = Field(default=0.001, description="Time between two samples.")
+    time_law: TimeLawChoice = Field(default="quintic", description="Law of each stretch of path between stops.")
+    corners: CornerChoice = Field(default="stop", description="Stop at corners, or round them.")
 
     @model_validator(mode="after")
     def _has_a_sensible_clock(self) -> Self:
@@ -87,21 +87,23 @@ class MotionEntry(Entry):
 class SolverEntry(Entry):
     """How joint speeds are found."""
 
-    method: Method = Field("weighted_pseudo_inverse", description="Resolution method.")
+    method: Method = Field(default="weighted_pseudo_inverse", description="Resolution method.")
     gain_per_s: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
-        None, description="Gain of the pose-error feedback; 0.5 / step_s when absent. gain_per_s * step_s is below 2."
+        default=None,
+        description="Gain of the pose-error feedback; 0.5 / step_s when absent. gain_per_s * step_s is below 2.",
     )
     damping: DampingChoice = Field(
-        "auto", description="Largest damping factor; auto lets the smallest singular value decide, 0 turns it off."
+        default="auto",
+        description="Largest damping factor; auto lets the smallest singular value decide, 0 turns it off.",
     )
-    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(0, description="Seed of every random search.")
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(default=0, description="Seed of every random search.")
 
 
 class ExclusionEntry(Entry):
     """A pair of bodies that the collision check leaves out."""
 
     bodies: tuple[Text, Text] = Field(
-        description="Two bodies: ROBOT/LINK, ROBOT/tool, ROBOT/tool_2, part or the name of something in the environment."
+        description="Two bodies: ROBOT/LINK, ROBOT/tool, ROBOT/tool_2, part or a name of the environment."
     )
     reason: Text = Field(description="Why they may touch; it is repeated in the report.")
 
@@ -117,12 +119,12 @@ class ChecksEntry(Entry):
     """What the checks demand."""
 
     clearance_mm: Annotated[float, Field(ge=0.0, le=10_000.0)] = Field(
-        5.0, description="Smallest allowed distance between things that must not touch."
+        default=5.0, description="Smallest allowed distance between things that must not touch."
     )
     contact_zone_mm: Annotated[float, Field(ge=0.0, le=10_000.0)] = Field(
-        20.0, description="Radius round the tool tip within which tool and part may touch."
+        default=20.0, description="Radius round the tool tip within which tool and part may touch."
     )
-    exclude: tuple[ExclusionEntry, ...] = Field((), description="Pairs left out of the collision check.")
+    exclude: tuple[ExclusionEntry, ...] = Field(default=(), description="Pairs left out of the collision check.")
 
 
 LengthRange = tuple[Coordinate, Coordinate]
@@ -132,12 +134,12 @@ AngleRange = tuple[Angle, Angle]
 class BaseRangeEntry(Entry):
     """Ranges in which a base may be placed."""
 
-    x_mm: LengthRange | None = Field(None, description="Lowest and highest x.")
-    y_mm: LengthRange | None = Field(None, description="Lowest and highest y.")
-    z_mm: LengthRange | None = Field(None, description="Lowest and highest z.")
-    roll_deg: AngleRange | None = Field(None, description="Lowest and highest roll.")
-    pitch_deg: AngleRange | None = Field(None, description="Lowest and highest pitch.")
-    yaw_deg: AngleRange | None = Field(None, description="Lowest and highest yaw.")
+    x_mm: LengthRange | None = Field(default=None, description="Lowest and highest x.")
+    y_mm: LengthRange | None = Field(default=None, description="Lowest and highest y.")
+    z_mm: LengthRange | None = Field(default=None, description="Lowest and highest z.")
+    roll_deg: AngleRange | None = Field(default=None, description="Lowest and highest roll.")
+    pitch_deg: AngleRange | None = Field(default=None, description="Lowest and highest pitch.")
+    yaw_deg: AngleRange | None = Field(default=None, description="Lowest and highest yaw.")
 
     @model_validator(mode="after")
     def _is_ordered(self) -> Self:
@@ -159,7 +161,8 @@ class LayoutEntry(Entry):
     """What a layout search may change."""
 
     vary: dict[str, VaryChoice] = Field(
-        {}, description="Ranges by ROBOT.base, and true by ROBOT.start_deg for start postures that may be changed."
+        default={},
+        description="Ranges by ROBOT.base, and true by ROBOT.start_deg for start postures that may be changed.",
     )
 
 
@@ -174,9 +177,9 @@ class CellDocument(Entry):
     part: PartEntry = Field(description="The workpiece.")
     tasks: dict[Name, TaskEntry] = Field(min_length=1, max_length=TASK_LIMIT, description="Tasks by name.")
     environment: dict[Name, ObstacleEntry] = Field(
-        {}, max_length=OBSTACLE_LIMIT, description="Fixed things in the cell by name."
+        default={}, max_length=OBSTACLE_LIMIT, description="Fixed things in the cell by name."
     )
     motion: MotionEntry = Field(description="Who moves, and the common clock.")
-    solver: SolverEntry = Field(SolverEntry(), description="How joint speeds are found.")
-    checks: ChecksEntry = Field(ChecksEntry(), description="What the checks demand.")
-    layout: LayoutEntry | None = Field(None, description="What a layout search may change; not used by solve.")
+    solver: SolverEntry = Field(default=SolverEntry(), description="How joint speeds are found.")
+    checks: ChecksEntry = Field(default=ChecksEntry(), description="What the checks demand.")
+    layout: LayoutEntry | None = Field(default=None, description="What a layout search may change; not used by solve.")

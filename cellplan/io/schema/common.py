@@ -95,7 +95,8 @@ class Entry(BaseModel):
 class PoseEntry(Entry):
     """A pose: where a frame stands and how it is turned."""
 
-    xyz_mm: Coordinates = Field((0.0, 0.0, 0.0), description="Position.")
+    xyz_mm: Coordinates = Field(default=(0.0, 0.0, 0.0), description="Position.")
     rpy_deg: Angles = Field(
-        (0.0, 0.0, 0.0), description="Roll, pitch and yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF."
+        default=(0.0, 0.0, 0.0),
+        description="Roll, pitch and yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF.",
     )

@@ -36,20 +36,22 @@ NamedPosture = Annotated[
 class ToolEntry(PoseEntry):
     """A tool: its tip in the flange frame, z out of the tool, and its solids."""
 
-    geometry: ToolShapeEntry | None = Field(None, description="Shape that ends at the tool tip; none when absent.")
-    bodies: tuple[ToolBodyEntry, ...] = Field((), description="Further solids, placed in the flange frame.")
+    geometry: ToolShapeEntry | None = Field(
+        default=None, description="Shape that ends at the tool tip; none when absent."
+    )
+    bodies: tuple[ToolBodyEntry, ...] = Field(default=(), description="Further solids, placed in the flange frame.")
 
 
 class LimitsEntry(Entry):
     """Limits of one joint: they tighten those of the model, or supply what it lacks."""
 
-    lower_deg: JointAngle | None = Field(None, description="Lowest angle of a revolute joint.")
-    upper_deg: JointAngle | None = Field(None, description="Highest angle of a revolute joint.")
-    velocity_deg_s: TurningSpeed | None = Field(None, description="Largest speed of a revolute joint.")
-    lower_mm: Coordinate | None = Field(None, description="Lowest position of a prismatic joint.")
-    upper_mm: Coordinate | None = Field(None, description="Highest position of a prismatic joint.")
-    velocity_mm_s: SlidingSpeed | None = Field(None, description="Largest speed of a prismatic joint.")
-    wrap: bool = Field(False, description="Whether a continuous joint may turn without end.")
+    lower_deg: JointAngle | None = Field(default=None, description="Lowest angle of a revolute joint.")
+    upper_deg: JointAngle | None = Field(default=None, description="Highest angle of a revolute joint.")
+    velocity_deg_s: TurningSpeed | None = Field(default=None, description="Largest speed of a revolute joint.")
+    lower_mm: Coordinate | None = Field(default=None, description="Lowest position of a prismatic joint.")
+    upper_mm: Coordinate | None = Field(default=None, description="Highest position of a prismatic joint.")
+    velocity_mm_s: SlidingSpeed | None = Field(default=None, description="Largest speed of a prismatic joint.")
+    wrap: bool = Field(default=False, description="Whether a continuous joint may turn without end.")
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -77,28 +79,36 @@ class RobotEntry(Entry):
     """A robot placed in the cell."""
 
     model: Text = Field(
-        description="Bundled robot, or path of a URDF (.urdf) or a joint-axis table (.yaml) below the cell file's folder."
+        description="Bundled robot, or path of a URDF (.urdf) or joint-axis table (.yaml) below the cell file's folder."
     )
     package_dirs: tuple[Text, ...] = Field(
-        (), description="Folders in which package://NAME/... of a URDF is looked up as FOLDER/NAME/...."
+        default=(), description="Folders in which package://NAME/... of a URDF is looked up as FOLDER/NAME/...."
     )
     flange: Text | None = Field(
-        None, description="URDF link taken as the flange; when absent tool0, else flange, else the only last link."
+        default=None,
+        description="URDF link taken as the flange; when absent tool0, else flange, else the only last link.",
     )
-    base: PoseEntry = Field(PoseEntry(), description="Pose of the robot's base (root link of a URDF) in the world.")
-    tool: ToolEntry = Field(ToolEntry(), description="What the robot carries; without it the flange is the tool tip.")
+    base: PoseEntry = Field(
+        default=PoseEntry(), description="Pose of the robot's base (root link of a URDF) in the world."
+    )
+    tool: ToolEntry = Field(
+        default=ToolEntry(), description="What the robot carries; without it the flange is the tool tip."
+    )
     start_deg: Posture | None = Field(
-        None, description="Start posture, one angle per joint, for robots with revolute joints only; auto finds one."
+        default=None,
+        description="Start posture, one angle per joint, for robots with revolute joints only; auto finds one.",
     )
     start: NamedPosture | None = Field(
-        None, description="Start posture, one key per joint with its unit (a1_deg, rail_mm); excludes start_deg."
+        default=None,
+        description="Start posture, one key per joint with its unit (a1_deg, rail_mm); excludes start_deg.",
     )
     weights: tuple[Weight, ...] | None = Field(
-        None, description="One positive weight per joint, ones when absent; a larger weight moves that joint less."
+        default=None,
+        description="One positive weight per joint, ones when absent; a larger weight moves that joint less.",
     )
-    limits: dict[str, LimitsEntry] = Field({}, description="Limits by joint name, beside those of the model.")
+    limits: dict[str, LimitsEntry] = Field(default={}, description="Limits by joint name, beside those of the model.")
     locked: dict[str, JointPosition] = Field(
-        {},
+        default={},
         description="Positions of URDF joints that do not lead to the flange, by joint name with its unit (finger_mm).",
     )
 

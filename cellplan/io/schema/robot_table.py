@@ -32,21 +32,23 @@ class JointEntry(Entry):
 
     type: Literal["revolute", "prismatic"] = Field(description="How the joint moves.")
     axis: Vector = Field(description="Unit direction of the axis.")
-    point_mm: Coordinates = Field((0.0, 0.0, 0.0), description="A point on the axis; required for a revolute joint.")
-    lower_deg: JointAngle | None = Field(None, description="Lowest angle of a revolute joint.")
-    upper_deg: JointAngle | None = Field(None, description="Highest angle of a revolute joint.")
-    velocity_deg_s: TurningSpeed | None = Field(None, description="Largest speed of a revolute joint.")
+    point_mm: Coordinates = Field(
+        default=(0.0, 0.0, 0.0), description="A point on the axis; required for a revolute joint."
+    )
+    lower_deg: JointAngle | None = Field(default=None, description="Lowest angle of a revolute joint.")
+    upper_deg: JointAngle | None = Field(default=None, description="Highest angle of a revolute joint.")
+    velocity_deg_s: TurningSpeed | None = Field(default=None, description="Largest speed of a revolute joint.")
     acceleration_deg_s2: Positive | None = Field(
-        None, description="Largest acceleration of a revolute joint, if known."
+        default=None, description="Largest acceleration of a revolute joint, if known."
     )
-    jerk_deg_s3: Positive | None = Field(None, description="Largest jerk of a revolute joint, if known.")
-    lower_mm: Coordinate | None = Field(None, description="Lowest position of a prismatic joint.")
-    upper_mm: Coordinate | None = Field(None, description="Highest position of a prismatic joint.")
-    velocity_mm_s: SlidingSpeed | None = Field(None, description="Largest speed of a prismatic joint.")
+    jerk_deg_s3: Positive | None = Field(default=None, description="Largest jerk of a revolute joint, if known.")
+    lower_mm: Coordinate | None = Field(default=None, description="Lowest position of a prismatic joint.")
+    upper_mm: Coordinate | None = Field(default=None, description="Highest position of a prismatic joint.")
+    velocity_mm_s: SlidingSpeed | None = Field(default=None, description="Largest speed of a prismatic joint.")
     acceleration_mm_s2: Positive | None = Field(
-        None, description="Largest acceleration of a prismatic joint, if known."
+        default=None, description="Largest acceleration of a prismatic joint, if known."
     )
-    jerk_mm_s3: Positive | None = Field(None, description="Largest jerk of a prismatic joint, if known.")
+    jerk_mm_s3: Positive | None = Field(default=None, description="Largest jerk of a prismatic joint, if known.")
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -82,7 +84,7 @@ class PlacedBoxEntry(Entry):
 
     size_mm: tuple[Size, Size, Size] = Field(description="Edge lengths along its own x, y, z.")
     center_mm: Coordinates = Field(description="Centre.")
-    rpy_deg: Angles = Field((0.0, 0.0, 0.0), description="Roll, pitch and yaw about fixed axes.")
+    rpy_deg: Angles = Field(default=(0.0, 0.0, 0.0), description="Roll, pitch and yaw about fixed axes.")
 
 
 class PlacedSphereEntry(SphereEntry):
@@ -96,7 +98,7 @@ class PlacedMeshEntry(Entry):
 
     file: Text = Field(description="STL, OBJ or PLY file, relative to the table.")
     unit: MeshUnit = Field(description="Unit of the file.")
-    at: PoseEntry = Field(PoseEntry(), description="Pose of the drawing in the base frame.")
+    at: PoseEntry = Field(default=PoseEntry(), description="Pose of the drawing in the base frame.")
 
 
 class LinkBodyEntry(Entry):
@@ -105,12 +107,12 @@ class LinkBodyEntry(Entry):
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
 
     link: Text = Field(description="The word base, or the joint that carries the solid.")
-    name: Name | None = Field(None, description="Name in reports; the link's name, numbered, when absent.")
-    box: PlacedBoxEntry | None = Field(None, description="Cuboid.")
-    cylinder: SegmentEntry | None = Field(None, description="Cylinder with flat ends.")
-    capsule: SegmentEntry | None = Field(None, description="Cylinder with round ends beyond the segment.")
-    sphere: PlacedSphereEntry | None = Field(None, description="Ball.")
-    mesh: PlacedMeshEntry | None = Field(None, description="Mesh from a file.")
+    name: Name | None = Field(default=None, description="Name in reports; the link's name, numbered, when absent.")
+    box: PlacedBoxEntry | None = Field(default=None, description="Cuboid.")
+    cylinder: SegmentEntry | None = Field(default=None, description="Cylinder with flat ends.")
+    capsule: SegmentEntry | None = Field(default=None, description="Cylinder with round ends beyond the segment.")
+    sphere: PlacedSphereEntry | None = Field(default=None, description="Ball.")
+    mesh: PlacedMeshEntry | None = Field(default=None, description="Mesh from a file.")
 
     @model_validator(mode="after")
     def _is_one_shape(self) -> Self:
@@ -125,7 +127,7 @@ class RobotTableDocument(Entry):
     """A whole robot file."""
 
     robot: Name = Field(description="Name of the robot model.")
-    source: Text = Field("not stated", description="Where the figures come from.")
+    source: Text = Field(default="not stated", description="Where the figures come from.")
     joints: dict[Name, JointEntry] = Field(
         min_length=1, max_length=AXIS_LIMIT, description="Joints by name, from the base to the flange."
     )
@@ -133,5 +135,5 @@ class RobotTableDocument(Entry):
         description="Flange (mechanical interface) in the base frame at the reference posture, z out of the flange."
     )
     bodies: tuple[LinkBodyEntry, ...] = Field(
-        (), max_length=200, description="Solids of the links, in the base frame at the reference posture."
+        default=(), max_length=200, description="Solids of the links, in the base frame at the reference posture."
     )

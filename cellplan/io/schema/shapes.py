@@ -32,7 +32,7 @@ class CylinderEntry(Entry):
 
     radius_mm: Size = Field(description="Radius.")
     length_mm: Size = Field(description="Length along its axis.")
-    axis: AxisName = Field("z", description="Direction of its axis.")
+    axis: AxisName = Field(default="z", description="Direction of its axis.")
 
 
 class CapsuleEntry(Entry):
@@ -40,7 +40,7 @@ class CapsuleEntry(Entry):
 
     radius_mm: Size = Field(description="Radius.")
     length_mm: Size = Field(description="Length from end to end, round ends included.")
-    axis: AxisName = Field("z", description="Direction of its axis.")
+    axis: AxisName = Field(default="z", description="Direction of its axis.")
 
     @model_validator(mode="after")
     def _has_round_ends(self) -> Self:
@@ -97,11 +97,13 @@ class PartShapeEntry(Entry):
 
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PART_SHAPES))
 
-    box: BoxEntry | None = Field(None, description="Cuboid centred on the part frame.")
-    cylinder: CylinderEntry | None = Field(None, description="Circular cylinder centred on the part frame.")
-    sphere: SphereEntry | None = Field(None, description="Ball centred on the part frame.")
-    mesh: Text | None = Field(None, description="STL, OBJ or PLY file of a closed surface, drawn in the part frame.")
-    unit: MeshUnit | None = Field(None, description="Unit of the mesh file; required with a mesh.")
+    box: BoxEntry | None = Field(default=None, description="Cuboid centred on the part frame.")
+    cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder centred on the part frame.")
+    sphere: SphereEntry | None = Field(default=None, description="Ball centred on the part frame.")
+    mesh: Text | None = Field(
+        default=None, description="STL, OBJ or PLY file of a closed surface, drawn in the part frame."
+    )
+    unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
 
     @model_validator(mode="after")
     def _is_one_shape(self) -> Self:
@@ -116,12 +118,18 @@ class ToolShapeEntry(Entry):
 
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
 
-    box: BoxEntry | None = Field(None, description="Cuboid; along the tool's z axis it reaches from -size to 0.")
-    cylinder: ToolRoundEntry | None = Field(None, description="Cylinder along the tool's z axis, from -length to 0.")
-    capsule: ToolCapsuleEntry | None = Field(None, description="Capsule along the tool's z axis, from -length to 0.")
-    sphere: SphereEntry | None = Field(None, description="Ball that touches the tool tip from behind.")
-    mesh: Text | None = Field(None, description="STL, OBJ or PLY file, drawn in the flange frame.")
-    unit: MeshUnit | None = Field(None, description="Unit of the mesh file; required with a mesh.")
+    box: BoxEntry | None = Field(
+        default=None, description="Cuboid; along the tool's z axis it reaches from -size to 0."
+    )
+    cylinder: ToolRoundEntry | None = Field(
+        default=None, description="Cylinder along the tool's z axis, from -length to 0."
+    )
+    capsule: ToolCapsuleEntry | None = Field(
+        default=None, description="Capsule along the tool's z axis, from -length to 0."
+    )
+    sphere: SphereEntry | None = Field(default=None, description="Ball that touches the tool tip from behind.")
+    mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file, drawn in the flange frame.")
+    unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
 
     @model_validator(mode="after")
     def _is_one_shape(self) -> Self:
@@ -136,13 +144,13 @@ class ToolBodyEntry(Entry):
 
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
 
-    box: BoxEntry | None = Field(None, description="Cuboid.")
-    cylinder: CylinderEntry | None = Field(None, description="Circular cylinder.")
-    capsule: CapsuleEntry | None = Field(None, description="Cylinder with round ends.")
-    sphere: SphereEntry | None = Field(None, description="Ball.")
-    mesh: Text | None = Field(None, description="STL, OBJ or PLY file.")
-    unit: MeshUnit | None = Field(None, description="Unit of the mesh file; required with a mesh.")
-    at: PoseEntry = Field(PoseEntry(), description="Pose of the solid in the flange frame.")
+    box: BoxEntry | None = Field(default=None, description="Cuboid.")
+    cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder.")
+    capsule: CapsuleEntry | None = Field(default=None, description="Cylinder with round ends.")
+    sphere: SphereEntry | None = Field(default=None, description="Ball.")
+    mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file.")
+    unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
+    at: PoseEntry = Field(default=PoseEntry(), description="Pose of the solid in the flange frame.")
 
     @model_validator(mode="after")
     def _is_one_shape(self) -> Self:
@@ -157,15 +165,15 @@ class ObstacleEntry(Entry):
 
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*OBSTACLE_SHAPES))
 
-    plane: PlaneEntry | None = Field(None, description="Floor of the cell.")
-    box: BoxEntry | None = Field(None, description="Cuboid.")
-    cylinder: CylinderEntry | None = Field(None, description="Circular cylinder.")
-    capsule: CapsuleEntry | None = Field(None, description="Cylinder with round ends.")
-    sphere: SphereEntry | None = Field(None, description="Ball.")
-    mesh: Text | None = Field(None, description="STL, OBJ or PLY file.")
-    unit: MeshUnit | None = Field(None, description="Unit of the mesh file; required with a mesh.")
+    plane: PlaneEntry | None = Field(default=None, description="Floor of the cell.")
+    box: BoxEntry | None = Field(default=None, description="Cuboid.")
+    cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder.")
+    capsule: CapsuleEntry | None = Field(default=None, description="Cylinder with round ends.")
+    sphere: SphereEntry | None = Field(default=None, description="Ball.")
+    mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file.")
+    unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
     at: PoseEntry | None = Field(
-        None, description="Pose of the shape in the world; the world frame when absent. Not with a plane."
+        default=None, description="Pose of the shape in the world; the world frame when absent. Not with a plane."
     )
 
     @model_validator(mode="after")

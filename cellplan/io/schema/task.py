@@ -40,7 +40,7 @@ class CircleEntry(Entry):
 
     radius_mm: Size = Field(description="Radius.")
     plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field((0.0, 0.0), description="Centre on the plane's two axes.")
+    center_mm: PlaneCoordinates = Field(default=(0.0, 0.0), description="Centre on the plane's two axes.")
 
 
 class RectangleEntry(Entry):
@@ -48,8 +48,8 @@ class RectangleEntry(Entry):
 
     sides_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
     plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field((0.0, 0.0), description="Centre on the plane's two axes.")
-    angle_deg: Angle = Field(0.0, description="Turn in the plane, from the first axis towards the second.")
+    center_mm: PlaneCoordinates = Field(default=(0.0, 0.0), description="Centre on the plane's two axes.")
+    angle_deg: Angle = Field(default=0.0, description="Turn in the plane, from the first axis towards the second.")
 
 
 class RhombusEntry(Entry):
@@ -57,8 +57,8 @@ class RhombusEntry(Entry):
 
     diagonals_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
     plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field((0.0, 0.0), description="Centre on the plane's two axes.")
-    angle_deg: Angle = Field(0.0, description="Turn in the plane, from the first axis towards the second.")
+    center_mm: PlaneCoordinates = Field(default=(0.0, 0.0), description="Centre on the plane's two axes.")
+    angle_deg: Angle = Field(default=0.0, description="Turn in the plane, from the first axis towards the second.")
 
 
 class PolylineEntry(Entry):
@@ -68,9 +68,9 @@ class PolylineEntry(Entry):
         min_length=2, description="Points, all [u, v] on the plane's axes or all [x, y, z] in the part frame."
     )
     plane: PlaneWord | None = Field(
-        None, description="Plane of the part frame; required with [u, v], not with [x, y, z]."
+        default=None, description="Plane of the part frame; required with [u, v], not with [x, y, z]."
     )
-    closed: bool = Field(False, description="Whether the last point is joined to the first.")
+    closed: bool = Field(default=False, description="Whether the last point is joined to the first.")
 
     @model_validator(mode="after")
     def _is_drawable(self) -> Self:
@@ -105,8 +105,10 @@ class CsvEntry(Entry):
     """Tool targets from a CSV file."""
 
     file: Text = Field(description="File with the header x_mm,y_mm,z_mm and optionally i,j,k or qw,qx,qy,qz.")
-    smooth: bool = Field(True, description="Whether a curve is laid through the points instead of straight sides.")
-    closed: bool = Field(False, description="Whether the last point is joined to the first.")
+    smooth: bool = Field(
+        default=True, description="Whether a curve is laid through the points instead of straight sides."
+    )
+    closed: bool = Field(default=False, description="Whether the last point is joined to the first.")
 
 
 CsvChoice = Annotated[
@@ -128,7 +130,7 @@ class RampEntry(Entry):
     """Settings of the trapezoid law."""
 
     ramp: Annotated[float, Field(gt=0.0, le=0.5)] = Field(
-        0.25, description="Share of the time of each stretch spent speeding up, and the same slowing down."
+        default=0.25, description="Share of the time of each stretch spent speeding up, and the same slowing down."
     )
 
 
@@ -160,16 +162,18 @@ class PathEntry(Entry):
 
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PATHS))
 
-    circle: CircleEntry | None = Field(None, description="Circle.")
-    rectangle: RectangleEntry | None = Field(None, description="Rectangle.")
-    rhombus: RhombusEntry | None = Field(None, description="Rhombus.")
-    polyline: PolylineEntry | None = Field(None, description="Points joined by straight sides.")
-    csv: CsvChoice | None = Field(None, description="Tool targets from a file.")
+    circle: CircleEntry | None = Field(default=None, description="Circle.")
+    rectangle: RectangleEntry | None = Field(default=None, description="Rectangle.")
+    rhombus: RhombusEntry | None = Field(default=None, description="Rhombus.")
+    polyline: PolylineEntry | None = Field(default=None, description="Points joined by straight sides.")
+    csv: CsvChoice | None = Field(default=None, description="Tool targets from a file.")
     project: Direction | None = Field(
-        None, description="Side of the part that the path is laid on, seen from the part frame; absent: used as drawn."
+        default=None,
+        description="Side of the part that the path is laid on, seen from the part frame; absent: used as drawn.",
     )
     offset_mm: Coordinate | None = Field(
-        None, description="Shift of a planar path that is not projected along the plane's normal axis; 0 when absent."
+        default=None,
+        description="Shift of a planar path that is not projected along the plane's normal axis; 0 when absent.",
     )
 
     @model_validator(mode="after")
@@ -193,8 +197,10 @@ class PathEntry(Entry):
 class ToleranceEntry(Entry):
     """Largest allowed tool error on the part."""
 
-    position_mm: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(0.1, description="Largest position error.")
-    orientation_deg: Annotated[float, Field(gt=0.0, le=180.0)] = Field(0.01, description="Largest orientation error.")
+    position_mm: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(default=0.1, description="Largest position error.")
+    orientation_deg: Annotated[float, Field(gt=0.0, le=180.0)] = Field(
+        default=0.01, description="Largest orientation error."
+    )
 
 
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
@@ -206,34 +212,40 @@ class TaskEntry(Entry):
     robot: Name = Field(description="Robot that does the task; a robot has at most one.")
     path: PathEntry = Field(description="Path of the tool tip on the part.")
     tool_axis: ToolAxis | None = Field(
-        None,
+        default=None,
         description="Direction of the tool's z axis in the part frame; normal, the default, points into the surface or "
         "takes the file's orientations.",
     )
-    tool_x: Direction = Field("+x", description="Direction in the part frame that the tool's x axis leans to.")
+    tool_x: Direction = Field(default="+x", description="Direction in the part frame that the tool's x axis leans to.")
     tool_turn_deg: Angle = Field(
-        0.0, description="Angle by which the tool turns about its own z axis, evenly over the length of the path."
+        default=0.0,
+        description="Angle by which the tool turns about its own z axis, evenly over the length of the path.",
     )
     axes: tuple[TaskAxis, ...] = Field(
-        ("x", "y", "z", "rx", "ry", "rz"),
+        default=("x", "y", "z", "rx", "ry", "rz"),
         min_length=1,
         description="Components of the motion that are prescribed, in the part frame.",
     )
     free: tuple[Literal["spin"], ...] = Field(
-        (), description="[spin] leaves the rotation about the tool's z axis open."
+        default=(), description="[spin] leaves the rotation about the tool's z axis open."
     )
-    tolerance: ToleranceEntry = Field(ToleranceEntry(), description="Largest allowed tool error.")
-    start_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(0.0, description="Start on the common clock.")
+    tolerance: ToleranceEntry = Field(default=ToleranceEntry(), description="Largest allowed tool error.")
+    start_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
+        default=0.0, description="Start on the common clock."
+    )
     duration_s: Seconds | None = Field(
-        None, description="Time for the whole path; the rest of the motion's duration when absent. Excludes feed_mm_s."
+        default=None,
+        description="Time for the whole path; the rest of the motion's duration when absent. Excludes feed_mm_s.",
     )
     feed_mm_s: SlidingSpeed | None = Field(
-        None, description="Largest speed along the path on the surface; excludes duration_s."
+        default=None, description="Largest speed along the path on the surface; excludes duration_s."
     )
     time_law: TimeLawChoice | None = Field(
-        None, description="Law of each stretch between stops; the motion's when absent."
+        default=None, description="Law of each stretch between stops; the motion's when absent."
     )
-    corners: CornerChoice | None = Field(None, description="Stop at corners or round them; the motion's when absent.")
+    corners: CornerChoice | None = Field(
+        default=None, description="Stop at corners or round them; the motion's when absent."
+    )
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:

@@ -1,0 +1,238 @@
+"""Entries of a cell file, in millimetres and degrees, become the cell's frozen data in metres and radians."""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.io.cell_rules import needs_surface
+from cellplan.io.robot_rules import start_posture
+from cellplan.io.schema import CellDocument
+from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry, SolverEntry
+from cellplan.io.schema.robot import RobotEntry, ToolEntry
+from cellplan.io.schema.shapes import ObstacleEntry
+from cellplan.io.schema.task import (
+    BlendEntry,
+    PathEntry,
+    PolylineEntry,
+    RectangleEntry,
+    RhombusEntry,
+    TaskEntry,
+    TrapezoidEntry,
+)
+from cellplan.io.shape_build import MM, MeshReader, centred_solid, obstacle_shape, pose_from_entry, tool_solid
+from cellplan.model.cell import (
+    CheckSettings,
+    Exclusion,
+    Grasp,
+    Mode,
+    MotionSettings,
+    Obstacle,
+    Part,
+    Robot,
+    SolverSettings,
+    Tool,
+)
+from cellplan.model.robot import BASE, Body, RobotModel
+from cellplan.model.task import (
+    CirclePath,
+    PathSpec,
+    PlaneName,
+    PolygonPath,
+    SampledPath,
+    SpacePolylinePath,
+    Task,
+    TimeLaw,
+    TimeLawKind,
+    Tolerance,
+)
+
+COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
+PLANE_NORMAL: Final = {"xy": "z", "yz": "x", "xz": "y"}
+HALF_FEEDBACK: Final = 0.5  # gain_per_s * step_s by default: a quarter of where Euler's steps begin to swing
+
+TargetReader = Callable[[str], SampledPath]  # name of the task -> its file, read
+
+
+def build_robot(name: str, entry: RobotEntry, model: RobotModel, read_mesh: MeshReader) -> Robot:
+    """A robot placed in the cell."""
+    weights = np.ones(len(model.joints)) if entry.weights is None else np.array(entry.weights)
+    return Robot(
+        name=name,
+        model=model,
+        X_WB=pose_from_entry(entry.base),
+        tool=_tool(entry.tool, read_mesh),
+        start=start_posture(entry, model),
+        weights=weights,
+    )
+
+
+def _tool(entry: ToolEntry, read_mesh: MeshReader) -> Tool:
+    """A tool; its bodies are named ``tool``, ``tool_2``, …."""
+    X_FT = pose_from_entry(entry)
+    placed = [] if entry.geometry is None else [tool_solid(entry.geometry, X_FT, read_mesh)]
+    for body in entry.bodies:
+        solid, X_AS = centred_solid(body, read_mesh)
+        placed.append((solid, pose_from_entry(body.at) @ X_AS))
+    bodies = [
+        Body(name="tool" if number == 1 else f"tool_{number}", link=BASE, shape=solid, X_BS=X_FS)
+        for number, (solid, X_FS) in enumerate(placed, start=1)
+    ]
+    return Tool(X_FT=X_FT, bodies=tuple(bodies))
+
+
+def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
+    """The workpiece."""
+    shape, X_PS = centred_solid(entry.geometry, read_mesh)
+    return Part(
+        shape=shape,
+        X_PS=X_PS,
+        held_by=tuple(Grasp(robot=grasp.robot, X_PT=pose_from_entry(grasp.at)) for grasp in entry.held_by),
+        X_WP=None if entry.at is None else pose_from_entry(entry.at),
+    )
+
+
+def build_obstacle(name: str, entry: ObstacleEntry, read_mesh: MeshReader) -> Obstacle:
+    """A fixed thing."""
+    shape, X_WS = obstacle_shape(entry, read_mesh)
+    return Obstacle(name=name, shape=shape, X_WS=X_WS)
+
+
+def build_task(name: str, document: CellDocument, read_targets: TargetReader) -> Task:
+    """One operator's work, with the motion's settings where it has none of its own."""
+    entry, motion = document.tasks[name], document.motion
+    tool_axis, tool_x = tool_directions(entry)
+    has_own_time = entry.duration_s is not None or entry.feed_mm_s is not None
+    law = entry.time_law or motion.time_law
+    corners = entry.corners or motion.corners
+    return Task(
+        name=name,
+        robot=entry.robot,
+        path=_path(name, entry.path, read_targets),
+        project=None if entry.path.project is None else direction(entry.path.project),
+        plane_offset=(entry.path.offset_mm or 0.0) / MM,
+        tool_axis=None if tool_axis is None else direction(tool_axis),
+        tool_x=direction(tool_x),
+        turn=float(np.deg2rad(entry.tool_turn_deg)),
+        axes=tuple(sorted(COMPONENTS.index(axis) for axis in entry.axes)),
+        is_spin_free="spin" in entry.free,
+        tolerance=Tolerance(
+            position=entry.tolerance.position_mm / MM, orientation=float(np.deg2rad(entry.tolerance.orientation_deg))
+        ),
+        start=entry.start_s,
+        duration=entry.duration_s if has_own_time else motion.duration_s - entry.start_s,
+        feed=None if entry.feed_mm_s is None else entry.feed_mm_s / MM,
+        time_law=_time_law(law),
+        blend=corners.blend_mm / MM if isinstance(corners, BlendEntry) else None,
+    )
+
+
+Direction = str | tuple[float, float, float]
+
+
+def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
+    """Tool axis (None for the normal) and tool x of a task, as words or vectors.
+
+    A task that prescribes positions only, on a path that is used as drawn, needs no axis; the tool then looks against
+    the normal of the path's plane.
+    """
+    if entry.tool_axis not in {None, "normal"}:
+        return entry.tool_axis, entry.tool_x
+    path = entry.path
+    if needs_surface(entry) or path.project is not None or path.csv is not None:
+        return None, entry.tool_x
+    shape = path.circle or path.rectangle or path.rhombus or path.polyline
+    normal = PLANE_NORMAL[(shape.plane if shape else None) or "xy"]
+    is_default = "tool_x" not in entry.model_fields_set
+    return f"-{normal}", "+y" if is_default and normal == "x" else entry.tool_x
+
+
+def direction(written: Direction) -> Array:
+    """Unit vector of a word such as ``+x`` or of a vector of any length."""
+    if isinstance(written, str):
+        vector = np.zeros(3)
+        vector["xyz".index(written[-1])] = -1.0 if written.startswith("-") else 1.0
+        return vector
+    unit: Array = np.array(written) / np.linalg.norm(written)
+    return unit
+
+
+def resolved_document(document: CellDocument) -> dict[str, Any]:
+    """The file as plain values in its own units, with every default that follows from other entries filled in."""
+    values = document.model_dump(exclude_none=True)
+    motion, dumped_motion = document.motion, values["motion"]
+    for name, task in document.tasks.items():
+        entry = values["tasks"][name]
+        tool_axis, entry["tool_x"] = tool_directions(task)
+        entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
+        entry.setdefault("time_law", dumped_motion["time_law"])
+        entry.setdefault("corners", dumped_motion["corners"])
+        if task.duration_s is None and task.feed_mm_s is None:
+            entry["duration_s"] = motion.duration_s - task.start_s
+        if task.path.is_planar and task.path.project is None:
+            entry["path"].setdefault("offset_mm", 0.0)
+        values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}
+    return values
+
+
+def _path(name: str, entry: PathEntry, read_targets: TargetReader) -> PathSpec:
+    """Geometry of a path in [m]."""
+    if entry.circle is not None:
+        u, v = entry.circle.center_mm
+        return CirclePath(
+            plane=PlaneName(entry.circle.plane), center=(u / MM, v / MM), radius=entry.circle.radius_mm / MM
+        )
+    if entry.rectangle is not None:
+        return _polygon(entry.rectangle, entry.rectangle.sides_mm, ((1, 1), (-1, 1), (-1, -1), (1, -1)))
+    if entry.rhombus is not None:
+        return _polygon(entry.rhombus, entry.rhombus.diagonals_mm, ((1, 0), (0, 1), (-1, 0), (0, -1)))
+    return read_targets(name) if entry.polyline is None else _polyline(entry.polyline)
+
+
+def _polygon(
+    entry: RectangleEntry | RhombusEntry, extents_mm: tuple[float, float], signs: tuple[tuple[int, int], ...]
+) -> PolygonPath:
+    """Corners of a centred shape, turned and moved in its plane."""
+    angle = np.deg2rad(entry.angle_deg)
+    R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    corners = np.array(signs) * (0.5 * np.array(extents_mm)) @ R.T + np.array(entry.center_mm)
+    return PolygonPath(
+        plane=PlaneName(entry.plane), corners=tuple((float(u) / MM, float(v) / MM) for u, v in corners), is_closed=True
+    )
+
+
+def _polyline(entry: PolylineEntry) -> PathSpec:
+    """Points in a plane or in space."""
+    points = [tuple(value / MM for value in point) for point in entry.points_mm]
+    if entry.plane is None:
+        return SpacePolylinePath(points=tuple((x, y, z) for x, y, z in points), is_closed=entry.closed)
+    return PolygonPath(plane=PlaneName(entry.plane), corners=tuple((u, v) for u, v in points), is_closed=entry.closed)
+
+
+def _time_law(law: str | TrapezoidEntry) -> TimeLaw:
+    """A time law with its ramp."""
+    if isinstance(law, TrapezoidEntry):
+        return TimeLaw(kind=TimeLawKind.TRAPEZOID, ramp=law.trapezoid.ramp)
+    return TimeLaw(kind=TimeLawKind(law))
+
+
+def build_motion(entry: MotionEntry) -> MotionSettings:
+    """Mode and clock."""
+    return MotionSettings(mode=Mode(entry.mode), duration=entry.duration_s, step=entry.step_s)
+
+
+def build_solver(entry: SolverEntry, step: float) -> SolverSettings:
+    """Method and gains; the gain follows from the step in [s] when it is not given."""
+    gain = HALF_FEEDBACK / step if entry.gain_per_s is None else entry.gain_per_s
+    damping = None if isinstance(entry.damping, str) else entry.damping
+    return SolverSettings(method=entry.method, gain=gain, damping=damping, seed=entry.seed)
+
+
+def build_checks(entry: ChecksEntry) -> CheckSettings:
+    """Demands."""
+    return CheckSettings(
+        clearance=entry.clearance_mm / MM,
+        contact_zone=entry.contact_zone_mm / MM,
+        exclusions=tuple(Exclusion(bodies=pair.bodies, reason=pair.reason) for pair in entry.exclude),
+    )

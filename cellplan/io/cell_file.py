@@ -1,0 +1,178 @@
+"""Cell file: read, understood, checked against itself and against the files it names; all complaints at once."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from cellplan.errors import InputError
+from cellplan.geometry.shapes import Mesh
+from cellplan.io.cell_build import (
+    build_checks,
+    build_motion,
+    build_obstacle,
+    build_part,
+    build_robot,
+    build_solver,
+    build_task,
+    resolved_document,
+)
+from cellplan.io.cell_rules import needs_surface, rule_complaints
+from cellplan.io.cell_sources import Sources
+from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, raise_complaints
+from cellplan.io.reach import Reach
+from cellplan.io.robot_rules import robot_complaints
+from cellplan.io.schema import CellDocument
+from cellplan.io.schema.pieces import Pieces, read_pieces
+from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry, ToolBodyEntry, ToolShapeEntry
+from cellplan.io.yaml_reader import YamlDocument, read_yaml
+from cellplan.model.cell import Cell, Origin
+from cellplan.model.robot import RobotModel
+from cellplan.model.task import SampledPath
+
+PART_EXTENT_MM: Final = (1.0, 20_000.0)  # smaller or larger parts are slips of the unit
+
+
+def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> Cell:
+    """Read a cell file and everything it names.
+
+    Args:
+        path: The cell file.
+        allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+
+    Raises:
+        InvalidFileError: Everything that is wrong with the cell and the files it names, one located line each.
+        InputError: The cell file cannot be read at all.
+    """
+    path = Path(path)
+    file = str(path)
+    document = read_yaml(path, file=file)
+    pieces, complaints = read_pieces(document)
+    complaints += [*document.complaints, *rule_complaints(pieces, document)]
+    sources = Sources(document, Reach(folder=path.parent, allowed=tuple(Path(folder) for folder in allow_dirs)))
+    sources.inputs[path.name] = document.digest
+    models = _models(pieces, sources)
+    for name, model in models.items():
+        complaints += robot_complaints(name, pieces.robots[name], model, document)
+    complaints += _unknown_bodies(pieces, models, document)
+    complaints += _part_extent(pieces, document)
+    _read_meshes(pieces, sources)
+    targets = _targets(pieces, sources)
+    complaints += _targets_without_axes(pieces, targets, document)
+    raise_complaints(file, [*complaints, *sources.complaints], sources.errors)
+    if pieces.whole is None:
+        raise InputError(f"{file}: the cell cannot be understood")
+    return _cell(pieces.whole, models, targets, document=document, sources=sources)
+
+
+def _models(pieces: Pieces, sources: Sources) -> dict[str, RobotModel]:
+    """Models of all robots that are understood, by name."""
+    found = {name: sources.robot(name, entry) for name, entry in pieces.robots.items()}
+    return {name: model for name, model in found.items() if model is not None}
+
+
+def _targets(pieces: Pieces, sources: Sources) -> dict[str, SampledPath]:
+    """Tool targets from files, by task."""
+    found = {
+        name: sources.targets(task.path.csv, ("tasks", name, "path", "csv"))
+        for name, task in pieces.tasks.items()
+        if task.path.csv is not None
+    }
+    return {name: sampled for name, sampled in found.items() if sampled is not None}
+
+
+def _targets_without_axes(
+    pieces: Pieces, targets: Mapping[str, SampledPath], document: YamlDocument
+) -> Iterator[Complaint]:
+    """A file without orientations, not laid on the part, has no normals."""
+    for name, sampled in targets.items():
+        task = pieces.tasks[name]
+        has_axes = sampled.axes is not None or sampled.rotations is not None
+        if needs_surface(task) and task.path.project is None and not has_axes:
+            text = (
+                "tool_axis: normal needs axes or quaternions in the file, or a path that is laid on the part: "
+                "add columns i,j,k, add project: +z (or another side), or give tool_axis a direction"
+            )
+            yield document.complaint(("tasks", name, "tool_axis" if task.tool_axis else "path"), text)
+
+
+def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Complaint]:
+    """Exclusions name bodies that exist; told only when all robots are known."""
+    if pieces.checks is None or set(models) != set(pieces.names["robots"]):
+        return
+    known = {"part", *pieces.names["environment"]}
+    for name, model in models.items():
+        tool = pieces.robots[name].tool
+        count = len(tool.bodies) + (tool.geometry is not None)
+        known |= {f"{name}/{body.name}" for body in model.bodies}
+        known |= {f"{name}/tool" if number == 1 else f"{name}/tool_{number}" for number in range(1, count + 1)}
+    for index, pair in enumerate(pieces.checks.exclude):
+        for side, body in enumerate(pair.bodies):
+            if body not in known:
+                text = f"expected a body of this cell, got '{body}'{did_you_mean(body, sorted(known))}"
+                yield document.complaint(("checks", "exclude", index, "bodies", side), text)
+
+
+def _part_extent(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """A part of a likely size; meshes are looked at by their reader."""
+    shape = pieces.part.geometry if pieces.part else None
+    if shape is None or shape.mesh is not None:
+        return
+    extent = 0.0
+    if shape.box is not None:
+        extent = max(shape.box.size_mm)
+    elif shape.cylinder is not None:
+        extent = max(2.0 * shape.cylinder.radius_mm, shape.cylinder.length_mm)
+    elif shape.sphere is not None:
+        extent = 2.0 * shape.sphere.radius_mm
+    low, high = PART_EXTENT_MM
+    if not low <= extent <= high:
+        text = f"expected a part of {low:g} to {high:g} mm, got {extent:g} mm; is the unit right?"
+        yield document.complaint(("part", "geometry"), text)
+
+
+Meshed = PartShapeEntry | ToolShapeEntry | ToolBodyEntry | ObstacleEntry
+
+
+def _read_meshes(pieces: Pieces, sources: Sources) -> None:
+    """Read every mesh once, so that all complaints come together."""
+    shapes: list[tuple[KeyPath, Meshed]] = [(("environment", name), it) for name, it in pieces.environment.items()]
+    for name, robot in pieces.robots.items():
+        place: KeyPath = ("robots", name, "tool")
+        shapes += [((*place, "bodies", index), body) for index, body in enumerate(robot.tool.bodies)]
+        shapes += [((*place, "geometry"), robot.tool.geometry)] if robot.tool.geometry is not None else []
+    if pieces.part is not None and pieces.part.geometry.mesh is not None and pieces.part.geometry.unit is not None:
+        sources.solid_mesh(pieces.part.geometry.mesh, pieces.part.geometry.unit, ("part", "geometry", "mesh"))
+    for path, shape in shapes:
+        if shape.mesh is not None and shape.unit is not None:
+            sources.mesh(shape.mesh, shape.unit, (*path, "mesh"))
+
+
+def _cell(
+    whole: CellDocument,
+    models: Mapping[str, RobotModel],
+    targets: Mapping[str, SampledPath],
+    *,
+    document: YamlDocument,
+    sources: Sources,
+) -> Cell:
+    """The cell, once nothing is left to complain about."""
+
+    def mesh(written: str, unit: str) -> Mesh:
+        """A mesh that was read before."""
+        found = sources.mesh(written, unit, ())
+        if found is None:
+            raise InputError(f"{document.file}: mesh '{written}' could not be read")
+        return found
+
+    return Cell(
+        name=whole.name,
+        robots=tuple(build_robot(name, entry, models[name], mesh) for name, entry in whole.robots.items()),
+        part=build_part(whole.part, mesh),
+        tasks=tuple(build_task(name, whole, targets.__getitem__) for name in whole.tasks),
+        obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),
+        motion=build_motion(whole.motion),
+        solver=build_solver(whole.solver, whole.motion.step_s),
+        checks=build_checks(whole.checks),
+        origin=Origin(file=document.file, lines=document.lines(), document=resolved_document(whole)),
+        inputs=dict(sorted(sources.inputs.items())),
+    )

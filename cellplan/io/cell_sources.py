@@ -1,0 +1,193 @@
+"""Files that a cell names: robots, meshes and toolpaths, each read once and known by its digest."""
+
+import os
+import posixpath
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.meshes import read_mesh, require_solid
+from cellplan.geometry.shapes import Mesh
+from cellplan.io.bundled_robots import load_bundled_table
+from cellplan.io.complaints import Complaint, KeyPath, shown
+from cellplan.io.input_files import digest_of_file
+from cellplan.io.reach import Reach
+from cellplan.io.robot_rules import limits_in_si, tightened
+from cellplan.io.robot_table import MESH_UNITS, RobotTable, load_robot_table
+from cellplan.io.schema.robot import RobotEntry
+from cellplan.io.schema.task import CsvEntry
+from cellplan.io.toolpath_csv import read_toolpath_csv
+from cellplan.io.urdf import UrdfOptions, load_urdf
+from cellplan.io.yaml_reader import YamlDocument
+from cellplan.model.robot import RobotModel
+from cellplan.model.task import SampledPath
+
+URDF_SUFFIXES = frozenset({".urdf"})
+TABLE_SUFFIXES = frozenset({".yaml", ".yml"})
+
+
+class Sources:
+    """Reads what a cell names and gathers what is wrong with it.
+
+    Attributes:
+        inputs: SHA-256 of every file that was read, by the path as written.
+        complaints: About the names in the cell file.
+        errors: About the files themselves.
+    """
+
+    def __init__(self, document: YamlDocument, reach: Reach) -> None:
+        """Remember where to look and where to complain."""
+        self._document = document
+        self._reach = reach
+        self._meshes: dict[tuple[str, str], Mesh | None] = {}
+        self.inputs: dict[str, str] = {}
+        self.complaints: list[Complaint] = []
+        self.errors: list[InputError] = []
+
+    def mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
+        """Mesh in [m]; None after a complaint."""
+        if (written, unit) not in self._meshes:
+            self._meshes[written, unit] = self._read_mesh(written, unit, path)
+        return self._meshes[written, unit]
+
+    def solid_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
+        """Closed mesh with a volume, in [m]; None after a complaint."""
+        mesh = self.mesh(written, unit, path)
+        try:
+            if mesh is not None:
+                require_solid(mesh)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return mesh
+
+    def targets(self, entry: str | CsvEntry, path: KeyPath) -> SampledPath | None:
+        """Tool targets of a task; None after a complaint."""
+        settings = CsvEntry(file=entry) if isinstance(entry, str) else entry
+        place = self._file(settings.file, path if isinstance(entry, str) else (*path, "file"))
+        if place is None:
+            return None
+        try:
+            sampled = read_toolpath_csv(
+                place, is_smooth=settings.smooth, is_closed=settings.closed, source=settings.file
+            )
+            self.inputs[settings.file] = digest_of_file(place, file=settings.file)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return sampled
+
+    def robot(self, name: str, entry: RobotEntry) -> RobotModel | None:
+        """Model of a robot within the limits of the cell; None after a complaint."""
+        suffix = PurePosixPath(entry.model).suffix.lower()
+        if suffix in URDF_SUFFIXES:
+            return self._urdf(name, entry)
+        self.complaints += self._only_for_urdf(name, entry)
+        model = self._table(name, entry, is_file=suffix in TABLE_SUFFIXES)
+        if model is None:
+            return None
+        model, complaints = tightened(("robots", name), entry, model, self._document)
+        self.complaints += complaints
+        return None if complaints else model
+
+    def _read_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
+        """Mesh in [m]; None after a complaint."""
+        place = self._file(written, path)
+        if place is None:
+            return None
+        try:
+            mesh = read_mesh(place, scale=MESH_UNITS[unit])
+            self.inputs[written] = digest_of_file(place, file=written)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return mesh
+
+    def _file(self, written: str, path: KeyPath) -> Path | None:
+        """Path of a named file; None after a complaint."""
+        try:
+            return self._reach.file(written)
+        except InputError as error:
+            self.complaints.append(self._document.complaint(path, str(error)))
+            return None
+
+    def _only_for_urdf(self, name: str, entry: RobotEntry) -> Iterator[Complaint]:
+        """Keys that say something about a URDF."""
+        for key in ("package_dirs", "flange", "locked"):
+            if getattr(entry, key):
+                yield self._document.key_complaint(("robots", name, key), "unexpected key, it goes with a URDF only")
+
+    def _table(self, name: str, entry: RobotEntry, *, is_file: bool) -> RobotModel | None:
+        """Model from a joint-axis table, bundled or in a file."""
+        path = ("robots", name, "model")
+        table: RobotTable
+        if not is_file:
+            try:
+                table = load_bundled_table(entry.model)
+            except InputError as error:
+                self.complaints.append(self._document.complaint(path, str(error)))
+                return None
+            self.inputs[f"bundled:{entry.model}"] = table.digest
+            return table.model
+        place = self._file(entry.model, path)
+        if place is None:
+            return None
+        try:
+            reach = Reach(folder=place.parent, allowed=(self._reach.folder, *self._reach.allowed))
+            table = load_robot_table(place, file=str(place), reach=reach)
+            self.inputs[entry.model] = table.digest
+            for written, mesh in table.mesh_files.items():
+                key = posixpath.join(posixpath.dirname(entry.model), written)
+                self.inputs[key] = digest_of_file(mesh, file=written)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return table.model
+
+    def _urdf(self, name: str, entry: RobotEntry) -> RobotModel | None:
+        """Model from a URDF and its meshes."""
+        path = ("robots", name, "model")
+        place, folders = self._file(entry.model, path), self._package_dirs(name, entry)
+        if place is None or folders is None:
+            return None
+        options = UrdfOptions(
+            flange=entry.flange,
+            package_dirs=folders,
+            limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items()},
+            locked=dict(_locked_in_si(entry)),
+        )
+        try:
+            robot = load_urdf(place, options)
+            self.inputs[entry.model] = digest_of_file(place, file=entry.model)
+            for mesh in robot.mesh_files:
+                if not self._reach.holds(mesh):
+                    text = f"expected meshes below the folder of the cell file, got {shown(mesh.name)} from elsewhere"
+                    self.complaints.append(self._document.complaint(path, f"{text}; allow it with --allow-dir"))
+                    return None
+                way = os.path.relpath(mesh.resolve(), place.parent.resolve()).replace(os.sep, "/")
+                key = posixpath.normpath(posixpath.join(posixpath.dirname(entry.model), way))
+                self.inputs[key] = digest_of_file(mesh, file=mesh.name)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return robot.model
+
+    def _package_dirs(self, name: str, entry: RobotEntry) -> tuple[Path, ...] | None:
+        """Folders for ``package://``; None after a complaint."""
+        found: list[Path] = []
+        for index, written in enumerate(entry.package_dirs):
+            try:
+                found.append(self._reach.directory(written))
+            except InputError as error:
+                path = ("robots", name, "package_dirs", index)
+                self.complaints.append(self._document.complaint(path, str(error)))
+        return tuple(found) if len(found) == len(entry.package_dirs) else None
+
+
+def _locked_in_si(entry: RobotEntry) -> Iterator[tuple[str, float]]:
+    """Positions of locked joints in [rad] or [m], by joint name."""
+    for key, value in entry.locked.items():
+        joint, _, unit = key.rpartition("_")
+        yield joint, float(np.deg2rad(value)) if unit == "deg" else value / 1000.0

@@ -1,0 +1,155 @@
+"""What a cell says about a robot must fit its model: start posture, weights and limits, joint by joint."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.io.complaints import Complaint, did_you_mean, listed, shown
+from cellplan.io.schema.robot import LimitsEntry, RobotEntry
+from cellplan.io.urdf_limits import JointLimits
+from cellplan.io.yaml_reader import YamlDocument
+from cellplan.model.robot import Joint, RobotModel
+
+FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference posture: farther is a slip of the unit
+ROOM: Final = 1e-9  # [rad] or [m]: degrees in a cell do not read back to the last bit
+
+
+def start_keys(model: RobotModel) -> tuple[str, ...]:
+    """Keys of a start posture by joint name: ``a1_deg``, ``rail_mm``."""
+    return tuple(f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in model.joints)
+
+
+def start_posture(entry: RobotEntry, model: RobotModel) -> Array | None:
+    """Start posture in [rad] or [m] as written; None when it is to be found."""
+    given = entry.given_start
+    if given is None:
+        return None
+    values = [given[key] for key in start_keys(model)] if isinstance(given, dict) else given
+    turns = [joint.is_revolute for joint in model.joints]
+    return np.where(turns, np.deg2rad(values), np.divide(values, 1000.0))
+
+
+def limits_in_si(entry: LimitsEntry) -> JointLimits:
+    """Limits of a cell in [rad], [m], [rad/s] and [m/s]."""
+    if entry.unit == "mm":
+        values = (entry.lower_mm, entry.upper_mm, entry.velocity_mm_s)
+        lower, upper, velocity = (None if value is None else value / 1000.0 for value in values)
+    else:
+        values = (entry.lower_deg, entry.upper_deg, entry.velocity_deg_s)
+        lower, upper, velocity = (None if value is None else float(np.deg2rad(value)) for value in values)
+    return JointLimits(lower=lower, upper=upper, velocity=velocity, wraps=entry.wrap)
+
+
+def robot_complaints(name: str, entry: RobotEntry, model: RobotModel, document: YamlDocument) -> Iterator[Complaint]:
+    """Everything a cell says about a robot that its model contradicts."""
+    yield from _start_complaints(("robots", name), entry, model, document)
+    yield from _unit_complaints(("robots", name), entry, model, document)
+    count = len(model.joints)
+    if entry.weights is not None and len(entry.weights) != count:
+        text = f"expected {count} weights, one per joint ({listed(model.joint_names)}), got {len(entry.weights)}"
+        yield document.complaint(("robots", name, "weights"), text)
+    reach = float(np.linalg.norm(model.X_BF[:3, 3] - model.joints[0].point_B))
+    if reach > FARTHEST_FLANGE:
+        text = f"expected a reach of at most {FARTHEST_FLANGE:g} m, got {reach:.6g} m; is the unit right?"
+        yield document.complaint(("robots", name, "model"), text)
+
+
+def _start_complaints(
+    path: tuple[str, str], entry: RobotEntry, model: RobotModel, document: YamlDocument
+) -> Iterator[Complaint]:
+    """A start posture has one value for each joint, in the joint's unit."""
+    given = entry.given_start
+    if given is None:
+        return
+    keys = start_keys(model)
+    if isinstance(given, dict):
+        for key in given:
+            if key not in keys:
+                text = f"unknown key{did_you_mean(key, keys)}; allowed: {listed(keys)}"
+                yield document.key_complaint((*path, "start", key), text)
+        missing = [key for key in keys if key not in given]
+        if missing:
+            yield document.complaint((*path, "start"), f"missing, expected one value per joint: add {listed(missing)}")
+        return
+    sliding = [joint.name for joint in model.joints if not joint.is_revolute]
+    if sliding:
+        wanted = ", ".join(f"{key}: …" for key in keys)
+        text = f"unexpected key, '{sliding[0]}' is a prismatic joint: use start: {{{wanted}}}"
+        yield document.key_complaint((*path, "start_deg"), text)
+    elif len(given) != len(keys):
+        text = f"expected {len(keys)} angles, one per joint ({listed(model.joint_names)}), got {len(given)}"
+        yield document.complaint((*path, "start_deg"), text)
+
+
+def _unit_complaints(
+    path: tuple[str, str], entry: RobotEntry, model: RobotModel, document: YamlDocument
+) -> Iterator[Complaint]:
+    """Limits belong to joints that exist and are in the joint's unit."""
+    joints = {joint.name: joint for joint in model.joints}
+    for name, limits in entry.limits.items():
+        if name not in joints:
+            text = f"expected a joint of the robot ({listed(joints)}), got '{name}'{did_you_mean(name, joints)}"
+            yield document.key_complaint((*path, "limits", name), text)
+        elif limits.unit is not None and (limits.unit == "deg") != joints[name].is_revolute:
+            kind, unit = ("revolute", "deg") if joints[name].is_revolute else ("prismatic", "mm")
+            text = f"expected limits in {unit}, the joint is {kind}, got {limits.unit}"
+            yield document.complaint((*path, "limits", name), text)
+
+
+def tightened(
+    path: tuple[str, str], entry: RobotEntry, model: RobotModel, document: YamlDocument
+) -> tuple[RobotModel, list[Complaint]]:
+    """The model within the limits of the cell, which may only be tighter than its own."""
+    complaints: list[Complaint] = []
+    joints: list[Joint] = []
+    for joint in model.joints:
+        limits = entry.limits.get(joint.name)
+        if limits is None:
+            joints.append(joint)
+            continue
+        wider = list(_wider(joint, limits))
+        complaints += [document.complaint((*path, "limits", joint.name, key), text) for key, text in wider]
+        joints.append(joint if wider else _within(joint, limits_in_si(limits)))
+    return replace(model, joints=tuple(joints)), complaints
+
+
+def _wider(joint: Joint, entry: LimitsEntry) -> Iterator[tuple[str, str]]:
+    """Limits of a cell that allow more than the model does, by key; and what leaves no room."""
+    limits, unit = limits_in_si(entry), "deg" if joint.is_revolute else "mm"
+    if limits.wraps:
+        yield "wrap", "unexpected key, only a continuous joint of a URDF may turn without end"
+        return
+    own = {"lower": joint.lower, "upper": joint.upper, "velocity": joint.velocity}
+    for key, value in (("lower", limits.lower), ("upper", limits.upper), ("velocity", limits.velocity)):
+        if value is None:
+            continue
+        sign = -1.0 if key == "lower" else 1.0
+        ending = f"{unit}_s" if key == "velocity" else unit
+        if sign * (value - own[key]) > ROOM:
+            bound = f"at {'least' if key == 'lower' else 'most'} {shown(_in_file_unit(joint, own[key]))}"
+            text = f"expected {bound}, the limit of the model, got {shown(_in_file_unit(joint, value))}"
+            yield f"{key}_{ending}", text
+    lower = joint.lower if limits.lower is None else limits.lower
+    upper = joint.upper if limits.upper is None else limits.upper
+    if not lower < upper:
+        key = "lower" if limits.upper is None else "upper"
+        ends = f"{shown(_in_file_unit(joint, lower))} and {shown(_in_file_unit(joint, upper))}"
+        yield f"{key}_{unit}", f"expected a lower limit below the upper one, got {ends}"
+
+
+def _within(joint: Joint, limits: JointLimits) -> Joint:
+    """The joint with tighter limits."""
+    return replace(
+        joint,
+        lower=joint.lower if limits.lower is None else max(joint.lower, limits.lower),
+        upper=joint.upper if limits.upper is None else min(joint.upper, limits.upper),
+        velocity=joint.velocity if limits.velocity is None else min(joint.velocity, limits.velocity),
+    )
+
+
+def _in_file_unit(joint: Joint, value: float) -> float:
+    """Degrees or millimetres for a message."""
+    return round(float(np.rad2deg(value)) if joint.is_revolute else 1000.0 * value, 6)
