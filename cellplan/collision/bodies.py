@@ -160,11 +160,9 @@ def fine_segments(radius: float) -> int:
 
 
 def _thin_triangle(length: float) -> Mesh:
-    """A line along z, or a point, as one very thin triangle that holds it."""
-    half = 0.5 * length
+    """A triangle that holds a line along z as its edge, or a point in the middle of it, and very little else."""
+    half = max(0.5 * length, POINT_SIZE)
     vertices = np.array([[0.0, 0.0, -half], [0.0, 0.0, half], [POINT_SIZE, 0.0, 0.0]])
-    vertices[1, 1] += POINT_SIZE
-    vertices[0, 1] -= POINT_SIZE
     return Mesh(vertices=vertices, faces=np.array([[0, 1, 2]]), source="line", is_closed=False)
 
 
