@@ -2,13 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from cellplan.checks.verify import verify
 from cellplan.geometry.transforms import Array
+from cellplan.io.cell_writer import as_written
 from cellplan.io.tables import TableHeader, parse_table, program_digest, render_table, replace_header
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, Robot
 from cellplan.model.motion import Motion, Program
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
@@ -21,6 +23,8 @@ from cellplan.planning.schedule import schedule_tasks
 from cellplan.planning.start_search import find_start
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.scene import Scene
+
+START_DECIMALS: Final = 9  # of a degree or a metre: a tool moves by 1e-8 mm at most
 
 
 def solve(cell: Cell, *, progress: Progress = silent) -> Solution:
@@ -39,8 +43,8 @@ def solve(cell: Cell, *, progress: Progress = silent) -> Solution:
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
     examine_given_starts(cell, toolpaths)
-    start = find_start(scene, toolpaths, progress=progress)
-    solved = with_start(cell, start)
+    solved = with_start(cell, find_start(scene, toolpaths, progress=progress))
+    start = np.concatenate([robot.start for robot in solved.robots if robot.start is not None])
     runs = tuple(_run(scene, toolpaths, plan, start=start, progress=progress) for plan in plan_runs(cell))
     return Solution(cell=solved, runs=runs)
 
@@ -93,6 +97,16 @@ def _digests(cell: Cell, program: Program) -> dict[str, str]:
 
 
 def with_start(cell: Cell, start: Array) -> Cell:
-    """The cell with every start posture filled in."""
-    robots = tuple(replace(robot, start=np.array(start[cell.columns(robot.name)])) for robot in cell.robots)
-    return replace(cell, robots=robots)
+    """The cell with every start posture filled in; found ones are rounded to what is written of them."""
+    robots = []
+    for robot in cell.robots:
+        found = start[cell.columns(robot.name)]
+        robots.append(robot if robot.start is not None else replace(robot, start=_rounded(robot, found)))
+    return replace(cell, robots=tuple(robots))
+
+
+def _rounded(robot: Robot, q: Array) -> Array:
+    """A posture with few decimals of a degree or millimetre, as the resolved cell file gives it back."""
+    turns = [joint.is_revolute for joint in robot.model.joints]
+    rounded = np.where(turns, np.deg2rad(np.round(np.rad2deg(q), START_DECIMALS)), np.round(q, START_DECIMALS))
+    return as_written(robot.model, np.clip(rounded, robot.model.lower, robot.model.upper))
