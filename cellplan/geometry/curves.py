@@ -1,0 +1,165 @@
+"""Curves in space over a parameter: circles, straight sides, rounded corners and smooth curves through points."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.transforms import Array
+
+Interval = tuple[float | Array, float | Array]  # stretch of the parameter, one or one per point: see spans_at
+
+ROUNDING: Final = np.array([-1.0, -0.6, -0.4, 0.4, 0.6, 1.0])  # [-] control points of a corner, see rounded_sides
+
+
+class Curve(Protocol):
+    """A curve that is smooth between its knots."""
+
+    @property
+    def knots(self) -> Array:
+        """Increasing parameter values, shape (M + 1,): the first and the last end the curve."""
+
+    def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:
+        """Points and derivatives by the parameter, shape (N, 3) each, at ``u`` of shape (N,) within ``interval``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CircleCurve:
+    """Full circle ``centre + first cos(u) + second sin(u)``.
+
+    Attributes:
+        centre: Centre in [m], shape (3,).
+        first: Radius vector to the start in [m], shape (3,).
+        second: Radius vector a quarter turn later in [m], shape (3,).
+    """
+
+    centre: Array
+    first: Array
+    second: Array
+
+    @property
+    def knots(self) -> Array:
+        """One smooth span of a full turn in [rad]."""
+        return np.array([0.0, 2.0 * np.pi])
+
+    def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:  # noqa: ARG002
+        """Points and derivatives, see `Curve`."""
+        cosine, sine = np.cos(u)[:, None], np.sin(u)[:, None]
+        return self.centre + cosine * self.first + sine * self.second, cosine * self.second - sine * self.first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BezierCurve:
+    """Chain of Bezier spans of one degree.
+
+    Attributes:
+        knots: Increasing parameter values, shape (M + 1,).
+        control: Control points of each span, shape (M, degree + 1, 3).
+    """
+
+    knots: Array
+    control: Array
+
+    def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:
+        """Points and derivatives by de Casteljau's rule, see `Curve`."""
+        span = spans_at(self.knots, u, interval)
+        width = (self.knots[span + 1] - self.knots[span])[:, None]
+        x = (u - self.knots[span])[:, None] / width
+        control = list(np.moveaxis(self.control[span], 1, 0))
+        steps = [b - a for a, b in pairwise(control)]
+        return _casteljau(control, x), len(steps) * _casteljau(steps, x) / width
+
+
+def spans_at(knots: Array, u: Array, interval: Interval) -> NDArray[np.intp]:
+    """Index of the span that holds each parameter; at a knot that ends the interval, the span inside it."""
+    first = np.searchsorted(knots, interval[0], side="right") - 1
+    last = np.searchsorted(knots, interval[1], side="left") - 1
+    spans: NDArray[np.intp] = np.clip(np.searchsorted(knots, u, side="right") - 1, first, np.maximum(first, last))
+    return spans
+
+
+def _casteljau(control: list[Array], x: Array) -> Array:
+    """Points of Bezier curves at shares ``x``, shape (N, 1), from their control points, shape (N, 3) each."""
+    while len(control) > 1:
+        control = [a + x * (b - a) for a, b in pairwise(control)]
+    return control[0]
+
+
+def chord_lengths(points: Array) -> Array:
+    """Length of the straight sides behind each point, shape (N,), from points of shape (N, 3)."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def straight_sides(knots: Array, points: Array) -> BezierCurve:
+    """Straight sides between points of shape (N, 3) that are passed at ``knots``, shape (N,)."""
+    return BezierCurve(knots=knots, control=np.stack([points[:-1], points[1:]], axis=1))
+
+
+def rounded_sides(knots: Array, corners: Array, blend: float) -> BezierCurve:
+    """Straight sides with every inner corner rounded from ``blend`` before it to ``blend`` after it.
+
+    The control points of a rounded corner lie on its two sides at ``-1, -3/5, -2/5, 2/5, 3/5, 1`` times ``blend``: the
+    quintic then joins the straight sides with the same tangent and zero curvature, stays inside the corner's triangle
+    and passes the corner at ``blend / 4`` times the length of the change of direction. Its sharpest curvature at a
+    right angle is 1.3 times that of the circular arc between the same points, which would jump.
+
+    Args:
+        knots: Parameter at each corner: the length along the straight sides in [m], shape (N,).
+        corners: Corner points in [m], shape (N, 3); the first and the last are the ends of the curve.
+        blend: Distance in [m], at most half of the shortest side.
+    """
+    sides = np.diff(corners, axis=0)
+    direction = sides / np.linalg.norm(sides, axis=1, keepdims=True)
+    before, after = corners[1:-1] - blend * direction[:-1], corners[1:-1] + blend * direction[1:]
+    starts, ends = np.vstack([corners[:1], after]), np.vstack([before, corners[-1:]])
+    share = np.linspace(0.0, 1.0, len(ROUNDING))[:, None]
+    lines = starts[:, None] + share * (ends - starts)[:, None]
+    along = np.where((ROUNDING < 0.0)[:, None], direction[:-1, None], direction[1:, None])
+    turns = corners[1:-1, None] + blend * ROUNDING[:, None] * along
+    spans = np.empty((2 * len(lines) - 1, len(ROUNDING), 3))
+    spans[0::2], spans[1::2] = lines, turns
+    edges = np.concatenate([knots[:1], np.column_stack([knots[1:-1] - blend, knots[1:-1] + blend]).ravel(), knots[-1:]])
+    is_long = np.diff(edges) > 1e-9 * blend  # a side that its two roundings use up leaves no straight rest
+    return BezierCurve(knots=np.concatenate([edges[:-1][is_long], edges[-1:]]), control=spans[is_long])
+
+
+def smooth_through(knots: Array, values: Array, *, breaks: NDArray[np.bool_]) -> BezierCurve:
+    """Cubic curve through values of shape (N, 3) at ``knots``, with continuous derivatives except at the breaks.
+
+    Args:
+        knots: Increasing parameters, shape (N,).
+        values: Points or vectors, shape (N, 3).
+        breaks: Whether the derivative may jump at a knot, shape (N,); see `tangents`.
+    """
+    width = np.diff(knots)[:, None]
+    leaving, arriving = tangents(np.diff(values, axis=0) / width, width, breaks)
+    start, end = values[:-1], values[1:]
+    control = np.stack([start, start + leaving * width / 3.0, end - arriving * width / 3.0, end], axis=1)
+    return BezierCurve(knots=knots, control=control)
+
+
+def tangents(slopes: Array, widths: Array, breaks: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Derivatives at the two ends of each span so that a parabola through three neighbours is met.
+
+    Inside, the derivative is the mean of the neighbouring slopes, weighted with the opposite widths. At a break it
+    comes from the span's own side alone: a span between two breaks is straight. When neither the first nor the last
+    knot is a break, the curve is closed and the two are neighbours.
+
+    Args:
+        slopes: Mean derivative of each span, shape (M, 3).
+        widths: Parameter width of each span, shape (M, 1).
+        breaks: Whether the derivative may jump at a knot, shape (M + 1,).
+
+    Returns:
+        Derivatives at the start and at the end of each span, shape (M, 3) each.
+    """
+    before, after = np.roll(slopes, 1, axis=0), slopes
+    width_before = np.roll(widths, 1, axis=0)
+    inner = (widths * before + width_before * after) / (widths + width_before)
+    inner = np.vstack([inner, inner[:1]])
+    start_breaks, end_breaks = breaks[:-1, None], breaks[1:, None]
+    leaving = np.where(start_breaks, np.where(end_breaks, slopes, 2.0 * slopes - inner[1:]), inner[:-1])
+    arriving = np.where(end_breaks, np.where(start_breaks, slopes, 2.0 * slopes - inner[:-1]), inner[1:])
+    return leaving, arriving

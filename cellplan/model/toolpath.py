@@ -1,0 +1,108 @@
+"""Toolpath: where the tool must be on the part, before any robot or clock is involved."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.arc_length import ArcLength
+from cellplan.geometry.curves import Curve
+from cellplan.geometry.orientations import Orientation
+from cellplan.geometry.transforms import Array, pose_from, rotation_about
+
+TOOL_Z: Final = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Toolpath:
+    """Path of one task as tool poses in P over the length along it, cut into pieces at its stops.
+
+    Attributes:
+        name: Name of the task.
+        tip: Where the tool tip goes, in P.
+        orientation: How the tool stands, in P, before it turns about its own axis.
+        arc: Length along the tip curve.
+        stops: Parameters of the tip curve between which the pieces lie, shape (pieces + 1,).
+        turn: Angle in [rad] by which the tool turns about its own z axis, evenly over the whole length.
+        is_closed: Whether the last piece ends where the first starts.
+    """
+
+    name: str
+    tip: Curve
+    orientation: Orientation
+    arc: ArcLength
+    stops: Array
+    turn: float
+    is_closed: bool
+
+    @property
+    def length(self) -> float:
+        """Length of the whole path on the surface in [m]."""
+        return self.arc.total
+
+    @property
+    def behind(self) -> Array:
+        """Length in [m] behind each stop, from zero to the whole length, shape (pieces + 1,)."""
+        return self.arc.behind_knots(self.stops)
+
+    @property
+    def pieces(self) -> "tuple[Piece, ...]":
+        """The stretches between stops, in order; each starts where the one before ends."""
+        behind = self.behind
+        lengths = zip(behind[:-1], np.diff(behind), strict=True)
+        return tuple(Piece(self, k, float(start), float(length)) for k, (start, length) in enumerate(lengths))
+
+    @property
+    def X_PT_start(self) -> Array:
+        """Tool tip pose at the start, shape (4, 4)."""
+        first: Array = self.poses(np.zeros(1))[0]
+        return first
+
+    def poses(self, s: Array) -> Array:
+        """Tool tip poses X_PT, shape (N, 4, 4), at lengths in [m] from the start of the path, shape (N,)."""
+        pieces = np.clip(np.searchsorted(self.behind, s, side="right") - 1, 0, len(self.stops) - 2)
+        return self.targets(pieces, s)[0]
+
+    def targets(self, pieces: NDArray[np.intp], s: Array) -> tuple[Array, Array]:
+        """Tool poses and their change per length of path.
+
+        Args:
+            pieces: Which piece each target belongs to, shape (N,): it says which side counts at a stop.
+            s: Lengths in [m] from the start of the path, shape (N,); beyond its piece the nearer end is taken.
+
+        Returns:
+            Poses X_PT, shape (N, 4, 4), and tool twists in P per length, linear first, shape (N, 6), in [m/m] and
+            [rad/m].
+        """
+        interval = (self.stops[pieces], self.stops[pieces + 1])
+        u = self.arc.parameters(s, interval)
+        p, dp = self.tip.evaluate(u, interval)
+        R, w = self.orientation.frames(u, interval, p=p, dp=dp)
+        twists = np.concatenate([dp, w], axis=1) / np.linalg.norm(dp, axis=1, keepdims=True)
+        if self.turn:
+            R = R @ rotation_about(TOOL_Z, self.turn / self.length * np.clip(s, 0.0, self.length))
+            twists[:, 3:] += self.turn / self.length * R[:, :, 2]
+        return pose_from(R, p), twists
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """Stretch of a toolpath between two stops: its number, the length before it and its own length in [m]."""
+
+    path: Toolpath
+    number: int
+    start: float
+    length: float
+
+    def poses(self, s: Array) -> Array:
+        """Tool tip poses X_PT, shape (N, 4, 4), at lengths in [m] from the start of the piece, shape (N,)."""
+        return self._targets(s)[0]
+
+    def twists_per_length(self, s: Array) -> Array:
+        """Change of the pose per length: tool twists in P, linear first, shape (N, 6), in [m/m] and [rad/m]."""
+        return self._targets(s)[1]
+
+    def _targets(self, s: Array) -> tuple[Array, Array]:
+        """See `Toolpath.targets`."""
+        return self.path.targets(np.full(len(s), self.number), self.start + np.clip(s, 0.0, self.length))

@@ -1,0 +1,60 @@
+"""Time laws: how the share of a stretch that is done grows with the share of its time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.task import TimeLaw, TimeLawKind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Advance:
+    """Share of a stretch that is done and its first two derivatives by the share of the time, shape (N,) each."""
+
+    share: Array
+    rate: Array
+    acceleration: Array
+
+
+def advance(law: TimeLaw, tau: Array) -> Advance:
+    """How far a law has come at shares ``tau`` of the time, 0..1, shape (N,).
+
+    Constant: ``sigma = tau``. Quintic: ``sigma = 10 tau^3 - 15 tau^4 + 6 tau^5``, at rest and without acceleration at
+    both ends. Trapezoid: even speeding up and slowing down, each during ``ramp`` of the time, at rest at both ends.
+    """
+    match law.kind:
+        case TimeLawKind.CONSTANT:
+            return Advance(share=tau, rate=np.ones_like(tau), acceleration=np.zeros_like(tau))
+        case TimeLawKind.QUINTIC:
+            rest = 1.0 - tau
+            return Advance(
+                share=tau**3 * (10.0 - tau * (15.0 - 6.0 * tau)),
+                rate=30.0 * (tau * rest) ** 2,
+                acceleration=60.0 * tau * rest * (1.0 - 2.0 * tau),
+            )
+        case TimeLawKind.TRAPEZOID:
+            return _trapezoid(tau, law.ramp)
+
+
+def peak_rate(law: TimeLaw) -> float:
+    """Largest rate of a law: how much faster than the mean speed its fastest moment is."""
+    match law.kind:
+        case TimeLawKind.CONSTANT:
+            return 1.0
+        case TimeLawKind.QUINTIC:
+            return 1.875
+        case TimeLawKind.TRAPEZOID:
+            return 1.0 / (1.0 - law.ramp)
+
+
+def _trapezoid(tau: Array, ramp: float) -> Advance:
+    """Speeding up to the rate ``v = 1 / (1 - ramp)``, keeping it, and slowing down in mirror image."""
+    v = 1.0 / (1.0 - ramp)
+    rest = 1.0 - tau
+    parts = [tau < ramp, rest < ramp]
+    return Advance(
+        share=np.select(parts, [0.5 * v * tau**2 / ramp, 1.0 - 0.5 * v * rest**2 / ramp], v * (tau - 0.5 * ramp)),
+        rate=np.select(parts, [v * tau / ramp, v * rest / ramp], v),
+        acceleration=np.select(parts, [np.full_like(tau, v / ramp), np.full_like(tau, -v / ramp)], 0.0),
+    )

@@ -1,0 +1,63 @@
+"""Toolpaths: from the words of a task to tool poses on the part."""
+
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import CellplanError, InputError
+from cellplan.geometry.arc_length import ArcLength, measure
+from cellplan.geometry.curves import Curve
+from cellplan.geometry.transforms import is_rigid
+from cellplan.model.cell import Origin, Part
+from cellplan.model.task import Task
+from cellplan.model.toolpath import Toolpath
+from cellplan.planning.path_drawing import draw_path
+from cellplan.planning.path_laying import lay_path
+from cellplan.planning.path_words import in_mm
+from cellplan.planning.tool_frames import orient_tool
+
+STANDSTILL: Final = 1e-6  # [-] of the largest speed by the parameter: a curve slower than this has a cusp there
+PROBES: Final = 257  # poses looked at before a toolpath is handed on
+
+
+def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
+    """Draw a task's path, lay it on the part, stand the tool on it and cut it at its stops.
+
+    Args:
+        task: The task.
+        part: The part it works on.
+        origin: Where the words of the task stand, for complaints.
+
+    Raises:
+        InputError: The path cannot be drawn, misses the part, runs over an edge, or leaves the tool's turn open.
+    """
+    drawing = draw_path(task, origin)
+    laid = lay_path(drawing, task, part, origin)
+    orientation = orient_tool(task, drawing, laid, origin)
+    arc = measure(laid.tip)
+    _refuse_standstill(laid.tip, arc, origin.at(f"tasks.{task.name}.path"))
+    toolpath = Toolpath(
+        name=task.name,
+        tip=laid.tip,
+        orientation=orientation,
+        arc=arc,
+        stops=drawing.stops,
+        turn=task.turn,
+        is_closed=drawing.is_closed,
+    )
+    if not is_rigid(toolpath.poses(np.linspace(0.0, toolpath.length, PROBES))):
+        raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")
+    return toolpath
+
+
+def _refuse_standstill(tip: Curve, arc: ArcLength, where: str) -> None:
+    """Refuse a path that has no direction somewhere: a side along the projection, or a cusp."""
+    middle = 0.5 * (arc.edges[:-1] + arc.edges[1:])
+    p, dp = tip.evaluate(middle, (float(arc.edges[0]), float(arc.edges[-1])))
+    speed = np.linalg.norm(dp, axis=1)
+    k = int(np.argmin(speed))
+    if not speed[k] > STANDSTILL * speed.max():
+        raise InputError(
+            f"{where}: expected a path with a direction everywhere, but it stands still near {in_mm(p[k])}: "
+            "a side runs along the projection, or the curve turns back on itself"
+        )

@@ -1,0 +1,208 @@
+"""The schedule keeps times, feeds and rests, and its twists are the motion of its poses."""
+
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cellplan.errors import InputError
+from cellplan.geometry.shapes import Cylinder
+from cellplan.geometry.transforms import pose, rotation_exp
+from cellplan.model.cell import (
+    Cell,
+    CheckSettings,
+    Mode,
+    MotionSettings,
+    Origin,
+    Part,
+    SolverSettings,
+)
+from cellplan.model.motion import Schedule
+from cellplan.model.task import (
+    CirclePath,
+    PathSpec,
+    PlaneName,
+    PolygonPath,
+    SpacePolylinePath,
+    Task,
+    TimeLaw,
+    TimeLawKind,
+    Tolerance,
+)
+from cellplan.planning.schedule import schedule_tasks
+from cellplan.planning.toolpaths import build_toolpath
+
+ROLLER = Part(shape=Cylinder(0.25, 0.5), X_PS=pose(rpy=[0.0, np.pi / 2.0, 0.0]), held_by=(), X_WP=np.eye(4))
+ORIGIN = Origin(file="cell.yaml", lines={"tasks.a": 7, "motion.step_s": 20})
+QUINTIC = TimeLaw(kind=TimeLawKind.QUINTIC)
+TRAPEZOID = TimeLaw(kind=TimeLawKind.TRAPEZOID, ramp=0.2)
+CONSTANT = TimeLaw(kind=TimeLawKind.CONSTANT)
+CIRCLE = CirclePath(plane=PlaneName.XY, center=(0.0, 0.0), radius=0.1)
+RECTANGLE = PolygonPath(
+    plane=PlaneName.XZ, corners=((0.175, 0.125), (-0.175, 0.125), (-0.175, -0.125), (0.175, -0.125)), is_closed=True
+)
+ELL = SpacePolylinePath(points=((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.3, 0.1, 0.0)), is_closed=False)
+
+
+def task(name: str, path: PathSpec, **words: Any) -> Task:
+    plain: dict[str, Any] = {
+        "robot": name,
+        "project": None,
+        "plane_offset": 0.0,
+        "tool_axis": np.array([0.0, 0.0, -1.0]),
+        "tool_x": np.array([1.0, 0.0, 0.0]),
+        "turn": 0.0,
+        "axes": (0, 1, 2, 3, 4, 5),
+        "is_spin_free": False,
+        "tolerance": Tolerance(position=1e-4, orientation=1e-4),
+        "start": 0.0,
+        "duration": None,
+        "feed": None,
+        "time_law": QUINTIC,
+        "blend": None,
+    }
+    return Task(name=name, path=path, **(plain | words))
+
+
+def scheduled(*tasks: Task, duration: float = 4.0, step: float = 0.001) -> Schedule:
+    cell = Cell(
+        name="cell",
+        robots=(),
+        part=ROLLER,
+        tasks=tasks,
+        obstacles=(),
+        motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=duration, step=step),
+        solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
+        checks=CheckSettings(clearance=0.005, contact_zone=0.02),
+        origin=ORIGIN,
+        inputs={},
+    )
+    return schedule_tasks(cell, [build_toolpath(one, ROLLER, ORIGIN) for one in tasks])
+
+
+def on_roller(name: str = "a", path: PathSpec = CIRCLE, **words: Any) -> Task:
+    side = np.array([0.0, 0.0, 1.0]) if path is CIRCLE else np.array([0.0, -1.0, 0.0])
+    return task(name, path, project=side, tool_axis=None, **words)
+
+
+def test_the_clock_is_even_and_reads_well() -> None:
+    times = scheduled(on_roller()).times
+
+    assert len(times) == 4001
+    assert [repr(float(t)) for t in times[[0, 3, 7, 4000]]] == ["0.0", "0.003", "0.007", "4.0"]
+
+
+def test_the_clock_runs_until_the_last_task_ends() -> None:
+    schedule = scheduled(
+        task("a", ELL, start=0.5, duration=1.0), task("b", ELL, duration=2.0005), duration=1.0, step=0.001
+    )
+
+    assert schedule.times[-1] == 2.001  # the first instant not before 2.0005
+    assert [one.end for one in schedule.tasks] == pytest.approx([1.5, 2.0005], abs=1e-15)
+
+
+def test_without_own_times_a_task_lasts_until_the_end_of_the_motion() -> None:
+    (one,) = scheduled(task("a", ELL, start=1.25), duration=3.0).tasks
+
+    assert one.end == 3.0
+    assert np.all(one.travelled[1251:3000] > 0.0)
+    assert one.travelled[1250] == 0.0
+    assert one.travelled[3000] == pytest.approx(0.4, abs=1e-15)
+
+
+@pytest.mark.parametrize("law", [QUINTIC, TRAPEZOID, CONSTANT], ids=lambda law: law.kind)
+def test_integrating_the_twists_reproduces_the_poses(law: TimeLaw) -> None:
+    (one,) = scheduled(on_roller(path=RECTANGLE, time_law=law, turn=1.0)).tasks
+    h = 0.001
+    p, R = one.X_PT[0, :3, 3].copy(), one.X_PT[0, :3, :3].copy()
+    worst = 0.0
+    for k in range(len(one.V_PT_P) - 1):
+        v = 0.5 * (one.V_PT_P[k] + one.V_PT_P[k + 1]) if law is not CONSTANT else one.V_PT_P[k]
+        p, R = p + h * v[:3], rotation_exp(h * v[3:]) @ R
+        worst = max(worst, np.abs(p - one.X_PT[k + 1, :3, 3]).max(), np.abs(R - one.X_PT[k + 1, :3, :3]).max())
+
+    limit = 2e-5 if law is QUINTIC else 2e-3  # trapezoid rule h^2; the others change speed between two samples
+    assert worst <= limit
+
+
+@pytest.mark.parametrize("law", [QUINTIC, TRAPEZOID, CONSTANT], ids=lambda law: law.kind)
+def test_the_fastest_moment_runs_at_the_feed(law: TimeLaw) -> None:
+    (one,) = scheduled(on_roller(path=RECTANGLE, feed=0.2, time_law=law), step=0.0005).tasks
+
+    speed = np.linalg.norm(one.V_PT_P[:, :3], axis=1)
+
+    assert speed.max() == pytest.approx(0.2, rel=1e-5)  # the peak lies between two samples
+    assert speed.max() <= 0.2 * (1.0 + 1e-12)
+
+
+def test_with_a_duration_each_side_takes_time_in_proportion_to_its_length() -> None:
+    (one,) = scheduled(task("a", ELL, duration=4.0)).tasks
+
+    speed = np.linalg.norm(one.V_PT_P[:, :3], axis=1)
+
+    assert np.flatnonzero(speed == 0.0).tolist() == [0, 3000, 4000]
+    assert one.travelled[3000] == pytest.approx(0.3, abs=1e-15)
+    assert speed[:3000].max() == pytest.approx(1.875 * 0.1, rel=1e-6)
+    assert speed[3000:].max() == pytest.approx(1.875 * 0.1, rel=1e-6)
+
+
+def test_a_constant_law_changes_direction_at_the_corner_and_keeps_its_speed_to_the_end() -> None:
+    (one,) = scheduled(task("a", ELL, duration=4.0, start=0.5, time_law=CONSTANT), task("b", ELL, duration=6.0)).tasks[
+        :1
+    ]
+
+    velocity = one.V_PT_P[:, :3]
+
+    assert np.all(velocity[:500] == 0.0)
+    assert np.allclose(velocity[500:3500], [0.1, 0.0, 0.0], atol=1e-14)
+    assert np.allclose(velocity[3500:4501], [0.0, 0.1, 0.0], atol=1e-14)  # at the corner the later side counts
+    assert np.all(one.V_PT_P[4501:] == 0.0)
+
+
+def test_the_tool_holds_still_before_and_after_its_task() -> None:
+    first, _ = scheduled(on_roller("a", start=0.5, duration=1.0), on_roller("b", duration=3.0)).tasks
+
+    assert np.all(first.X_PT[:501] == first.X_PT[0])
+    assert np.all(first.X_PT[1500:] == first.X_PT[-1])
+    assert np.all(first.V_PT_P[:501] == 0.0)
+    assert np.all(first.V_PT_P[1500:] == 0.0)
+    assert np.allclose(first.X_PT[0], first.X_PT[-1], atol=1e-14)
+    assert first.travelled[-1] == pytest.approx(first.length, abs=1e-15)
+
+
+def test_steps_that_do_not_divide_the_cycle_are_kept() -> None:
+    schedule = scheduled(task("a", ELL), duration=1.0, step=0.3)
+
+    assert schedule.times.tolist() == [0.0, 0.3, 0.6, 0.9, 1.2]
+    assert schedule.tasks[0].travelled[-1] == pytest.approx(0.4, abs=1e-15)
+
+
+def test_a_task_that_starts_after_the_motion_is_refused() -> None:
+    with pytest.raises(InputError) as caught:
+        scheduled(task("a", ELL, start=4.0))
+
+    assert str(caught.value) == (
+        "cell.yaml:7: tasks.a.start_s: expected a start before the end of the motion at 4 s, got 4; give the task its "
+        "own duration_s or feed_mm_s to go on for longer"
+    )
+
+
+def test_too_many_samples_are_refused() -> None:
+    with pytest.raises(InputError) as caught:
+        scheduled(task("a", ELL), step=1e-6)
+
+    assert str(caught.value) == (
+        "cell.yaml:20: motion.step_s: expected a step that makes at most 2000000 samples, got 1e-06 s for a cycle of "
+        "4 s; make the step longer"
+    )
+
+
+def test_three_tasks_of_4001_samples_are_scheduled_at_once() -> None:
+    tasks = [on_roller("a"), on_roller("b", RECTANGLE), task("c", ELL, turn=1.0)]
+    scheduled(*tasks)
+    begin = time.perf_counter()
+
+    scheduled(*tasks)
+
+    assert time.perf_counter() - begin < 0.5  # measured 0.05 s, paths included; room for a busy machine
