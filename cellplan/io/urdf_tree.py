@@ -1,6 +1,6 @@
 """How the links of a URDF hang together, and what each joint does: driven, following, held still."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,6 +13,8 @@ from cellplan.io.urdf_document import UrdfDocument, UrdfJoint, UrdfLink
 from cellplan.model.robot import BASE
 
 FLANGE_NAMES: Final = ("tool0", "flange")  # taken as the flange in this order when the user names none
+
+SHOWN_NAMES: Final = 12  # more names than these make a message unreadable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,7 +83,7 @@ def build_tree(document: UrdfDocument) -> UrdfTree:
     for joint in document.joints.values():
         for end, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in document.links:
-                raise joint.error(f"unknown {end} link '{link}'{did_you_mean(link, document.links)}")
+                raise joint.error(f"unknown {end} link '{link}'{_known(link, document.links)}")
         if joint.child in above:
             first = above[joint.child]
             raise joint.error(
@@ -112,7 +114,7 @@ def choose_flange(tree: UrdfTree, wanted: str | None) -> str:
     links = tree.document.links
     if wanted is not None:
         if wanted not in links:
-            raise InputError(f"{tree.document.file}: flange: unknown link '{wanted}'{did_you_mean(wanted, links)}")
+            raise InputError(f"{tree.document.file}: flange: unknown link '{wanted}'{_known(wanted, links)}")
         return wanted
     for name in FLANGE_NAMES:
         if name in links:
@@ -121,7 +123,7 @@ def choose_flange(tree: UrdfTree, wanted: str | None) -> str:
     leaves = [name for name in links if name not in parents and _moves(tree, name)]
     if len(leaves) != 1:
         names = listed(leaves)
-        raise InputError(f"{tree.document.file}: expected `flange:` to name the flange link, got none of: {names}")
+        raise InputError(f"{tree.document.file}: flange: expected the name of a link, as it could be any of: {names}")
     return leaves[0]
 
 
@@ -183,13 +185,19 @@ def known_joint(document: UrdfDocument, name: str, key: str) -> UrdfJoint:
         InputError: There is no such joint.
     """
     if name not in document.joints:
-        raise InputError(f"{document.file}: {key}: unknown joint '{name}'{did_you_mean(name, document.joints)}")
+        raise InputError(f"{document.file}: {key}: unknown joint '{name}'{_known(name, document.joints)}")
     return document.joints[name]
 
 
 def links_in_order(tree: UrdfTree) -> list[UrdfLink]:
     """All links in the order of the file."""
     return list(tree.document.links.values())
+
+
+def _known(word: str, names: Collection[str]) -> str:
+    """The nearest name, or all of them when none is near and they are few."""
+    few = f", expected one of: {listed(names)}" if len(names) <= SHOWN_NAMES else ""
+    return did_you_mean(word, names) or few
 
 
 def _moves(tree: UrdfTree, link: str) -> bool:
@@ -223,7 +231,7 @@ def _leader(joint: UrdfJoint, document: UrdfDocument) -> UrdfJoint:
     """The joint that drives a mimic joint."""
     name = joint.mimic.leader if joint.mimic else ""
     if name not in document.joints:
-        raise joint.error(f"mimics the unknown joint '{name}'{did_you_mean(name, document.joints)}")
+        raise joint.error(f"mimics the unknown joint '{name}'{_known(name, document.joints)}")
     leader = document.joints[name]
     if leader is joint:
         raise joint.error("mimics itself")

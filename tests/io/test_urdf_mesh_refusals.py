@@ -1,0 +1,116 @@
+"""Bodies of a URDF that cannot be taken over faithfully are refused with file, line and cure."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from cellplan.errors import InputError
+from cellplan.io.urdf import UrdfOptions, load_urdf
+
+LIMIT = '<limit lower="-1" upper="2" velocity="3"/>'
+
+
+def joint(name: str, parent: str, child: str, inside: str = LIMIT) -> str:
+    return f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>{inside}</joint>'
+
+
+def collision(shape: str) -> str:
+    return f'<link name="base"><collision><geometry>{shape}</geometry></collision></link>'
+
+
+def refusal(path: Path, options: UrdfOptions | None = None) -> str:
+    with pytest.raises(InputError) as caught:
+        load_urdf(path, options)
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+def refused(folder: Path, *lines: str, options: UrdfOptions | None = None) -> str:
+    """Message for a robot whose elements stand in lines 2, 3, …"""
+    path = folder / "r.urdf"
+    path.write_text("\n".join(['<robot name="rig">', *lines, "</robot>"]), encoding="utf-8")
+    return refusal(path, options)
+
+
+ARM = ('<link name="base"/>', '<link name="tip"/>', joint("a1", "base", "tip"))
+
+
+@pytest.mark.parametrize(
+    ("shape", "message"),
+    [
+        ("", "expected <collision> with a <geometry> of one shape, got 0 shapes"),
+        (
+            '<sphere radius="1"/><sphere radius="1"/>',
+            "expected <collision> with a <geometry> of one shape, got 2 shapes",
+        ),
+        ('<cone radius="1"/>', "expected a box, cylinder, capsule, sphere or mesh, got <cone>"),
+        ('<box size="1 1"/>', "expected 3 finite numbers in 'size', got '1 1'"),
+        ('<box size="1 0 1"/>', "expected a positive 'size', got '1 0 1'"),
+        ('<sphere radius="-1"/>', "expected a positive 'radius', got '-1'"),
+        ('<sphere radius="inf"/>', "expected a finite number in 'radius', got 'inf'"),
+        ('<sphere radius="250"/>', "expected a 'radius' of at most 20 m, got '250': is the unit mm?"),
+        ('<cylinder radius="1"/>', "expected <cylinder> with the attribute 'length'"),
+        ("<mesh/>", "expected <mesh> with the attribute 'filename'"),
+        ('<mesh filename="a.stl" scale="1 1"/>', "expected 3 finite numbers in 'scale', got '1 1'"),
+        ('<mesh filename="a.stl" scale="1 0 1"/>', "expected a 'scale' without zeros, got '1 0 1'"),
+    ],
+)
+def test_unsound_shapes_are_refused_with_their_line(tmp_path: Path, shape: str, message: str) -> None:
+    assert refused(tmp_path, collision(shape), *ARM[1:]) == f"r.urdf:2: link 'base': {message}"
+
+
+def test_missing_meshes_name_every_place_that_was_tried(tmp_path: Path) -> None:
+    start = "r.urdf:2: link 'base' (collision): mesh"
+    assert refused(tmp_path, collision('<mesh filename="m/a.stl"/>'), *ARM[1:]) == (
+        f"{start} 'm/a.stl': no such mesh file, tried {tmp_path}/m/a.stl"
+    )
+    packages = UrdfOptions(package_dirs=(tmp_path / "ros",))
+    message = refused(tmp_path, collision('<mesh filename="package://arm/a.stl"/>'), *ARM[1:], options=packages)
+    first = f"{start} 'package://arm/a.stl': no such mesh file, tried {tmp_path}/ros/arm/a.stl, {tmp_path}/arm/a.stl, "
+    assert message.startswith(first)
+    assert message.endswith(": name the folder that holds the package in `package_dirs`")
+
+
+@pytest.mark.parametrize(
+    ("uri", "message"),
+    [
+        ("package://arm", "expected package://NAME/path"),
+        ("package:///a.stl", "expected package://NAME/path"),
+        ("http://x.org/a.stl", "expected a path, package:// or file://, got http://"),
+        ("model://arm/a.stl", "expected a path, package:// or file://, got model://"),
+        ("/etc/a.stl", "expected an absolute path below the URDF's folder or one of `package_dirs`"),
+        ("file:///etc/a.stl", "expected an absolute path below the URDF's folder or one of `package_dirs`"),
+        ("a.dae", "a.dae: COLLADA files are not read: convert the mesh to STL, OBJ or PLY"),
+        ("a.stp", "a.stp: expected a mesh file .stl, .obj or .ply, got '.stp'"),
+        (
+            "torn.stl",
+            "torn.stl: expected 684 bytes for the 12 triangles that its header names, got 683: "
+            "the file is damaged or not STL",
+        ),
+        ("sheet.stl", "sheet.stl: expected a body with a volume, got a flat one"),
+        ("large.stl", "large.stl: expected an extent of at most 20 m, got 500 m: is the unit mm?"),
+        ("x" * 300 + ".stl", None),
+    ],
+)
+def test_unsound_meshes_are_refused_with_the_line_of_their_link(tmp_path: Path, uri: str, message: str | None) -> None:
+    trimesh.creation.box((500, 1, 1)).export(tmp_path / "large.stl")
+    (tmp_path / "torn.stl").write_bytes((tmp_path / "large.stl").read_bytes()[:-1])
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]])
+    trimesh.Trimesh(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]).export(tmp_path / "sheet.stl")
+    for name in ("a.dae", "a.stp"):
+        (tmp_path / name).write_text("?")
+    message = message or f"no such mesh file, tried {tmp_path / uri}"
+    expected = f"r.urdf:2: link 'base' (collision): mesh '{uri}': {message}"
+    assert refused(tmp_path, collision(f'<mesh filename="{uri}"/>'), *ARM[1:]) == expected
+
+
+def test_a_drawn_link_whose_drawing_cannot_be_read_is_not_dropped(tmp_path: Path) -> None:
+    drawn = '<link name="base"><visual><geometry><mesh filename="a.dae"/></geometry></visual></link>'
+    (tmp_path / "a.dae").write_text("<COLLADA/>")
+    assert refused(tmp_path, drawn, *ARM[1:]) == (
+        "r.urdf:2: link 'base' (visual, used as it has no collision element): mesh 'a.dae': a.dae: COLLADA files are "
+        "not read: convert the mesh to STL, OBJ or PLY"
+    )
