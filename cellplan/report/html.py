@@ -1,6 +1,5 @@
 """``report.html``: the verdict of a run and everything behind it, as one page that needs nothing but itself."""
 
-import math
 import re
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -11,7 +10,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.report import Check, Report
 from cellplan.report.json_report import summary_record
 from cellplan.report.palette import ROBOTS, robot_colours
-from cellplan.report.record import Provenance, Record, report_record
+from cellplan.report.record import Provenance, Record, report_record, rounded_down
 
 MODES = {
     "simultaneous": "all robots move",
@@ -36,7 +35,6 @@ CLASSES = {
 }
 NARROW = 0.05  # [-] of the half range: a joint whose margin is smaller is marked
 FAST = 0.95  # [-] of the speed limit: likewise
-ROUNDING = 1e-9  # [-] of a tenth: lets 37.0 that is stored as 36.99999999999 stay 37.0
 SMALLEST_SHOWN = 1e-6  # [mm] or [deg]: below it more digits tell nothing
 
 
@@ -116,8 +114,7 @@ def _small(value: float | None) -> str:
 
 
 def _floored(value: float | None) -> str:
-    """The value with one decimal, rounded down: never more clearance or margin than there is."""
-    return "–" if value is None else _fixed(math.floor(10.0 * value + ROUNDING) / 10.0, 1)
+    return "–" if value is None else _fixed(rounded_down(value), 1)
 
 
 def _percent(value: float | None, digits: int = 0) -> str:

@@ -12,6 +12,7 @@ from cellplan.model.report import ClearanceClass, JointUse, Report, TaskAccuracy
 from cellplan.report import palette
 from cellplan.report.palette import INK, LIMIT
 from cellplan.report.plots_canvas import Sheet, pictures, style
+from cellplan.report.record import rounded_down
 
 JOINT_COLUMNS = 3
 CLASS_TITLES: Mapping[ClearanceClass, str] = {
@@ -111,19 +112,25 @@ def _draw_positions(robot: str, uses: list[JointUse], report: Report, colour: st
     sheet = _joint_sheet(f"{robot}: joint positions", len(uses), report.times)
     for i, use in enumerate(uses):
         unit, scale = ("deg", math.degrees(1.0)) if use.is_revolute else ("mm", 1e3)
-        is_endless = not math.isfinite(use.margin)
-        margin = f"margin {scale * use.margin:.1f}" if use.margin >= 0.0 else f"outside by {-scale * use.margin:.3g}"
-        note = "turns without end" if is_endless else f"{margin} at {use.margin_at_s:.2f} s"
         curve = _JointCurve(
             title=f"{use.joint}, in {unit}",
-            note=note,
+            note=_margin_note(use, scale),
             times=report.times,
             values=scale * report.q[robot][:, i],
             lower=scale * use.lower,
             upper=scale * use.upper,
         )
-        _draw_joint(sheet, i, curve, colour=colour, worst_at_s=None if is_endless else use.margin_at_s)
+        _draw_joint(sheet, i, curve, colour=colour, worst_at_s=use.margin_at_s if math.isfinite(use.margin) else None)
     return pictures(sheet, f"positions_{robot}")
+
+
+def _margin_note(use: JointUse, scale: float) -> str:
+    """How near the joint comes to its limits, or how far it leaves them, and when."""
+    if not math.isfinite(use.margin):
+        return "turns without end"
+    margin = scale * use.margin
+    near = f"margin {rounded_down(margin):.1f}" if margin >= 0.0 else f"outside by {-margin:.3g}"
+    return f"{near} at {use.margin_at_s:.2f} s"
 
 
 def _draw_velocities(robot: str, uses: list[JointUse], report: Report, colour: str) -> dict[str, bytes]:
@@ -189,7 +196,7 @@ def _draw_clearance(report: Report, required: float) -> dict[str, bytes]:
         panel = sheet.panel(
             index,
             f"{title}, in mm",
-            note=f"smallest {smallest:.1f} at {minimum.at_s:.2f} s, required {1e3 * required:g}",
+            note=f"smallest {rounded_down(smallest):.1f} at {minimum.at_s:.2f} s, required {1e3 * required:g}",
             span=(0.0, max(float(curve[known].max()), 1e3 * required) or 1.0),
             is_floored=True,
         )

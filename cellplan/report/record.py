@@ -25,6 +25,7 @@ Record = dict[str, Any]
 
 SCHEMA = "cellplan.report/1"
 SIGNIFICANT = 12  # [-] digits: hides the noise of unit conversion (-185.00000000000003) and nothing else
+ROUNDING = 1e-9  # [-] of a tenth: lets 37.0 that is stored as 36.99999999999 stay 37.0
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
@@ -71,6 +72,11 @@ def number(value: float | None) -> float | None:
     if value is None or not math.isfinite(value):
         return None
     return float(f"{value:.{SIGNIFICANT}g}") + 0.0
+
+
+def rounded_down(value: float) -> float:
+    """The value with one decimal, rounded down: never more clearance or margin than there is."""
+    return math.floor(10.0 * value + ROUNDING) / 10.0
 
 
 def status(report: Report) -> str:
