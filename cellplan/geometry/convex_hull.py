@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
-from cellplan.geometry.mesh_topology import components, count_edges, make_mesh
+from cellplan.geometry.mesh_topology import count_edges, make_mesh
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 
@@ -73,8 +73,11 @@ def _grow(points: Array, faces: Indices, *, room: float) -> Indices:
     while height.max() > room and corners < MAX_CORNERS:
         corners += 1
         apex = int(np.argmax(height))
-        seen = _seen_faces(faces, normals @ points[apex] - offsets > room, start=int(owner[apex]))
-        horizon = _horizon(faces[seen])
+        seen_ones, horizon = _horizon(
+            faces, np.flatnonzero(normals @ points[apex] - offsets > room), start=int(owner[apex])
+        )
+        seen = np.zeros(len(faces), dtype=bool)
+        seen[seen_ones] = True
         fresh = np.column_stack([horizon, np.full(len(horizon), apex)])
         fresh_normals, fresh_offsets = _planes(points, fresh)
         loose = np.flatnonzero(seen[owner] & (height > -np.inf))
@@ -120,11 +123,12 @@ def _holds(hull: Array, faces: Indices, points: Array, *, room: float) -> bool:
 
 def _planes(points: Array, faces: Indices) -> tuple[Array, Array]:
     """Unit normals and offsets of faces; a face without area gets a normal of zero and sees nothing."""
-    corner = points[faces]
-    normals = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    origin = points[faces[:, 0]]
+    u, v = points[faces[:, 1]] - origin, points[faces[:, 2]] - origin
+    normals = u[:, [1, 2, 0]] * v[:, [2, 0, 1]] - u[:, [2, 0, 1]] * v[:, [1, 2, 0]]
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(length > 0.0, length, 1.0)
-    return normals, np.sum(normals * corner[:, 0], axis=1)
+    return normals, np.sum(normals * origin, axis=1)
 
 
 def _assign(points: Array, chosen: Indices, normals: Array, offsets: Array) -> tuple[Indices, Array]:
@@ -134,23 +138,19 @@ def _assign(points: Array, chosen: Indices, normals: Array, offsets: Array) -> t
     return owner, height[np.arange(len(chosen)), owner]
 
 
-def _seen_faces(faces: Indices, seen: NDArray[np.bool_], *, start: int) -> NDArray[np.bool_]:
-    """The seen faces that hang together with the one the point was assigned to."""
-    seen[start] = True
-    index = np.flatnonzero(seen)
-    edges = np.sort(np.stack([faces[index], np.roll(faces[index], -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
-    face = np.repeat(np.arange(len(index)), 3)
-    order = np.lexsort((edges[:, 1], edges[:, 0]))
-    same = np.all(edges[order[:-1]] == edges[order[1:]], axis=1)
-    group = components(len(index), np.stack([face[order[:-1]][same], face[order[1:]][same]], axis=1))
-    connected = np.zeros(len(faces), dtype=bool)
-    connected[index[group == group[np.searchsorted(index, start)]]] = True
-    return connected
-
-
-def _horizon(seen: Indices) -> Indices:
-    """Directed edges of the seen faces whose other side is not seen, shape (H, 2)."""
-    edges = np.stack([seen, np.roll(seen, -1, axis=1)], axis=2).reshape(-1, 2)
-    base = int(edges.max()) + 1
-    inner = np.isin(edges[:, 0] * base + edges[:, 1], edges[:, 1] * base + edges[:, 0])
-    return edges[~inner]
+def _horizon(faces: Indices, seen: Indices, *, start: int) -> tuple[list[int], Indices]:
+    """The seen faces that hang together with one of them, and the directed edges round them, shape (H, 2)."""
+    corners = {start: faces[start].tolist()} | dict(zip(seen.tolist(), faces[seen].tolist(), strict=True))
+    face_at = {edge: face for face, (a, b, c) in corners.items() for edge in ((a, b), (b, c), (c, a))}
+    reached, waiting = {start}, [start]
+    rim: list[tuple[int, int]] = []
+    while waiting:
+        a, b, c = corners[waiting.pop()]
+        for p, q in ((a, b), (b, c), (c, a)):
+            beyond = face_at.get((q, p))
+            if beyond is None:
+                rim.append((p, q))
+            elif beyond not in reached:
+                reached.add(beyond)
+                waiting.append(beyond)
+    return sorted(reached), np.array(sorted(rim))
