@@ -163,14 +163,15 @@ def test_poses_that_are_not_rigid_are_refused(X: np.ndarray) -> None:
 def test_height_above_the_floor_is_exact_for_every_shape() -> None:
     rng = np.random.default_rng(0)
     for shape in (*SHAPES.values(), rock(0)):
+        around = tessellate(shape, 120).vertices
         for _ in range(20):
             X, ground = random_pose(rng, reach=1.0), random_pose(rng, reach=0.2)
-            surface = tessellate(shape, 400).vertices @ X[:3, :3].T + X[:3, 3]
+            surface = around @ X[:3, :3].T + X[:3, 3]
             lowest = float(((surface - ground[:3, 3]) @ ground[:3, 2]).min())
 
             height = heights(shape, X[None, :3, :3], X[None, :3, 3], X_WS=ground)[0]
 
-            assert lowest - 1e-9 <= height <= lowest + 2e-4  # the fine mesh lies round the true shape
+            assert lowest - 1e-9 <= height <= lowest + 3e-4  # the fine mesh lies round the true shape
 
 
 @pytest.mark.parametrize(("first", "second"), [(a, b) for a in SHAPES for b in SHAPES if a <= b])
