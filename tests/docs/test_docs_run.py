@@ -1,6 +1,5 @@
 """Whatever the README and the docs show is run here, page by page, from top to bottom."""
 
-import os
 import re
 import shutil
 import subprocess
@@ -19,6 +18,7 @@ PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"
 BLOCK = re.compile(r"^(?:<!-- (?P<mark>[^>]*?) -->\n)?```(?P<kind>\w*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\((?P<target>[^)#\s]+)(?:#[^)]*)?\)")
 EXIT_STATUS = re.compile(r"#\s*exit status (\d+)\s*$")
+PROGRAM = f"cellplan() {{ '{sys.executable}' -m cellplan \"$@\"; }}; "  # this tree, wherever it is installed
 COMMAND_LIMIT_S = 120  # [s] a block that takes longer does not belong on a page for newcomers
 
 
@@ -42,18 +42,16 @@ def page_name(page: Path) -> str:
 
 def run_shell(text: str, folder: Path) -> str:
     """Run a block line by line; targets of make are only looked up, for they would run the tests again."""
-    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     output = ""
     for line in text.replace("\\\n", " ").splitlines():
         if not line.strip() or line.startswith("#"):
             continue
         expected = int(match[1]) if (match := EXIT_STATUS.search(line)) else 0
-        command = re.sub(r"^make\b", f"make --dry-run -C '{ROOT}'", line)
+        command = PROGRAM + re.sub(r"^make\b", f"make --dry-run -C '{ROOT}'", line)
         run = subprocess.run(
             ["bash", "-c", command],
             check=False,
             cwd=folder,
-            env=environment,
             capture_output=True,
             text=True,
             timeout=COMMAND_LIMIT_S,

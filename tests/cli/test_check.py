@@ -1,0 +1,49 @@
+"""Checking a cell from the shell, without solving it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cellplan.cli.main import run
+
+
+def test_a_sound_cell_is_told_with_postures_and_paths(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status = run(["check", str(cells / "four_robots.yaml")])
+
+    lines = capsys.readouterr().out.splitlines()
+    assert status == 0
+    assert lines[0] == "four-robots: sound"
+    assert "  start of reis (given): A1_deg 0, B1_deg -93, C1_deg 108, D1_deg 0, E1_deg -15, F1_deg 0" in lines
+    assert any(line.startswith("  task rectangle: path of ") for line in lines)
+
+
+def test_a_collision_at_the_start_ends_with_one(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status = run(["check", str(cells / "four_robots_initial.yaml"), "--json"])
+
+    told = json.loads(capsys.readouterr().out)
+    assert (status, told["exit"], told["status"], told["schema"]) == (1, 1, "failed", "cellplan.check/1")
+    assert any(not check["passed"] for check in told["checks"])
+
+
+def test_a_start_off_its_task_is_bad_input(cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (cells / "four_robots.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "off.yaml"
+    path.write_text(text.replace("start_deg: [21.020925685,", "start_deg: [25.0,"), encoding="utf-8")
+
+    status = run(["check", str(path)])
+
+    out, err = capsys.readouterr()
+    assert (status, out) == (2, "")
+    assert f"{path}:16: robots.kuka.start_deg" in err
+    assert err.count("\n") == 1
+
+
+def test_checking_writes_nothing(
+    cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    run(["check", str(cells / "four_robots.yaml")])
+
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,140 @@
+"""Solving a cell from the shell: what is said, what is written, how it ends."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cellplan.cli.main import run
+
+
+@pytest.fixture
+def coarse_cell(cells: Path, tmp_path: Path) -> Path:
+    """The four robots on a clock of 5 ms, which is quick; the gain goes with the step."""
+    text = (cells / "four_robots.yaml").read_text(encoding="utf-8")
+    text = text.replace("step_s: 0.001", "step_s: 0.005").replace("gain_per_s: 650", "gain_per_s: 200")
+    path = tmp_path / "coarse.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_sound_cell_is_told_and_written(
+    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+
+    status = run(["solve", str(coarse_cell), "-o", str(folder)])
+
+    out, err = capsys.readouterr()
+    assert (status, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == "four-robots: passed"
+    assert lines[-2:] == [f"report: {folder / 'report.html'}", f"tables: {folder / 'tables'}"]
+    assert sorted(path.name for path in (folder / "tables").iterdir()) == [
+        "abb.csv",
+        "kuka.csv",
+        "reis.csv",
+        "staubli.csv",
+    ]
+
+
+def test_a_machine_gets_one_object_with_the_whole_report(
+    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+
+    status = run(["solve", str(coarse_cell), "-o", str(folder), "--task", "circle", "--json"])
+
+    told = json.loads(capsys.readouterr().out)
+    assert (status, told["exit"]) == (0, 0)
+    assert (told["schema"], told["status"]) == ("cellplan.solve/1", "passed")
+    assert told["report_path"] == str(folder / "report.html")
+    assert told["report"] == json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    assert list(told["report"]["tasks"]) == ["circle"]
+
+
+def test_a_failed_cell_ends_with_one_and_leaves_no_tables(
+    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+
+    status = run(["solve", str(coarse_cell), "-o", str(folder), "--task", "circle", "--duration", "0.2"])
+
+    out = capsys.readouterr().out
+    assert status == 1
+    assert out.startswith("four-robots: failed\n")
+    assert "too fast" in out
+    assert (folder / "report.html").is_file()
+    assert not (folder / "tables").exists()
+    assert not (folder / "rejected").exists()
+
+
+def test_rejected_tables_are_kept_on_request(
+    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+
+    status = run(
+        ["solve", str(coarse_cell), "-o", str(folder), "--task", "circle", "--duration", "0.2", "--keep-rejected"]
+    )
+
+    assert status == 1
+    assert f"tables: {folder / 'rejected'}" in capsys.readouterr().out
+    assert "# verdict: REJECTED" in (folder / "rejected" / "kuka.csv").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "complaint"),
+    [
+        ("--mode", "pair", "error: --mode: expected one of simultaneous, pairwise, part_at_rest, got 'pair'"),
+        ("--task", "circel", "error: --task: expected one of circle, rhombus, rectangle, got 'circel'"),
+        ("--method", "magic", "error: --method: expected one of "),
+        ("--duration", "-4", "error: --duration: expected a number of seconds of at least 0.001, got -4"),
+        ("--duration", "nan", "error: --duration: expected a number of seconds of at least 0.001, got nan"),
+    ],
+)
+def test_a_wrong_choice_is_refused_before_anything_is_done(
+    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str, value: str, complaint: str
+) -> None:
+    folder = tmp_path / "out"
+
+    status = run(["solve", str(coarse_cell), "-o", str(folder), option, value])
+
+    out, err = capsys.readouterr()
+    assert (status, out) == (2, "")
+    assert err.startswith(complaint)
+    assert err.count("\n") == 1
+    assert not folder.exists()
+
+
+def test_a_folder_with_other_things_in_it_is_never_replaced(
+    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "thesis.tex").write_text("years of work", encoding="utf-8")
+
+    status = run(["solve", str(coarse_cell), "-o", str(folder)])
+
+    assert status == 2
+    assert "thesis.tex" in capsys.readouterr().err
+    assert (folder / "thesis.tex").read_text(encoding="utf-8") == "years of work"
+
+
+def test_complaints_about_a_cell_come_all_at_once_each_with_its_line(
+    coarse_cell: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = coarse_cell.read_text(encoding="utf-8")
+    text = text.replace("duration_s: 4", "duration_s: -4").replace("model: kuka_kr6", "modle: kuka_kr6")
+    coarse_cell.write_text(text, encoding="utf-8")
+
+    status = run(["solve", str(coarse_cell), "--json"])
+
+    out, err = capsys.readouterr()
+    assert status == 2
+    lines = err.splitlines()
+    assert len(lines) >= 2
+    assert all(line.startswith(f"{coarse_cell}:") for line in lines)
+    assert any("did you mean 'model'?" in line for line in lines)
+    told = json.loads(out)
+    assert (told["status"], told["exit"], told["errors"]) == ("error", 2, lines)
