@@ -117,5 +117,5 @@ def _smallest(J: Array) -> Array:
     """Smallest singular value of each matrix; zero when there are fewer columns than rows."""
     if J.shape[2] < J.shape[1]:
         return np.zeros(len(J))
-    values: Array = np.linalg.svd(J, compute_uv=False)[:, -1]
-    return values
+    values = np.linalg.svd(J, compute_uv=False)[:, -1]
+    return values.astype(np.float64, copy=False)

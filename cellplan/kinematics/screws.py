@@ -62,8 +62,16 @@ class ScrewChain:
         Returns:
             Screws, shape (N, 6, n); zero for joints that do not carry the flange.
         """
+        return self._screws(self.link_displacements(q))
+
+    def tool_motion(self, q: Array) -> tuple[Array, Array]:
+        """`tool_poses` and `flange_screws` at once, for searches that need both many times."""
         D = self.link_displacements(q)
-        screws = np.zeros((len(q), 6, self._n))
+        return D[:, self._flange_link + 1] @ self._X_BT, self._screws(D)
+
+    def _screws(self, D: Array) -> Array:
+        """Screws of the joints that carry the flange, from link displacements, shape (N, 6, n)."""
+        screws = np.zeros((len(D), 6, self._n))
         link = self._flange_link
         while link != BASE:
             axis = self._axes[link]

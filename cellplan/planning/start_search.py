@@ -28,7 +28,10 @@ from cellplan.planning.schedule import schedule_tasks
 from cellplan.scene.scene import Scene
 
 SEEDS: Final = 48  # random starts of the inverse kinematics per robot and place; finds all 8 branches of a 6-axis arm
-HOLDER_POSTURES: Final = 150  # postures of the positioner that are tried when its start is to be found as well
+SEEDS_PER_HOLDER: Final = 16  # the same when many postures of the positioner are to be tried
+HOLDER_DRAWS: Final = 1500  # postures of the positioner that are drawn when its start is to be found as well
+HOLDER_POSTURES: Final = 60  # the most promising of these, which are tried
+HOLDER_RANGE: Final = 0.7  # share of each joint range that they are drawn from, so that room is left to move
 CANDIDATES: Final = 10  # whole-cell postures that are rehearsed
 BRANCHES: Final = 4  # best branches of each operator that are combined
 COMBINATIONS_PER_HOLDER: Final = 3  # candidates taken from one posture of the positioner, so that several are compared
@@ -36,9 +39,7 @@ COMFORTABLE: Final = 0.1  # smallest singular value above which more manipulabil
 REHEARSAL_SAMPLES: Final = 160  # instants of the coarse motion that a candidate is judged by
 REHEARSAL_GAIN: Final = 0.5  # feedback gain times step of the coarse motion
 TOUCH_INSTANTS: Final = 12  # instants of the coarse motion that are looked at for collisions
-TOUCHING: Final = (
-    2.0  # taken off the quality of a candidate that collides on the way
-)
+TOUCHING: Final = 2.0  # taken off the quality of a candidate that collides on the way
 
 
 @dataclass(slots=True)
@@ -107,10 +108,40 @@ def _holder_postures(scene: Scene, toolpaths: Mapping[str, Toolpath], rng: np.ra
         operator = cell.robot(task.robot)
         if operator.start is not None:
             return list(_postures_meeting(scene, task, toolpaths[task.name], operator.start, rng))
+    return list(_promising_postures(scene, toolpaths, holder, rng))
+
+
+def _promising_postures(
+    scene: Scene, toolpaths: Mapping[str, Toolpath], holder: Robot, rng: np.random.Generator
+) -> Array:
+    """Postures of the positioner that hold the part where the operators' tools like to be, best first."""
     lower, upper = finite_limits(holder.model)
-    first = np.clip(np.zeros(len(lower)), lower, upper)
-    drawn = 0.5 * (lower + upper) + 0.7 * (random_postures(holder.model, HOLDER_POSTURES, rng) - 0.5 * (lower + upper))
-    return [first, *drawn]
+    middle = 0.5 * (lower + upper)
+    q = middle + HOLDER_RANGE * (random_postures(holder.model, HOLDER_DRAWS, rng) - middle)
+    X_WP = scene.chains[holder.name].tool_poses(q) @ inverse(scene.cell.part.held_by[0].X_PT)
+    awkwardness = np.zeros(len(q))
+    for task in scene.cell.tasks:
+        operator = scene.cell.robot(task.robot)
+        usual = scene.chains[task.robot].tool_poses(random_postures(operator.model, HOLDER_DRAWS, rng))
+        goal = X_WP @ toolpaths[task.name].X_PT_start
+        base = operator.X_WB[:3, 3]
+        awkwardness = np.maximum(awkwardness, _awkwardness(goal, usual, base))
+    order: Array = q[np.argsort(awkwardness, kind="stable")[:HOLDER_POSTURES]]
+    return order
+
+
+def _awkwardness(goal: Array, usual: Array, base: Array) -> Array:
+    """How far tool goals, shape (N, 4, 4), are from where and how a robot's tool usually is, shape (N,).
+
+    The measure is the distance from the base in standard deviations of the usual distance, and the cosine between the
+    tool axis and the direction away from the base.
+    """
+    away, usual_away = goal[:, :3, 3] - base, usual[:, :3, 3] - base
+    distance, usual_distance = np.linalg.norm(away, axis=1), np.linalg.norm(usual_away, axis=1)
+    spread = max(float(usual_distance.std()), 1e-6)  # a robot that cannot move has none
+    outward = np.sum(goal[:, :3, 2] * away, axis=1) / np.maximum(distance, 1e-9)
+    measure: Array = np.abs(distance - np.median(usual_distance)) / spread + (1.0 - outward)
+    return measure
 
 
 def _postures_meeting(
@@ -183,7 +214,8 @@ def _branches(
         return [(np.inf, np.clip(np.zeros(len(robot.model.joints)), *finite_limits(robot.model)))]
     X_PT = toolpaths[task.name].X_PT_start
     chain = scene.chains[robot.name]
-    seeds = random_postures(robot.model, SEEDS, rng)
+    is_holder_given = not cell.positioners or cell.robot(cell.positioners[0]).start is not None
+    seeds = random_postures(robot.model, SEEDS if is_holder_given else SEEDS_PER_HOLDER, rng)
     q = within_limits(robot.model, reaching_postures(chain, task, X_PT, X_WP=X_WP, seeds=seeds))
     if not len(q):
         return []
