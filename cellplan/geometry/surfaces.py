@@ -127,8 +127,9 @@ class Ball:
         return _round_hits(points, direction, across=direction, offset=points - self.centre, radius=self.radius)
 
     def covers(self, hits: Array) -> NDArray[np.bool_]:
-        """Every hit, see `Patch`."""
-        return np.ones(len(hits), dtype=bool)
+        """Every line that does not pass by, see `Patch`."""
+        met: NDArray[np.bool_] = np.all(np.isfinite(hits), axis=1)
+        return met
 
     def normals(self, p: Array) -> Array:
         """Directions straight away from the centre, see `Patch`."""

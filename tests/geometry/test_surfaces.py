@@ -60,8 +60,10 @@ def test_lines_beside_a_round_body_do_not_hit() -> None:
     ball = Ball(centre=np.zeros(3), radius=0.1)
     beside = np.array([[0.0, 0.1 + 1e-9, 0.0]])
 
-    assert np.all(np.isnan(wall.hits(beside, np.eye(3)[0])))
-    assert np.all(np.isnan(ball.hits(beside, np.eye(3)[0])))
+    for patch in (wall, ball):
+        hits = patch.hits(beside, np.eye(3)[0])
+        assert np.all(np.isnan(hits))
+        assert not patch.covers(hits)[0]
 
 
 @pytest.mark.parametrize("shape", [Box((0.3, 0.3, 0.4)), Cylinder(0.15, 0.4), Sphere(0.2)], ids=str)
