@@ -158,7 +158,7 @@ def _forbidden(scene: Scene, times: Array, findings: _Findings) -> list[Contact]
 
 def _spans(samples: Samples, times: Array) -> Spans:
     """First and last sample of each contact, short breaks bridged."""
-    ends = np.flatnonzero(np.diff(times[samples]) > max(SAME_CONTACT, 1.5 * float(times[-1]) / (len(times) - 1)))
+    ends = np.flatnonzero(np.diff(times[samples]) > max(SAME_CONTACT, 1.5 * float(times[-1]) / max(1, len(times) - 1)))
     first, last = np.append(0, ends + 1), np.append(ends, len(samples) - 1)
     return [(int(samples[a]), int(samples[b])) for a, b in zip(first, last, strict=True)]
 
