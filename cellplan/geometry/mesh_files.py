@@ -25,17 +25,18 @@ def parse_mesh(data: bytes, name: str) -> Triangles:
     Raises:
         InputError: The format is not read, or the file is damaged.
     """
-    match name.lower().rpartition(".")[2]:
-        case "stl":
-            return _parse_stl(data, name)
-        case "obj":
-            return _parse_obj(data, name)
-        case "ply":
-            return parse_ply(data, name)
-        case "dae":
-            raise InputError(f"{name}: COLLADA files are not read: convert the mesh to STL, OBJ or PLY")
-        case suffix:
-            raise InputError(f"{name}: expected a mesh file .stl, .obj or .ply, got '.{suffix}'")
+    with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused by name later
+        match name.lower().rpartition(".")[2]:
+            case "stl":
+                return _parse_stl(data, name)
+            case "obj":
+                return _parse_obj(data, name)
+            case "ply":
+                return parse_ply(data, name)
+            case "dae":
+                raise InputError(f"{name}: COLLADA files are not read: convert the mesh to STL, OBJ or PLY")
+            case suffix:
+                raise InputError(f"{name}: expected a mesh file .stl, .obj or .ply, got '.{suffix}'")
 
 
 def _parse_stl(data: bytes, name: str) -> Triangles:

@@ -27,6 +27,7 @@ TYPES: Final = {
 ORDERS: Final = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
 INDEX_NAMES: Final = ("vertex_indices", "vertex_index")
 MAX_ROWS: Final = 3_000_000  # more than the largest allowed mesh can need
+MAX_INDEX: Final = 2**31  # beyond any index that such a file can hold
 MAX_CORNERS: Final = 1000  # more in one face is a damaged file
 
 
@@ -59,18 +60,18 @@ class _Values:
         """Take the bytes after the header; ``order`` is the byte order, empty for text."""
         self._order = order
         self._body = body
-        self._place = 0
+        self.place = 0
         self._words: NDArray[np.float64] = np.array(body.split() if not order else [], dtype=np.float64)
 
     def take(self, kind: str, count: int) -> NDArray[np.float64]:
         """The next ``count`` numbers of one type."""
         if not self._order:
-            values = self._words[self._place : self._place + count]
-            self._place += count
+            values = self._words[self.place : self.place + count]
+            self.place += count
         else:
             dtype = np.dtype(self._order + TYPES[kind])
-            values = np.frombuffer(self._body, dtype=dtype, count=count, offset=self._place).astype(np.float64)
-            self._place += count * dtype.itemsize
+            values = np.frombuffer(self._body, dtype=dtype, count=count, offset=self.place).astype(np.float64)
+            self.place += count * dtype.itemsize
         if len(values) != count:
             raise ValueError("ends too early")
         return values
@@ -81,14 +82,14 @@ class _Values:
         if not self._order:
             return self.take("", element.rows * width).reshape(-1, width)
         dtype = np.dtype([(f"c{i}", self._order + TYPES[prop.kind]) for i, prop in enumerate(element.properties)])
-        table = np.frombuffer(self._body, dtype=dtype, count=element.rows, offset=self._place)
-        self._place += table.nbytes
+        table = np.frombuffer(self._body, dtype=dtype, count=element.rows, offset=self.place)
+        self.place += table.nbytes
         return np.stack([table[f"c{i}"].astype(np.float64) for i in range(width)], axis=1)
 
     @property
     def is_used_up(self) -> bool:
         """Whether nothing but blanks is left."""
-        return self._place == len(self._words) if not self._order else not self._body[self._place :].strip(b"\r\n\0 ")
+        return self.place == len(self._words) if not self._order else not self._body[self.place :].strip(b"\r\n\0 ")
 
 
 def parse_ply(data: bytes, name: str) -> Triangles:
@@ -107,7 +108,7 @@ def parse_ply(data: bytes, name: str) -> Triangles:
             if element.name == "vertex" and None not in columns and not _has_lists(element):
                 vertices = values.take_table(element)[:, [column for column in columns if column is not None]]
             elif element.name == "face" and element.column(INDEX_NAMES) is not None:
-                polygons = list(_polygons(values, element))
+                polygons = _polygons(values, element)
             elif _has_lists(element):
                 list(_rows(values, element))
             else:
@@ -165,15 +166,37 @@ def _has_lists(element: _Element) -> bool:
     return any(prop.count for prop in element.properties)
 
 
-def _polygons(values: _Values, element: _Element) -> Iterator[list[int]]:
+def _triangles(values: _Values, element: _Element) -> NDArray[np.float64] | None:
+    """Corner indices of all faces at once if every one has three, shape (M, 3); else None and nothing taken."""
+    column = element.column(INDEX_NAMES) or 0
+    corners = element.properties[column]
+    others = [prop for prop in element.properties if prop is not corners]
+    if corners.count is None or any(prop.count for prop in others):
+        return None
+    count = _Property("count", corners.count, None)
+    unrolled = [count, *[_Property(corners.name, corners.kind, None)] * 3]
+    flat = [*element.properties[:column], *unrolled, *element.properties[column + 1 :]]
+    start = values.place
+    try:
+        table = values.take_table(_Element(element.name, element.rows, flat))
+    except ValueError:
+        table = np.zeros((1, len(flat)))
+    if np.all(table[:, column] == 3.0):
+        return table[:, column + 1 : column + 4]
+    values.place = start
+    return None
+
+
+def _polygons(values: _Values, element: _Element) -> Polygons:
     """Corner indices of each face."""
-    column = element.column(INDEX_NAMES)
-    for row in _rows(values, element):
-        corners = row[column or 0]
-        indices = corners.astype(np.int64)
-        if len(corners) < 3 or np.any(indices != corners):
-            raise ValueError("a face needs three or more whole vertex numbers")
-        yield indices.tolist()
+    column = element.column(INDEX_NAMES) or 0
+    triangles = _triangles(values, element)
+    faces = list(triangles) if triangles is not None else [row[column] for row in _rows(values, element)]
+    numbers = np.concatenate([np.zeros(0), *faces])
+    is_whole = np.all((np.abs(numbers) < MAX_INDEX) & (numbers == np.floor(numbers)))
+    if not is_whole or min(map(len, faces), default=3) < 3:
+        raise ValueError("a face needs three or more whole vertex numbers")
+    return [face.astype(np.int64).tolist() for face in faces]
 
 
 def _rows(values: _Values, element: _Element) -> Iterator[list[NDArray[np.float64]]]:
@@ -181,8 +204,8 @@ def _rows(values: _Values, element: _Element) -> Iterator[list[NDArray[np.float6
     for _ in range(element.rows):
         row = []
         for prop in element.properties:
-            length = 1 if prop.count is None else int(values.take(prop.count, 1)[0])
-            if not 0 <= length <= MAX_CORNERS:
-                raise ValueError(f"a list has {length} entries")
-            row.append(values.take(prop.kind, length))
+            length = 1.0 if prop.count is None else values.take(prop.count, 1)[0]
+            if not (0.0 <= length <= MAX_CORNERS and length == np.floor(length)):
+                raise ValueError(f"a list has {length:g} entries")
+            row.append(values.take(prop.kind, int(length)))
         yield row

@@ -189,6 +189,15 @@ def test_bad_obj_is_refused_with_its_line(tmp_path: Path, text: str, message: st
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (
+            "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nend_header\ninf 0 1 2\n",
+            "m.ply: expected the numbers that the PLY header names, got a damaged file: a list has inf entries",
+        ),
+        (
+            "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n3 0 1 nan\n",
+            "m.ply: expected the numbers that the PLY header names, got a damaged file: "
+            "a face needs three or more whole vertex numbers",
+        ),
         ("PLY\n", "m.ply: expected a PLY file that starts with 'ply' and has an 'end_header'"),
         ("ply\nend_header\n", "m.ply: expected a PLY header with a 'format' line"),
         ("ply\nformat ascii 2.0\nend_header\n", "m.ply:2: expected a PLY header line, got 'format ascii 2.0'"),
