@@ -9,6 +9,7 @@ from cellplan.errors import InputError, InvalidFileError
 
 COMPLAINT_LIMIT: Final = 100  # a file with more is told so; nobody reads on
 SHOWN_LENGTH: Final = 40  # characters of a wrong text that are repeated in a message
+SHORTEST_GUESS: Final = 3  # characters; for shorter words every other one is near
 
 KeyPath = tuple[str | int, ...]
 
@@ -62,6 +63,8 @@ def key_text(path: KeyPath) -> str:
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """``, did you mean 'base'?`` when a known word is near, else nothing."""
+    if len(word) < SHORTEST_GUESS:
+        return ""
     near = get_close_matches(word[:SHOWN_LENGTH], list(known), n=1, cutoff=0.6)
     return f", did you mean '{near[0]}'?" if near else ""
 

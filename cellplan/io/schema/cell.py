@@ -2,7 +2,7 @@
 
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import AfterValidator, Field, Tag, model_validator
+from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.io.schema.common import Angle, Coordinate, Entry, Name, PoseEntry, Text, by_kind, rule
 from cellplan.io.schema.robot import RobotEntry
@@ -166,10 +166,20 @@ class LayoutEntry(Entry):
     )
 
 
+def _is_known_version(version: int) -> int:
+    """Refuse files of another version."""
+    if version != SCHEMA_VERSION:
+        raise rule(f"expected {SCHEMA_VERSION}, the version that this program reads, got {version}")
+    return version
+
+
+Version = Annotated[int, AfterValidator(_is_known_version), WithJsonSchema({"const": SCHEMA_VERSION})]
+
+
 class CellDocument(Entry):
     """A whole cell file."""
 
-    cellplan: Literal[1] = Field(description="Version of the file format.")
+    cellplan: Version = Field(description="Version of the file format.")
     name: Name = Field(description="Name of the cell and of its output folder.")
     robots: dict[Name, RobotEntry] = Field(
         min_length=1, max_length=ROBOT_LIMIT, description="Robots by name; their order is the order of the joints."

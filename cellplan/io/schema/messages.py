@@ -93,7 +93,8 @@ class _Finding:
         value = value_at(self.document.root, path)
         is_word = isinstance(value, str) and self.kind == "literal_error"
         hint = did_you_mean(value, _words(expected)) if is_word else ""
-        return self.document.complaint(path, f"expected {expected}, got {shown(value)}{hint}")
+        got = str(len(value)) if expected.startswith("at ") and isinstance(value, dict | tuple) else shown(value)
+        return self.document.complaint(path, f"expected {expected}, got {got}{hint}")
 
     def _rule(self) -> Complaint:
         """Complaint of a rule between several keys."""
@@ -134,9 +135,9 @@ class _Finding:
 
     def _count(self) -> str:
         """How many entries are allowed."""
-        if self.kind == "too_short":
-            return f"at least {self.context['min_length']}"
-        return f"at most {self.context['max_length']}"
+        is_short = self.kind == "too_short"
+        bound = self.context["min_length" if is_short else "max_length"]
+        return f"at {'least' if is_short else 'most'} {bound} {'entry' if bound == 1 else 'entries'}"
 
     def _bound(self) -> str:
         """A number and its bound, with the unit that the key names."""
