@@ -1,18 +1,25 @@
-"""The cell file format as a JSON Schema, for editors."""
+"""The formats of the cell file and of the robot table as JSON Schemas, for editors and the reference."""
 
 from typing import Any
 
 from cellplan.io.schema.cell import CellDocument
+from cellplan.io.schema.robot_table import RobotTableDocument
 
 
 def json_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of the cell file."""
-    schema = CellDocument.model_json_schema()
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "cellplan cell file, version 1",
-        **_without_null({key: value for key, value in schema.items() if key != "title"}),
-    }
+    return _finished(CellDocument.model_json_schema(), "cellplan cell file, version 1")
+
+
+def robot_table_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a joint-axis table."""
+    return _finished(RobotTableDocument.model_json_schema(), "cellplan robot table")
+
+
+def _finished(schema: dict[str, Any], title: str) -> dict[str, Any]:
+    """The schema with its dialect and title in front."""
+    rest = {key: value for key, value in schema.items() if key != "title"}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **_without_null(rest)}
 
 
 def _without_null(node: Any) -> Any:

@@ -1,0 +1,150 @@
+"""Write the reference of the cell file from its format: ``python docs/make_reference.py`` makes the page anew."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from cellplan.io.schema import json_schema, robot_table_schema
+
+PAGE = Path(__file__).resolve().parent / "reference" / "cell-file.md"
+INTRODUCTION = """\
+# The cell file
+
+This page is made from the format itself by `docs/make_reference.py`; do not edit it by hand. `cellplan schema` prints
+the same as a JSON Schema for editors.
+
+- **Units are in the keys**: `_mm`, `_deg`, `_s`, `_mm_s`, `_deg_s`, `_per_s`. Everything else is a plain number.
+- **Poses** are `{xyz_mm: [x, y, z], rpy_deg: [roll, pitch, yaw]}` with angles about fixed axes, as in URDF.
+- **Names** have 1 to 40 letters, digits, `_` or `-` and do not start with `-`.
+- **Files** are named relative to the cell file and lie below its folder, or below a folder given with `--allow-dir`.
+- **YAML is read strictly**: unknown or duplicate keys, anchors, aliases, merges, tags, several documents, empty
+  values, numbers that are not finite and words that readers understand in different ways (`010`, `1:30`, `1_000`,
+  `0x10`, `no`, `on`, `2010-01-01`) are errors with file and line. Put such a word in quotes where it is meant as a
+  text. Truth values are `true` and `false`.
+- **Limits**: 2 MB, 200,000 values, 32 levels, 16 robots, 200 tasks, 2,000,000 samples.
+- **Bodies** are called `ROBOT/LINK`, `ROBOT/tool`, `ROBOT/tool_2`, …, `part` and by their names in the environment.
+
+All complaints about a file come at once, in the order of the file, as `FILE:LINE: key.path: what, got, allowed`.
+
+The copy of a cell in its run folder has every default and the start postures written out. It names files as the
+original does, so it loads only where these names lead to them. Its numbers read back to the values that were solved.
+Tasks that the command line left out are left out.
+"""
+CELL_TITLE, TABLE_TITLE = "Cell", "Robot table"
+TABLE_INTRODUCTION = """\
+A robot may be given by the axes of its joints at the reference posture, where all joints read zero. The joints form
+one chain in the order of the file. Everything is given in the base frame at that posture, the solids of the links as
+well.
+"""
+
+
+def main() -> None:
+    """Write the page."""
+    PAGE.parent.mkdir(exist_ok=True)
+    PAGE.write_text(reference(), encoding="utf-8")
+
+
+def reference() -> str:
+    """Text of the page."""
+    cell, table = json_schema(), robot_table_schema()
+    known: set[str] = set()
+    parts = [INTRODUCTION, *sections(cell, CELL_TITLE, known), f"\n# Robot tables\n\n{TABLE_INTRODUCTION}"]
+    return "".join([*parts, *sections(table, TABLE_TITLE, known)])
+
+
+def sections(schema: dict[str, Any], title: str, known: set[str]) -> list[str]:
+    """One section for each kind of entry, in the order in which they are first named."""
+    found: list[tuple[str, dict[str, Any]]] = [(title, schema)]
+    for _, entry in found:
+        for name in references(entry.get("properties", {})):
+            if name not in known:
+                known.add(name)
+                found.append((heading(name), schema["$defs"][name]))
+    return [section(name, entry) for name, entry in found]
+
+
+def references(node: Any) -> list[str]:
+    """Kinds of entries that a piece of schema names."""
+    if isinstance(node, list):
+        return [name for item in node for name in references(item)]
+    if not isinstance(node, dict):
+        return []
+    own = [node["$ref"].rpartition("/")[2]] if "$ref" in node else []
+    return own + [name for value in node.values() for name in references(value)]
+
+
+def heading(name: str) -> str:
+    """Heading of a kind of entry: ``PartShapeEntry`` becomes ``Part shape``."""
+    return re.sub(r"(?<!^)([A-Z])", lambda match: " " + match[1].lower(), name.removesuffix("Entry"))
+
+
+def section(title: str, entry: dict[str, Any]) -> str:
+    """Heading, one sentence and the table of keys."""
+    required = entry.get("required", [])
+    lines = [
+        f"\n## {title}\n",
+        entry.get("description", ""),
+        "",
+        "| key | value | default | meaning |",
+        "|---|---|---|---|",
+    ]
+    for key, field in entry["properties"].items():
+        default = "required" if key in required else shown(field["default"]) if "default" in field else "–"
+        lines.append(f"| `{key}` | {words(field)} | {default} | {field.get('description', 'See there.')} |")
+    return "\n".join(lines) + "\n"
+
+
+def shown(value: Any) -> str:
+    """A default as it would be written in the file."""
+    if isinstance(value, dict):
+        return "all its defaults" if value else "`{}`"
+    text = json.dumps(value).replace('"', "")
+    whole = re.sub(r"(\d)\.0(?!\d)", r"\1", text)
+    return f"`{whole}`"
+
+
+def words(field: dict[str, Any]) -> str:
+    """What may stand as the value of a key."""
+    if "$ref" in field:
+        title = heading(field["$ref"].rpartition("/")[2])
+        return f"[{title.lower()}](#{title.lower().replace(' ', '-')})"
+    for choice in ("oneOf", "anyOf"):
+        if choice in field:
+            return " or ".join(words(arm) for arm in field[choice])
+    if "const" in field or "enum" in field:
+        return ", ".join(f"`{shown(word).strip('`')}`" for word in field.get("enum", [field.get("const")]))
+    return PLAIN.get(field["type"], container_words)(field)
+
+
+def container_words(field: dict[str, Any]) -> str:
+    """What may stand in a list or under free names."""
+    if field["type"] == "object":
+        inner = field.get("additionalProperties") or next(iter(field["patternProperties"].values()))
+        return f"by name: {words(inner)}"
+    if "prefixItems" in field:
+        return f"list of {len(field['prefixItems'])}: {words(field['prefixItems'][0])}"
+    return f"list: {words(field.get('items', {}))}"
+
+
+def bounds(field: dict[str, Any]) -> str:
+    """Smallest and largest number."""
+    above, low, high = (field.get(key) for key in ("exclusiveMinimum", "minimum", "maximum"))
+    upper = "" if high is None else f"{high:.10g}"
+    if low is not None:
+        return f" from {low:.10g} to {upper}" if upper else f" from {low:.10g}"
+    start = "" if above is None else f" above {above:g}"
+    return f"{start}, up to {upper}" if upper else start
+
+
+PLAIN: dict[str, Callable[[dict[str, Any]], str]] = {
+    "string": lambda _: "text",
+    "boolean": lambda _: "`true`, `false`",
+    "integer": lambda field: f"whole number{bounds(field)}",
+    "number": lambda field: f"number{bounds(field)}",
+}  # by type of value
+
+
+if __name__ == "__main__":
+    main()

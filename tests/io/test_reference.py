@@ -1,0 +1,16 @@
+"""The reference of the cell file is made from the format and says what the format says."""
+
+import importlib.util
+from pathlib import Path
+
+
+def test_the_reference_page_is_up_to_date(repository: Path) -> None:
+    spec = importlib.util.spec_from_file_location("make_reference", repository / "docs" / "make_reference.py")
+    assert spec is not None
+    assert spec.loader is not None
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+
+    page = (repository / "docs" / "reference" / "cell-file.md").read_text(encoding="utf-8")
+
+    assert page == script.reference(), "run: python docs/make_reference.py"
