@@ -13,6 +13,7 @@ from cellplan.geometry.transforms import Array
 NODES: Final = 12  # Gauss-Legendre nodes of a panel
 PANEL_CHUNK: Final = 4096  # panels worked on at once: about 10 MB
 RESOLVED: Final = 1e-12  # [-] a speed whose last Legendre coefficients are smaller than this share is resolved
+NEGLIGIBLE: Final = 1e-14  # [-] of the whole length: less than this is rounding, whatever share of a panel it is
 DEEPEST_SPLIT: Final = 24  # halvings of a panel; only a cusp asks for more
 NEWTON_STEPS: Final = 60  # far more than Newton needs; a step that leaves its bracket halves it instead
 PARAMETER_TOL: Final = 1e-13  # [-] of a panel from -1 to 1: a Newton step as small as this lands on the last digit
@@ -60,7 +61,8 @@ def measure(curve: Curve) -> ArcLength:
     edges = np.asarray(curve.knots, dtype=float)
     speed = _speed_series(curve, edges[:-1], edges[1:])
     for _ in range(DEEPEST_SPLIT):
-        is_open = np.abs(speed[:, -2:]).max(axis=1) > RESOLVED * np.abs(speed[:, 0])
+        rest, width = np.abs(speed[:, -2:]).max(axis=1), np.diff(edges)
+        is_open = (rest > RESOLVED * speed[:, 0]) & (rest * width > NEGLIGIBLE * float(speed[:, 0] @ width))
         if not np.any(is_open):
             break
         edges = _halve(edges, is_open)

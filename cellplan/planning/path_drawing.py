@@ -168,13 +168,29 @@ def _draw_sides(points: Array, task: Task, origin: Origin) -> Drawing:
     is_closed = bool(np.linalg.norm(points[-1] - points[0]) <= SAME_POINT)
     angles = _turns(points)
     is_corner = np.concatenate([[True], angles > STRAIGHT_ON, [True]])
+    if task.project is not None:
+        _refuse_hidden_sides(points, task.project, origin.at(f"tasks.{task.name}.path"))
     if task.blend is None:
         curve = straight_sides(given, points)
         return Drawing(curve=curve, stops=given[is_corner], given=given, is_closed=is_closed)
     corners, at = points[is_corner], given[is_corner]
-    _refuse_blend(corners, angles[is_corner[1:-1]], task.blend, _corners_at(task, origin))
+    seen = corners if task.project is None else corners - np.outer(corners @ task.project, task.project)
+    _refuse_blend(corners, np.maximum(_turns(corners), _turns(seen)), task.blend, _corners_at(task, origin))
     rounded: BezierCurve = rounded_sides(at, corners, task.blend)
     return Drawing(curve=rounded, stops=given[[0, -1]], given=given, is_closed=is_closed)
+
+
+def _refuse_hidden_sides(points: Array, direction: Array, where: str) -> None:
+    """Refuse a straight side that runs along the projection: on the part it would be a point."""
+    sides = np.diff(points, axis=0)
+    lengths = np.linalg.norm(sides, axis=1)
+    is_hidden = np.linalg.norm(np.cross(sides, direction), axis=1) < IN_PLANE * lengths
+    if np.any(is_hidden):
+        k = int(np.argmax(is_hidden))
+        raise InputError(
+            f"{where}: expected sides across the projection from {direction_name(direction)}, but the side from "
+            f"{in_mm(points[k])} to {in_mm(points[k + 1])} runs along it"
+        )
 
 
 def _turns(points: Array) -> Array:

@@ -16,7 +16,7 @@ from cellplan.planning.path_laying import lay_path
 from cellplan.planning.path_words import in_mm
 from cellplan.planning.tool_frames import orient_tool
 
-STANDSTILL: Final = 1e-6  # [-] of the largest speed by the parameter: a curve slower than this has a cusp there
+STANDSTILL: Final = 1e-4  # [-] of the largest speed by the parameter: a curve slower than this has a cusp there
 PROBES: Final = 257  # poses looked at before a toolpath is handed on
 
 
@@ -52,8 +52,8 @@ def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
 
 def _refuse_standstill(tip: Curve, arc: ArcLength, where: str) -> None:
     """Refuse a path that has no direction somewhere: a side along the projection, or a cusp."""
-    middle = 0.5 * (arc.edges[:-1] + arc.edges[1:])
-    p, dp = tip.evaluate(middle, (float(arc.edges[0]), float(arc.edges[-1])))
+    u = np.concatenate([arc.edges, 0.5 * (arc.edges[:-1] + arc.edges[1:])])
+    p, dp = tip.evaluate(u, (float(arc.edges[0]), float(arc.edges[-1])))
     speed = np.linalg.norm(dp, axis=1)
     k = int(np.argmin(speed))
     if not speed[k] > STANDSTILL * speed.max():

@@ -209,3 +209,20 @@ def test_a_flat_ellipse_is_measured_as_well() -> None:
     assert arc.total == pytest.approx(4.0 * quarter, rel=1e-9)  # the rule itself is that good
     halves = arc.parameters(np.array([0.0, 0.25, 0.5, 1.0]) * arc.total, (0.0, 2.0 * np.pi))
     assert np.allclose(halves, np.array([0.0, 0.25, 0.5, 1.0]) * 2.0 * np.pi, atol=1e-9)
+
+
+def test_a_side_as_short_as_rounding_is_measured_without_endless_splitting() -> None:
+    points = np.array([[0.1, 0.1, 0.0], [0.0, 0.1, 0.0], [0.0, 0.1, 1e-17], [0.0, 0.3, 0.2]])
+    noisy = straight_sides(np.array([0.0, 0.1, 0.3, 0.6]), points + 1e-17 * np.sin(np.arange(12.0)).reshape(4, 3))
+
+    class Shaken:
+        knots = noisy.knots
+
+        def evaluate(self, u: np.ndarray, interval: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+            p, dp = noisy.evaluate(u, interval)
+            return p, dp + 1e-17 * np.sin(1e6 * u)[:, None]
+
+    arc = measure(Shaken())
+
+    assert arc.total == pytest.approx(0.1 + np.sqrt(0.08), rel=1e-14)
+    assert len(arc.edges) < 100

@@ -126,3 +126,11 @@ def test_a_path_that_turns_back_cannot_be_rounded() -> None:
 
     with pytest.raises(InputError, match=r"got 180 deg at \(300, 0, 0\) mm; write corners: stop"):
         build_toolpath(task_on(path, tool_axis=-EZ, blend=0.01), ROLLER, ORIGIN)
+
+
+def test_a_corner_that_turns_back_in_the_view_cannot_be_rounded_either() -> None:
+    points = ((0.0, 0.0, 0.3), (0.1, 0.0, 0.4), (0.0, 0.0, 0.5))
+    path = SpacePolylinePath(points=points, is_closed=False)
+
+    with pytest.raises(InputError, match=r"got 180 deg at \(100, 0, 400\) mm; write corners: stop"):
+        build_toolpath(task_on(path, project=EZ, blend=0.01), ROLLER, ORIGIN)

@@ -165,7 +165,11 @@ REFUSED = {
         task_on(
             SpacePolylinePath(points=((0.0, 0.0, 0.3), (0.0, 0.0, 0.4), (0.1, 0.0, 0.4)), is_closed=False), project=EZ
         ),
-        "it stands still near (0, 0, 250) mm",
+        "from +z, but the side from (0, 0, 300) mm to (0, 0, 400) mm runs along it",
+    ),
+    "a cusp": (
+        task_on(sampled([[-0.1, 0, 0.3], [0, 0, 0.5], [0, 0.0, 0.6], [-0.1, 0, 0.8]], is_smooth=True), project=EZ),
+        "expected a path with a direction everywhere, but it stands still near (",
     ),
     "orientation given twice": (
         task_on(sampled([[0, 0, 0], [1, 0, 0]], axes=np.array([-EZ, -EZ])), tool_axis=EZ),
