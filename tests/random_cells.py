@@ -92,14 +92,16 @@ def make_task(robot: str, **changes: object) -> Task:
     return replace(task, **changes)  # type: ignore[arg-type]
 
 
-def random_cell(seed: int, *, operators: int, held: bool = True, with_follower: bool = False) -> Cell:
+def random_cell(
+    seed: int, *, operators: int, held: bool = True, with_follower: bool = False, joints: int | None = None
+) -> Cell:
     """A holder and operators with random axes, bases and tools; every third joint slides."""
     rng = np.random.default_rng(seed)
     names = ["holder", *(f"op{i}" for i in range(operators))]
     robots = tuple(
         Robot(
             name=name,
-            model=random_model(rng, int(rng.integers(5, 8)), with_follower=with_follower),
+            model=random_model(rng, joints or int(rng.integers(5, 8)), with_follower=with_follower),
             X_WB=random_pose(rng),
             tool=Tool(X_FT=random_pose(rng), bodies=()),
             start=None,

@@ -37,6 +37,7 @@ class _Findings:
     """What has been seen so far, by index into ``Scene.pairs``."""
 
     touched: dict[int, list[Samples]] = field(default_factory=dict)
+    in_the_way: dict[int, list[Samples]] = field(default_factory=dict)
     nearest: dict[ClearanceClass, Nearest] = field(default_factory=dict)
 
 
@@ -48,8 +49,8 @@ def check_clearance(
     The tool of a robot whose task is scheduled may touch the part within ``checks.contact_zone`` of its tip, from the
     first instant to the last: before its start and after its end it dwells on the part. Such contacts are listed as
     allowed, and the distance between that tool and the part is no matter of clearance. What of the tool lies outside
-    the zone must not touch. A robot whose task is not scheduled stands idle; in reality it would be withdrawn, so it is
-    not checked against the part.
+    the zone must not touch. A robot whose task is not scheduled stands idle where its task starts, at the part; it is
+    to be withdrawn before the program is run, so what it has in the way of the part is listed but fails no check.
 
     Args:
         scene: The cell made computable.
@@ -64,12 +65,16 @@ def check_clearance(
     rows = [row for row in range(len(scene.pairs)) if row not in idle]
     findings = _Findings()
     for first, last in _chunks(len(q), len(rows)):
-        found = survey(scene, rows, scene.body_poses(q[first:last]))
-        _note_contacts(findings, found, first)
+        found = survey(scene, range(len(scene.pairs)), scene.body_poses(q[first:last]))
+        _note_contacts(findings, found, first, idle=idle)
         for kind, own in _by_class(scene, rows, Rule.CLEARANCE).items():
             _note_nearest(findings, found, kind, own=own, first=first)
         progress(STAGE, 0.8 * last / len(q))
-    contacts = (*_forbidden(scene, schedule.times, findings), *_allowed(scene, schedule, q, rows=rows))
+    contacts = (
+        *_contacts(scene, schedule.times, findings.touched, idle={}),
+        *_allowed(scene, schedule, q, rows=rows),
+        *_contacts(scene, schedule.times, findings.in_the_way, idle=idle),
+    )
     minima = {kind: _minimum(scene, schedule.times, findings, kind) for kind in ClearanceClass}
     curve_samples, curves = _curves(scene, q, findings, rows=rows)
     progress(STAGE, 1.0)
@@ -88,7 +93,7 @@ def check_clearance(
 
 
 def _idle_exclusions(scene: Scene, schedule: Schedule) -> dict[int, str]:
-    """Pairs of the part with robots whose task is not worked on now, and the reason they are left out."""
+    """Pairs of the part with robots whose task is not worked on now, and what is said of them."""
     at_work = {scheduled.task.robot for scheduled in schedule.tasks}
     idle = {task.robot for task in scene.cell.tasks} - at_work
     left_out = {}
@@ -96,7 +101,7 @@ def _idle_exclusions(scene: Scene, schedule: Schedule) -> dict[int, str]:
         ends = [scene.bodies[pair.first], scene.bodies[pair.second]]
         robots = {body.robot for body in ends if body.kind in (Kind.LINK, Kind.TOOL)} & idle
         if robots and any(body.kind is Kind.PART for body in ends):
-            left_out[row] = f"{robots.pop()} stands idle in this run: withdraw it before running it"
+            left_out[row] = f"{robots.pop()} stands idle in this run: withdraw it from the part before running it"
     return left_out
 
 
@@ -116,11 +121,11 @@ def _by_class(scene: Scene, rows: Sequence[int], rule: Rule) -> dict[ClearanceCl
     return chosen
 
 
-def _note_contacts(findings: _Findings, found: Survey, first: int) -> None:
-    """Write down at which samples which pairs touch."""
+def _note_contacts(findings: _Findings, found: Survey, first: int, *, idle: Mapping[int, str]) -> None:
+    """Write down at which samples which pairs touch; idle robots at the part on a page of their own."""
     for place in np.flatnonzero(found.touching.any(axis=1)):
-        samples = first + np.flatnonzero(found.touching[place])
-        findings.touched.setdefault(found.rows[place], []).append(samples)
+        samples, row = first + np.flatnonzero(found.touching[place]), found.rows[place]
+        (findings.in_the_way if row in idle else findings.touched).setdefault(row, []).append(samples)
 
 
 def _note_nearest(findings: _Findings, found: Survey, kind: ClearanceClass, *, own: Sequence[int], first: int) -> None:
@@ -136,10 +141,12 @@ def _note_nearest(findings: _Findings, found: Survey, kind: ClearanceClass, *, o
         findings.nearest[kind] = Nearest(proved, new.measured, new.row, first + new.sample)
 
 
-def _forbidden(scene: Scene, times: Array, findings: _Findings) -> list[Contact]:
-    """Contacts that must not be, by pair and then by time."""
+def _contacts(
+    scene: Scene, times: Array, touched: Mapping[int, list[Samples]], *, idle: Mapping[int, str]
+) -> list[Contact]:
+    """Contacts by pair and then by time: forbidden ones, or those of idle robots that are to be withdrawn."""
     contacts = []
-    for row in sorted(findings.touched):
+    for row in sorted(touched):
         pair = scene.pairs[row]
         reason = "outside the contact zone of the tool at work" if pair.rule is Rule.PROCESS else ""
         contacts += [
@@ -148,10 +155,10 @@ def _forbidden(scene: Scene, times: Array, findings: _Findings) -> list[Contact]
                 clearance_class=pair.clearance_class,
                 first_s=float(times[first]),
                 last_s=float(times[last]),
-                is_allowed=False,
-                reason=reason,
+                is_allowed=row in idle,
+                reason=idle.get(row, reason),
             )
-            for first, last in _spans(np.concatenate(findings.touched[row]), times)
+            for first, last in _spans(np.concatenate(touched[row]), times)
         ]
     return contacts
 

@@ -52,13 +52,11 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.solve import solve as solve_cell
         from cellplan.pipeline.write_run import write_run
 
-        asked = with_overrides(
-            load_cell(cell, allow_dirs=allow_dir or ()), mode=mode, method=method, duration=duration, task=task
-        )
+        asked = with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), mode=mode, method=method, duration=duration)
         folder = output or Path("outputs") / asked.name
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:
-            solution = solve_cell(asked, progress=progress)
+            solution = solve_cell(asked, task=task, progress=progress)
             write_run(solution, folder, keep_rejected=keep_rejected)
         record = read_record(folder)
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED

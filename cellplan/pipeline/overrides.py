@@ -17,7 +17,6 @@ def with_overrides(
     mode: str | None = None,
     method: str | None = None,
     duration: float | None = None,
-    task: str | None = None,
 ) -> Cell:
     """The cell with other choices; what is None stays as it is.
 
@@ -26,7 +25,6 @@ def with_overrides(
         mode: Who moves.
         method: Resolution method.
         duration: Length of the common clock in [s], for tasks without a time or feed of their own.
-        task: The only task to work on; the other operators stand still.
 
     Raises:
         InputError: A choice does not exist, or makes no sense.
@@ -39,9 +37,6 @@ def with_overrides(
         cell = replace(cell, solver=solver)
     if duration is not None:
         cell = _with_duration(cell, duration)
-    if task is not None:
-        name = _known("--task", task, [each.name for each in cell.tasks])
-        cell = replace(cell, tasks=tuple(each for each in cell.tasks if each.name == name))
     return cell
 
 

@@ -24,16 +24,17 @@ from cellplan.planning.start_search import find_start
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.scene import Scene
 
-START_DECIMALS: Final = 9  # of a degree or a metre: a tool moves by 1e-8 mm at most
+START_DECIMALS: Final = 12  # of a degree or a metre, as in the tables: below the noise of the arithmetic
 
 
-def solve(cell: Cell, *, progress: Progress = silent) -> Solution:
+def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -> Solution:
     """Plan the motion of all robots, render their joint tables, read these back and verify them.
 
     A run that breaks a limit or collides is returned like any other: its report says by how much, where and when.
 
     Args:
         cell: The cell, as ``load_cell`` gives it.
+        task: Name of the only task to work on; the other operators stand still at their start posture.
         progress: Who wants to know how far it is.
 
     Raises:
@@ -45,7 +46,7 @@ def solve(cell: Cell, *, progress: Progress = silent) -> Solution:
     examine_given_starts(cell, toolpaths)
     solved = with_start(cell, find_start(scene, toolpaths, progress=progress))
     start = np.concatenate([robot.start for robot in solved.robots if robot.start is not None])
-    runs = tuple(_run(scene, toolpaths, plan, start=start, progress=progress) for plan in plan_runs(cell))
+    runs = tuple(_run(scene, toolpaths, plan, start=start, progress=progress) for plan in plan_runs(cell, only=task))
     return Solution(cell=solved, runs=runs)
 
 

@@ -14,22 +14,23 @@ from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.scene import Scene
 
 
-def verify(cell: Cell, tables: Mapping[str, str], *, run: str | None = None, progress: Progress = silent) -> Report:
+def verify(cell: Cell, tables: Mapping[str, str], *, task: str | None = None, progress: Progress = silent) -> Report:
     """Recompute tool errors, joint limits and clearance from the text of joint tables.
 
     Args:
         cell: The cell the tables were made for.
         tables: Text of one joint table per robot, by robot name.
-        run: Name of the run, for a cell whose mode has one per task.
+        task: Name of the only task that was worked on; needed when the cell's mode has one run per task.
         progress: Who wants to know how far it is.
 
     Raises:
-        InputError: A table is missing, unreadable, or does not fit the cell; there is no such run.
+        InputError: A table is missing, unreadable, or does not fit the cell; there is no such task.
     """
-    plans = {plan.name: plan for plan in plan_runs(cell)}
-    if run not in plans:
-        raise InputError(f"run: expected one of {', '.join(str(name) for name in plans)}, got {run}")
-    plan = plans[run]
+    plans = plan_runs(cell, only=task)
+    if len(plans) > 1:
+        names = ", ".join(str(plan.name) for plan in plans)
+        raise InputError(f"task: this cell has one run per task: name one of {names}")
+    plan = plans[0]
     toolpaths = [build_toolpath(cell.task(name), cell.part, cell.origin) for name in plan.tasks]
     parsed = [parse_table(text, f"tables/{name}.csv") for name, text in tables.items()]
     schedule = schedule_tasks(cell, toolpaths)

@@ -10,7 +10,7 @@ from cellplan.model.robot import RobotModel
 from cellplan.model.task import Task
 from cellplan.planning.cooperation import constraint_rows, pose_errors
 
-CLOSED: Final = 1e-9  # [m, rad] a posture counts as found when the tool is this near its goal
+CLOSED: Final = 1e-12  # [m, rad] a posture counts as found when the tool is this near its goal: rounding is 1e-15
 SAME_POSTURE: Final = 1e-3  # [rad, m] solutions nearer to each other are one branch
 LONGEST_MOVE: Final = 0.4  # [rad, m] largest change of a joint in one iteration: farther, the linear model is wrong
 DAMPING: Final = 1e-3  # keeps iterations finite at singular postures; small enough to converge to CLOSED

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from cellplan.errors import InputError
 from cellplan.model.cell import Cell, Mode
 
 
@@ -20,10 +21,21 @@ class RunPlan:
     moving: tuple[str, ...]
 
 
-def plan_runs(cell: Cell) -> tuple[RunPlan, ...]:
-    """The runs that the cell's mode asks for, in the order of the tasks."""
-    operators = tuple(task.robot for task in cell.tasks)
-    tasks = tuple(task.name for task in cell.tasks)
+def plan_runs(cell: Cell, *, only: str | None = None) -> tuple[RunPlan, ...]:
+    """The runs that the cell's mode asks for, in the order of the tasks.
+
+    Args:
+        cell: The cell.
+        only: Name of the only task to work on; None for all.
+
+    Raises:
+        InputError: There is no such task.
+    """
+    chosen = [task for task in cell.tasks if only in (None, task.name)]
+    if not chosen:
+        raise InputError(f"task: expected one of {', '.join(task.name for task in cell.tasks)}, got '{only}'")
+    operators = tuple(task.robot for task in chosen)
+    tasks = tuple(task.name for task in chosen)
     match cell.motion.mode:
         case Mode.SIMULTANEOUS:
             return (RunPlan(name=None, tasks=tasks, moving=cell.positioners + operators),)
@@ -31,6 +43,5 @@ def plan_runs(cell: Cell) -> tuple[RunPlan, ...]:
             return (RunPlan(name=None, tasks=tasks, moving=operators),)
         case Mode.PAIRWISE:
             return tuple(
-                RunPlan(name=task.name, tasks=(task.name,), moving=(*cell.positioners, task.robot))
-                for task in cell.tasks
+                RunPlan(name=task.name, tasks=(task.name,), moving=(*cell.positioners, task.robot)) for task in chosen
             )

@@ -20,6 +20,7 @@ from cellplan.scene.pairs import Excluded, Rule, ScenePair, near_in_chain, stand
 
 POSTURES: Final = 48  # random postures beside the reference; a pair that is free in one of ten escapes 0.6 % of trials
 SEED: Final = 0  # the rule is the same for every run
+HARDLY: Final = 1e-3  # [m] a distance that varies by less over all postures is a matter of mounting, not of motion
 ENDLESS: Final = np.pi  # [rad] or [m] range sampled to either side of zero where a joint has no limit
 
 
@@ -38,7 +39,8 @@ def apply_design(
 
     - touching in all of them: left out;
     - two links: checked for contact, not for distance;
-    - a tool or a held part against a link, nearer than the demanded clearance in all of them: likewise.
+    - a tool or a held part against a link, nearer than the demanded clearance in all of them: likewise;
+    - a tool or a held part against a link, at a distance that hardly changes between them: likewise.
 
     A robot whose foot has no body may stand with its first link in the surroundings, if it does so in every posture.
     """
@@ -96,7 +98,12 @@ def _relaxed(
     if bodies[first].kind is bodies[second].kind is Kind.LINK:
         reason = "checked for contact only: two joints apart, their distance is set by the robot's design"
         return replace(pair, rule=Rule.CONTACT, reason=reason)
-    if all(measure(engine, (first, second), poses, sample=k).bound < clearance for k in range(poses.p.shape[1])):
+    distances = [measure(engine, (first, second), poses, sample=k).bound for k in range(poses.p.shape[1])]
+    if max(distances) < clearance:
         reason = "checked for contact only: nearer than the demanded clearance in every posture by its mounting"
+        return replace(pair, rule=Rule.CONTACT, reason=reason)
+    if max(distances) - min(distances) <= HARDLY:
+        shown = 1e3 * min(distances)
+        reason = f"checked for contact only: {shown:.0f} mm apart in every posture, the mounting sets their distance"
         return replace(pair, rule=Rule.CONTACT, reason=reason)
     return pair

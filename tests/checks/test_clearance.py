@@ -178,7 +178,13 @@ def test_a_robot_whose_task_is_not_worked_on_is_left_out_against_the_part_and_sa
     report, checks = checked(replace(cell, tasks=(work("drill"),)), np.zeros((11, 1)))
 
     assert all(check.passed for check in checks)
-    assert ("drill/tool", "part", "drill stands idle in this run: withdraw it before running it") in report.exclusions
+    assert (
+        "drill/tool",
+        "part",
+        "drill stands idle in this run: withdraw it from the part before running it",
+    ) in report.exclusions
+    in_the_way = [(c.pair, c.first_s, c.last_s) for c in report.contacts if c.is_allowed]
+    assert in_the_way == [(("drill/tool", "part"), 0.0, 1.0)]
     assert report.pair_count == 0
 
 

@@ -240,3 +240,18 @@ def test_a_tool_always_near_the_link_behind_it_is_checked_for_contact_only() -> 
 
     assert pair.rule is Rule.CONTACT
     assert "nearer than the demanded clearance in every posture" in pair.reason
+
+
+def test_a_tool_at_a_distance_that_no_joint_changes_is_checked_for_contact_only() -> None:
+    """The round tool turns about the axis of the round wrist: their distance is 55 mm at every posture."""
+    pair = watched(Scene.from_cell(make_cell(placed("a", arm_model(), tool=stick()))))[frozenset(("a/wrist", "a/tool"))]
+
+    assert pair.rule is Rule.CONTACT
+    assert "55 mm apart in every posture, the mounting sets their distance" in pair.reason
+
+
+def test_a_bent_tool_whose_distance_changes_keeps_its_clearance() -> None:
+    bent = replace(stick(), bodies=(body("tool", 0, shape=Capsule(0.01, 0.2), at=(0.1, 0.0, 0.02), rpy=(0, 1.4, 0)),))
+    pair = watched(Scene.from_cell(make_cell(placed("a", arm_model(), tool=bent))))[frozenset(("a/tube", "a/tool"))]
+
+    assert pair.rule is Rule.CLEARANCE

@@ -1,0 +1,203 @@
+"""The four robots of Ribeiro 2010, chapter 5, in the three modes, and the planar pair of appendix E."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cellplan import load_cell, solve, verify, write_run
+from cellplan.pipeline.overrides import with_overrides
+
+
+@pytest.fixture(scope="module")
+def four_robots(cells):
+    return solve(load_cell(cells / "four_robots.yaml"))
+
+
+def failed(report, name):
+    return {check.subject: check for check in report.checks if check.name == name and not check.passed}
+
+
+def tightest_margin(report):
+    return np.degrees(min(use.margin for use in report.joints))
+
+
+def highest_speed(report):
+    return max(use.peak_velocity / use.velocity_limit for use in report.joints)
+
+
+def largest_errors(report):
+    """Position in mm and orientation in deg over all tasks."""
+    position = max(np.linalg.norm(a.position_error, axis=1).max() for a in report.accuracy)
+    orientation = max(np.linalg.norm(a.orientation_error, axis=1).max() for a in report.accuracy)
+    return 1e3 * position, np.degrees(orientation)
+
+
+def test_four_robots_conform_at_four_seconds(four_robots):
+    report = four_robots.runs[0].report
+    position, orientation = largest_errors(report)
+
+    assert four_robots.passed
+    assert len(report.times) == 4001
+    assert report.cycle_time == 4.0
+    assert position <= 0.003
+    assert orientation <= 0.001
+    assert tightest_margin(report) == pytest.approx(37.0, abs=1.0)
+    assert highest_speed(report) == pytest.approx(0.35, abs=0.02)
+
+
+def test_first_layout_breaks_kuka_b2_and_staubli_c4(cells):
+    solution = solve(load_cell(cells / "four_robots_initial.yaml"))
+    broken = failed(solution.runs[0].report, "joint_position")
+
+    assert not solution.passed
+    assert set(broken) == {"kuka/B2", "staubli/C4"}
+    assert "beyond its upper limit 35 deg" in broken["kuka/B2"].message
+    assert "beyond its upper limit 150 deg" in broken["staubli/C4"].message
+    assert not failed(solution.runs[0].report, "joint_velocity")
+
+
+def test_pairwise_passes_for_each_task_while_the_others_stand_still(cells):
+    solution = solve(with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise"))
+
+    assert solution.passed
+    assert [run.name for run in solution.runs] == ["circle", "rhombus", "rectangle"]
+    for run in solution.runs:
+        operator = run.schedule.tasks[0].task.robot
+        still = {robot: np.ptp(q, axis=0).max() for robot, q in run.report.q.items()}
+        assert {robot for robot, range_ in still.items() if range_ > 0} == {"reis", operator}
+        assert largest_errors(run.report)[0] <= 0.003
+
+
+def test_with_the_part_at_rest_staubli_d4_and_f4_break_position_and_speed(cells):
+    solution = solve(with_overrides(load_cell(cells / "four_robots.yaml"), mode="part_at_rest"))
+    report = solution.runs[0].report
+
+    assert not solution.passed
+    assert set(failed(report, "joint_position")) == {"staubli/D4", "staubli/F4"}
+    assert set(failed(report, "joint_velocity")) == {"staubli/D4", "staubli/F4"}
+    assert np.ptp(report.q["reis"], axis=0).max() == 0.0
+
+
+def test_positioner_works_harder_together_than_in_pairs_and_operators_hardest_alone(four_robots, cells):
+    """The qualitative conclusion of section 5.6: travel of the REIS and of the operators in modes 1, 2 and 3."""
+
+    def travel(run, robot):
+        return sum(use.travel for use in run.report.joints if use.robot == robot)
+
+    cell = load_cell(cells / "four_robots.yaml")
+    pairs = {run.name: run for run in solve(with_overrides(cell, mode="pairwise")).runs}
+    alone = solve(with_overrides(cell, mode="part_at_rest")).runs[0]
+    together = four_robots.runs[0]
+    for run in pairs.values():
+        operator = run.schedule.tasks[0].task.robot
+        assert travel(together, "reis") > travel(run, "reis")
+        assert travel(alone, operator) > travel(run, operator)
+
+
+def test_planar_pair_of_appendix_e(cells):
+    report = solve(load_cell(cells / "planar_pair.yaml")).runs[0].report
+    position, orientation = largest_errors(report)
+    assert len(report.times) == 12001
+    assert position < 0.003
+    assert np.radians(orientation) < 1e-12
+
+
+def test_euler_reference_agrees_with_a_finer_one(cells):
+    """The redundancy is resolved too: the final posture at half the step is the same to first order."""
+    cell = with_overrides(load_cell(cells / "four_robots.yaml"), duration=4.0)
+    finer = replace(
+        cell, motion=replace(cell.motion, step=5e-4), solver=replace(cell.solver, gain=2 * cell.solver.gain)
+    )
+    coarse_end, fine_end = (solve(c).runs[0].motion.q[-1] for c in (cell, finer))
+    assert np.degrees(np.abs(coarse_end - fine_end).max()) < 0.03  # Euler at 1 ms is 0.024 deg from the limit
+
+
+def test_moving_the_whole_cell_changes_nothing(four_robots, cells):
+    cell = load_cell(cells / "four_robots.yaml")
+    X = np.eye(4)
+    X[:3, :3] = [[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    X[:3, 3] = [3.0, -1.0, 0.0]  # the floor stays where it is
+    elsewhere = replace(cell, robots=tuple(replace(r, X_WB=X @ r.X_WB) for r in cell.robots))
+
+    moved = solve(elsewhere).runs[0]
+
+    assert np.abs(moved.motion.q - four_robots.runs[0].motion.q).max() < 1e-9  # rounding over 4000 steps
+    for kind, minimum in four_robots.runs[0].report.clearance.minima.items():
+        assert moved.report.clearance.minima[kind].minimum == pytest.approx(
+            minimum.minimum, abs=2e-4
+        )  # [m] twice 0.1 mm
+
+
+def test_written_tables_verify_and_any_edit_shows(four_robots):
+    tables = dict(four_robots.runs[0].program.tables)
+    assert verify(four_robots.cell, tables).passed
+
+    lines = tables["kuka"].split("\n")
+    time, first, *rest = lines[2000].split(",")
+    lines[2000] = ",".join([time, f"{float(first) + 0.5:.6f}", *rest])
+    report = verify(four_robots.cell, tables | {"kuka": "\n".join(lines)})
+
+    assert not report.passed
+    assert set(failed(report, "position_error")) == {"circle"}
+    assert set(failed(report, "joint_velocity")) == {"kuka/A2"}
+
+
+def test_swapped_or_missing_tables_are_refused(four_robots):
+    from cellplan.errors import InputError
+
+    tables = dict(four_robots.runs[0].program.tables)
+    with pytest.raises(InputError, match="expected one for each of"):
+        verify(four_robots.cell, {name: text for name, text in tables.items() if name != "abb"})
+    with pytest.raises(InputError):
+        verify(four_robots.cell, tables | {"abb": tables["kuka"]})
+
+
+def test_run_folder_holds_what_it_promises(four_robots, tmp_path):
+    folder = tmp_path / "run"
+    write_run(four_robots, folder)
+    record = json.loads((folder / "report.json").read_text())
+
+    assert {path.name for path in folder.iterdir()} == {"cell.yaml", "plots", "report.html", "report.json", "tables"}
+    assert {path.stem for path in (folder / "tables").iterdir()} == {"reis", "kuka", "abb", "staubli"}
+    assert record["status"] == "passed"
+    assert record["cycle_time_s"] == 4.0
+    assert record["tasks"]["circle"]["max_position_error_mm"] <= 0.003
+    assert record["joints"]["reis"]["B1"]["margin"] == pytest.approx(37.0, abs=1.0)
+
+
+def test_same_input_gives_the_same_bytes(four_robots, cells, tmp_path):
+    write_run(four_robots, tmp_path / "first")
+    write_run(solve(load_cell(cells / "four_robots.yaml")), tmp_path / "second")
+    files = sorted(path.relative_to(tmp_path / "first") for path in (tmp_path / "first").rglob("*") if path.is_file())
+    assert len(files) > 20
+    for name in files:
+        assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes(), name
+
+
+def test_resolved_cell_gives_the_same_motion(four_robots, cells, tmp_path):
+    write_run(four_robots, tmp_path / "run")
+    again = solve(load_cell(tmp_path / "run" / "cell.yaml"))
+    np.testing.assert_array_equal(again.runs[0].motion.q, four_robots.runs[0].motion.q)
+
+
+def test_failed_run_leaves_no_tables_unless_asked(cells, tmp_path):
+    solution = solve(load_cell(cells / "four_robots_initial.yaml"))
+    write_run(solution, tmp_path / "plain")
+    write_run(solution, tmp_path / "kept", keep_rejected=True)
+
+    assert not (tmp_path / "plain" / "tables").exists()
+    assert not (tmp_path / "plain" / "rejected").exists()
+    assert not (tmp_path / "kept" / "tables").exists()
+    for table in (tmp_path / "kept" / "rejected").iterdir():
+        assert "# verdict: REJECTED: joint kuka/B2 goes" in table.read_text()
+
+
+def test_pairwise_writes_a_subfolder_for_each_task(cells, tmp_path):
+    cell = with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise")
+    write_run(solve(cell, task="circle"), tmp_path / "run")
+    record = json.loads((tmp_path / "run" / "report.json").read_text())
+    assert list(record["runs"]) == ["circle"]
+    assert (tmp_path / "run" / "circle" / "tables" / "kuka.csv").is_file()
+    assert json.loads((tmp_path / "run" / "circle" / "report.json").read_text())["status"] == "passed"

@@ -1,0 +1,22 @@
+"""Every shipped cell that is meant to pass does, and its resolved copy says so again."""
+
+from pathlib import Path
+
+import pytest
+
+from cellplan import load_cell, solve
+from cellplan.pipeline.check import check
+
+CELLS = sorted((Path(__file__).resolve().parents[2] / "cells").glob("*.yaml"))
+MEANT_TO_FAIL = {"four_robots_initial"}  # the start of a layout search
+
+
+@pytest.mark.parametrize("path", [p for p in CELLS if p.stem not in MEANT_TO_FAIL], ids=lambda p: p.stem)
+def test_cell_passes(path):
+    solution = solve(load_cell(path))
+    assert solution.passed, [c.message for run in solution.runs for c in run.report.checks if not c.passed]
+
+
+@pytest.mark.parametrize("path", CELLS, ids=lambda p: p.stem)
+def test_cell_can_be_checked_without_solving(path):
+    assert check(load_cell(path)).passed is (path.stem not in MEANT_TO_FAIL)
