@@ -47,7 +47,10 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> Cell:
     file = str(path)
     document = read_yaml(path, file=file)
     pieces, complaints = read_pieces(document)
-    complaints += [*document.complaints, *rule_complaints(pieces, document)]
+    complaints += document.complaints
+    if pieces.is_too_large:
+        raise_complaints(file, complaints)
+    complaints += rule_complaints(pieces, document)
     sources = Sources(document, Reach(folder=path.parent, allowed=tuple(Path(folder) for folder in allow_dirs)))
     sources.inputs[path.name] = document.digest
     models = _models(pieces, sources)

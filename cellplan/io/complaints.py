@@ -9,6 +9,7 @@ from cellplan.errors import InputError, InvalidFileError
 
 COMPLAINT_LIMIT: Final = 100  # a file with more is told so; nobody reads on
 SHOWN_LENGTH: Final = 40  # characters of a wrong text that are repeated in a message
+LISTED_LIMIT: Final = 60  # words of a list in a message; more than any robot's joints
 SHORTEST_GUESS: Final = 3  # characters; for shorter words every other one is near
 
 KeyPath = tuple[str | int, ...]
@@ -43,7 +44,7 @@ def raise_complaints(file: str, complaints: Iterable[Complaint], others: Sequenc
     ordered = sorted(dict.fromkeys(complaints), key=lambda complaint: complaint.line)
     errors = [complaint.to_error(file) for complaint in ordered[:COMPLAINT_LIMIT]]
     if len(ordered) > COMPLAINT_LIMIT:
-        errors.append(InputError(f"{file}: and {len(ordered) - COMPLAINT_LIMIT} more complaints"))
+        errors.append(InputError(f"{file}: and more than {len(ordered) - COMPLAINT_LIMIT - 1} other complaints"))
     for other in others:
         errors.extend(other.complaints if isinstance(other, InvalidFileError) else [other])
     if errors:
@@ -70,8 +71,10 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def listed(words: Iterable[str]) -> str:
-    """Words joined by commas, or ``none``."""
-    return ", ".join(words) or "none"
+    """Words joined by commas, or ``none``; of very many only the first."""
+    words = list(words)
+    more = ", …" if len(words) > LISTED_LIMIT else ""
+    return ", ".join(words[:LISTED_LIMIT]) + more or "none"
 
 
 def shown(value: object) -> str:

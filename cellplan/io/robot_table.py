@@ -65,6 +65,8 @@ def load_robot_table(path: Path, *, file: str, reach: Reach) -> RobotTable:
     meshes = _Meshes(document, reach)
     bodies = tuple(_bodies(table, meshes)) if table is not None and not complaints else ()
     raise_complaints(file, [*complaints, *meshes.complaints], meshes.errors)
+    if table is None:
+        raise InputError(f"{file}: the table cannot be understood")
     return RobotTable(model=_model(table, bodies), digest=document.digest, mesh_files=meshes.files)
 
 

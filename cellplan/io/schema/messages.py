@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 from types import NoneType, UnionType
-from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, Tag, ValidationError
 
@@ -22,27 +22,37 @@ UNITS: Final[Mapping[str, str]] = {
     "_mm": "millimetres",
     "_s": "seconds",
 }  # by the ending of the key, longest first
+FINDING_LIMIT: Final = 1000  # findings that are told; a file with more is not corrected line by line
 TAG: Final = re.compile(r"<.*>")
 
 
-def validate(model: type[Entry], document: YamlDocument, path: KeyPath = ()) -> tuple[Any, list[Complaint]]:
-    """Read one part of a file.
+AnyEntry = TypeVar("AnyEntry", bound=Entry)
+
+
+def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | None, list[Complaint]]:
+    """Read a whole file.
 
     Args:
         model: What should stand there.
         document: The file.
-        path: Where in the file.
 
     Returns:
         The entry, or None when there are complaints; and the complaints that the YAML reader has not made already.
     """
-    value = value_at(document.root, path)
     try:
-        return model.model_validate(value), []
+        return model.model_validate(document.root), []
     except ValidationError as error:
         findings = error.errors(include_url=False, include_context=True, include_input=False)
-    told = [_Finding(model, document, path, dict(finding)).complaint() for finding in findings]
+    told = [_Finding(model, document, dict(finding)).complaint() for finding in findings[:FINDING_LIMIT]]
     return None, [complaint for complaint in dict.fromkeys(told) if complaint is not None]
+
+
+def understood(model: type[AnyEntry], document: YamlDocument, path: KeyPath) -> AnyEntry | None:
+    """One part of a file; None when it is not as it should be."""
+    try:
+        return model.model_validate(value_at(document.root, path))
+    except ValidationError:
+        return None
 
 
 def value_at(root: Any, path: KeyPath) -> Any:
@@ -58,14 +68,14 @@ def value_at(root: Any, path: KeyPath) -> Any:
 class _Finding:
     """One finding of pydantic, with its place in the file and in the format."""
 
-    def __init__(self, model: type[Entry], document: YamlDocument, base: KeyPath, finding: dict[str, Any]) -> None:
+    def __init__(self, model: type[Entry], document: YamlDocument, finding: dict[str, Any]) -> None:
         """Take the finding apart."""
         location = tuple(finding["loc"])
         self.model = model
         self.document = document
         self.is_key = location[-1:] == ("[key]",)
         self.location: KeyPath = location[:-1] if self.is_key else location
-        self.path: KeyPath = (*base, *(key for key in self.location if not TAG.fullmatch(str(key))))
+        self.path: KeyPath = tuple(key for key in self.location if not TAG.fullmatch(str(key)))
         self.kind: str = finding["type"]
         self.text: str = finding["msg"]
         self.context: dict[str, Any] = finding.get("ctx", {})
@@ -80,8 +90,10 @@ class _Finding:
             return self.document.key_complaint(self.path, self._unknown_key())
         return self._rule() if self.kind == "rule" else self._value()
 
-    def _value(self) -> Complaint:
+    def _value(self) -> Complaint | None:
         """Complaint about a value that is absent or not allowed."""
+        if self.kind == "too_short" and len(value_at(self.document.root, self.path)) >= self.context["min_length"]:
+            return None  # short only of entries that are wrong themselves
         if self.kind != "missing":
             return self._about(self.path, self._allowed())
         if isinstance(self.path[-1], int):

@@ -2,10 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 from cellplan.io.complaints import Complaint
 from cellplan.io.schema.cell import (
+    OBSTACLE_LIMIT,
+    ROBOT_LIMIT,
+    TASK_LIMIT,
     CellDocument,
     ChecksEntry,
     LayoutEntry,
@@ -13,14 +16,11 @@ from cellplan.io.schema.cell import (
     PartEntry,
     SolverEntry,
 )
-from cellplan.io.schema.common import Entry
-from cellplan.io.schema.messages import validate
+from cellplan.io.schema.messages import AnyEntry, understood, validate
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml_reader import YamlDocument
-
-AnyEntry = TypeVar("AnyEntry", bound=Entry)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +51,11 @@ class Pieces:
     layout: LayoutEntry | None
     names: Mapping[str, tuple[str, ...]]
 
+    @property
+    def is_too_large(self) -> bool:
+        """Whether there are more robots or tasks than any cell has, so that nothing else is worth a look."""
+        return len(self.robots) > ROBOT_LIMIT or len(self.tasks) > TASK_LIMIT or not self.names["robots"]
+
 
 def read_pieces(document: YamlDocument) -> tuple[Pieces, list[Complaint]]:
     """Understand a cell file as far as possible; the complaints tell the rest."""
@@ -71,14 +76,14 @@ def read_pieces(document: YamlDocument) -> tuple[Pieces, list[Complaint]]:
 
 
 def _section(document: YamlDocument, key: str) -> Mapping[str, Any]:
-    """Entries of a section by name; none when it is something else."""
+    """Entries of a section by name; none when it is something else or far too much."""
     section = document.root.get(key)
-    return section if isinstance(section, dict) else {}
+    return section if isinstance(section, dict) and len(section) <= OBSTACLE_LIMIT else {}
 
 
 def _named(model: type[AnyEntry], document: YamlDocument, key: str) -> dict[str, AnyEntry]:
     """Entries of a section that are understood."""
-    found = {name: validate(model, document, (key, name))[0] for name in _section(document, key)}
+    found = {name: understood(model, document, (key, name)) for name in _section(document, key)}
     return {name: entry for name, entry in found.items() if entry is not None}
 
 
@@ -86,5 +91,4 @@ def _single(model: type[AnyEntry], document: YamlDocument, key: str) -> AnyEntry
     """A section that is one entry; its defaults when it is absent and may be."""
     if key not in document.root:
         return None if key in {"part", "motion", "layout"} else model()
-    entry: AnyEntry | None = validate(model, document, (key,))[0]
-    return entry
+    return understood(model, document, (key,))
