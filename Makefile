@@ -1,14 +1,16 @@
 # Every target works on a bare machine: Python 3.11 or newer with venv, make and a package index are all it takes.
 # PYTHON=/path/to/python picks the interpreter that `.venv` is made from; WORKERS=n picks the number of test processes.
+# ROUNDS=n says how often a benchmark runs.
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install test test-all lint format demo clean FORCE
+.PHONY: help install test test-all lint format demo bench clean FORCE
 
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= auto
+ROUNDS ?= 3
 USABLE := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 comma := ,
 
@@ -19,6 +21,7 @@ help:
 	@echo "make test      formatter, linter, types, import rules, sizes and all quick tests"
 	@echo "make test-all  the same with the slow tests"
 	@echo "make lint      everything but the tests"
+	@echo "make bench     time whole commands, beside a baseline of the same run"
 	@echo "make format    put the code into shape"
 	@echo "make clean     remove .venv, caches and results"
 
@@ -67,6 +70,9 @@ format: $(STAMP)
 demo: $(STAMP)
 	$(BIN)/python -m cellplan solve cells/four_robots.yaml
 	@echo "open outputs/four-robots/report.html in a browser"
+
+bench: $(STAMP)
+	$(BIN)/python benchmarks/commands.py --rounds $(ROUNDS)
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist outputs/*/

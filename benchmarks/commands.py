@@ -1,0 +1,158 @@
+"""Time whole commands as a user waits for them: ``make bench``, or ``python benchmarks/commands.py --help``.
+
+Every command runs several times as a child process of its own. The table shows medians of processor time, waiting time
+and peak memory, each also as a multiple of a baseline that is measured in the same run: a Python that imports the big
+libraries and does nothing. Multiples can be compared between machines, seconds cannot.
+"""
+
+import argparse
+import json
+import os
+import platform
+import shutil
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+CELL = "cells/four_robots.yaml"
+OUTPUT = "{output}"  # stands for a folder that is new in every round
+MB = 1e6  # [bytes]
+MAXRSS_UNIT = 1 if sys.platform == "darwin" else 1024  # [bytes] ru_maxrss is in kilobytes but on a Mac
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A command, and the goals that are set for it: waiting time in [s], peak memory in [MB]."""
+
+    name: str
+    arguments: tuple[str, ...]
+    goal_s: float | None = None
+    goal_mb: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """What a command takes: processor time and waiting time in [s], peak memory in [MB]."""
+
+    cpu_s: float
+    wall_s: float
+    peak_mb: float
+
+
+BASELINE = Command(name="import libraries", arguments=("-c", "import numpy, pinocchio, fcl, matplotlib.pyplot"))
+COMMANDS = (
+    Command(name="--help", arguments=("-m", "cellplan", "--help"), goal_s=0.5),
+    Command(name="check", arguments=("-m", "cellplan", "check", CELL, "--quiet")),
+    Command(
+        name="solve",
+        arguments=("-m", "cellplan", "solve", CELL, "--quiet", "-o", OUTPUT),
+        goal_s=10.0,
+        goal_mb=500.0,
+    ),
+    Command(
+        name="solve --mode pairwise",
+        arguments=("-m", "cellplan", "solve", CELL, "--quiet", "--mode", "pairwise", "-o", OUTPUT),
+        goal_mb=500.0,
+    ),
+)
+
+
+def run_once(command: Command) -> Cost:
+    """Cost of one run in a child process; the program ends when the command fails."""
+    folder = Path(tempfile.mkdtemp(prefix="cellplan-bench-"))
+    log = folder / "log.txt"
+    arguments = [sys.executable, *(str(folder / "run") if part == OUTPUT else part for part in command.arguments)]
+    try:
+        begin = time.perf_counter()
+        child = os.posix_spawn(
+            sys.executable,
+            arguments,
+            {**os.environ, "MPLBACKEND": "agg"},
+            file_actions=[
+                (os.POSIX_SPAWN_OPEN, 1, str(log), os.O_WRONLY | os.O_CREAT, 0o600),
+                (os.POSIX_SPAWN_DUP2, 1, 2),
+            ],
+        )
+        _, status, usage = os.wait4(child, 0)
+        wall_s = time.perf_counter() - begin
+        if os.waitstatus_to_exitcode(status) != 0:
+            sys.exit(f"benchmark: '{command.name}' failed:\n{log.read_text(encoding='utf-8', errors='replace')}")
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    return Cost(cpu_s=usage.ru_utime + usage.ru_stime, wall_s=wall_s, peak_mb=usage.ru_maxrss * MAXRSS_UNIT / MB)
+
+
+def measure(commands: Sequence[Command], rounds: int) -> dict[str, Cost]:
+    """Median cost of each command; the rounds alternate between the commands, so that a slow minute hits all alike."""
+    runs: dict[str, list[Cost]] = {command.name: [] for command in commands}
+    for number in range(rounds):
+        for command in commands:
+            print(f"round {number + 1} of {rounds}: {command.name}", file=sys.stderr)
+            runs[command.name].append(run_once(command))
+    return {
+        name: Cost(
+            cpu_s=statistics.median(cost.cpu_s for cost in costs),
+            wall_s=statistics.median(cost.wall_s for cost in costs),
+            peak_mb=statistics.median(cost.peak_mb for cost in costs),
+        )
+        for name, costs in runs.items()
+    }
+
+
+def table(commands: Sequence[Command], costs: dict[str, Cost]) -> list[str]:
+    """Lines for people: seconds and megabytes, with the multiple of the baseline in brackets."""
+    base = costs[BASELINE.name]
+    lines = [f"{'command':<23}{'cpu':>17}{'wall':>17}{'peak memory':>18}   goals"]
+    for command in commands:
+        cost = costs[command.name]
+        lines.append(
+            f"{command.name:<23}"
+            f"{cost.cpu_s:8.2f} s ({cost.cpu_s / base.cpu_s:4.1f})"
+            f"{cost.wall_s:8.2f} s ({cost.wall_s / base.wall_s:4.1f})"
+            f"{cost.peak_mb:8.0f} MB ({cost.peak_mb / base.peak_mb:4.1f})"
+            f"   {goals(command, cost)}".rstrip()
+        )
+    return lines
+
+
+def goals(command: Command, cost: Cost) -> str:
+    """The goals of a command and whether they are met."""
+    wanted = [
+        (cost.wall_s, command.goal_s, "s wall"),
+        (cost.peak_mb, command.goal_mb, "MB"),
+    ]
+    return ", ".join(
+        f"{goal:g} {unit}: {'met' if value <= goal else 'MISSED'}" for value, goal, unit in wanted if goal is not None
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description="Time whole commands of cellplan as child processes.")
+    parser.add_argument("--rounds", type=int, default=3, help="runs of each command; medians are shown (default: 3)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
+    options = parser.parse_args()
+    if options.rounds < 1:
+        parser.error("--rounds: expected at least 1")
+    os.chdir(ROOT)
+    commands = (BASELINE, *COMMANDS)
+    costs = measure(commands, options.rounds)
+    if options.json:
+        print(json.dumps({name: asdict(cost) for name, cost in costs.items()}, indent=1))
+        return
+    print(f"medians of {options.rounds}, in brackets as multiples of '{BASELINE.name}'; {machine()}")
+    print("\n".join(table(commands, costs)))
+
+
+def machine() -> str:
+    """What the figures were measured on."""
+    return f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors, Python {platform.python_version()}"
+
+
+if __name__ == "__main__":
+    main()
