@@ -41,8 +41,18 @@ def random_model(rng: np.random.Generator, joints: int, *, with_follower: bool =
         for i in range(joints)
     ]
     followers = ()
-    if with_follower:  # the flange sits on a lever that the second joint drives
+    if with_follower:  # one lever beside the way to the flange, one that carries it; the second joint drives both
         followers = (
+            FollowerJoint(
+                name="side_lever",
+                kind=JointKind.REVOLUTE,
+                parent=1,
+                axis_B=_unit(rng),
+                point_B=rng.normal(size=3),
+                leader=1,
+                ratio=1.3,
+                offset=-0.4,
+            ),
             FollowerJoint(
                 name="lever",
                 kind=JointKind.REVOLUTE,
@@ -59,7 +69,7 @@ def random_model(rng: np.random.Generator, joints: int, *, with_follower: bool =
         source="drawn",
         joints=tuple(axes),
         followers=followers,
-        flange_link=joints if with_follower else joints - 1,
+        flange_link=joints + 1 if with_follower else joints - 1,
         X_BF=random_pose(rng),
         bodies=(),
     )

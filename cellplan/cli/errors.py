@@ -2,12 +2,14 @@
 
 import contextlib
 import os
+import re
 import sys
 import traceback
 
 from cellplan.errors import CellplanError, ExitStatus, InvalidFileError
 
 DEBUG_VARIABLE = "CELLPLAN_DEBUG"  # set to 1 to see the traceback of an internal error
+LOCATED = re.compile(r".+?:\d+: ")  # a message that begins with file and line needs no other opening
 
 
 class OutputError(CellplanError):
@@ -22,13 +24,14 @@ def exit_status(error: BaseException) -> ExitStatus:
 
 
 def error_lines(error: BaseException) -> list[str]:
-    """What went wrong, one complaint per line; a complaint about a file begins with ``FILE:LINE:``."""
+    """What went wrong, one complaint per line; a complaint about a line of a file begins with ``FILE:LINE:``."""
     if isinstance(error, KeyboardInterrupt):
         return ["interrupted: nothing was written"]
     if isinstance(error, InvalidFileError):
         return [_one_line(str(complaint)) for complaint in error.complaints]
     if isinstance(error, CellplanError):
-        return [f"error: {_one_line(str(error))}"]
+        line = _one_line(str(error))
+        return [line if LOCATED.match(line) else f"error: {line}"]
     what = _one_line(str(error)) or "no further words"
     return [f"internal error: {type(error).__name__}: {what} (set {DEBUG_VARIABLE}=1 to see where)"]
 

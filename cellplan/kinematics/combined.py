@@ -39,6 +39,7 @@ class CombinedModel:
         self._leaders: list[int] = []
         self._ratios: list[float] = []
         self._offsets: list[float] = []
+        self._is_on_the_way: list[bool] = []
         self.carries_flange = np.zeros((len(cell.robots), cell.joint_count), dtype=bool)
         self._flange_ids: list[int] = []
         self._X_JT: list[Array] = []
@@ -47,6 +48,7 @@ class CombinedModel:
         self._data = self._model.createData()
         self._spread = np.zeros((self._model.nv, cell.joint_count))
         self._spread[np.arange(self._model.nv), self._leaders] = self._ratios
+        self._spread_to_flange = self._spread * np.array(self._is_on_the_way)[:, None]
         self._offset = np.array(self._offsets)
         self._is_plain = bool(np.array_equal(self._spread, np.eye(cell.joint_count)))
         self._X_WT = np.tile(np.eye(4), (len(cell.robots), 1, 1))
@@ -56,7 +58,7 @@ class CombinedModel:
         """Kinematics at the stacked joint vector ``q``, shape (nq,); the result owns its arrays."""
         full = q if self._is_plain else self._spread @ q + self._offset
         pin.computeJointJacobians(self._model, self._data, full)
-        screws = self._data.J.copy() if self._is_plain else self._data.J @ self._spread
+        screws = self._data.J.copy() if self._is_plain else self._data.J @ self._spread_to_flange
         X_WT = self._X_WT.copy()
         for index, (joint_id, X_JT) in enumerate(zip(self._flange_ids, self._X_JT, strict=True)):
             X_WT[index] = self._data.oMi[joint_id].homogeneous @ X_JT
@@ -86,10 +88,13 @@ class CombinedModel:
         self._flange_ids.append(0 if link == BASE else ids[link])
         X_joint = inverse(robot.X_WB) if link == BASE else _at(axes[link].point_B)
         self._X_JT.append(inverse(X_joint) @ model.X_BF @ robot.tool.X_FT)
+        on_the_way = [False] * len(axes)
         while link != BASE:
             axis = axes[link]
+            on_the_way[link] = True
             carries[columns.start + (axis.leader if isinstance(axis, FollowerJoint) else link)] = True
             link = axis.parent
+        self._is_on_the_way += on_the_way
 
 
 def _at(point: Array) -> Array:

@@ -34,8 +34,8 @@ def apply_design(
 ) -> tuple[list[ScenePair], list[Excluded]]:
     """Leave out what always touches, and ask only for "no contact" where the robot's own design sets the distance.
 
-    Looked at are pairs of one robot with at most two joints between them, at the reference posture and at random ones
-    within the joint limits:
+    Looked at are pairs of one robot with at most two joints between them, or with a bar of a linkage, at the reference
+    posture and at random ones within the joint limits:
 
     - touching in all of them: left out;
     - two links: checked for contact, not for distance;

@@ -15,6 +15,7 @@ class LinkTree:
         axes: tuple[Joint | FollowerJoint, ...] = (*model.joints, *model.followers)
         self._parents = [axis.parent for axis in axes]
         self._names = [axis.name for axis in axes]
+        self._driven = len(model.joints)
         self._with_body = {body.link for body in model.bodies}
 
     def carrier(self, link: int) -> int:
@@ -26,6 +27,10 @@ class LinkTree:
     def parent(self, link: int) -> int:
         """The nearest link with a body before a link; ``NO_BODY`` when there is none."""
         return NO_BODY if link in (BASE, NO_BODY) else self.carrier(self._parents[link])
+
+    def is_bar(self, link: int) -> bool:
+        """Whether a link is moved through a linkage rather than by a joint of its own."""
+        return link >= self._driven
 
     def joint_name(self, link: int) -> str:
         """Name of the joint that moves a link."""

@@ -82,12 +82,17 @@ def clearance_class(first: SceneBody, second: SceneBody) -> ClearanceClass:
 
 
 def near_in_chain(pair: ScenePair, bodies: Sequence[SceneBody], *, cell: Cell) -> bool:
-    """Whether a pair belongs to one robot and moves against each other by no more than two joints."""
+    """Whether a pair belongs to one robot and moves against each other by no more than two joints.
+
+    A bar of a linkage counts as near to every link: the loop it closes is not in the chain of joints, so the bars of a
+    parallelogram meet links that are three or more joints away.
+    """
     a, b = bodies[pair.first], bodies[pair.second]
     if a.robot is None or a.robot != b.robot:
         return False
     tree = LinkTree(cell.robot(a.robot).model)
-    return tree.joints_between(_joined_to(a, tree), _joined_to(b, tree)) <= 2
+    first, second = _joined_to(a, tree), _joined_to(b, tree)
+    return tree.is_bar(first) or tree.is_bar(second) or tree.joints_between(first, second) <= 2
 
 
 def stands_on(pair: ScenePair, bodies: Sequence[SceneBody], *, cell: Cell) -> bool:
