@@ -48,11 +48,12 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.cli.summary import read_record, summary_lines
         from cellplan.io.cell_file import load_cell
         from cellplan.io.run_folder import refuse_unless_replaceable
-        from cellplan.pipeline.overrides import with_overrides
+        from cellplan.pipeline.overrides import require_task, with_overrides
         from cellplan.pipeline.solve import solve as solve_cell
         from cellplan.pipeline.write_run import write_run
 
         asked = with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), mode=mode, method=method, duration=duration)
+        require_task(asked, task)
         folder = output or Path("outputs") / asked.name
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:

@@ -24,6 +24,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
         *_speed_lines(record["joints"]),
         *_clearance_lines(record["clearance"]["whole"]),
         *_failure_lines(record["checks"]),
+        *(f"  before you run it: {line}" for line in record.get("before_you_run", [])),
         *_place_lines(record, folder),
     ]
 

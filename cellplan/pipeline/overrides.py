@@ -40,6 +40,16 @@ def with_overrides(
     return cell
 
 
+def require_task(cell: Cell, name: str | None) -> None:
+    """Refuse the name of a task that the cell does not have.
+
+    Raises:
+        InputError: There is no such task.
+    """
+    if name is not None:
+        _known("--task", name, [task.name for task in cell.tasks])
+
+
 def _with_duration(cell: Cell, duration: float) -> Cell:
     """The cell on a clock of another length; tasks that filled the old clock fill the new one."""
     if not SHORTEST <= duration < float("inf"):

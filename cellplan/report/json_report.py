@@ -19,6 +19,7 @@ from cellplan.report.record import (
     report_record,
     status,
     tasks_record,
+    withdrawals,
 )
 
 
@@ -57,6 +58,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "clearance": clearance_record(minima),
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
         "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
+        "before_you_run": [f"{name}: {line}" for name, report in reports.items() for line in withdrawals(report, cell)],
         **origin_record(cell, provenance),
         "caution": CAUTION,
     }

@@ -201,3 +201,12 @@ def test_pairwise_writes_a_subfolder_for_each_task(cells, tmp_path):
     assert list(record["runs"]) == ["circle"]
     assert (tmp_path / "run" / "circle" / "tables" / "kuka.csv").is_file()
     assert json.loads((tmp_path / "run" / "circle" / "report.json").read_text())["status"] == "passed"
+
+
+def test_idle_robots_in_the_way_of_the_part_are_to_be_withdrawn(cells, tmp_path):
+    """They stand at their own tasks while the part moves; the thesis takes them out of the cell altogether."""
+    cell = with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise")
+    write_run(solve(cell, task="rectangle"), tmp_path / "run")
+    lines = json.loads((tmp_path / "run" / "report.json").read_text())["before_you_run"]
+    assert [line.split(":")[1].split()[1] for line in lines] == ["kuka", "abb"]
+    assert all("would touch the part between" in line for line in lines)
