@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.collision.hulls import convex_hull
 from cellplan.errors import CellplanError, InputError
-from cellplan.geometry.convex_hull import convex_hull
 from cellplan.geometry.mesh_topology import components
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, bounding_sphere
 from cellplan.geometry.tessellation import tessellate

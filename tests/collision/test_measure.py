@@ -8,10 +8,10 @@ from scene_builders import random_pose
 from cellplan.collision.bodies import BodyPoses, CollisionBody, checked_poses, prepare
 from cellplan.collision.certificate import heights
 from cellplan.collision.engine import Engine
+from cellplan.collision.hulls import convex_hull
 from cellplan.collision.inside import is_inside
 from cellplan.collision.measure import Reading, look, measure
 from cellplan.errors import CellplanError
-from cellplan.geometry.convex_hull import convex_hull
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import pose

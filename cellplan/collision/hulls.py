@@ -1,0 +1,112 @@
+"""Convex hulls of meshes, found by Qhull through coal, and proved to hold every vertex."""
+
+from collections.abc import Iterator
+from typing import Final
+
+import coal
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.mesh_topology import count_edges, make_mesh
+from cellplan.geometry.shapes import Mesh
+from cellplan.geometry.transforms import Array
+
+FLAT: Final = 1e-6  # [-] of the largest spread: thinner meshes count as flat; coal crashes on those below 1e-8
+GRID: Final = 1e-9  # [-] of the extent: vertices nearer than that are one; coal crashes on heaps of almost equal ones
+HULL_ROOM: Final = 1e-7  # [-] of the extent by which a vertex may stick out of the hull; without rounding it is none
+MAX_CORNERS: Final = 2000  # the work of every distance grows with their number
+FEW_CORNERS: Final = 250  # coal keeps at most 255 neighbours of a corner: so few corners cannot have more
+MAX_GROWTH: Final = 1.1  # [-] by which a hull of some of the points may be blown up to hold the others
+PAIR_CHUNK: Final = 4_000_000  # [-] products of points and planes worked on at once: about 30 MB
+GOLDEN_ANGLE: Final = np.pi * (3.0 - np.sqrt(5.0))  # [rad]
+
+
+def convex_hull(mesh: Mesh) -> Mesh:
+    """Smallest convex mesh that holds all vertices, up to 1e-7 of the extent; closed, facing outward.
+
+    Where that has more than 2000 corners, or a corner with more than 255 neighbours, it is a slightly larger one: the
+    hull of the farthest vertices in many directions, blown up until it holds the others too.
+
+    Raises:
+        InputError: The mesh is flat.
+    """
+    points = mesh.vertices
+    if _is_flat(points):
+        raise InputError(f"{mesh.source}: expected a body with a volume, got a flat one")
+    extent = float(np.ptp(points, axis=0).max())
+    room = HULL_ROOM * extent
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    snapped = np.unique(np.round((points - middle) / (GRID * extent)), axis=0) * (GRID * extent) + middle
+    for chosen in _choices(snapped):
+        hull = None if _is_flat(chosen) else _hull(chosen, mesh.source)
+        if hull is None or len(hull.vertices) > MAX_CORNERS:
+            continue
+        if _sticking_out(hull, points) > room:
+            hull = _blown_up(hull, points)
+        if hull is not None and _sticking_out(hull, points) <= room:
+            return hull
+    raise InputError(f"{mesh.source}: expected a mesh with a convex hull, got one too ill-shaped for it")
+
+
+def _is_flat(points: Array) -> bool:
+    """Whether the points, shape (N, 3), lie so near to a plane that there is no inside."""
+    if len(points) < 4:
+        return True
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return not spread[2] > FLAT * spread[0]
+
+
+def _choices(points: Array) -> Iterator[Array]:
+    """All points; then fewer and fewer, the farthest ones in directions spread evenly over the sphere."""
+    yield points
+    for count in (MAX_CORNERS, FEW_CORNERS):
+        height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+        angle = GOLDEN_ANGLE * np.arange(count)
+        width = np.sqrt(1.0 - height**2)
+        directions = np.stack([width * np.cos(angle), width * np.sin(angle), height], axis=1)
+        step = max(1, PAIR_CHUNK // len(points))
+        farthest = [np.argmax(directions[k : k + step] @ points.T, axis=1) for k in range(0, count, step)]
+        yield points[np.unique(np.concatenate(farthest))]
+
+
+def _hull(points: Array, source: str) -> Mesh | None:
+    """Convex hull of points that are not flat; None where coal finds none."""
+    given = coal.StdVec_Vec3s()
+    given.extend(list(points))
+    try:
+        found = coal.Convex.convexHull(given, True, "Qt")
+    except RuntimeError:
+        return None
+    polygons = [found.polygons(k) for k in range(found.num_polygons)]
+    faces = np.array([[polygon[0], polygon[1], polygon[2]] for polygon in polygons], dtype=np.int64)
+    return make_mesh(np.array(found.points()), faces, source=source) if count_edges(faces).is_closed else None
+
+
+def _blown_up(hull: Mesh, points: Array) -> Mesh | None:
+    """The hull of some of the points, moved away from its middle until it holds all; None if that is much larger."""
+    middle = hull.vertices.mean(axis=0)
+    normals, offsets = _planes(hull)
+    depth = offsets - normals @ middle
+    if not np.all(depth > 0.0):
+        return None
+    step = max(1, PAIR_CHUNK // len(normals))
+    share = max(float(((points[k : k + step] - middle) @ normals.T / depth).max()) for k in range(0, len(points), step))
+    if share > MAX_GROWTH:
+        return None
+    corners = middle + max(share, 1.0) * (hull.vertices - middle)
+    return Mesh(vertices=corners, faces=hull.faces, source=hull.source, is_closed=hull.is_closed)
+
+
+def _sticking_out(hull: Mesh, points: Array) -> float:
+    """How far in [m] the farthest point lies outside of a face: the proof of the hull, however it was found."""
+    normals, offsets = _planes(hull)
+    step = max(1, PAIR_CHUNK // len(normals))
+    return max(float((points[k : k + step] @ normals.T - offsets).max()) for k in range(0, len(points), step))
+
+
+def _planes(hull: Mesh) -> tuple[Array, Array]:
+    """Unit outward normals, shape (M, 3), and offsets in [m], shape (M,), of the faces."""
+    corner = hull.vertices[hull.faces]
+    normals = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals, np.sum(normals * corner[:, 0], axis=1)
