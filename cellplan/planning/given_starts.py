@@ -14,9 +14,10 @@ from cellplan.model.toolpath import Toolpath
 from cellplan.planning.cooperation import constraint_rows, pose_errors
 
 
-def start_key(robot: Robot) -> str:
-    """Key path of a robot's start posture in the cell file."""
-    return f"robots.{robot.name}.start_deg"
+def start_place(cell: Cell, robot: Robot) -> str:
+    """Where a robot's start posture stands in the cell file, or would stand."""
+    by_joint, as_list = f"robots.{robot.name}.start", f"robots.{robot.name}.start_deg"
+    return cell.origin.at(by_joint if by_joint in cell.origin.lines else as_list)
 
 
 def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
@@ -61,7 +62,7 @@ def _outside(cell: Cell, robot: Robot) -> list[InputError]:
         return []
     return [
         StartOutsideLimitsError(
-            f"{cell.origin.at(start_key(robot))}: joint '{joint.name}' starts at {_shown(joint, position)}, outside "
+            f"{start_place(cell, robot)}: joint '{joint.name}' starts at {_shown(joint, position)}, outside "
             f"its limits {_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}"
         )
         for joint, position in zip(robot.model.joints, start, strict=True)
@@ -85,7 +86,7 @@ def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
         return []
     return [
         StartOffTaskError(
-            f"{cell.origin.at(start_key(robot))}: the tool is {1e3 * distance:.3f} mm and {np.degrees(angle):.4f} deg "
+            f"{start_place(cell, robot)}: the tool is {1e3 * distance:.3f} mm and {np.degrees(angle):.4f} deg "
             f"from the start of task '{task.name}', allowed are {1e3 * task.tolerance.position:g} mm and "
             f"{np.degrees(task.tolerance.orientation):g} deg; `auto` finds a posture"
         )

@@ -14,7 +14,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.task import Task
 from cellplan.model.toolpath import Toolpath
 from cellplan.planning.follow import follow
-from cellplan.planning.given_starts import part_pose, start_key
+from cellplan.planning.given_starts import part_pose, start_place
 from cellplan.planning.inverse_kinematics import (
     finite_limits,
     margin_shares,
@@ -272,6 +272,6 @@ def _why_nothing(cell: Cell, obstructions: _Obstructions, holder_count: int) -> 
     name = max(obstructions.unreached, key=lambda robot: obstructions.unreached[robot], default=cell.robots[0].name)
     task = next((task.name for task in cell.tasks if task.robot == name), "")
     return (
-        f"{cell.origin.at(start_key(cell.robot(name)))}: no posture within the joint limits brings the tool to the "
+        f"{start_place(cell, cell.robot(name))}: no posture within the joint limits brings the tool to the "
         f"start of task '{task}' ({tried} tried): move the base, change the tool or free an axis"
     )

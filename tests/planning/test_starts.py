@@ -1,0 +1,146 @@
+"""Start postures: given ones are examined, missing ones found within limits, on the task and free."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cellplan import load_cell
+from cellplan.errors import InvalidFileError, StartNotFoundError, StartOffTaskError, StartOutsideLimitsError
+from cellplan.geometry.transforms import inverse
+from cellplan.kinematics.screws import ScrewChain
+from cellplan.planning.given_starts import examine_given_starts
+from cellplan.planning.inverse_kinematics import margin_shares, random_postures, reaching_postures, within_limits
+from cellplan.planning.start_search import find_start
+from cellplan.planning.toolpaths import build_toolpath
+from cellplan.scene.scene import Scene
+
+
+@pytest.fixture(scope="module")
+def cell(cells):
+    return load_cell(cells / "four_robots.yaml")
+
+
+def toolpaths_of(cell):
+    return {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+
+
+def with_start(cell, name, start):
+    return replace(cell, robots=tuple(replace(r, start=start) if r.name == name else r for r in cell.robots))
+
+
+def distance_from_task(cell, task, q):
+    holder, operator = cell.robot(cell.positioners[0]), cell.robot(task.robot)
+    X_WP = ScrewChain(holder).tool_poses(q[None, cell.columns(holder.name)])[0] @ inverse(cell.part.held_by[0].X_PT)
+    X_WT = ScrewChain(operator).tool_poses(q[None, cell.columns(operator.name)])[0]
+    wanted = toolpaths_of(cell)[task.name].X_PT_start
+    return np.abs(inverse(X_WP) @ X_WT - wanted).max()
+
+
+def test_given_starts_of_the_reference_cell_are_accepted(cell):
+    examine_given_starts(cell, toolpaths_of(cell))
+
+
+def test_start_outside_limits_is_named_with_its_line(cell):
+    start = cell.robot("kuka").start.copy()
+    start[1] = np.radians(40.0)
+    with pytest.raises(StartOutsideLimitsError) as caught:
+        examine_given_starts(with_start(cell, "kuka", start), toolpaths_of(cell))
+    assert str(caught.value).endswith(
+        "four_robots.yaml:16: robots.kuka.start_deg: joint 'B2' starts at 40 deg, outside its limits -155 deg .. 35 deg"
+    )
+
+
+def test_start_off_the_task_is_named_with_distance_and_cure(cell):
+    start = cell.robot("abb").start.copy()
+    start[0] += np.radians(1.0)
+    with pytest.raises(StartOffTaskError) as caught:
+        examine_given_starts(with_start(cell, "abb", start), toolpaths_of(cell))
+    assert "robots.abb.start_deg: the tool is " in str(caught.value)
+    assert "from the start of task 'rhombus', allowed are 0.1 mm and 0.01 deg; `auto` finds a posture" in str(
+        caught.value
+    )
+
+
+def test_all_wrong_starts_are_named_at_once(cell):
+    wrong = cell
+    for name in ("kuka", "staubli"):
+        wrong = with_start(wrong, name, cell.robot(name).start + np.radians(200.0))
+    with pytest.raises(InvalidFileError) as caught:
+        examine_given_starts(wrong, toolpaths_of(cell))
+    assert {line.split(" robots.")[1].split(".")[0] for line in str(caught.value).split("\n")} == {"kuka", "staubli"}
+
+
+@pytest.mark.parametrize("missing", [("kuka",), ("kuka", "abb", "staubli"), ("reis",)], ids="+".join)
+def test_found_starts_reach_their_tasks_within_limits_and_free(cell, missing):
+    open_cell = cell
+    for name in missing:
+        open_cell = with_start(open_cell, name, None)
+    scene = Scene.from_cell(open_cell)
+
+    q = find_start(scene, toolpaths_of(cell))
+
+    for robot in cell.robots:
+        own = q[cell.columns(robot.name)]
+        assert np.all((own >= robot.model.lower) & (own <= robot.model.upper))
+        if robot.name not in missing:
+            np.testing.assert_array_equal(own, robot.start)
+    for task in cell.tasks:
+        assert distance_from_task(cell, task, q) < 1e-8  # given starts close to 1e-9 m, found ones to 1e-12
+    assert scene.touching(q) is None
+
+
+def test_search_gives_the_same_posture_again_and_another_with_another_seed(cell):
+    open_cell = with_start(with_start(cell, "kuka", None), "abb", None)
+    first, again = (find_start(Scene.from_cell(open_cell), toolpaths_of(cell)) for _ in range(2))
+    np.testing.assert_array_equal(first, again)
+
+
+def test_all_postures_of_the_positioner_may_be_open_as_well(cells):
+    cell = load_cell(cells / "mesh_part_csv.yaml")
+    assert any(robot.start is None for robot in cell.robots)
+    scene = Scene.from_cell(cell)
+    q = find_start(scene, toolpaths_of(cell))
+    assert scene.touching(q) is None
+
+
+def test_base_out_of_reach_is_named(cell):
+    far = replace(
+        cell,
+        robots=tuple(
+            replace(r, start=None, X_WB=r.X_WB + np.array([[0, 0, 0, 9.0], [0] * 4, [0] * 4, [0] * 4]))
+            if r.name == "kuka"
+            else r
+            for r in cell.robots
+        ),
+    )
+    with pytest.raises(StartNotFoundError, match="no posture within the joint limits brings the tool to the start of"):
+        find_start(Scene.from_cell(far), toolpaths_of(cell))
+
+
+def test_multi_start_finds_the_branches_of_a_six_axis_arm(cell):
+    """Shoulder, elbow and wrist of a wrist-partitioned arm each have two sides: eight branches, some out of limits."""
+    robot, task = cell.robot("staubli"), cell.task("rectangle")
+    chain = ScrewChain(robot)
+    goal = chain.tool_poses(np.radians([[20.0, -30.0, 80.0, 40.0, 50.0, -20.0]]))[0]
+    seeds = random_postures(robot.model, 200, np.random.default_rng(0))
+
+    q = reaching_postures(chain, task, goal, X_WP=np.eye(4), seeds=seeds)
+
+    assert np.abs(chain.tool_poses(q) - goal).max() < 1e-11
+    branches = {tuple(np.round(np.cos(posture) + 2 * np.sin(posture), 4)) for posture in q}
+    assert len(branches) == 8
+
+
+def test_turning_joints_are_brought_back_by_whole_turns(cell):
+    model = cell.robot("kuka").model
+    q = np.radians([[10.0, -20.0, 30.0, 300.0 - 360.0 * 3, 50.0, 100.0 + 360.0]])
+    back = within_limits(model, q)
+    np.testing.assert_allclose(np.degrees(back), [[10, -20, 30, -60, 50, 100]], atol=1e-9)
+
+
+def test_margin_share_is_one_in_the_middle_and_nil_on_a_limit(cell):
+    model = cell.robot("kuka").model
+    middle = 0.5 * (model.lower + model.upper)
+    assert margin_shares(model, middle) == pytest.approx(1.0)
+    assert margin_shares(model, model.upper) == pytest.approx(0.0)
