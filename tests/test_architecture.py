@@ -25,8 +25,8 @@ PARAMETERS = 6
 DOORS = {
     "pinocchio": ["kinematics/combined.py"],
     "fcl": ["collision/engine.py"],
-    "trimesh": ["geometry/meshes.py"],
-    "rtree": ["geometry/meshes.py"],
+    "coal": ["collision/hulls.py"],
+    "trimesh": ["geometry/mesh_files.py"],
     "matplotlib": ["report/plots*.py"],
     "jinja2": ["report/html.py"],
     "yaml": ["io/yaml_reader.py", "io/yaml_writer.py"],
@@ -36,7 +36,7 @@ DOORS = {
     "typer": ["cli/*.py"],
 }
 EVERYWHERE = {"cellplan", "numpy"}
-HEAVY = {"numpy", "pinocchio", "fcl", "coal", "trimesh", "rtree", "matplotlib", "pydantic", "jinja2", "yaml"}
+HEAVY = {"numpy", "pinocchio", "fcl", "coal", "trimesh", "matplotlib", "pydantic", "jinja2", "yaml"}
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cellplan.errors import InputError
-from cellplan.geometry.convex_hull import convex_hull
-from cellplan.geometry.mesh_files import FORMATS, parse_mesh
+from cellplan.geometry.mesh_files import FORMATS, parse_mesh, require_likely_count
 from cellplan.geometry.mesh_rays import RayHits, ray_hits
 from cellplan.geometry.mesh_topology import components, count_edges, make_mesh, mesh_volume, winding_numbers
 from cellplan.geometry.shapes import Mesh
@@ -20,7 +19,6 @@ __all__ = [
     "FORMATS",
     "RayHits",
     "contains",
-    "convex_hull",
     "corner_normals",
     "is_flat",
     "make_mesh",
@@ -32,8 +30,6 @@ __all__ = [
 ]
 
 MAX_BYTES: Final = 100_000_000
-MAX_TRIANGLES: Final = 500_000
-MIN_TRIANGLES: Final = 4  # a tetrahedron
 MIN_EXTENT: Final = 1e-3  # [m] smaller things in a robot cell are slips of the unit
 MAX_EXTENT: Final = 20.0  # [m] larger ones as well
 FLAT_SHARE: Final = 1e-6  # [-] of the extent: thinner than this is a sheet without inside
@@ -54,8 +50,7 @@ def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
         InputError: The file cannot be read, is damaged, too large, not finite or of an unlikely size.
     """
     vertices, faces = parse_mesh(_read_bytes(path), path.name)
-    if not MIN_TRIANGLES <= len(faces) <= MAX_TRIANGLES:
-        raise InputError(f"{path.name}: expected {MIN_TRIANGLES} to {MAX_TRIANGLES} triangles, got {len(faces)}")
+    require_likely_count(len(faces), path.name)
     if not np.all(np.isfinite(vertices)):
         raise InputError(f"{path.name}: expected finite coordinates, got {int(np.sum(~np.isfinite(vertices)))} others")
     factors = np.broadcast_to(np.asarray(scale, dtype=float), (3,))

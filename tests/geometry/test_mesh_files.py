@@ -159,6 +159,39 @@ def test_text_stl_with_a_lost_line_is_refused(tmp_path: Path) -> None:
     assert refusal(path) == f"part.stl:{vertex + 1}: expected 3 numbers, got '1,0 2 3'"
 
 
+def test_text_stl_may_hold_several_solids_whose_names_are_words_of_the_format(tmp_path: Path) -> None:
+    path = write(tmp_path, "ascii.stl")
+    facets = "\r".join(path.read_text().splitlines()[1:-1])
+    moved = facets.replace("vertex ", "VERTEX  ").replace(" 0.3", " +3.E-01")
+    path.write_text(f"solid vertex solid 1 2 3\r{facets}\rendsolid vertex\rSOLID\r{moved}\rENDSOLID endsolid normal")
+
+    mesh = read_mesh(path)
+
+    assert (mesh.vertices.shape, mesh.faces.shape) == ((8, 3), (24, 3))
+    assert np.ptp(mesh.vertices, axis=0) == pytest.approx([0.2, 0.4, 0.6], rel=1e-6)
+
+
+def test_numbers_of_text_stl_that_slipped_from_one_line_to_another_are_refused(tmp_path: Path) -> None:
+    path = write(tmp_path, "ascii.stl")
+    text = path.read_text()
+    vertex = re.search(r"vertex .*\n", text)
+    assert vertex
+    path.write_text(text.replace(vertex[0], "vertex 1 2\n", 1))
+    assert refusal(path).endswith(": expected 3 numbers, got '1 2'")
+    path.write_text(text.replace(vertex[0], "", 1).replace("endloop", f"{vertex[0]}endloop", 2))
+    assert "got 37 vertices, 12 'endfacet'" in refusal(path)
+    path.write_text(text.replace(vertex[0], "", 1).replace("endfacet", f"{vertex[0]}endfacet", 1))
+    assert "got 36 vertices, 12 'endfacet' and 1 'endsolid': the file is cut off" in refusal(path)
+
+
+def test_a_binary_stl_with_too_many_or_no_triangles_is_refused_by_its_header(tmp_path: Path) -> None:
+    path = tmp_path / "part.stl"
+    path.write_bytes(bytes(84))
+    assert refusal(path) == "part.stl: expected 4 to 500000 triangles, got 0"
+    path.write_bytes(bytes(80) + struct.pack("<I", 500_001) + bytes(50 * 500_001))
+    assert refusal(path) == "part.stl: expected 4 to 500000 triangles, got 500001"
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
