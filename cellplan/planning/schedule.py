@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.transforms import Array, rotation_vector
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.task import Task
@@ -81,8 +81,24 @@ def _follow_clock(times: Array, task: Task, toolpath: Toolpath, corners: Array) 
     travelled = toolpath.behind[pieces] + law.share * length
     X_PT, twists = toolpath.targets(pieces, travelled)
     V_PT_P = twists * (law.rate * length / duration)[:, None]
-    rests = (times < corners[0] - INSTANT_ROOM) | (times > corners[-1] + INSTANT_ROOM)
+    rests = (times < corners[0] - INSTANT_ROOM) | (times > corners[-1] - INSTANT_ROOM)
     V_PT_P[rests] = 0.0
+    _even_out_jumps(times, corners, X_PT, V_PT_P=V_PT_P)
     return TaskSchedule(
         task=task, X_PT=X_PT, V_PT_P=V_PT_P, travelled=travelled, length=toolpath.length, end=float(corners[-1])
     )
+
+
+def _even_out_jumps(times: Array, corners: Array, X_PT: Array, *, V_PT_P: Array) -> None:
+    """Put mean twists, in place, where a tool starts, passes a corner or comes to rest between two instants.
+
+    The speed of a constant law jumps there: the twist at the instant before would miss the pose at the next one.
+    """
+    before = np.searchsorted(times, corners, side="right") - 1
+    after = np.minimum(before + 1, len(times) - 1)
+    is_between = (corners - times[before] > INSTANT_ROOM) & (times[after] - corners > INSTANT_ROOM)
+    k = np.unique(before[is_between])
+    step = np.diff(times)[k, None]
+    turns = X_PT[k + 1, :3, :3] @ np.swapaxes(X_PT[k, :3, :3], 1, 2)
+    V_PT_P[k, :3] = (X_PT[k + 1, :3, 3] - X_PT[k, :3, 3]) / step
+    V_PT_P[k, 3:] = rotation_vector(turns) / step

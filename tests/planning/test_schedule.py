@@ -146,7 +146,7 @@ def test_with_a_duration_each_side_takes_time_in_proportion_to_its_length() -> N
     assert speed[3000:].max() == pytest.approx(1.875 * 0.1, rel=1e-6)
 
 
-def test_a_constant_law_changes_direction_at_the_corner_and_keeps_its_speed_to_the_end() -> None:
+def test_a_constant_law_changes_direction_at_the_corner_and_rests_from_its_end_on() -> None:
     (one,) = scheduled(task("a", ELL, duration=4.0, start=0.5, time_law=CONSTANT), task("b", ELL, duration=6.0)).tasks[
         :1
     ]
@@ -155,8 +155,23 @@ def test_a_constant_law_changes_direction_at_the_corner_and_keeps_its_speed_to_t
 
     assert np.all(velocity[:500] == 0.0)
     assert np.allclose(velocity[500:3500], [0.1, 0.0, 0.0], atol=1e-14)
-    assert np.allclose(velocity[3500:4501], [0.0, 0.1, 0.0], atol=1e-14)  # at the corner the later side counts
-    assert np.all(one.V_PT_P[4501:] == 0.0)
+    assert np.allclose(velocity[3500:4500], [0.0, 0.1, 0.0], atol=1e-14)  # at the corner the later side counts
+    assert np.all(one.V_PT_P[4500:] == 0.0)  # and the rest at the end
+
+
+@pytest.mark.parametrize("step", [0.001, 0.0037, 0.1])
+def test_straight_sides_at_constant_speed_are_met_by_single_steps_even_where_corners_fall_between_them(
+    step: float,
+) -> None:
+    early = task("a", ELL, start=0.2503, duration=0.9127, time_law=CONSTANT, turn=1.0)
+    schedule = scheduled(early, task("b", ELL), duration=2.0, step=step)
+
+    X, V = schedule.tasks[0].X_PT, schedule.tasks[0].V_PT_P
+    p_next = X[:-1, :3, 3] + step * V[:-1, :3]
+    R_next = np.stack([rotation_exp(step * v[3:]) @ R for v, R in zip(V[:-1], X[:-1, :3, :3], strict=True)])
+
+    assert np.abs(p_next - X[1:, :3, 3]).max() <= 1e-14  # a straight line has no error of the method
+    assert np.abs(R_next - X[1:, :3, :3]).max() <= 1e-12
 
 
 def test_the_tool_holds_still_before_and_after_its_task() -> None:
