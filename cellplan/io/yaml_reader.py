@@ -20,6 +20,7 @@ SIZE_LIMIT: Final = 2_000_000  # [bytes]
 NODE_LIMIT: Final = 200_000
 DEPTH_LIMIT: Final = 32
 KEY_LENGTH_LIMIT: Final = 100  # [characters] no key of a cell comes near
+FORBIDDEN_IN_KEYS: Final = frozenset("<>")  # no name has them; the schema marks its choices with them
 
 # Everything that is not printable text: it could hide words from the reader or shift the line numbers.
 CONTROL_CHARACTERS: Final = re.compile(
@@ -227,13 +228,16 @@ class _Composer:
             if not isinstance(event, yaml.AliasEvent):
                 self._skip(event)
             return None
-        if not event.value.isprintable() or len(event.value) > KEY_LENGTH_LIMIT:
-            self._complain(event, path, f"expected a short word as key, got {shown(event.value)}")
-            return None
         if event.anchor is not None or event.tag is not None:
             self._complain(event, (*path, event.value), "YAML anchors (&) and tags (!) are not allowed")
         if event.value == "<<":
             self._complain(event, path, "YAML merge keys (<<) are not allowed; write the values out")
+            return None
+        if not event.value.isprintable() or len(event.value) > KEY_LENGTH_LIMIT:
+            self._complain(event, path, f"expected a short word as key, got {shown(event.value)}")
+            return None
+        if FORBIDDEN_IN_KEYS & set(event.value):
+            self._complain(event, path, f"expected a key without '<' and '>', got {shown(event.value)}")
             return None
         value = self._scalar(event, path, is_key=True)
         if isinstance(value, bool):

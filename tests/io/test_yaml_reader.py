@@ -99,6 +99,7 @@ def test_plain_values_mean_what_they_say(text: str, value: object) -> None:
         ('a: "\\x07"', "f.yaml:1: a: expected printable text, got control character U+0007"),
         ('a: "\\u202e"', "f.yaml:1: a: expected printable text, got control character U+202E"),
         ('"a\\nb": 1', "f.yaml:1: expected a short word as key, got 'a\\nb'"),
+        ('a: {"<b>": 1}', "f.yaml:1: a: expected a key without '<' and '>', got '<b>'"),
     ],
 )
 def test_what_could_mean_two_things_is_refused_where_it_stands(text: str, message: str) -> None:
