@@ -1,7 +1,7 @@
 """URDF as it is written: links with solids, joints with limits and mimics, checked one by one and counted."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeVar
@@ -23,6 +23,13 @@ REFUSED: Final = ("floating", "planar")
 LINK_CHILDREN: Final = ("inertial", "visual", "collision")
 JOINT_CHILDREN: Final = ("origin", "parent", "child", "axis", "limit", "mimic", "dynamics", "calibration")
 SAFETY: Final = "safety_controller"
+ATTRIBUTES: Final[Mapping[str, tuple[str, ...]]] = {
+    "origin": ("xyz", "rpy"),
+    "axis": ("xyz",),
+    "limit": ("lower", "upper", "velocity", "effort", "acceleration", "deceleration", "jerk"),
+    "mimic": ("joint", "multiplier", "offset"),
+    "mesh": ("filename", "scale"),
+}  # of the elements in which a missing attribute has a default
 FOREIGN: Final = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "group_state", "actuator"})
 
 
@@ -168,6 +175,16 @@ def _require_known_children(element: Element, known: tuple[str, ...], owner: str
             raise child.error(f"{owner}: unknown element <{child.tag}>{hint}")
 
 
+def _require_known_attributes(element: Element, owner: str) -> None:
+    """Misspelt, an attribute would leave its default in place; extensions with other names are left alone."""
+    for child in element.children:
+        known = ATTRIBUTES.get(child.tag, ())
+        for name in child.attributes:
+            hint = "" if name in known else did_you_mean(name.lower(), known)
+            if hint:
+                raise child.error(f"{owner}: unknown attribute '{name}' in <{child.tag}>{hint}")
+
+
 def _link(element: Element) -> UrdfLink:
     """One link; a link that is drawn but has no collision body gets the drawn one."""
     name = _name(element)
@@ -180,10 +197,12 @@ def _link(element: Element) -> UrdfLink:
 def _solid(element: Element, owner: str) -> UrdfSolid:
     """One collision or visual element."""
     _require_known_children(element, ("origin", "geometry", "material"), owner)
+    _require_known_attributes(element, owner)
     geometry = element.one("geometry", owner)
     if geometry is None or len(geometry.children) != 1:
         count = 0 if geometry is None else len(geometry.children)
         raise element.error(f"{owner}: expected <{element.tag}> with a <geometry> of one shape, got {count} shapes")
+    _require_known_attributes(geometry, owner)
     return UrdfSolid(element=element, shape=_shape(geometry.children[0], owner), X_LS=origin_of(element, owner))
 
 
@@ -235,6 +254,7 @@ def _joint(element: Element) -> UrdfJoint:
     name = _name(element)
     owner = f"joint '{name}'"
     _require_known_children(element, JOINT_CHILDREN, owner)
+    _require_known_attributes(element, owner)
     kind = element.text("type", owner)
     if kind in REFUSED:
         raise element.error(f"{owner}: expected one axis at most, got the type '{kind}', which is not supported")
@@ -264,7 +284,7 @@ def _axis(element: Element, owner: str) -> Array:
     axis = element.one("axis", owner)
     if axis is None:
         return np.array([1.0, 0.0, 0.0])
-    vector = axis.numbers("xyz", 3, owner=owner, default=(1.0, 0.0, 0.0))
+    vector = axis.numbers("xyz", 3, owner=owner)
     length = float(np.linalg.norm(vector))
     if not 1e-6 < length < 1e6:
         raise axis.error(f"{owner}: expected an axis that is not zero, got {shown(axis.attributes['xyz'])}")

@@ -58,6 +58,25 @@ ARM = ('<link name="base"/>', '<link name="tip"/>', joint("a1", "base", "tip"))
         ),
         ([*ARM[:2], joint("a1", "base", "top")], "r.urdf:4: joint 'a1': unknown child link 'top', did you mean 'tip'?"),
         (["<gazebo/>"], "r.urdf: expected 1 to 200 links, got 0"),
+        (
+            [*ARM[:2], joint("a1", "base", "tip", f'<axis xzy="0 1 0"/>{LIMIT}')],
+            "r.urdf:4: joint 'a1': unknown attribute 'xzy' in <axis>, did you mean 'xyz'?",
+        ),
+        (
+            [*ARM[:2], joint("a1", "base", "tip", f"<axis/>{LIMIT}")],
+            "r.urdf:4: joint 'a1': expected <axis> with the attribute 'xyz'",
+        ),
+        (
+            [*ARM[:2], joint("a1", "base", "tip", f'<origin XYZ="0 0 1"/>{LIMIT}')],
+            "r.urdf:4: joint 'a1': unknown attribute 'XYZ' in <origin>, did you mean 'xyz'?",
+        ),
+        (
+            [
+                '<link name="base"><collision><geometry>',
+                '<mesh filename="m.stl" scales="1 1 1"/></geometry></collision></link>',
+            ],
+            "r.urdf:3: link 'base': unknown attribute 'scales' in <mesh>, did you mean 'scale'?",
+        ),
         ([f'<link name="l{i}"/>' for i in range(201)], "r.urdf: expected 1 to 200 links, got 201"),
         (
             [
