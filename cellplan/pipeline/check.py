@@ -8,6 +8,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
 from cellplan.pipeline.solve import with_start
 from cellplan.planning.given_starts import examine_given_starts
+from cellplan.planning.schedule import examine_times
 from cellplan.planning.start_search import find_start
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.scene import Scene
@@ -44,6 +45,7 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
     """
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    examine_times(cell, tuple(toolpaths.values()))
     examine_given_starts(cell, toolpaths)
     start = find_start(scene, toolpaths, progress=progress)
     pair = scene.touching(start)

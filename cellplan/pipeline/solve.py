@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import PurePath
 from typing import Final
 
 import numpy as np
@@ -19,7 +20,7 @@ from cellplan.pipeline.solution import Run, Solution
 from cellplan.planning.follow import follow
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.modes import RunPlan, plan_runs
-from cellplan.planning.schedule import schedule_tasks
+from cellplan.planning.schedule import examine_times, schedule_tasks
 from cellplan.planning.start_search import find_start
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.scene import Scene
@@ -43,6 +44,7 @@ def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -
     """
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    examine_times(cell, tuple(toolpaths.values()))
     examine_given_starts(cell, toolpaths)
     solved = with_start(cell, find_start(scene, toolpaths, progress=progress))
     start = np.concatenate([robot.start for robot in solved.robots if robot.start is not None])
@@ -93,7 +95,8 @@ def _with_verdict(cell: Cell, program: Program, report: Report) -> Program:
 
 def _digests(cell: Cell, program: Program) -> dict[str, str]:
     """Digest of the cell file, where there is one, and of the rows of all tables."""
-    of_cell = {"cell": cell.inputs[cell.origin.file]} if cell.origin.file in cell.inputs else {}
+    file = PurePath(cell.origin.file).name  # inputs are known by their path from the folder of the cell
+    of_cell = {"cell": cell.inputs[file]} if file in cell.inputs else {}
     return of_cell | {"program": program_digest(program.tables)}
 
 

@@ -14,6 +14,7 @@ from cellplan.model.toolpath import Toolpath
 from cellplan.planning.time_laws import advance, peak_rate
 
 MOST_SAMPLES: Final = 2_000_000  # tables longer than this fill disks, not controllers
+FEWEST_STEPS: Final = 10  # a task of fewer has so few samples that checks at them say nothing about its path
 STEP_ROOM: Final = 1e-9  # [-] share of a step by which the last task may outlast the clock: rounding of a quotient
 INSTANT_ROOM: Final = 1e-9  # [s] instants nearer than this are the same: rounding of sums of durations
 TIME_DECIMALS: Final = 12  # decimals kept of k * step, so that 0.001 * 3 reads 0.003
@@ -35,8 +36,7 @@ def schedule_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> Schedule:
     """
     tasks = [cell.task(toolpath.name) for toolpath in toolpaths]
     corners = [_corner_times(cell, task, toolpath) for task, toolpath in zip(tasks, toolpaths, strict=True)]
-    cycle = max((float(times[-1]) for times in corners), default=cell.motion.duration)
-    times = _clock(cell, cycle)
+    times = np.round(np.arange(_step_count(cell, corners) + 1) * cell.motion.step, TIME_DECIMALS)
     planned = zip(tasks, toolpaths, corners, strict=True)
     return Schedule(times=times, tasks=tuple(_follow_clock(times, *plan) for plan in planned))
 
@@ -58,15 +58,36 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
     return corners
 
 
-def _clock(cell: Cell, cycle: float) -> Array:
-    """Instants of the common clock in [s]; the last is not before the end of the cycle."""
+def examine_times(cell: Cell, toolpaths: Sequence[Toolpath]) -> None:
+    """See that the tasks fit a clock that shows enough of each, without making it.
+
+    Raises:
+        InputError: As `schedule_tasks` does, or a task has so few samples that nobody can judge its motion by them.
+    """
+    tasks = [cell.task(toolpath.name) for toolpath in toolpaths]
+    corners = [_corner_times(cell, task, toolpath) for task, toolpath in zip(tasks, toolpaths, strict=True)]
+    _step_count(cell, corners)
+    least = FEWEST_STEPS * cell.motion.step
+    for task, times in zip(tasks, corners, strict=True):
+        duration = float(times[-1] - times[0])
+        if duration < least * (1.0 - STEP_ROOM) - INSTANT_ROOM:
+            where = cell.origin.at(f"tasks.{task.name}.{'duration_s' if task.feed is None else 'feed_mm_s'}")
+            raise InputError(
+                f"{where}: expected a task of at least {least:g} s ({FEWEST_STEPS} times motion.step_s), "
+                f"got {duration:g} s; slow the task down or shorten the step"
+            )
+
+
+def _step_count(cell: Cell, corners: Sequence[Array]) -> int:
+    """Steps of the common clock; the last does not end before the last task."""
+    cycle = max((float(times[-1]) for times in corners), default=cell.motion.duration)
     steps = np.ceil(cycle / cell.motion.step - STEP_ROOM)
     if not steps < MOST_SAMPLES:
         raise InputError(
             f"{cell.origin.at('motion.step_s')}: expected a step that makes at most {MOST_SAMPLES} samples, "
             f"got {cell.motion.step:g} s for a cycle of {cycle:g} s; make the step longer"
         )
-    return np.round(np.arange(max(int(steps), 1) + 1) * cell.motion.step, TIME_DECIMALS)
+    return max(int(steps), 1)
 
 
 def _follow_clock(times: Array, task: Task, toolpath: Toolpath, corners: Array) -> TaskSchedule:

@@ -1,10 +1,12 @@
 """Every shipped cell that is meant to pass does, and its resolved copy says so again."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from cellplan import load_cell, solve
+from cellplan.model.cell import Cell
 from cellplan.pipeline.check import check
 
 CELLS = sorted((Path(__file__).resolve().parents[2] / "cells").glob("*.yaml"))
@@ -20,3 +22,18 @@ def test_cell_passes(path):
 @pytest.mark.parametrize("path", CELLS, ids=lambda p: p.stem)
 def test_cell_can_be_checked_without_solving(path):
     assert check(load_cell(path)).passed is (path.stem not in MEANT_TO_FAIL)
+
+
+def test_tables_do_not_depend_on_where_the_cell_was_called_from(monkeypatch):
+    path = CELLS[[one.stem for one in CELLS].index("turntable")]
+    from_afar = solve(_quick(load_cell(path))).runs[0].program.tables
+    monkeypatch.chdir(path.parent)
+
+    beside = solve(_quick(load_cell(path.name))).runs[0].program.tables
+
+    assert beside == from_afar
+    assert all("# cell digest: sha256 " in text for text in beside.values())
+
+
+def _quick(cell: Cell) -> Cell:
+    return replace(cell, motion=replace(cell.motion, step=0.02), solver=replace(cell.solver, gain=25.0))

@@ -29,7 +29,7 @@ from cellplan.model.task import (
     TimeLawKind,
     Tolerance,
 )
-from cellplan.planning.schedule import schedule_tasks
+from cellplan.planning.schedule import examine_times, schedule_tasks
 from cellplan.planning.toolpaths import build_toolpath
 
 ROLLER = Part(shape=Cylinder(0.25, 0.5), X_PS=pose(rpy=[0.0, np.pi / 2.0, 0.0]), held_by=(), X_WP=np.eye(4))
@@ -64,8 +64,8 @@ def task(name: str, path: PathSpec, **words: Any) -> Task:
     return Task(name=name, path=path, **(plain | words))
 
 
-def scheduled(*tasks: Task, duration: float = 4.0, step: float = 0.001) -> Schedule:
-    cell = Cell(
+def clocked(*tasks: Task, duration: float = 4.0, step: float = 0.001) -> Cell:
+    return Cell(
         name="cell",
         robots=(),
         part=ROLLER,
@@ -77,6 +77,10 @@ def scheduled(*tasks: Task, duration: float = 4.0, step: float = 0.001) -> Sched
         origin=ORIGIN,
         inputs={},
     )
+
+
+def scheduled(*tasks: Task, duration: float = 4.0, step: float = 0.001) -> Schedule:
+    cell = clocked(*tasks, duration=duration, step=step)
     return schedule_tasks(cell, [build_toolpath(one, ROLLER, ORIGIN) for one in tasks])
 
 
@@ -210,3 +214,30 @@ def test_too_many_samples_are_refused() -> None:
         "cell.yaml:20: motion.step_s: expected a step that makes at most 2000000 samples, got 1e-06 s for a cycle of "
         "4 s; make the step longer"
     )
+
+
+@pytest.mark.parametrize(
+    ("words", "got", "key"),
+    [
+        ({"duration": 0.0099}, "0.0099", "duration_s"),
+        ({"start": 3.995}, "0.005", "duration_s"),
+        ({"feed": 1e3}, None, "feed_mm_s"),
+    ],
+)
+def test_a_task_too_short_to_be_judged_by_its_samples_is_refused(words: Any, got: str | None, key: str) -> None:
+    """A closed path within one step would pass every check with a tool that never moves."""
+    one = on_roller(**words)
+
+    with pytest.raises(InputError) as caught:
+        examine_times(clocked(one), [build_toolpath(one, ROLLER, ORIGIN)])
+
+    told = str(caught.value)
+    wanted = "expected a task of at least 0.01 s (10 times motion.step_s), got "
+    assert told.startswith(f"cell.yaml:7: tasks.a.{key}: {wanted}{got or ''}")
+    assert told.endswith("; slow the task down or shorten the step")
+
+
+def test_ten_steps_are_enough() -> None:
+    one = on_roller(duration=0.01)
+
+    examine_times(clocked(one), [build_toolpath(one, ROLLER, ORIGIN)])
