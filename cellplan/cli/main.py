@@ -1,5 +1,6 @@
 """The program ``cellplan``: its commands, and the one place where errors become lines and exit statuses."""
 
+import signal
 import sys
 from collections.abc import Sequence
 from typing import Annotated, NoReturn
@@ -70,5 +71,9 @@ def _usage_status(error: BaseException) -> int | None:
 
 
 def main() -> NoReturn:
-    """Enter from the console."""
+    """Enter from the console; whoever ends the program or closes its terminal interrupts it, as Ctrl-C does."""
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) == signal.SIG_DFL:  # nohup keeps its way
+            signal.signal(number, signal.default_int_handler)
     sys.exit(run())

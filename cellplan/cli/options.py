@@ -9,7 +9,12 @@ CellFile = Annotated[Path, typer.Argument(metavar="CELL", help="Cell file (YAML)
 AllowDirs = Annotated[
     list[Path] | None,
     typer.Option(
-        "--allow-dir", metavar="DIR", help="Also read files below this folder; may be repeated.", show_default=False
+        "--allow-dir",
+        metavar="DIR",
+        help="Also read files below this folder; may be repeated.",
+        show_default=False,
+        exists=True,
+        file_okay=False,
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]

@@ -73,16 +73,24 @@ def test_a_full_disk_is_told_in_one_line() -> None:
     assert ended.stderr == "error: standard output: the result was not shown: no space left on device\n"
 
 
-def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
+def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Path, number: signal.Signals) -> None:
     folder = tmp_path / "run"
     command = [*PROGRAM, "solve", str(cells / "four_robots.yaml"), "-o", str(folder), "--duration", "60"]
 
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     time.sleep(2.0)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     out, err = process.communicate(timeout=10)
 
     assert process.returncode == 130
     assert out == ""
     assert err.splitlines()[-1] == "interrupted: nothing was written"
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_does_not_exist_cannot_be_allowed(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status = run(["check", str(cells / "turntable.yaml"), "--allow-dir", "absent"])
+
+    assert status == 2
+    assert "'absent' does not exist" in capsys.readouterr().err
