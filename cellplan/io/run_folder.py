@@ -50,8 +50,11 @@ class RunFolder:
         return self
 
     def write_text(self, name: str, text: str) -> None:
-        """Write a text file in UTF-8, line breaks as given; ``name`` is relative, with ``/`` between folders."""
-        self.write_bytes(name, text.encode())
+        """Write a text file in UTF-8, line breaks as given; ``name`` is relative, with ``/`` between folders.
+
+        The name of an input file may hold bytes that are not UTF-8; they are written as escapes.
+        """
+        self.write_bytes(name, text.encode("utf-8", "backslashreplace"))
 
     def write_bytes(self, name: str, content: bytes) -> None:
         """Write a file and force it to the disk.

@@ -190,3 +190,9 @@ def test_full_disk_is_one_line_and_leaves_nothing(tmp_path: Path) -> None:
         signal.signal(signal.SIGXFSZ, ignored)
     assert str(caught.value) == f"{tmp_path / 'bench/tables/arm.csv'}: cannot write the output: file too large"
     assert names_in(tmp_path) == []
+
+
+def test_names_that_are_not_utf8_are_written_as_escapes(tmp_path: Path) -> None:
+    """The name of a cell file may hold any byte; Python keeps it as a lone surrogate."""
+    write_run(tmp_path / "bench", tables="# from bad\udcffname.yaml\n")
+    assert (tmp_path / "bench/tables/arm.csv").read_bytes() == b"# from bad\\udcffname.yaml\n"
