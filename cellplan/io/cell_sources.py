@@ -59,7 +59,7 @@ class Sources:
             if mesh is not None:
                 require_solid(mesh)
         except InputError as error:
-            self.errors.append(error)
+            self.complaints.append(self._document.complaint(path, str(error)))
             return None
         return mesh
 
@@ -101,7 +101,7 @@ class Sources:
             mesh = read_mesh(place, scale=MESH_UNITS[unit])
             self.inputs[written] = digest_of_file(place, file=written)
         except InputError as error:
-            self.errors.append(error)
+            self.complaints.append(self._document.complaint(path, str(error)))
             return None
         return mesh
 

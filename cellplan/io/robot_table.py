@@ -64,7 +64,7 @@ def load_robot_table(path: Path, *, file: str, reach: Reach) -> RobotTable:
         complaints += _rules(table, document)
     meshes = _Meshes(document, reach)
     bodies = tuple(_bodies(table, meshes)) if table is not None and not complaints else ()
-    raise_complaints(file, [*complaints, *meshes.complaints], meshes.errors)
+    raise_complaints(file, [*complaints, *meshes.complaints])
     if table is None:
         raise InputError(f"{file}: the table cannot be understood")
     return RobotTable(model=_model(table, bodies), digest=document.digest, mesh_files=meshes.files)
@@ -101,7 +101,6 @@ class _Meshes:
         self._read: dict[tuple[str, str], Mesh] = {}
         self.files: dict[str, Path] = {}
         self.complaints: list[Complaint] = []
-        self.errors: list[InputError] = []
 
     def mesh(self, written: str, unit: str, *, index: int) -> Mesh | None:
         """Mesh in [m]; None after a complaint."""
@@ -115,7 +114,7 @@ class _Meshes:
         try:
             mesh = read_mesh(path, scale=MESH_UNITS[unit])
         except InputError as error:
-            self.errors.append(error)
+            self.complaints.append(self._document.complaint(("bodies", index, "mesh", "file"), str(error)))
             return None
         self.files[written] = path
         self._read[written, unit] = mesh

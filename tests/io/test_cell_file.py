@@ -210,6 +210,14 @@ def test_files_elsewhere_need_leave_also_through_links(load: Load, refuse: Refus
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes in the file system")
+def test_a_damaged_mesh_is_told_with_the_line_that_names_it(refuse: Refuse, tmp_path: Path) -> None:
+    (tmp_path / "part.stl").write_bytes(b"\x89PNG")
+
+    told = refuse(("{cylinder: {radius_mm: 250, length_mm: 500, axis: x}}", "{mesh: part.stl, unit: mm}"))
+
+    assert [line.startswith("c:13: part.geometry.mesh: part.stl: expected ") for line in told] == [True]
+
+
 def test_a_pipe_named_as_mesh_is_refused(load: Load, refuse: Refuse, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "part.stl")
 
