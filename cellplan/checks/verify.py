@@ -7,6 +7,7 @@ import numpy as np
 from cellplan.checks.clearance import check_clearance
 from cellplan.checks.conditioning import conditioning
 from cellplan.checks.limits import check_joints, joint_uses
+from cellplan.checks.speeds import robot_speed
 from cellplan.checks.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
@@ -66,6 +67,10 @@ def verify(
         clearance=clearance,
         conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving),
         motion_share=_motion_share(uses),
+        speeds={
+            robot.name: robot_speed(robot, scene.chains[robot.name], schedule.times, q[robot.name])
+            for robot in cell.robots
+        },
         times=schedule.times,
         q=q,
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},

@@ -11,6 +11,9 @@ CAUTION = (
 )
 
 
+REDUCED_SPEED = 0.25  # [m/s] of the tool tip: what ISO 10218-1 allows while people are near
+
+
 class ClearanceClass(StrEnum):
     """What keeps its distance from what."""
 
@@ -83,6 +86,27 @@ class JointUse:
     velocity_limit: float
     peak_velocity_at_s: float
     travel: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotSpeed:
+    """How fast a robot moves in the world, between the samples.
+
+    Attributes:
+        tool_peak: Largest speed of the tool tip in [m/s].
+        tool_peak_at_s: Its instant.
+        share_above_reduced: Share of the cycle, 0..1, in which the tool tip is faster than ``REDUCED_SPEED``.
+        axis_peak: Largest speed of a point on a joint axis (shoulder, elbow, wrist) in [m/s].
+        axis: The joint whose axis that is.
+        axis_peak_at_s: Its instant.
+    """
+
+    tool_peak: float
+    tool_peak_at_s: float
+    share_above_reduced: float
+    axis_peak: float
+    axis: str
+    axis_peak_at_s: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,6 +186,7 @@ class Report:
         clearance: Distances.
         conditioning: Smallest singular values.
         motion_share: Share of all joint travel per robot, 0..1, and the busiest joint of each, as (share, joint).
+        speeds: How fast each robot moves in the world.
         times: The common clock in [s], shape (N,).
         q: Positions read back from the tables in [rad] or [m], shape (N, n), by robot.
         qd: Speeds between the samples, shape (N - 1, n), by robot.
@@ -176,6 +201,7 @@ class Report:
     clearance: ClearanceReport
     conditioning: Conditioning
     motion_share: Mapping[str, tuple[float, str]]
+    speeds: Mapping[str, RobotSpeed]
     times: Array
     q: Mapping[str, Array]
     qd: Mapping[str, Array]

@@ -11,6 +11,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.report import (
     CAUTION,
+    REDUCED_SPEED,
     Check,
     ClearanceClass,
     ClearanceMinimum,
@@ -19,6 +20,7 @@ from cellplan.model.report import (
     Contact,
     JointUse,
     Report,
+    RobotSpeed,
     TaskAccuracy,
 )
 
@@ -62,6 +64,7 @@ def report_record(report: Report, *, cell: Cell, provenance: Provenance) -> Reco
         "exclusions": exclusions_record(report.clearance),
         "singularity": _singularity_record(report.conditioning, report.times),
         "motion_share": _motion_share_record(report, cell),
+        "speeds": {robot: _speed_record(speed) for robot, speed in report.speeds.items()},
         "checks": [check_record(check) for check in report.checks],
         "before_you_run": withdrawals(report, cell),
         **origin_record(cell, provenance),
@@ -287,6 +290,18 @@ def _motion_share_record(report: Report, cell: Cell) -> Record:
             "unit": "deg" if use is None or use.is_revolute else "mm",
         }
     return record
+
+
+def _speed_record(speed: RobotSpeed) -> Record:
+    """How fast a robot moves in the world."""
+    return {
+        "tool_peak_mm_s": number(1e3 * speed.tool_peak),
+        "tool_peak_at_s": number(speed.tool_peak_at_s),
+        f"share_above_{1e3 * REDUCED_SPEED:.0f}_mm_s": number(speed.share_above_reduced),
+        "axis_peak_mm_s": number(1e3 * speed.axis_peak),
+        "axis": speed.axis,
+        "axis_peak_at_s": number(speed.axis_peak_at_s),
+    }
 
 
 def role(robot: str, report: Report, cell: Cell) -> str:

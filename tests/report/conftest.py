@@ -31,6 +31,7 @@ from cellplan.model.report import (
     Contact,
     JointUse,
     Report,
+    RobotSpeed,
     TaskAccuracy,
 )
 from cellplan.model.robot import Joint, JointKind, RobotModel
@@ -167,6 +168,17 @@ def _accuracy(index: int, task: str, robot: str) -> TaskAccuracy:
     )
 
 
+def _speed(i: int) -> RobotSpeed:
+    return RobotSpeed(
+        tool_peak=0.2 + 0.1 * i,
+        tool_peak_at_s=1.25,
+        share_above_reduced=0.25 * i,
+        axis_peak=0.3,
+        axis="C3",
+        axis_peak_at_s=2.5,
+    )
+
+
 def _clearance() -> ClearanceReport:
     curve_times = TIMES[::10]
     names = {
@@ -268,6 +280,7 @@ def _run(name: str = "four-robots", amplitude: float = 1.0, kinds: str = "rrrrrr
         clearance=_clearance(),
         conditioning=conditioning,
         motion_share=share,
+        speeds={robot: _speed(i) for i, robot in enumerate(q)},
         times=TIMES,
         q=q,
         qd=qd,

@@ -171,6 +171,7 @@ def hostile(run: Any) -> Any:
         q={renamed.get(name, name): values for name, values in report.q.items()},
         qd={renamed.get(name, name): values for name, values in report.qd.items()},
         motion_share={renamed.get(name, name): share for name, share in report.motion_share.items()},
+        speeds={renamed.get(name, name): replace(speed, axis=HOSTILE) for name, speed in report.speeds.items()},
         clearance=replace(report.clearance, exclusions=((HOSTILE, HOSTILE, HOSTILE),)),
     )
     cell = replace(run.cell, robots=robots, inputs={HOSTILE: HOSTILE})

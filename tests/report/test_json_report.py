@@ -191,3 +191,15 @@ def test_numbers_keep_twelve_digits(value: float) -> None:
 def test_conversion_leaves_no_noise() -> None:
     assert number(math.degrees(math.radians(-185.0))) == -185.0
     assert (number(math.nan), number(math.inf), number(None), number(-0.0)) == (None, None, None, 0.0)
+
+
+def test_speeds_in_the_world_are_told_in_millimetres_per_second(passed_run: Any) -> None:
+    speeds = record_of(passed_run)["speeds"]
+    assert speeds["kuka"] == {
+        "tool_peak_mm_s": 300.0,
+        "tool_peak_at_s": 1.25,
+        "share_above_250_mm_s": 0.25,
+        "axis_peak_mm_s": 300.0,
+        "axis": "C3",
+        "axis_peak_at_s": 2.5,
+    }
