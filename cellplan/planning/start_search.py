@@ -69,13 +69,12 @@ def find_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: Pro
     if all(robot.start is not None for robot in cell.robots):
         return np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     candidates = _candidates(scene, toolpaths, progress)
-    if len(candidates) == 1:
-        return candidates[0]
-    qualities = []
+    rehearsed = []
     for index, candidate in enumerate(candidates):
         progress("rehearsing start postures", index / len(candidates))
-        qualities.append(_rehearse(scene, toolpaths, candidate))
-    return candidates[int(np.argmax(qualities))]
+        rehearsed.append(_rehearse(scene, toolpaths, candidate))
+    best = int(np.argmax([quality for quality, _ in rehearsed]))
+    return rehearsed[best][1]
 
 
 def _candidates(scene: Scene, toolpaths: Mapping[str, Toolpath], progress: Progress) -> list[Array]:
@@ -182,16 +181,34 @@ def _combinations(
             return []
         choices.append(branches)
     found: list[Array] = []
-    for combination in sorted(product(*choices), key=lambda c: -min(score for score, _ in c)):
-        q = np.concatenate([posture for _, posture in combination])
+    blocked: set[tuple[tuple[int, int], ...]] = set()
+    order = sorted(
+        product(*(range(len(branches)) for branches in choices)),
+        key=lambda picks: -min(branches[pick][0] for branches, pick in zip(choices, picks, strict=True)),
+    )
+    for picks in order:
+        if any(all(picks[robot] == pick for robot, pick in known) for known in blocked):
+            continue
+        q = np.concatenate([branches[pick][1] for branches, pick in zip(choices, picks, strict=True)])
         pair = scene.touching(q)
         if pair is None:
             found.append(q)
         else:
             obstructions.touching[pair] = obstructions.touching.get(pair, 0) + 1
+            blocked.add(_culprits(cell, pair, picks))
         if len(found) == room:
             break
     return found
+
+
+def _culprits(cell: Cell, pair: tuple[str, str], picks: tuple[int, ...]) -> tuple[tuple[int, int], ...]:
+    """Robots of a pair that touches with the branches they are on: no other robot can keep these from touching."""
+    owners = {name.split("/")[0] for name in pair}
+    return tuple(
+        (index, picks[index])
+        for index, robot in enumerate(cell.robots)
+        if robot.name in owners or (robot.name in cell.positioners and "part" in owners)
+    )
 
 
 def _branches(
@@ -225,8 +242,11 @@ def _branches(
     return [(float(scores[index]), q[index]) for index in order]
 
 
-def _rehearse(scene: Scene, toolpaths: Mapping[str, Toolpath], start: Array) -> float:
-    """Quality of a start posture: smallest share of joint range and joint speed left free on a coarse clock."""
+def _rehearse(scene: Scene, toolpaths: Mapping[str, Toolpath], start: Array) -> tuple[float, Array]:
+    """Quality of a start posture on a coarse clock, and the posture with joints turned so that they have most room.
+
+    The quality is the smallest share of joint range and joint speed left free, less when something collides.
+    """
     cell = scene.cell
     schedule = schedule_tasks(cell, [toolpaths[task.name] for task in cell.tasks])
     step = max(cell.motion.step, schedule.times[-1] / REHEARSAL_SAMPLES)
@@ -235,18 +255,38 @@ def _rehearse(scene: Scene, toolpaths: Mapping[str, Toolpath], start: Array) -> 
         motion=replace(cell.motion, step=float(step)),
         solver=replace(cell.solver, gain=REHEARSAL_GAIN / float(step)),
     )
-    quality = 1.0
+    motions = []
     for run in plan_runs(coarse):
         schedule = schedule_tasks(coarse, [toolpaths[name] for name in run.tasks])
         try:
-            q = follow(coarse, schedule, start=start, moving=run.moving).q
+            motions.append(follow(coarse, schedule, start=start, moving=run.moving).q)
         except NoSolutionError:
-            return -np.inf
-        quality = min(quality, _share_left_free(coarse, q, schedule.step))
+            return -np.inf, start
+    turns = _whole_turns(cell, np.concatenate(motions))
+    quality = min(_share_left_free(coarse, q + turns, schedule.step) for q in motions)
+    for q in motions:
         instants = np.linspace(0, len(q) - 1, TOUCH_INSTANTS).astype(int)
         if any(scene.touching(q[k]) is not None for k in instants):
             quality = min(quality, 1.0) - TOUCHING
-    return quality
+    return quality, start + turns
+
+
+def _whole_turns(cell: Cell, q: Array) -> Array:
+    """Whole turns in [rad] that bring the motion of each joint nearest to mid-range; none where the start is given.
+
+    A posture does not show on which turn its joints are, and a wrist may need a whole turn of room on one side.
+    """
+    turns = np.zeros(q.shape[1])
+    for robot in cell.robots:
+        if robot.start is None:
+            lower, upper = robot.model.lower, robot.model.upper
+            motion = q[:, cell.columns(robot.name)]
+            turning = np.isfinite(upper - lower) & np.array([joint.is_revolute for joint in robot.model.joints])
+            middle = 0.5 * np.where(turning, lower + upper, 0.0)
+            own = -2 * np.pi * np.round((0.5 * (motion.min(axis=0) + motion.max(axis=0)) - middle) / (2 * np.pi))
+            start = motion[0] + own
+            turns[cell.columns(robot.name)] = np.where(turning & (start >= lower) & (start <= upper), own, 0.0)
+    return turns
 
 
 def _share_left_free(cell: Cell, q: Array, step: float) -> float:

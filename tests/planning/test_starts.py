@@ -1,5 +1,6 @@
 """Start postures: given ones are examined, missing ones found within limits, on the task and free."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +10,10 @@ from cellplan import load_cell
 from cellplan.errors import InvalidFileError, StartNotFoundError, StartOffTaskError, StartOutsideLimitsError
 from cellplan.geometry.transforms import inverse
 from cellplan.kinematics.screws import ScrewChain
+from cellplan.planning.follow import follow
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.inverse_kinematics import margin_shares, random_postures, reaching_postures, within_limits
+from cellplan.planning.schedule import schedule_tasks
 from cellplan.planning.start_search import find_start
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.scene import Scene
@@ -102,6 +105,59 @@ def test_all_postures_of_the_positioner_may_be_open_as_well(cells):
     scene = Scene.from_cell(cell)
     q = find_start(scene, toolpaths_of(cell))
     assert scene.touching(q) is None
+
+
+WRIST_THAT_TURNS_ROUND = """
+cellplan: 1
+name: one-arm-at-a-ball
+robots:
+  kuka: {model: kuka_kr6, tool: {xyz_mm: [0, 0, 150]}, start_deg: auto}
+part: {geometry: {sphere: {radius_mm: 120}}, at: {xyz_mm: [1100, 0, 600]}}
+tasks:
+  ring: {robot: kuka, path: {circle: {radius_mm: 40, plane: yz}, project: [-1, 0, 1]}, tool_axis: normal, tool_x: +z}
+motion: {mode: simultaneous, duration_s: 4, step_s: 0.01, time_law: quintic}
+"""
+
+
+def test_a_wrist_that_turns_round_begins_where_a_whole_turn_has_room(tmp_path):
+    """The circle leads the tool axis once round the forearm: D2, free for 700 deg, must make a whole turn."""
+    (tmp_path / "cell.yaml").write_text(WRIST_THAT_TURNS_ROUND, encoding="utf-8")
+    cell = load_cell(tmp_path / "cell.yaml")
+    toolpaths = toolpaths_of(cell)
+
+    start = find_start(Scene.from_cell(cell), toolpaths)
+
+    schedule = schedule_tasks(cell, list(toolpaths.values()))
+    q = follow(cell, schedule, start=start, moving=["kuka"]).q
+    assert abs(q[-1, 3] - q[0, 3]) == pytest.approx(2 * np.pi, abs=1e-2)  # the tracking error at the end of the path
+    assert margin_shares(cell.robot("kuka").model, q).min() > 0.0
+
+
+def test_arms_that_cannot_help_do_not_multiply_a_search_without_hope(tmp_path):
+    """Seven free arms of a few branches each beside one that stands in a wall make thousands of combinations."""
+    lines = ["cellplan: 1", "name: eight-arms", "robots:"]
+    turns = [float(turn) for turn in range(0, 360, 45)]
+    for k, turn in enumerate(turns):
+        x, y = 1350.0 * np.cos(np.radians(turn)), 1350.0 * np.sin(np.radians(turn))
+        base = f"{{xyz_mm: [{x:.3f}, {y:.3f}, 0], rpy_deg: [0, 0, {turn - 180.0}]}}"
+        lines.append(f"  r{k}: {{model: staubli_rx90l, base: {base}, tool: {{xyz_mm: [0, 0, 200]}}}}")
+    lines += ["part: {geometry: {sphere: {radius_mm: 300}}, at: {xyz_mm: [0, 0, 700]}}", "tasks:"]
+    for k, turn in enumerate(turns):
+        side = f"[{np.cos(np.radians(turn)):.6f}, {np.sin(np.radians(turn)):.6f}, 0]"
+        across = f"[{-60 * np.sin(np.radians(turn)):.6f}, {60 * np.cos(np.radians(turn)):.6f}, 0]"
+        path = f"{{polyline: {{points_mm: [{across}, [0, 0, 60]]}}, project: {side}}}"
+        lines.append(f"  t{k}: {{robot: r{k}, path: {path}, tool_axis: normal, tool_x: +z, duration_s: 2}}")
+    lines += ["environment:", "  wall: {box: {size_mm: [200, 200, 600]}, at: {xyz_mm: [1000, 0, 700]}}"]
+    lines += ["motion: {mode: simultaneous, duration_s: 2}"]
+    (tmp_path / "cell.yaml").write_text("\n".join(lines), encoding="utf-8")
+    cell = load_cell(tmp_path / "cell.yaml")
+    scene, toolpaths = Scene.from_cell(cell), toolpaths_of(cell)
+
+    began = time.process_time()
+    with pytest.raises(StartNotFoundError, match=r"collides, most often 'r0/.*' with 'wall'"):
+        find_start(scene, toolpaths)
+
+    assert time.process_time() - began < 20.0  # some 3 s; looking at every combination takes minutes
 
 
 def test_base_out_of_reach_is_named(cell):
