@@ -11,7 +11,7 @@ from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml_writer import yaml_text
 from cellplan.model.cell import Cell, Part, Robot
 from cellplan.model.robot import RobotModel
-from cellplan.model.task import Task
+from cellplan.model.task import SampledPath, Task
 
 NEIGHBOURS: Final = 3  # units in the last place round the quotient in which the written number is sought
 MM: Final = 1000.0  # [mm/m]
@@ -98,6 +98,9 @@ def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
     written = {**entry, "start_s": task.start}
     if task.duration is not None:
         written["duration_s"] = task.duration
+    if isinstance(task.path, SampledPath):
+        settings = {"file": task.path.source, "smooth": task.path.is_smooth, "closed": task.path.is_closed}
+        written["path"] = {**entry["path"], "csv": settings}
     return written
 
 

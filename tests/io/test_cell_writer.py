@@ -49,6 +49,20 @@ def test_a_written_cell_loads_to_the_same_cell_and_writes_the_same_text(cells: P
     assert render_cell(again) == render_cell(cell)
 
 
+def test_a_csv_that_is_named_only_is_written_with_its_defaults(cells: Path, tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,0,-1\n10,0,0,0,0,-1\n", encoding="utf-8")
+    text = (cells / "four_robots.yaml").read_text(encoding="utf-8")
+    circle = "{circle: {center_mm: [0, 0], radius_mm: 100, plane: xy}, project: +z}"
+    assert circle in text
+    (tmp_path / "cell.yaml").write_text(text.replace(circle, "{csv: path.csv}"), encoding="utf-8")
+    cell = load_cell(tmp_path / "cell.yaml")
+
+    again = reload(cell, tmp_path)
+
+    assert "csv: {file: path.csv, smooth: true, closed: false}" in render_cell(cell)
+    assert same(cell, again)
+
+
 @pytest.mark.parametrize(
     "change",
     [
