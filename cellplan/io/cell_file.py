@@ -19,7 +19,7 @@ from cellplan.io.cell_build import (
 from cellplan.io.cell_rules import needs_surface, rule_complaints
 from cellplan.io.cell_sources import Sources
 from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, raise_complaints
-from cellplan.io.reach import Reach
+from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.robot_rules import robot_complaints
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.pieces import Pieces, read_pieces
@@ -51,7 +51,9 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> Cell:
     if pieces.is_too_large:
         raise_complaints(file, complaints)
     complaints += rule_complaints(pieces, document)
-    sources = Sources(document, Reach(folder=path.parent, allowed=tuple(Path(folder) for folder in allow_dirs)))
+    sources = Sources(
+        document, AllowedFolders(folder=path.parent, allowed=tuple(Path(folder) for folder in allow_dirs))
+    )
     sources.inputs[path.name] = document.digest
     models = _models(pieces, sources)
     for name, model in models.items():

@@ -13,7 +13,7 @@ from cellplan.geometry.shapes import Mesh
 from cellplan.io.bundled_robots import load_bundled_table
 from cellplan.io.complaints import Complaint, KeyPath, shown
 from cellplan.io.input_files import digest_of_file
-from cellplan.io.reach import Reach
+from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.robot_rules import limits_in_si, tightened
 from cellplan.io.robot_table import MESH_UNITS, RobotTable, load_robot_table
 from cellplan.io.schema.robot import RobotEntry
@@ -37,10 +37,10 @@ class Sources:
         errors: About the files themselves.
     """
 
-    def __init__(self, document: YamlDocument, reach: Reach) -> None:
+    def __init__(self, document: YamlDocument, folders: AllowedFolders) -> None:
         """Remember where to look and where to complain."""
         self._document = document
-        self._reach = reach
+        self._folders = folders
         self._meshes: dict[tuple[str, str], Mesh | None] = {}
         self.inputs: dict[str, str] = {}
         self.complaints: list[Complaint] = []
@@ -108,7 +108,7 @@ class Sources:
     def _file(self, written: str, path: KeyPath) -> Path | None:
         """Path of a named file; None after a complaint."""
         try:
-            return self._reach.file(written)
+            return self._folders.file(written)
         except InputError as error:
             self.complaints.append(self._document.complaint(path, str(error)))
             return None
@@ -135,8 +135,8 @@ class Sources:
         if place is None:
             return None
         try:
-            reach = Reach(folder=place.parent, allowed=(self._reach.folder, *self._reach.allowed))
-            table = load_robot_table(place, file=str(place), reach=reach)
+            folders = AllowedFolders(folder=place.parent, allowed=(self._folders.folder, *self._folders.allowed))
+            table = load_robot_table(place, file=str(place), folders=folders)
             self.inputs[entry.model] = table.digest
             for written, mesh in table.mesh_files.items():
                 key = posixpath.join(posixpath.dirname(entry.model), written)
@@ -162,7 +162,7 @@ class Sources:
             robot = load_urdf(place, options)
             self.inputs[entry.model] = digest_of_file(place, file=entry.model)
             for mesh in robot.mesh_files:
-                if not self._reach.holds(mesh):
+                if not self._folders.holds(mesh):
                     text = f"expected meshes below the folder of the cell file, got {shown(mesh.name)} from elsewhere"
                     self.complaints.append(self._document.complaint(path, f"{text}; allow it with --allow-dir"))
                     return None
@@ -179,7 +179,7 @@ class Sources:
         found: list[Path] = []
         for index, written in enumerate(entry.package_dirs):
             try:
-                found.append(self._reach.directory(written))
+                found.append(self._folders.directory(written))
             except InputError as error:
                 path = ("robots", name, "package_dirs", index)
                 self.complaints.append(self._document.complaint(path, str(error)))

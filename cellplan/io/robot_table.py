@@ -13,7 +13,7 @@ from cellplan.errors import InputError
 from cellplan.geometry.meshes import read_mesh
 from cellplan.geometry.shapes import Mesh
 from cellplan.io.complaints import Complaint, did_you_mean, listed, raise_complaints, shown
-from cellplan.io.reach import Reach
+from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.schema import RobotTableDocument
 from cellplan.io.schema.messages import validate
 from cellplan.io.schema.robot_table import JointEntry
@@ -43,16 +43,16 @@ class RobotTable:
 
 def read_robot_table(path: Path) -> RobotModel:
     """Robot model of a joint-axis table; see `load_robot_table`."""
-    return load_robot_table(path, file=str(path), reach=Reach(folder=path.parent)).model
+    return load_robot_table(path, file=str(path), folders=AllowedFolders(folder=path.parent)).model
 
 
-def load_robot_table(path: Path, *, file: str, reach: Reach) -> RobotTable:
+def load_robot_table(path: Path, *, file: str, folders: AllowedFolders) -> RobotTable:
     """Read a joint-axis table and its meshes.
 
     Args:
         path: The table.
         file: Its name in messages.
-        reach: Where its meshes may lie.
+        folders: Where its meshes may lie.
 
     Raises:
         InputError: All complaints about the table at once, or what is wrong with a mesh.
@@ -62,7 +62,7 @@ def load_robot_table(path: Path, *, file: str, reach: Reach) -> RobotTable:
     complaints += document.complaints
     if table is not None:
         complaints += _rules(table, document)
-    meshes = _Meshes(document, reach)
+    meshes = _Meshes(document, folders)
     bodies = tuple(_bodies(table, meshes)) if table is not None and not complaints else ()
     raise_complaints(file, [*complaints, *meshes.complaints])
     if table is None:
@@ -94,10 +94,10 @@ def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Compla
 class _Meshes:
     """Mesh files of a table, each read once for each unit."""
 
-    def __init__(self, document: YamlDocument, reach: Reach) -> None:
+    def __init__(self, document: YamlDocument, folders: AllowedFolders) -> None:
         """Remember where to look and where to complain."""
         self._document = document
-        self._reach = reach
+        self._folders = folders
         self._read: dict[tuple[str, str], Mesh] = {}
         self.files: dict[str, Path] = {}
         self.complaints: list[Complaint] = []
@@ -107,7 +107,7 @@ class _Meshes:
         if (written, unit) in self._read:
             return self._read[written, unit]
         try:
-            path = self._reach.file(written)
+            path = self._folders.file(written)
         except InputError as error:
             self.complaints.append(self._document.complaint(("bodies", index, "mesh", "file"), str(error)))
             return None

@@ -8,7 +8,7 @@ from cellplan.io.complaints import shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reach:
+class AllowedFolders:
     """Folder that names are relative to, and folders that they may lead into.
 
     Attributes:
@@ -20,7 +20,7 @@ class Reach:
     allowed: tuple[Path, ...] = ()
 
     def file(self, written: str) -> Path:
-        """Path of a file that exists within reach.
+        """Path of a file that exists within the allowed folders.
 
         Raises:
             InputError: With the reason only; the caller knows where the name stands.
@@ -33,7 +33,7 @@ class Reach:
         return path
 
     def directory(self, written: str) -> Path:
-        """Path of a folder that exists within reach.
+        """Path of a folder that exists within the allowed folders.
 
         Raises:
             InputError: With the reason only; the caller knows where the name stands.
@@ -44,7 +44,7 @@ class Reach:
         return path
 
     def holds(self, path: Path) -> bool:
-        """Whether a path, followed through all links, lies within reach."""
+        """Whether a path, followed through all links, lies within the allowed folders."""
         try:
             real = path.resolve()
             return any(real.is_relative_to(root.resolve()) for root in (self.folder, *self.allowed))
