@@ -26,7 +26,7 @@ def exit_status(error: BaseException) -> ExitStatus:
 def error_lines(error: BaseException) -> list[str]:
     """What went wrong, one complaint per line; a complaint about a line of a file begins with ``FILE:LINE:``."""
     if isinstance(error, KeyboardInterrupt):
-        return ["interrupted: nothing was written"]
+        return ["interrupted: no half-written run is left behind"]
     if isinstance(error, InvalidFileError):
         return [_one_line(str(complaint)) for complaint in error.complaints]
     if isinstance(error, CellplanError):

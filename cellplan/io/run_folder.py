@@ -32,6 +32,7 @@ class RunFolder:
         """Name the folder; nothing is touched before the ``with`` statement begins."""
         self.path = path
         self._draft = path.parent / f".{path.name}.{uuid4().hex[:12]}.partial"
+        self._aside = self._draft.with_suffix(".replaced")  # where the older run waits for its end
         self._made_parents: list[Path] = []
 
     def __enter__(self) -> Self:
@@ -90,7 +91,7 @@ class RunFolder:
         except OSError as failure:
             raise _cannot_write(self.path, failure) from failure
         finally:
-            shutil.rmtree(self._draft, ignore_errors=True)
+            _remove([self._draft, self._aside] if self.path.exists() else [self._draft])
             _remove_empty(self._made_parents)
 
     def _put_into_place(self) -> None:
@@ -98,18 +99,14 @@ class RunFolder:
         refuse_unless_replaceable(self.path)  # again: planning took a while
         for folder in (self._draft, *(path for path in self._draft.rglob("*") if path.is_dir())):
             _sync_folder(folder)
-        aside = self._draft.with_suffix(".replaced")
-        if not self.path.exists():
+        try:
+            if self.path.exists():
+                self.path.rename(self._aside)
             self._draft.rename(self.path)
-        else:
-            self.path.rename(aside)
-            try:
-                self._draft.rename(self.path)
-            except BaseException:
-                if not self.path.exists():
-                    aside.rename(self.path)
-                raise
-        shutil.rmtree(aside, ignore_errors=True)
+        except BaseException:
+            if self._aside.exists() and not self.path.exists():
+                self._aside.rename(self.path)
+            raise
         with contextlib.suppress(OSError):  # the run is in place; a folder that may not be read need not be synced
             _sync_folder(self.path.parent)
 
@@ -181,6 +178,16 @@ def _make_parents(folder: Path) -> list[Path]:
     for path in reversed(missing):
         path.mkdir(exist_ok=True)
     return missing
+
+
+def _remove(folders: list[Path]) -> None:
+    """Remove folders, to the end even when an interruption comes meanwhile."""
+    try:
+        for folder in folders:
+            shutil.rmtree(folder, ignore_errors=True)
+    finally:
+        for folder in folders:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _remove_empty(folders: list[Path]) -> None:

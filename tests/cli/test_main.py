@@ -85,7 +85,7 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Pa
 
     assert process.returncode == 130
     assert out == ""
-    assert err.splitlines()[-1] == "interrupted: nothing was written"
+    assert err.splitlines()[-1] == "interrupted: no half-written run is left behind"
     assert list(tmp_path.iterdir()) == []
 
 

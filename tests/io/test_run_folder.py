@@ -3,6 +3,7 @@
 import errno
 import os
 import resource
+import shutil
 import signal
 import stat
 from pathlib import Path
@@ -196,3 +197,33 @@ def test_names_that_are_not_utf8_are_written_as_escapes(tmp_path: Path) -> None:
     """The name of a cell file may hold any byte; Python keeps it as a lone surrogate."""
     write_run(tmp_path / "bench", tables="# from bad\udcffname.yaml\n")
     assert (tmp_path / "bench/tables/arm.csv").read_bytes() == b"# from bad\\udcffname.yaml\n"
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_an_interruption_between_the_renames_leaves_one_whole_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    """The interruption comes right after the first or second rename, or while the older run is removed."""
+    write_run(tmp_path / "bench", tables="old")
+    rename, calls = Path.rename, []
+
+    def rename_then_stop(source: Path, target: Path) -> Path:
+        moved = rename(source, target)
+        calls.append(source)
+        if len(calls) == number:
+            raise KeyboardInterrupt
+        return moved
+
+    def stop_once(path: str, _rmtree: object = shutil.rmtree, **words: object) -> None:
+        calls.append(Path(path))
+        if len(calls) == 4 and number == 3:
+            raise KeyboardInterrupt
+        _rmtree(path, **words)
+
+    monkeypatch.setattr(Path, "rename", rename_then_stop)
+    monkeypatch.setattr(shutil, "rmtree", stop_once)
+    with pytest.raises(KeyboardInterrupt):
+        write_run(tmp_path / "bench", tables="new")
+
+    assert names_in(tmp_path) == ["bench"]
+    assert (tmp_path / "bench/tables/arm.csv").read_text() == ("old" if number == 1 else "new")
