@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.io.complaints import did_you_mean, listed
 from cellplan.io.allowed_folders import AllowedFolders
+from cellplan.io.complaints import did_you_mean, listed
 from cellplan.io.robot_table import RobotTable, load_robot_table
 from cellplan.model.robot import RobotModel
 

@@ -6,6 +6,7 @@ from typing import Final
 
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Mesh
+from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.cell_build import (
     build_checks,
     build_motion,
@@ -19,7 +20,6 @@ from cellplan.io.cell_build import (
 from cellplan.io.cell_rules import needs_surface, rule_complaints
 from cellplan.io.cell_sources import Sources
 from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, raise_complaints
-from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.robot_rules import robot_complaints
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.pieces import Pieces, read_pieces

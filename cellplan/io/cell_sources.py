@@ -10,10 +10,10 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.meshes import read_mesh, require_solid
 from cellplan.geometry.shapes import Mesh
+from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.bundled_robots import load_bundled_table
 from cellplan.io.complaints import Complaint, KeyPath, shown
 from cellplan.io.input_files import digest_of_file
-from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.robot_rules import limits_in_si, tightened
 from cellplan.io.robot_table import MESH_UNITS, RobotTable, load_robot_table
 from cellplan.io.schema.robot import RobotEntry

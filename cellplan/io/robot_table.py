@@ -12,8 +12,8 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.meshes import read_mesh
 from cellplan.geometry.shapes import Mesh
-from cellplan.io.complaints import Complaint, did_you_mean, listed, raise_complaints, shown
 from cellplan.io.allowed_folders import AllowedFolders
+from cellplan.io.complaints import Complaint, did_you_mean, listed, raise_complaints, shown
 from cellplan.io.schema import RobotTableDocument
 from cellplan.io.schema.messages import validate
 from cellplan.io.schema.robot_table import JointEntry

@@ -119,13 +119,13 @@ Refuse = Callable[..., list[str]]
         ),
         (
             "environment:",
-            "checks: {exclude: [{bodies: [holder/base, worker/bsae], reason: near}]}\nenvironment:",
-            "c:22: checks.exclude[0].bodies[1]: expected a body of this cell, got 'worker/bsae', did you mean "
-            "'worker/base'?",
+            "checks: {exclude: [{bodies: [holder/foot, worker/foto], reason: near}]}\nenvironment:",
+            "c:22: checks.exclude[0].bodies[1]: expected a body of this cell, got 'worker/foto', did you mean "
+            "'worker/foot'?",
         ),
         (
             "environment:",
-            'checks: {exclude: [{bodies: [holder/base, floor], reason: " "}]}\nenvironment:',
+            'checks: {exclude: [{bodies: [holder/foot, floor], reason: " "}]}\nenvironment:',
             "c:22: checks.exclude[0].reason: expected some text, got an empty one",
         ),
         (

@@ -75,7 +75,7 @@ def test_a_csv_that_is_named_only_is_written_with_its_defaults(cells: Path, tmp_
         ("  floor: {plane: {z_mm: 0}}", '  floor: {plane: {z_mm: -7}}\n  "no": {sphere: {radius_mm: 5}}'),
         (
             "environment:",
-            'checks: {exclude: [{bodies: [worker/base, floor], reason: "it stands: there, #1"}]}\nenvironment:',
+            'checks: {exclude: [{bodies: [worker/foot, floor], reason: "it stands: there, #1"}]}\nenvironment:',
         ),
         ("environment:", "solver: {damping: 1e-5, seed: 7}\nenvironment:"),
         ("environment:", "layout: {vary: {worker.base: {x_mm: [0, 1.5]}, worker.start_deg: true}}\nenvironment:"),
