@@ -302,7 +302,9 @@ def _share_left_free(cell: Cell, q: Array, step: float) -> float:
 
 def _why_nothing(cell: Cell, obstructions: _Obstructions, holder_count: int) -> str:
     """One line that names what stood in the way most often."""
-    tried = f"{holder_count} posture(s) of the positioner, {SEEDS} starts of each arm"
+    tried = f"{SEEDS} starts of each arm"
+    if any(cell.robot(name).start is None for name in cell.positioners):
+        tried = f"{holder_count} posture(s) of the positioner, {SEEDS_PER_HOLDER} starts of each arm"
     if obstructions.touching:
         first, second = max(obstructions.touching, key=lambda pair: obstructions.touching[pair])
         return (

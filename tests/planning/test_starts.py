@@ -170,8 +170,11 @@ def test_base_out_of_reach_is_named(cell):
             for r in cell.robots
         ),
     )
-    with pytest.raises(StartNotFoundError, match="no posture within the joint limits brings the tool to the start of"):
+    with pytest.raises(
+        StartNotFoundError, match="no posture within the joint limits brings the tool to the start of"
+    ) as e:
         find_start(Scene.from_cell(far), toolpaths_of(cell))
+    assert "(48 starts of each arm tried)" in str(e.value)  # the posture of the positioner is given
 
 
 def test_multi_start_finds_the_branches_of_a_six_axis_arm(cell):
