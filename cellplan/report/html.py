@@ -168,13 +168,15 @@ def _error_figure(tasks: Record, name: str, unit: str) -> Record:
 
 
 def _joint_figures(joints: Record) -> list[Record]:
-    """Smallest joint margin, of turning joints where there are any, and highest share of a speed limit."""
+    """Smallest joint margin, of turning joints unless only sliding ones break theirs, and highest share of a speed."""
     uses = [(robot, name, joint) for robot, named in joints.items() for name, joint in named.items()]
     figures = []
     bounded = [use for use in uses if use[2]["margin"] is not None]
     turning = [use for use in bounded if use[2]["unit"] == "deg"]
     if bounded:
-        robot, name, joint = min(turning or bounded, key=lambda use: use[2]["margin"])
+        broken = [use for use in bounded if use[2]["margin"] < 0.0]
+        shown = [use for use in turning if use in broken] or broken or turning or bounded
+        robot, name, joint = min(shown, key=lambda use: use[2]["margin"])
         figures.append(
             {
                 "label": "Smallest joint margin",

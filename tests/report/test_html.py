@@ -152,6 +152,15 @@ def test_figures_are_never_rounded_to_the_better_side(passed_run: Any) -> None:
     assert "outside by 0.000573" in text  # 1e-5 rad in degrees
 
 
+def test_a_broken_sliding_joint_is_the_smallest_margin_while_turning_joints_hold(rail_run: Any) -> None:
+    joints = (replace(rail_run.report.joints[0], margin=-0.04626), *rail_run.report.joints[1:])
+    broken = replace(rail_run, report=replace(rail_run.report, joints=joints))
+
+    text = Page(page_of(broken, plots={})).text
+
+    assert f"Smallest joint margin −46.3 mm {joints[0].robot} {joints[0].joint} at" in text
+
+
 def hostile(run: Any) -> Any:
     """The same run with names that try to become markup."""
     robots = (replace(run.cell.robots[0], name=HOSTILE), *run.cell.robots[1:])
