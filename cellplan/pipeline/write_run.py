@@ -1,5 +1,6 @@
 """Write a solution: report, plots, the resolved cell and, when every check passed, the joint tables."""
 
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
@@ -7,7 +8,7 @@ from typing import Final
 import cellplan
 from cellplan.io.cell_writer import render_cell
 from cellplan.io.run_folder import RunFolder
-from cellplan.io.tables import program_digest
+from cellplan.io.tables import parse_header, program_digest, replace_header
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.solution import Run, Solution
@@ -22,13 +23,13 @@ ENGINES: Final = ("numpy", "pin", "python-fcl", "trimesh")  # packages whose ari
 def write_run(solution: Solution, folder: Path, *, keep_rejected: bool = False, progress: Progress = silent) -> None:
     """Write a run folder; it appears whole or not at all.
 
-    Every run has ``report.json``, ``report.html``, ``plots/`` and ``cell.yaml``, and ``tables/`` when it passed. A cell
-    with one run per task gets a subfolder for each and an overview above them.
+    Every run has ``report.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only when the whole solution
+    passed. A cell with one run per task gets a subfolder for each and an overview above them.
 
     Args:
         solution: What was solved.
         folder: The run folder; an older run there is replaced.
-        keep_rejected: Write the tables of a failed run too, under ``rejected/``, marked in every header.
+        keep_rejected: Write the tables of a failed solution too, under ``rejected/``, marked in every header.
         progress: Who wants to know how far it is.
 
     Raises:
@@ -37,7 +38,11 @@ def write_run(solution: Solution, folder: Path, *, keep_rejected: bool = False, 
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            _write_one(target, solution.cell, run, keep_rejected=keep_rejected)
+            _write_one(target, solution.cell, run)
+            if solution.passed:
+                _write_tables(target, run, "tables")
+            elif keep_rejected:
+                _write_tables(target, run, "rejected")
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
             provenance = Provenance(versions=versions(), digests={})
@@ -57,18 +62,28 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _write_one(target: RunFolder, cell: Cell, run: Run, *, keep_rejected: bool) -> None:
-    """Files of one run, in its subfolder when it has a name."""
-    prefix = "" if run.name is None else f"{run.name}/"
+def _write_one(target: RunFolder, cell: Cell, run: Run) -> None:
+    """Report, plots and resolved cell of one run."""
+    place = _place(run)
     provenance = Provenance(versions=versions(), digests={"program": program_digest(run.program.tables)})
     plots = draw_plots(run.report, cell=cell)
     for name, picture in plots.items():
-        target.write_bytes(f"{prefix}plots/{name}", picture)
+        target.write_bytes(f"{place}plots/{name}", picture)
     page = report_html(run.report, cell=cell, provenance=provenance, plots=plots)
-    target.write_text(f"{prefix}report.html", page)
-    target.write_text(f"{prefix}report.json", report_json(run.report, cell=cell, provenance=provenance))
-    target.write_text(f"{prefix}cell.yaml", render_cell(cell))
-    if run.report.passed or keep_rejected:
-        kept_in = "tables" if run.report.passed else "rejected"
-        for robot, text in run.program.tables.items():
-            target.write_text(f"{prefix}{kept_in}/{robot}.csv", text)
+    target.write_text(f"{place}report.html", page)
+    target.write_text(f"{place}report.json", report_json(run.report, cell=cell, provenance=provenance))
+    target.write_text(f"{place}cell.yaml", render_cell(cell))
+
+
+def _write_tables(target: RunFolder, run: Run, folder: str) -> None:
+    """Joint tables of one run; none of a failed solution says that it passed."""
+    for robot, text in run.program.tables.items():
+        if folder == "rejected" and run.report.passed:
+            header = replace(parse_header(text, robot), verdict="REJECTED: another run of the same job failed")
+            text = replace_header(text, header=header)  # noqa: PLW2901
+        target.write_text(f"{_place(run)}{folder}/{robot}.csv", text)
+
+
+def _place(run: Run) -> str:
+    """Where in the run folder a run is written: a run with a name has a subfolder."""
+    return "" if run.name is None else f"{run.name}/"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from cellplan import load_cell, solve, verify, write_run
+from cellplan.model.task import Tolerance
 from cellplan.pipeline.overrides import with_overrides
 
 
@@ -210,3 +211,20 @@ def test_idle_robots_in_the_way_of_the_part_are_to_be_withdrawn(cells, tmp_path)
     lines = json.loads((tmp_path / "run" / "report.json").read_text())["before_you_run"]
     assert [line.split(":")[1].split()[1] for line in lines] == ["kuka", "abb"]
     assert all("would touch the part between" in line for line in lines)
+
+
+def test_one_failed_run_withholds_the_tables_of_all(cells, tmp_path):
+    """With 0.1 um allowed the circle cannot pass; the rhombus alone would, but the job as a whole did not."""
+    cell = with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise")
+    strict = replace(cell.task("circle"), tolerance=Tolerance(position=1e-7, orientation=1e-3))
+    cell = replace(cell, tasks=(strict, cell.task("rhombus")))
+    solution = solve(cell)
+    assert [run.report.passed for run in solution.runs] == [False, True]
+
+    write_run(solution, tmp_path / "plain")
+    write_run(solution, tmp_path / "kept", keep_rejected=True)
+
+    assert not list((tmp_path / "plain").rglob("*.csv"))
+    assert not list((tmp_path / "kept").rglob("tables"))
+    header = (tmp_path / "kept" / "rhombus" / "rejected" / "abb.csv").read_text()
+    assert "# verdict: REJECTED: another run of the same job failed" in header
