@@ -23,8 +23,8 @@ ENGINES: Final = ("numpy", "pin", "python-fcl", "trimesh")  # packages whose ari
 def write_run(solution: Solution, folder: Path, *, keep_rejected: bool = False, progress: Progress = silent) -> None:
     """Write a run folder; it appears whole or not at all.
 
-    Every run has ``report.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only when the whole solution
-    passed. A cell with one run per task gets a subfolder for each and an overview above them.
+    Every run has ``report.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only when the whole
+    solution passed. A cell with one run per task gets a subfolder for each and an overview above them.
 
     Args:
         solution: What was solved.

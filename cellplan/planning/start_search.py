@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from itertools import product
 from typing import Final
 
 import numpy as np
@@ -13,6 +12,7 @@ from cellplan.model.cell import Cell, Robot
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import Task
 from cellplan.model.toolpath import Toolpath
+from cellplan.planning.combinations import Picks, best_combinations
 from cellplan.planning.follow import follow
 from cellplan.planning.given_starts import part_pose, start_place
 from cellplan.planning.inverse_kinematics import (
@@ -182,13 +182,11 @@ def _combinations(
         choices.append(branches)
     found: list[Array] = []
     blocked: set[tuple[tuple[int, int], ...]] = set()
-    order = sorted(
-        product(*(range(len(branches)) for branches in choices)),
-        key=lambda picks: -min(branches[pick][0] for branches, pick in zip(choices, picks, strict=True)),
-    )
-    for picks in order:
-        if any(all(picks[robot] == pick for robot, pick in known) for known in blocked):
-            continue
+
+    def collides(picks: Picks) -> bool:
+        return any(all(robot < len(picks) and picks[robot] == pick for robot, pick in known) for known in blocked)
+
+    for picks in best_combinations([[score for score, _ in branches] for branches in choices], collides):
         q = np.concatenate([branches[pick][1] for branches, pick in zip(choices, picks, strict=True)])
         pair = scene.touching(q)
         if pair is None:
@@ -196,7 +194,7 @@ def _combinations(
         else:
             obstructions.touching[pair] = obstructions.touching.get(pair, 0) + 1
             blocked.add(_culprits(cell, pair, picks))
-        if len(found) == room:
+        if len(found) == room or () in blocked:
             break
     return found
 

@@ -1,0 +1,37 @@
+"""Choices of one branch per robot, the best combinations first, however many robots there are."""
+
+from collections.abc import Callable, Iterator, Sequence
+from heapq import heappop, heappush
+from typing import Final
+
+Picks = tuple[int, ...]
+
+MOST_LOOKS: Final = 20_000  # partial combinations looked at before the search is given up: a second of work
+
+
+def best_combinations(scores: Sequence[Sequence[float]], is_ruled_out: Callable[[Picks], bool]) -> Iterator[Picks]:
+    """Combinations in the order of their worst score, the best first; equal ones in the order of the lists.
+
+    Partial combinations are grown best first, so the number of all combinations, which grows exponentially with the
+    number of robots, is never worked through. The search ends after ``MOST_LOOKS`` partial combinations.
+
+    Args:
+        scores: Scores of each robot's branches; a larger one is better.
+        is_ruled_out: Says of a partial combination, one pick for each of the first robots, that nothing can come of it;
+            asked anew for each, so that what is learned meanwhile counts.
+
+    Yields:
+        The index of the branch for each robot.
+    """
+    heap: list[tuple[float, int, Picks]] = [(float("-inf"), 0, ())]
+    for _ in range(MOST_LOOKS):
+        if not heap:
+            return
+        badness, _, picks = heappop(heap)
+        if is_ruled_out(picks):
+            continue
+        if len(picks) == len(scores):
+            yield picks
+            continue
+        for pick, score in enumerate(scores[len(picks)]):
+            heappush(heap, (max(badness, -score), -len(picks) - 1, (*picks, pick)))
