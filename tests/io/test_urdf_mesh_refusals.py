@@ -5,37 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from urdf_texts import ARM, refused
 
-from cellplan.errors import InputError
-from cellplan.io.urdf import UrdfOptions, load_urdf
-
-LIMIT = '<limit lower="-1" upper="2" velocity="3"/>'
-
-
-def joint(name: str, parent: str, child: str, inside: str = LIMIT) -> str:
-    return f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>{inside}</joint>'
+from cellplan.io.urdf import UrdfOptions
 
 
 def collision(shape: str) -> str:
     return f'<link name="base"><collision><geometry>{shape}</geometry></collision></link>'
-
-
-def refusal(path: Path, options: UrdfOptions | None = None) -> str:
-    with pytest.raises(InputError) as caught:
-        load_urdf(path, options)
-    message = str(caught.value)
-    assert "\n" not in message
-    return message
-
-
-def refused(folder: Path, *lines: str, options: UrdfOptions | None = None) -> str:
-    """Message for a robot whose elements stand in lines 2, 3, …"""
-    path = folder / "r.urdf"
-    path.write_text("\n".join(['<robot name="rig">', *lines, "</robot>"]), encoding="utf-8")
-    return refusal(path, options)
-
-
-ARM = ('<link name="base"/>', '<link name="tip"/>', joint("a1", "base", "tip"))
 
 
 @pytest.mark.parametrize(
