@@ -3,11 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Literal
 
 from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.task import Task
+
+MethodName = Literal["weighted_pseudo_inverse"]  # each is the name of a file and a function in planning/methods/
 
 
 class Mode(StrEnum):
@@ -123,13 +126,13 @@ class SolverSettings:
     """How joint speeds are found.
 
     Attributes:
-        method: Name of the resolution method.
+        method: The resolution method.
         gain: Error feedback gain in [1/s].
         damping: Largest damping factor; None lets the smallest singular value decide (``auto``).
         seed: Seed of every random search.
     """
 
-    method: str
+    method: MethodName
     gain: float
     damping: float | None
     seed: int

@@ -3,9 +3,10 @@
 from collections.abc import Iterable
 from dataclasses import replace
 from difflib import get_close_matches
+from typing import cast
 
 from cellplan.errors import InputError
-from cellplan.model.cell import Cell, Mode
+from cellplan.model.cell import Cell, MethodName, Mode
 from cellplan.planning.methods import METHODS
 
 SHORTEST = 1e-3  # [s] shorter cycles are slips of the pen
@@ -33,7 +34,8 @@ def with_overrides(
         motion = replace(cell.motion, mode=Mode(_known("--mode", mode, [str(each) for each in Mode])))
         cell = replace(cell, motion=motion)
     if method is not None:
-        solver = replace(cell.solver, method=_known("--method", method, METHODS))
+        name = cast(MethodName, _known("--method", method, METHODS))
+        solver = replace(cell.solver, method=name)
         cell = replace(cell, solver=solver)
     if duration is not None:
         cell = _with_duration(cell, duration)

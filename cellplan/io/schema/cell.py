@@ -8,6 +8,7 @@ from cellplan.io.schema.common import Angle, Coordinate, Entry, Name, PoseEntry,
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
 from cellplan.io.schema.task import CornerChoice, Seconds, TaskEntry, TimeLawChoice
+from cellplan.model.cell import MethodName
 
 SCHEMA_VERSION: Final = 1
 ROBOT_LIMIT: Final = 16
@@ -17,7 +18,6 @@ SAMPLE_LIMIT: Final = 2_000_000  # tables longer than this fill disks, not contr
 LARGEST_SEED: Final = 2**32 - 1
 DAMPING_WORDS: Final = "auto or a number of at least 0"
 
-Method = Literal["weighted_pseudo_inverse"]
 DampingChoice = Annotated[
     Annotated[Literal["auto"], Tag(f"<{DAMPING_WORDS}>")]
     | Annotated[Annotated[float, Field(ge=0.0, le=1e6)], Tag("<number>")],
@@ -87,7 +87,7 @@ class MotionEntry(Entry):
 class SolverEntry(Entry):
     """How joint speeds are found."""
 
-    method: Method = Field(default="weighted_pseudo_inverse", description="Resolution method.")
+    method: MethodName = Field(default="weighted_pseudo_inverse", description="Resolution method.")
     gain_per_s: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
         default=None,
         description="Gain of the pose-error feedback; 0.5 / step_s when absent. gain_per_s * step_s is below 2.",
