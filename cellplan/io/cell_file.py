@@ -55,7 +55,7 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> Cell:
         document, AllowedFolders(folder=path.parent, allowed=tuple(Path(folder) for folder in allow_dirs))
     )
     sources.inputs[path.name] = document.digest
-    models = _models(pieces, sources)
+    models = _models(pieces, document, sources)
     for name, model in models.items():
         complaints += robot_complaints(name, pieces.robots[name], model, document)
     complaints += _unknown_bodies(pieces, models, document)
@@ -69,9 +69,13 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> Cell:
     return _cell(pieces.whole, models, targets, document=document, sources=sources)
 
 
-def _models(pieces: Pieces, sources: Sources) -> dict[str, RobotModel]:
+def _models(pieces: Pieces, document: YamlDocument, sources: Sources) -> dict[str, RobotModel]:
     """Models of all robots that are understood, by name."""
     found = {name: sources.robot(name, entry) for name, entry in pieces.robots.items()}
+    for name in pieces.names["robots"]:
+        written = document.root["robots"][name]
+        if name not in found and isinstance(written, dict) and isinstance(written.get("model"), str):
+            sources.look_for_model(name, written["model"])
     return {name: model for name, model in found.items() if model is not None}
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from cellplan.io.complaints import Complaint, did_you_mean, listed
+from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, listed
 from cellplan.io.schema.pieces import Pieces
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml_reader import YamlDocument
@@ -41,29 +41,45 @@ def _clashing_names(pieces: Pieces, document: YamlDocument) -> Iterator[Complain
 
 def _holders(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
     """The part is held by a robot of the cell."""
-    for index, grasp in enumerate(pieces.part.held_by if pieces.part else ()):
-        yield from _known_robot(grasp.robot, pieces, document, ("part", "held_by", index, "robot"))
+    for path, robot in _holders_as_written(document):
+        yield from _known_robot(robot, pieces, document, path)
 
 
 def _operators(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
     """Each task has a robot of its own that does not hold the part."""
-    holders = {grasp.robot for grasp in pieces.part.held_by} if pieces.part else set()
+    holders = [robot for _, robot in _holders_as_written(document)][:1]  # a second one is refused as such
     busy: dict[str, str] = {}
-    for name, task in pieces.tasks.items():
-        path = ("tasks", name, "robot")
-        yield from _known_robot(task.robot, pieces, document, path)
-        if task.robot in holders:
-            text = f"expected a robot that does not hold the part, got the positioner '{task.robot}'"
+    for name, path, robot in _operators_as_written(document):
+        yield from _known_robot(robot, pieces, document, path)
+        if robot in holders:
+            text = f"expected a robot that does not hold the part, got the positioner '{robot}'"
             yield document.complaint(path, text)
-        other = busy.setdefault(task.robot, name)
+        other = busy.setdefault(robot, name)
         if other != name:
-            text = f"expected a robot without another task, got '{task.robot}', which does '{other}'"
+            text = f"expected a robot without another task, got '{robot}', which does '{other}'"
             yield document.complaint(path, text)
 
 
-def _known_robot(
-    robot: str, pieces: Pieces, document: YamlDocument, path: tuple[str | int, ...]
-) -> Iterator[Complaint]:
+def _holders_as_written(document: YamlDocument) -> Iterator[tuple[KeyPath, str]]:
+    """Robots that hold the part, also of a part that is wrong in other ways."""
+    part = document.root.get("part")
+    grasps = part.get("held_by") if isinstance(part, dict) else None
+    for index, grasp in enumerate(grasps if isinstance(grasps, tuple) else ()):
+        robot = grasp.get("robot") if isinstance(grasp, dict) else None
+        if isinstance(robot, str):
+            yield ("part", "held_by", index, "robot"), robot
+
+
+def _operators_as_written(document: YamlDocument) -> Iterator[tuple[str, KeyPath, str]]:
+    """Robots of the tasks, also of tasks that are wrong in other ways."""
+    tasks = document.root.get("tasks")
+    for name, task in tasks.items() if isinstance(tasks, dict) else ():
+        robot = task.get("robot") if isinstance(task, dict) else None
+        if isinstance(robot, str):
+            yield name, ("tasks", name, "robot"), robot
+
+
+def _known_robot(robot: str, pieces: Pieces, document: YamlDocument, path: KeyPath) -> Iterator[Complaint]:
     """A robot that the cell has."""
     known = pieces.names["robots"]
     if robot not in known:

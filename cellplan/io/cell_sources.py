@@ -92,6 +92,17 @@ class Sources:
         self.complaints += complaints
         return None if complaints else model
 
+    def look_for_model(self, name: str, written: str) -> None:
+        """Complain about a model that does not exist, for a robot that is not understood for other reasons."""
+        path = ("robots", name, "model")
+        if PurePosixPath(written).suffix.lower() in URDF_SUFFIXES | TABLE_SUFFIXES:
+            self._file(written, path)
+            return
+        try:
+            load_bundled_table(written)
+        except InputError as error:
+            self.complaints.append(self._document.complaint(path, str(error)))
+
     def _read_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
         """Mesh in [m]; None after a complaint."""
         place = self._file(written, path)

@@ -216,3 +216,20 @@ def test_complaints_about_a_robot_table_follow_those_about_the_cell(refuse: Refu
         "c:21: motion.duration_s: expected a positive number of seconds, got -4",
         "arm.yaml:3: joints.A.axis: missing, expected unit direction of the axis",
     ]
+
+
+def test_names_that_do_not_exist_are_told_beside_other_mistakes_of_the_same_entry(refuse: Refuse) -> None:
+    complaints = refuse(
+        ("model: kuka_kr6", "model: kuka_kr7\n    bse: {}"),
+        ("radius_mm: 250", "radius_mm: -250"),
+        ("{robot: holder, at", "{robot: hodler, at"),
+        ("    robot: worker", "    robot: wroker\n    start_s: soon"),
+    )
+    assert [complaint.split(": ")[1] for complaint in complaints] == [
+        "robots.holder.model",
+        "robots.holder.bse",
+        "part.geometry.cylinder.radius_mm",
+        "part.held_by[0].robot",
+        "tasks.ring.robot",
+        "tasks.ring.start_s",
+    ]
