@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.errors import NoSolutionError, StartNotFoundError
 from cellplan.geometry.transforms import Array, inverse
@@ -182,13 +183,14 @@ def _combinations(
         choices.append(branches)
     found: list[Array] = []
     blocked: set[tuple[tuple[int, int], ...]] = set()
+    open_pairs = _open_pairs(scene)
 
     def collides(picks: Picks) -> bool:
         return any(all(robot < len(picks) and picks[robot] == pick for robot, pick in known) for known in blocked)
 
     for picks in best_combinations([[score for score, _ in branches] for branches in choices], collides):
         q = np.concatenate([branches[pick][1] for branches, pick in zip(choices, picks, strict=True)])
-        pair = scene.touching(q)
+        pair = scene.touching(q, among=open_pairs)
         if pair is None:
             found.append(q)
         else:
@@ -197,6 +199,14 @@ def _combinations(
         if len(found) == room or () in blocked:
             break
     return found
+
+
+def _open_pairs(scene: Scene) -> NDArray[np.bool_]:
+    """Pairs of bodies that a choice of the search moves; what given postures make collide is for the report to say."""
+    given = {None, *(robot.name for robot in scene.cell.robots if robot.start is not None)}
+    bodies = scene.bodies
+    is_open = [not {bodies[pair.first].robot, bodies[pair.second].robot} <= given for pair in scene.pairs]
+    return np.array(is_open, dtype=bool)
 
 
 def _culprits(cell: Cell, pair: tuple[str, str], picks: tuple[int, ...]) -> tuple[tuple[int, int], ...]:
@@ -261,10 +271,11 @@ def _rehearse(scene: Scene, toolpaths: Mapping[str, Toolpath], start: Array) -> 
         except NoSolutionError:
             return -np.inf, start
     turns = _whole_turns(cell, np.concatenate(motions))
+    open_pairs = _open_pairs(scene)
     quality = min(_share_left_free(coarse, q + turns, schedule.step) for q in motions)
     for q in motions:
         instants = np.linspace(0, len(q) - 1, TOUCH_INSTANTS).astype(int)
-        if any(scene.touching(q[k]) is not None for k in instants):
+        if any(scene.touching(q[k], among=open_pairs) is not None for k in instants):
             quality = min(quality, 1.0) - TOUCHING
     return quality, start + turns
 

@@ -9,7 +9,7 @@ from cellplan.collision.bodies import BodyPoses, CollisionBody, checked_poses, p
 from cellplan.collision.certificate import heights
 from cellplan.collision.engine import Engine
 from cellplan.collision.self_test import prove_engine
-from cellplan.collision.sweep import Pair, PairIndices, first_touching
+from cellplan.collision.sweep import Flags, Pair, PairIndices, first_touching
 from cellplan.collision.zone import outside_zone
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import Array, inverse
@@ -91,19 +91,26 @@ class Scene:
         above = heights(body.hull, poses.R[pair.first], poses.p[pair.first], X_WS=self.bodies[pair.second].X_BS)
         return above - body.looseness
 
-    def touching(self, q: Array) -> tuple[str, str] | None:
-        """Names of the first two bodies that must not touch but do, at one stacked posture of shape (nq,)."""
+    def touching(self, q: Array, *, among: Flags | None = None) -> tuple[str, str] | None:
+        """Names of the first two bodies that must not touch but do, at one stacked posture of shape (nq,).
+
+        Args:
+            q: Stacked joint positions in [rad] or [m], shape (nq,).
+            among: Which of ``pairs`` are looked at, shape (len(pairs),); all when None.
+        """
+        looked_at = np.ones(len(self.pairs), dtype=bool) if among is None else among
         poses = self.body_poses(q[None])
-        row = self._first_on_ground(poses)
+        row = self._first_on_ground(poses, self.ground_rows[looked_at[self.ground_rows]])
         if row is None:
-            place = first_touching(self.engine, self.solid_pairs, poses, sample=0)
-            row = None if place is None else int(self.solid_rows[place])
+            solids = looked_at[self.solid_rows]
+            place = first_touching(self.engine, self.solid_pairs[solids], poses, sample=0)
+            row = None if place is None else int(self.solid_rows[solids][place])
         return None if row is None else self.names(self.pairs[row])
 
-    def _first_on_ground(self, poses: BodyPoses) -> int | None:
-        """The first pair of which the solid touches a half-space at the first sample, or None."""
+    def _first_on_ground(self, poses: BodyPoses, rows: PairIndices) -> int | None:
+        """The first of some pairs of which the solid touches a half-space at the first sample, or None."""
         centres = self.engine.sphere_centres(poses, sample=0)
-        for row in self.ground_rows:
+        for row in rows:
             pair = self.pairs[row]
             X_WS = self.bodies[pair.second].X_BS
             is_far = (centres[pair.first] - X_WS[:3, 3]) @ X_WS[:3, 2] > self.engine.radii[pair.first]

@@ -8,8 +8,10 @@ import pytest
 
 from cellplan import load_cell
 from cellplan.errors import InvalidFileError, StartNotFoundError, StartOffTaskError, StartOutsideLimitsError
-from cellplan.geometry.transforms import inverse
+from cellplan.geometry.shapes import Box
+from cellplan.geometry.transforms import inverse, pose
 from cellplan.kinematics.screws import ScrewChain
+from cellplan.model.cell import Obstacle
 from cellplan.planning.follow import follow
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.inverse_kinematics import margin_shares, random_postures, reaching_postures, within_limits
@@ -158,6 +160,20 @@ def test_arms_that_cannot_help_do_not_multiply_a_search_without_hope(tmp_path):
         find_start(scene, toolpaths)
 
     assert time.process_time() - began < 20.0  # some 3 s; looking at every combination takes minutes
+
+
+def test_what_given_postures_make_collide_is_left_to_the_report(cell):
+    """A post through the elbow of the positioner, whose start is given: no start of an operator could help it."""
+    reis = cell.robot("reis")
+    elbow = ScrewChain(reis).axis_points(reis.start[None])[0, 2]
+    post = Obstacle(name="post", shape=Box((0.1, 0.1, 0.1)), X_WS=pose(elbow))
+    blocked = with_start(replace(cell, obstacles=(*cell.obstacles, post)), "kuka", None)
+    scene = Scene.from_cell(blocked)
+
+    q = find_start(scene, toolpaths_of(cell))
+
+    first, second = scene.touching(q)
+    assert (first.split("/")[0], second) == ("reis", "post")
 
 
 def test_base_out_of_reach_is_named(cell):
