@@ -47,6 +47,14 @@ class StartOffTaskError(InputError):
     """A start posture given in the cell does not put the tool on the start of its task."""
 
 
+class NotPlanarError(InputError):
+    """A cell was to be treated as planar, but one of its joints moves something out of the plane."""
+
+
+class PrimaryChoiceError(InputError):
+    """Joint speeds were imposed that no speeds of the other joints can go with."""
+
+
 class NoSolutionError(CellplanError):
     """The input is sound, but no motion can be found for it."""
 

@@ -1,0 +1,137 @@
+"""Cooperation Jacobian by successive screw displacements: one walk from the part over the world to each tool."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array, inverse, skew
+from cellplan.kinematics.derivations.serial_chain import (
+    axis_positions,
+    chain_to_flange,
+    checked_posture,
+    displacement,
+    fixed_part_pose,
+    part_holder,
+)
+from cellplan.model.cell import Cell, Robot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Step:
+    """One axis on the walk, at the reference posture, expressed in the part frame P.
+
+    Attributes:
+        s_P: Unit direction, shape (3,): against the table's direction where the axis is passed from tip to base.
+        s0_P: A point on the axis in [m], shape (3,).
+        is_revolute: Whether it turns.
+        column: Place of the driving joint in the stacked joint vector.
+        share: Speed of the axis per speed of that joint.
+        position: Where the axis stands, in [rad] or [m].
+    """
+
+    s_P: Array
+    s0_P: Array
+    is_revolute: bool
+    column: int
+    share: float
+    position: float
+
+
+def walk_from_part(cell: Cell, q: Array, operator: str) -> tuple[list[Step], Array]:
+    """Axes met on the way from the part to an operator's tool, and that tool at the reference posture, in P.
+
+    The positioner is walked from the part back to its base, so its last axis comes first and each of its axes points
+    the other way; then the operator is walked from its base to its tool.
+    """
+    holder = part_holder(cell)
+    steps: list[Step] = []
+    if holder is None:
+        X_PW = inverse(fixed_part_pose(cell))
+    else:
+        robot, X_FP = holder
+        X_PB = inverse(robot.model.X_BF @ X_FP)
+        steps += [_reversed(step) for step in reversed(_steps(cell, robot, q, X_PB=X_PB))]
+        X_PW = X_PB @ inverse(robot.X_WB)
+    robot = cell.robot(operator)
+    X_PB = X_PW @ robot.X_WB
+    steps += _steps(cell, robot, q, X_PB=X_PB)
+    return steps, X_PB @ robot.model.X_BF @ robot.tool.X_FT
+
+
+def screw_cooperation_jacobian(cell: Cell, q: Array) -> Array:
+    r"""Cooperation Jacobian from screws moved one after another ([Ribeiro2010]_ Eqs. 3.56, 4.25, 4.33).
+
+    .. math:: J_{R1j} = \begin{bmatrix} -S(r) & I \\ I & 0 \end{bmatrix} \begin{bmatrix} {}^1J^p & {}^jJ^p \end{bmatrix}
+
+    Both robots stand there with a plus sign. That is right only because the screws of the positioner are those of a
+    walk *from the part*: their direction is opposite to the one in its joint-axis table.
+
+    Args:
+        cell: The cell.
+        q: Stacked joint vector in [rad] or [m], shape (nq,).
+
+    Returns:
+        Twists of the tools relative to the part, linear part first, expressed in P, shape (tasks, 6, nq).
+
+    Raises:
+        InputError: The posture does not fit the cell, or a fixed part has no pose.
+    """
+    q = checked_posture(cell, q)
+    J = np.zeros((len(cell.tasks), 6, cell.joint_count))
+    for block, task in zip(J, cell.tasks, strict=True):
+        steps, X_PT = walk_from_part(cell, q, task.robot)
+        screws, D = displaced_screws(steps)
+        r = (D @ X_PT)[:3, 3]
+        to_twist = np.zeros((6, 6))
+        to_twist[:3, :3], to_twist[:3, 3:], to_twist[3:, :3] = -skew(r), np.eye(3), np.eye(3)
+        for step, twist in zip(steps, (to_twist @ screws).T, strict=True):
+            block[:, step.column] += step.share * twist
+    return J
+
+
+def displaced_screws(steps: list[Step]) -> tuple[Array, Array]:
+    r"""Screws of the steps at the posture, and the displacement of what lies behind the last step.
+
+    ``$ = [s; s0 x s]`` for a revolute and ``[0; s]`` for a prismatic axis, angular part first as in the source
+    ([Ribeiro2010]_ Eqs. B.15, B.16), each moved by the displacements of the steps before it (B.73).
+
+    Returns:
+        Screws, shape (6, steps), expressed in P about its origin; displacement, shape (4, 4).
+    """
+    screws = np.zeros((6, len(steps)))
+    D = np.eye(4)
+    for column, step in enumerate(steps):
+        s = D[:3, :3] @ step.s_P
+        s0 = D[:3, :3] @ step.s0_P + D[:3, 3]
+        screws[:, column] = np.concatenate([s, np.cross(s0, s)] if step.is_revolute else [np.zeros(3), s])
+        D = D @ displacement(step.s_P, step.s0_P, step.position, is_revolute=step.is_revolute)
+    return screws, D
+
+
+def _steps(cell: Cell, robot: Robot, q: Array, *, X_PB: Array) -> list[Step]:
+    """Axes of one robot from base to flange, brought from B to P."""
+    columns = cell.columns(robot.name)
+    chain = chain_to_flange(robot.model)
+    return [
+        Step(
+            s_P=X_PB[:3, :3] @ axis.axis_B,
+            s0_P=X_PB[:3, :3] @ axis.point_B + X_PB[:3, 3],
+            is_revolute=axis.is_revolute,
+            column=columns.start + axis.leader,
+            share=axis.ratio,
+            position=position,
+        )
+        for axis, position in zip(chain, axis_positions(chain, q[columns]), strict=True)
+    ]
+
+
+def _reversed(step: Step) -> Step:
+    """The same axis passed from tip to base: what is seen to move is now the base side, the other way."""
+    return Step(
+        s_P=-step.s_P,
+        s0_P=step.s0_P,
+        is_revolute=step.is_revolute,
+        column=step.column,
+        share=step.share,
+        position=step.position,
+    )
