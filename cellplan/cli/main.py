@@ -10,6 +10,7 @@ import typer
 import cellplan
 from cellplan.cli.check import check
 from cellplan.cli.errors import OutputError, report_failure
+from cellplan.cli.explain import explain
 from cellplan.cli.output import say
 from cellplan.cli.robots import robots
 from cellplan.cli.schema import schema
@@ -41,6 +42,7 @@ def program(
 
 
 app.command()(check)
+app.command()(explain)
 app.command()(solve)
 app.command()(robots)
 app.command()(schema)

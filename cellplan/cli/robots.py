@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
+from cellplan.cli.joints import joint_record, limits_text
 from cellplan.cli.options import AsJson
 from cellplan.cli.output import json_failure, say, say_json
 
 if TYPE_CHECKING:
-    from cellplan.model.robot import Joint, RobotModel
+    from cellplan.model.robot import RobotModel
 
 SCHEMA = "cellplan.robots/1"
 
@@ -35,32 +35,14 @@ def _record(name: str, model: RobotModel) -> dict[str, Any]:
         "source": model.source,
         "reach_mm": round(1e3 * arm_reach(model), 1),
         "bodies": len(model.bodies),
-        "joints": [_joint_record(joint) for joint in model.joints],
+        "joints": [joint_record(joint) for joint in model.joints],
     }
-
-
-def _joint_record(joint: Joint) -> dict[str, Any]:
-    scale, unit = (math.degrees(1.0), "deg") if joint.is_revolute else (1e3, "mm")
-    return {
-        "name": joint.name,
-        "type": str(joint.kind),
-        f"lower_{unit}": _figure(scale * joint.lower),
-        f"upper_{unit}": _figure(scale * joint.upper),
-        f"velocity_{unit}_s": _figure(scale * joint.velocity),
-    }
-
-
-def _figure(value: float) -> float | None:
-    """The figure of the data sheet again; None for a joint that may turn without end."""
-    return float(f"{value:.9g}") if math.isfinite(value) else None
 
 
 def _lines(record: dict[str, Any]) -> list[str]:
     """One robot for people: joint, range, largest speed."""
     lines = [record["name"], f"  reach {record['reach_mm']:g} mm from the first axis; {record['source']}"]
     for joint in record["joints"]:
-        unit = "deg" if "lower_deg" in joint else "mm"
-        lower, upper = joint[f"lower_{unit}"], joint[f"upper_{unit}"]
-        limits = "without end" if lower is None or upper is None else f"{lower:g} … {upper:g} {unit}"
-        lines.append(f"  {joint['name']:<10} {limits:<22} {joint[f'velocity_{unit}_s']:g} {unit}/s")
+        limits, speed = limits_text(joint)
+        lines.append(f"  {joint['name']:<10} {limits:<22} {speed}")
     return lines

@@ -1,0 +1,25 @@
+"""``cellplan explain``: how a cell hangs together: robots, joints, circuits, graph, matrix blocks, redundancy."""
+
+from cellplan.cli.options import AllowDirs, AsJson, CellFile
+from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.structure import structure_lines
+from cellplan.cli.structure_record import structure_record
+from cellplan.errors import ExitStatus
+
+SCHEMA = "cellplan.explain/1"
+
+
+def explain(cell: CellFile, as_json: AsJson = False, allow_dir: AllowDirs = None) -> None:
+    """Show how a cell hangs together, without solving it: robots, joints, circuits, graph, matrix, redundancy.
+
+    Exit status: 0 shown, 2 bad input, 4 internal error.
+    """
+    with json_failure(SCHEMA, wanted=as_json):
+        from cellplan.io.cell_file import load_cell
+        from cellplan.pipeline.explain import explain as explain_cell
+
+        record = structure_record(explain_cell(load_cell(cell, allow_dirs=allow_dir or ())))
+    if as_json:
+        say_json({"schema": SCHEMA, "status": "passed", "exit": int(ExitStatus.PASSED), **record})
+    else:
+        say("\n".join(structure_lines(record)))

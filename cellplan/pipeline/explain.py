@@ -1,0 +1,129 @@
+"""Explain a cell: its coupling graph, its circuits, and the blocks, rank and redundancy of its cooperation Jacobian."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.errors import NotPlanarError
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.kinematics.combined import CombinedModel
+from cellplan.kinematics.derivations.coupling import PLANE, coupling_graph
+from cellplan.kinematics.derivations.davies import network
+from cellplan.kinematics.derivations.graph import Circuit, CouplingGraph, circuits, spanning_tree
+from cellplan.model.cell import Cell
+from cellplan.model.task import PlaneName, Task
+from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian
+from cellplan.planning.modes import RunPlan, plan_runs
+
+RANK_TOL = 1e-10  # [-] singular values below this share of the largest one are zero: rounding of the matrix
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MatrixShape:
+    """The cooperation Jacobian of one run, at the start postures of the cell.
+
+    Attributes:
+        plan: Which tasks are worked on and who moves.
+        rows: Constrained components of each task, in the order of the plan.
+        columns: Joints of each robot, in the order of the cell, that move and carry a tool or the part.
+        signs: Sign of each task's block for each robot, shape (tasks, robots): -1 positioner, +1 operator, 0 empty.
+        missing: Robots whose start posture is to be found before there is a rank.
+        singular_values: Largest first, one for each row or column, whichever are fewer; None where a start is missing.
+    """
+
+    plan: RunPlan
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+    signs: Array
+    missing: tuple[str, ...]
+    singular_values: Array | None
+
+    @property
+    def rank(self) -> int | None:
+        """Rank at the start; None while a start posture is to be found."""
+        if self.singular_values is None:
+            return None
+        return int(np.sum(self.singular_values > RANK_TOL * self.singular_values.max(initial=0.0)))
+
+    @property
+    def redundancy(self) -> int | None:
+        """Columns less rank: how many joint motions leave every tool where it is on the part."""
+        return None if self.rank is None else sum(self.columns) - self.rank
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Structure:
+    """How a cell hangs together.
+
+    Attributes:
+        cell: The cell.
+        plane: Plane of the part in which everything moves, with PPR chains; None for space, with PPPS chains.
+        graph: Links and joints, virtual chains included.
+        circuits: The independent ways round, one per chord.
+        matrices: One per run that the mode asks for.
+    """
+
+    cell: Cell
+    plane: PlaneName | None
+    graph: CouplingGraph
+    circuits: tuple[Circuit, ...]
+    matrices: tuple[MatrixShape, ...]
+
+
+def explain(cell: Cell) -> Structure:
+    """Take a cell apart without solving it; start postures are used where they are given and never searched."""
+    plane = _plane(cell)
+    graph = coupling_graph(cell, plane)
+    model = CombinedModel(cell)
+    return Structure(
+        cell=cell,
+        plane=plane,
+        graph=graph,
+        circuits=circuits(graph, spanning_tree(graph)),
+        matrices=tuple(_matrix(cell, model, plan) for plan in plan_runs(cell)),
+    )
+
+
+def _plane(cell: Cell) -> PlaneName | None:
+    """The plane of P in which all tasks are given and all joints move, if there is one."""
+    for plane, components in PLANE.items():
+        if all(task.axes == components and not task.is_spin_free for task in cell.tasks):
+            try:
+                network(cell, np.zeros(cell.joint_count), plane=plane)
+            except NotPlanarError:
+                return None
+            return plane
+    return None
+
+
+def _matrix(cell: Cell, model: CombinedModel, plan: RunPlan) -> MatrixShape:
+    """Blocks of one run, and its singular values where all postures that matter are known."""
+    tasks = [cell.task(name) for name in plan.tasks]
+    signs = column_signs(cell, model, tasks, plan.moving)
+    moves = np.any(signs != 0.0, axis=0)
+    at_work = {*cell.positioners[:1], *(task.robot for task in tasks)}
+    missing = tuple(robot.name for robot in cell.robots if robot.name in at_work and robot.start is None)
+    places = [cell.columns(robot.name) for robot in cell.robots]
+    blocks = [np.sign(signs[:, place].sum(axis=1)) for place in places]  # one robot's signs in one task are all alike
+    return MatrixShape(
+        plan=plan,
+        rows=tuple(len(constraint_rows(task, np.eye(4)[None])[0]) for task in tasks),
+        columns=tuple(int(moves[place].sum()) for place in places),
+        signs=np.stack(blocks, axis=1),
+        missing=missing,
+        singular_values=None if missing else _singular_values(cell, model, tasks, signs),
+    )
+
+
+def _singular_values(cell: Cell, model: CombinedModel, tasks: list[Task], signs: Array) -> Array:
+    """Singular values of the constrained rows over the moving joints at the start; bystanders do not matter."""
+    q = np.concatenate([np.zeros(len(r.model.joints)) if r.start is None else r.start for r in cell.robots])
+    state = model.state(q)
+    names = [robot.name for robot in cell.robots]
+    X_WT = state.X_WT[[names.index(task.robot) for task in tasks]]
+    X_PT = inverse(state.X_WP) @ X_WT
+    J = cooperation_jacobian(state, X_WT[:, :3, 3], signs)
+    picked = [constraint_rows(task, X[None])[0] @ block for task, X, block in zip(tasks, X_PT, J, strict=True)]
+    rows = np.concatenate(picked)
+    values: Array = np.linalg.svd(rows[:, np.any(signs != 0.0, axis=0)], compute_uv=False)
+    return values
