@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from jacobian_cells import planners_jacobian
+from jacobian_cells import model_of, planners_jacobian
 from random_cells import random_cell
 
 from cellplan import load_cell
@@ -202,3 +202,27 @@ def test_a_cell_in_space_has_no_planar_chains():
     cell = random_cell(33, operators=1)
     with pytest.raises(NotPlanarError, match=r"^joint 'holder/j0': expected motion in a plane of the part"):
         network(cell, np.zeros(cell.joint_count), plane=PlaneName.XY)
+
+
+def test_the_worked_example_of_the_concept_page_is_what_the_library_gives():
+    """Hinges in P: A (-1, 0) in the positioner; B (2, 0), C (2, 1), D (1, 1) in the operator; tip (1, 0.5)."""
+    cell = random_cell(34, operators=1)
+    z = (0, 0, 1)
+    models = [
+        model_of([("R", z, (-1, 0, 0))], np.eye(4)),
+        model_of([("R", z, (2, 0, 0)), ("R", z, (2, 1, 0)), ("R", z, (1, 1, 0))], pose([1.0, 0.5, 0.0])),
+    ]
+    robots = tuple(
+        replace(robot, model=model, X_WB=np.eye(4), tool=replace(robot.tool, X_FT=np.eye(4)))
+        for robot, model in zip(cell.robots, models, strict=True)
+    )
+    part = replace(cell.part, held_by=(replace(cell.part.held_by[0], X_PT=np.eye(4)),))
+    cell = replace(cell, robots=robots, part=part)
+
+    J = davies_cooperation_jacobian(cell, np.zeros(4), plane=PlaneName.XY)[0]
+    net = network(cell, np.zeros(4), plane=PlaneName.XY)
+    rest = {joint.name: 0.0 for joint in net.graph.joints if joint.is_virtual}
+    following = solve_network(net, rest | {"holder/j0": 1.0}).speeds
+
+    np.testing.assert_allclose(J, [[0.5, -0.5, 0.5, 0.5], [-2, -1, -1, 0], [-1, 1, 1, 1]], atol=1e-14)
+    np.testing.assert_allclose([following[f"op0/j{i}"] for i in range(3)], [1, -3, 3], atol=1e-12)
