@@ -1,7 +1,7 @@
 """Resolution methods: one file and one signature each, found by the name that ``MethodName`` lists.
 
-A method takes the constrained rows of the cooperation Jacobian, the wanted twist components, the joint weights and the
-damping, and returns joint speeds.
+A method is given the tracking problem and returns the step it takes: from an instant k and the stacked joint vector
+there to the joint vector at the next instant. What a method remembers from step to step lives inside that step.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,8 +10,10 @@ from typing import cast, get_args
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import MethodName
+from cellplan.planning.tracking_problem import TrackingProblem
 
-Method = Callable[[Array, Array, Array, float | None], Array]
+Step = Callable[[int, Array], Array]
+Method = Callable[[TrackingProblem], Step]
 
 
 def _method(name: MethodName) -> Method:

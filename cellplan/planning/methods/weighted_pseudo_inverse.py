@@ -1,18 +1,36 @@
 """Weighted, damped pseudo-inverse: the smallest weighted joint speeds that give the wanted tool twists."""
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
+from cellplan.planning.tracking_problem import TrackingProblem
 
 SINGULAR_REGION: Final = 0.02  # smallest singular value below which damping sets in when it is left to the program
 LARGEST_DAMPING: Final = 0.02  # damping factor at the singularity when it is left to the program
 ROUNDING: Final = 1e-12  # eigenvalues of J W^-1 J^T below this share of the largest are rounding: rank is lost
 
 
-def weighted_pseudo_inverse(J: Array, xdot: Array, weights: Array, damping: float | None) -> Array:
+def weighted_pseudo_inverse(problem: TrackingProblem) -> Callable[[int, Array], Array]:
+    r"""Integrate by Euler's method with pose-error feedback ([Ribeiro2010]_ Fig. 23, Eq. D.1).
+
+    .. math:: \dot q = J^\# (\dot x_d + K e), \qquad q(t + dt) = q(t) + \dot q \, dt
+
+    so that the error obeys ``e_dot + K e = 0`` (Eq. D.7).
+    """
+
+    def advance(k: int, q: Array) -> Array:
+        tasks = problem.first_order(k, q)
+        wanted = tasks.twist + problem.gain * tasks.error
+        return q + weighted_speeds(tasks.J, wanted, problem.weights, problem.damping) * problem.step(k)
+
+    return advance
+
+
+def weighted_speeds(J: Array, xdot: Array, weights: Array, damping: float | None) -> Array:
     r"""Joint speeds ([Ribeiro2010]_ Eqs. D.28-D.30 with the damping of [Nicolato2007]_ Eq. 2.12).
 
     .. math:: \dot q = W^{-1} J^T (J W^{-1} J^T + \lambda^2 I)^{-1} \dot x
