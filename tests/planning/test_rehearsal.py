@@ -1,0 +1,80 @@
+"""Rehearsals on a coarse clock against the full motion of the reference cell."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cellplan import load_cell, solve
+from cellplan.geometry.shapes import Box
+from cellplan.geometry.transforms import pose
+from cellplan.model.cell import Obstacle
+from cellplan.pipeline.overrides import with_overrides
+from cellplan.planning.rehearsal import TOUCHING, Rehearsal
+from cellplan.planning.toolpaths import build_toolpath
+from cellplan.scene.scene import Scene
+
+
+@pytest.fixture(scope="module")
+def cell(cells):
+    return load_cell(cells / "four_robots.yaml")
+
+
+def rehearsal_of(cell):
+    toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    return Rehearsal(Scene.from_cell(cell), toolpaths)
+
+
+def start_of(cell):
+    return np.concatenate([robot.start for robot in cell.robots])
+
+
+def share_left_free(report, robots):
+    """Smallest share of half a joint range or of a joint speed that the full motion leaves free."""
+    used = [use for use in report.joints if use.robot in robots]
+    ranges = min(use.margin / (0.5 * (use.upper - use.lower)) for use in used)
+    return min(ranges, *(1 - use.peak_velocity / use.velocity_limit for use in used))
+
+
+def test_rehearsal_foretells_what_the_full_motion_leaves_free(cell):
+    quality, start = rehearsal_of(cell).judge(start_of(cell))
+
+    np.testing.assert_array_equal(start, start_of(cell))  # given postures stay on their turn
+    expected = share_left_free(solve(cell).runs[0].report, {robot.name for robot in cell.robots})
+    assert quality == pytest.approx(expected, abs=0.02)  # 160 samples against 4001
+
+
+def test_an_operator_judged_alone_is_judged_as_in_a_run_of_its_own(cell):
+    task = cell.task("rectangle")
+    holder = cell.robot("reis").start
+
+    quality = rehearsal_of(cell).judge_alone(task, cell.robot("staubli").start, holder)
+
+    run = solve(with_overrides(cell, mode="pairwise"), task="rectangle").runs[0]
+    assert quality == pytest.approx(share_left_free(run.report, {"reis", "staubli"}), abs=0.02)
+
+
+def test_a_collision_on_the_way_costs_more_than_any_limit(cell):
+    """A block where the part swings to, clear of everything at the start; one start is open, so its pairs count."""
+    reach = solve(cell).runs[0].report.q["kuka"]
+    moved = Scene.from_cell(cell).chains["kuka"].axis_points(reach)[:, 2]
+    farthest = moved[np.argmax(np.linalg.norm(moved - moved[0], axis=1))]
+    outward = (farthest - moved[0]) / np.linalg.norm(farthest - moved[0])
+    block = Obstacle(name="block", shape=Box((0.02, 0.02, 0.02)), X_WS=pose(farthest + 0.12 * outward))
+    blocked = replace(
+        cell,
+        obstacles=(*cell.obstacles, block),
+        robots=tuple(replace(r, start=None) if r.name == "kuka" else r for r in cell.robots),
+    )
+    assert Scene.from_cell(blocked).touching(start_of(cell)) is None
+
+    free, _ = rehearsal_of(cell).judge(start_of(cell))
+    colliding, _ = rehearsal_of(blocked).judge(start_of(cell))
+
+    assert colliding == pytest.approx(free - TOUCHING)
+
+
+def test_a_lost_path_is_worth_nothing(cell):
+    start = start_of(cell)
+    start[cell.columns("kuka")] += 2.0
+    assert rehearsal_of(cell).judge(start)[0] == -np.inf
