@@ -65,6 +65,7 @@ def draw_plots(report: Report, *, cell: Cell) -> dict[str, bytes]:
             files |= _draw_positions(robot, uses, report, colours[robot])
             files |= _draw_velocities(robot, uses, report, colours[robot])
         files |= _draw_clearance(report, cell.checks.clearance)
+        files |= _draw_singularity(report, colours)
     return files
 
 
@@ -204,3 +205,23 @@ def _draw_clearance(report: Report, required: float) -> dict[str, bytes]:
         sheet.curve(panel, report.clearance.curve_times[known], curve[known], colour=palette.CLASSES[index])
         sheet.dot(panel, minimum.at_s, smallest, colour=LIMIT if smallest < 1e3 * required else INK)
     return pictures(sheet, "clearance")
+
+
+def _draw_singularity(report: Report, colours: Mapping[str, str]) -> dict[str, bytes]:
+    """Smallest singular value of the whole stack and of each robot along the motion."""
+    series = {"all robots together": report.conditioning.stack, **report.conditioning.robots}
+    rows = math.ceil(len(series) / JOINT_COLUMNS)
+    sheet = Sheet("smallest singular values along the motion", rows=rows, columns=JOINT_COLUMNS, times=report.times)
+    for index, (name, values) in enumerate(series.items()):
+        worst = int(np.argmin(values))
+        at_s, smallest = float(report.times[worst]), float(values[worst])
+        panel = sheet.panel(
+            index,
+            name,
+            note=f"smallest {smallest:.2g} at {at_s:.2f} s",
+            span=(0.0, float(values.max()) or 1.0),
+            is_floored=True,
+        )
+        sheet.curve(panel, report.times, values, colour=colours.get(name, INK))
+        sheet.dot(panel, at_s, smallest)
+    return pictures(sheet, "singularity")

@@ -130,7 +130,7 @@ def test_caution_and_assumptions_are_printed(failed_page: str) -> None:
 
 def test_drawings_have_a_text_for_those_who_cannot_see_them(failed_page: str) -> None:
     figures = re.findall(r"<figure[^>]*>", failed_page)
-    assert len(figures) == 3 + 4 + 4 + 1
+    assert len(figures) == 3 + 4 + 4 + 2  # tasks, positions, velocities, clearance and singularity
     assert all('role="img"' in figure and 'aria-label="' in figure for figure in figures)
 
 

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cellplan.model.report import Conditioning
 from cellplan.report.plots import draw_plots
 from cellplan.report.plots_canvas import nice_ticks, peaks_kept
 
@@ -28,7 +29,7 @@ def drawn(failed_run: Any) -> dict[str, bytes]:
 def test_every_plot_of_the_thesis_is_drawn_twice(drawn: dict[str, bytes]) -> None:
     names = [f"task_{task}" for task in ("circle", "rhombus", "rectangle")]
     names += [f"{kind}_{robot}" for robot in ("reis", "kuka", "abb", "staubli") for kind in ("positions", "velocities")]
-    names.append("clearance")
+    names += ["clearance", "singularity"]
     assert set(drawn) == {f"{name}.{ending}" for name in names for ending in ("svg", "png")}
 
 
@@ -40,7 +41,7 @@ def test_pictures_are_whole(drawn: dict[str, bytes]) -> None:
             assert data.startswith(b"\x89PNG\r\n\x1a\n")
             width, height = struct.unpack(">II", data[16:24])
             assert width == 1100
-            assert 400 < height < 700
+            assert 300 < height < 700
 
 
 def test_limits_are_written_beside_their_lines(drawn: dict[str, bytes]) -> None:
@@ -87,6 +88,10 @@ def test_robot_that_stands_still_and_a_clock_of_two_samples_can_be_drawn(rail_ru
             replace(a, position_error=a.position_error[ends], orientation_error=a.orientation_error[ends])
             for a in report.accuracy
         ),
+        conditioning=Conditioning(
+            stack=0.0 * report.conditioning.stack[ends],
+            robots={robot: values[ends] for robot, values in report.conditioning.robots.items()},
+        ),
     )
     files = draw_plots(report, cell=rail_run.cell)
     assert "turns without end" in text_of(files["positions_reis.svg"])
@@ -118,3 +123,10 @@ def test_ticks_are_even_and_inside(low: float, span: float, count: int) -> None:
     if len(ticks) > 2:
         steps = np.diff(ticks)
         assert np.ptp(steps) <= 1e-6 * steps.mean() + 2e-8 * abs(low)
+
+
+def test_singular_values_are_drawn_along_the_motion_with_their_smallest(drawn: dict[str, bytes]) -> None:
+    words = text_of(drawn["singularity.svg"])
+    assert "all robots together" in words
+    assert "staubli" in words
+    assert sum("smallest 0.1" in word for word in words) >= 1
