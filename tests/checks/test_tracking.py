@@ -2,45 +2,49 @@
 
 import numpy as np
 import pytest
+from random_cells import make_task
 
 from cellplan.checks.tracking import _turn_between, check_accuracy, task_accuracy
-from cellplan.geometry.transforms import pose_from, rotation_exp, rotation_vector
+from cellplan.geometry.transforms import pose_from, rotation_exp, rotation_vector, rpy_from_rotation
+from cellplan.kinematics.screws import ScrewChain
+from cellplan.model.cell import Robot, Tool
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
+from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
+from cellplan.model.task import Tolerance
 
 RNG = np.random.default_rng(3)
 
 
-class StillChain:
-    """A robot whose tool is where it is told to be."""
-
-    def __init__(self, X_WT):
-        self.X_WT = X_WT
-
-    def tool_poses(self, q):
-        return self.X_WT
-
-
-def scheduled_task(X_PT, *, axes=(0, 1, 2, 3, 4, 5), is_spin_free=False):
-    task = Task(
-        name="ring",
-        robot="arm",
-        path=CirclePath(plane=PlaneName.XY, center=(0.0, 0.0), radius=0.1),
-        project=None,
-        plane_offset=0.0,
-        tool_axis=None,
-        tool_x=np.array([1.0, 0, 0]),
-        turn=0.0,
-        axes=axes,
-        is_spin_free=is_spin_free,
-        tolerance=Tolerance(position=1e-4, orientation=1e-3),
-        start=0.0,
-        duration=1.0,
-        feed=None,
-        time_law=TimeLaw(kind=TimeLawKind.QUINTIC),
-        blend=None,
+def gantry():
+    """A robot whose joints are x, y, z and yaw, pitch, roll of its tool."""
+    directions = np.eye(3)[[0, 1, 2, 2, 1, 0]]
+    joints = tuple(
+        Joint(
+            name=f"j{i}",
+            kind=JointKind.PRISMATIC if i < 3 else JointKind.REVOLUTE,
+            parent=i - 1 if i else BASE,
+            axis_B=direction,
+            point_B=np.zeros(3),
+            lower=-9.0,
+            upper=9.0,
+            velocity=9.0,
+        )
+        for i, direction in enumerate(directions)
     )
+    model = RobotModel(name="gantry", source="test", joints=joints, flange_link=5, X_BF=np.eye(4), bodies=())
+    tool = Tool(X_FT=np.eye(4), bodies=())
+    return ScrewChain(Robot(name="arm", model=model, X_WB=np.eye(4), tool=tool, start=None, weights=np.ones(6)))
+
+
+def accuracy_at(scheduled, X_WT, X_WP):
+    """What is found of a task when the tool stands at given places in the world."""
+    q = np.array([[*X[:3, 3], *rpy_from_rotation(X[:3, :3])[::-1]] for X in X_WT])
+    return task_accuracy(scheduled, gantry(), q=q, X_WP=X_WP)
+
+
+def scheduled_task(X_PT, **changes):
     n = len(X_PT)
+    task = make_task("arm", name="ring", tolerance=Tolerance(position=1e-4, orientation=1e-3), **changes)
     return TaskSchedule(task=task, X_PT=X_PT, V_PT_P=np.zeros((n, 6)), travelled=np.zeros(n), length=1.0, end=1.0)
 
 
@@ -55,7 +59,7 @@ def accuracy_of(offset, turn, **options):
     actual[:, :3, 3] -= offset
     actual[:, :3, :3] = rotation_exp(-turn) @ wanted[:, :3, :3]
     scheduled = scheduled_task(wanted, **options)
-    return task_accuracy(scheduled, StillChain(X_WP @ actual), q=np.zeros((len(offset), 6)), X_WP=X_WP)
+    return accuracy_at(scheduled, X_WP @ actual, X_WP)
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-6, 1e-2, 1.0, 3.0])
@@ -96,8 +100,8 @@ def test_free_spin_counts_the_tilt_alone():
     tilted[:, :3, :3] = rotation_exp(-tilts) @ spun[:, :3, :3]
     scheduled = scheduled_task(wanted, is_spin_free=True)
 
-    only_spun = task_accuracy(scheduled, StillChain(spun), q=np.zeros((20, 6)), X_WP=eye)
-    also_tilted = task_accuracy(scheduled, StillChain(tilted), q=np.zeros((20, 6)), X_WP=eye)
+    only_spun = accuracy_at(scheduled, spun, eye)
+    also_tilted = accuracy_at(scheduled, tilted, eye)
 
     assert np.abs(only_spun.orientation_error).max() < 1e-15
     np.testing.assert_allclose(also_tilted.orientation_error, tilts, atol=1e-14)

@@ -84,17 +84,32 @@ MeshUnit = Literal["mm", "m", "inch"]
 _UNIT_RULE = "missing, expected the unit of the mesh: mm, m or inch"
 
 
-def require_unit(mesh: str | None, unit: str | None) -> None:
+def require_unit(entry: Entry) -> None:
     """A mesh file does not say its unit, so the cell must; nothing else may."""
-    if mesh is not None and unit is None:
+    has_mesh, has_unit = (getattr(entry, key) is not None for key in ("mesh", "unit"))
+    if has_mesh and not has_unit:
         raise rule(_UNIT_RULE, "unit")
-    if mesh is None and unit is not None:
+    if has_unit and not has_mesh:
         raise rule("unexpected key, a unit goes with a mesh only", "unit")
 
 
-class PartShapeEntry(Entry):
+class _OneShape(Entry):
+    """Base of entries that hold exactly one of several shapes, and the unit of a mesh."""
+
+    shapes: ClassVar[tuple[str, ...]]
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Self:
+        """Exactly one shape, with a unit if it is a mesh."""
+        require_one(self, self.shapes)
+        require_unit(self)
+        return self
+
+
+class PartShapeEntry(_OneShape):
     """Exactly one of box, cylinder, sphere and mesh."""
 
+    shapes: ClassVar[tuple[str, ...]] = PART_SHAPES
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PART_SHAPES))
 
     box: BoxEntry | None = Field(default=None, description="Cuboid centred on the part frame.")
@@ -105,17 +120,11 @@ class PartShapeEntry(Entry):
     )
     unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
 
-    @model_validator(mode="after")
-    def _is_one_shape(self) -> Self:
-        """Exactly one shape."""
-        require_one(self, PART_SHAPES)
-        require_unit(self.mesh, self.unit)
-        return self
 
-
-class ToolShapeEntry(Entry):
+class ToolShapeEntry(_OneShape):
     """Exactly one of box, cylinder, capsule, sphere and mesh; it ends at the tool tip."""
 
+    shapes: ClassVar[tuple[str, ...]] = SOLID_SHAPES
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
 
     box: BoxEntry | None = Field(
@@ -131,17 +140,11 @@ class ToolShapeEntry(Entry):
     mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file, drawn in the flange frame.")
     unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
 
-    @model_validator(mode="after")
-    def _is_one_shape(self) -> Self:
-        """Exactly one shape."""
-        require_one(self, SOLID_SHAPES)
-        require_unit(self.mesh, self.unit)
-        return self
 
-
-class ToolBodyEntry(Entry):
+class ToolBodyEntry(_OneShape):
     """A further solid of a tool, given in the flange frame."""
 
+    shapes: ClassVar[tuple[str, ...]] = SOLID_SHAPES
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
 
     box: BoxEntry | None = Field(default=None, description="Cuboid.")
@@ -152,17 +155,11 @@ class ToolBodyEntry(Entry):
     unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
     at: PoseEntry = Field(default=PoseEntry(), description="Pose of the solid in the flange frame.")
 
-    @model_validator(mode="after")
-    def _is_one_shape(self) -> Self:
-        """Exactly one shape."""
-        require_one(self, SOLID_SHAPES)
-        require_unit(self.mesh, self.unit)
-        return self
 
-
-class ObstacleEntry(Entry):
+class ObstacleEntry(_OneShape):
     """A fixed thing in the cell: exactly one shape and its pose."""
 
+    shapes: ClassVar[tuple[str, ...]] = OBSTACLE_SHAPES
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*OBSTACLE_SHAPES))
 
     plane: PlaneEntry | None = Field(default=None, description="Floor of the cell.")
@@ -177,10 +174,8 @@ class ObstacleEntry(Entry):
     )
 
     @model_validator(mode="after")
-    def _is_one_shape(self) -> Self:
-        """Exactly one shape; a floor has its height and no pose."""
-        require_one(self, OBSTACLE_SHAPES)
-        require_unit(self.mesh, self.unit)
+    def _is_placed_once(self) -> Self:
+        """A floor has its height and no pose."""
         if self.plane is not None and self.at is not None:
             raise rule("unexpected key, a plane is placed by z_mm only", "at")
         return self
