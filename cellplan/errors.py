@@ -61,10 +61,6 @@ class NoSolutionError(CellplanError):
     status = ExitStatus.NO_SOLUTION
 
 
-class UnreachablePointError(NoSolutionError):
-    """A robot cannot bring its tool to a point of its task."""
-
-
 class StartNotFoundError(NoSolutionError):
     """No start posture was found that reaches the task within limits and without collision."""
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.errors import DivergedError
 from cellplan.geometry.transforms import Array, inverse
@@ -41,12 +40,7 @@ class TrackingProblem:
         wanted: Wanted tool poses X_PT, shape (N, tasks, 4, 4).
         twists: Wanted tool twists in P, linear first, shape (N, tasks, 6).
         signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
-        may_move: Whether a joint moves anything that counts, shape (nq,).
         weights: Joint weights, shape (nq,).
-        lower: Lower joint limits, shape (nq,).
-        upper: Upper joint limits, shape (nq,).
-        velocity: Speed limits, shape (nq,).
-        acceleration: Acceleration limits, inf where unknown, shape (nq,).
         gain: Error feedback gain in [1/s].
         damping: Largest damping factor; None leaves it to the method.
     """
@@ -55,7 +49,6 @@ class TrackingProblem:
         """Gather what stays the same from step to step."""
         tasks = tuple(scheduled.task for scheduled in schedule.tasks)
         names = [robot.name for robot in cell.robots]
-        joints = [joint for robot in cell.robots for joint in robot.model.joints]
         self._model = CombinedModel(cell)
         self._operators = [names.index(task.robot) for task in tasks]
         self._rows = [constraint_rows(scheduled.task, scheduled.X_PT) for scheduled in schedule.tasks]
@@ -66,12 +59,7 @@ class TrackingProblem:
         self.wanted = np.stack([scheduled.X_PT for scheduled in schedule.tasks], axis=1)
         self.twists = np.stack([scheduled.V_PT_P for scheduled in schedule.tasks], axis=1)
         self.signs = column_signs(cell, self._model, tasks, moving)
-        self.may_move: NDArray[np.bool_] = np.asarray(self.signs.any(axis=0))
         self.weights = np.concatenate([robot.weights for robot in cell.robots])
-        self.lower = np.array([joint.lower for joint in joints])
-        self.upper = np.array([joint.upper for joint in joints])
-        self.velocity = np.array([joint.velocity for joint in joints])
-        self.acceleration = np.array([joint.acceleration or np.inf for joint in joints])
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
 
     def step(self, k: int) -> float:
@@ -81,11 +69,6 @@ class TrackingProblem:
     def state(self, q: Array) -> CellState:
         """Kinematics of the whole cell at a stacked joint vector, shape (nq,)."""
         return self._model.state(q)
-
-    def tool_poses(self, state: CellState) -> Array:
-        """Tool poses on the part X_PT, shape (tasks, 4, 4)."""
-        poses: Array = inverse(state.X_WP) @ state.X_WT[self._operators]
-        return poses
 
     def first_order(self, k: int, q: Array) -> FirstOrder:
         """The tasks at instant k and posture q, to first order.
