@@ -125,6 +125,8 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
         feed=None if entry.feed_mm_s is None else entry.feed_mm_s / MM,
         time_law=_time_law(law),
         blend=corners.blend_mm / MM if isinstance(corners, BlendEntry) else None,
+        settle=entry.settle_s,
+        repeat=entry.repeat,
     )
 
 

@@ -117,6 +117,9 @@ class Task:
         feed: Largest speed along the path on the surface in [m/s]; None when the duration decides.
         time_law: Law of each stretch between stops.
         blend: Corner rounding distance in [m]; None means that the tool stops at every corner.
+        settle: Time in [s] after the start during which the tool may come from beside its path: errors are reported
+            and not judged.
+        repeat: How often a closed path is gone through.
     """
 
     name: str
@@ -135,3 +138,5 @@ class Task:
     feed: float | None
     time_law: TimeLaw
     blend: float | None
+    settle: float = 0.0
+    repeat: int = 1

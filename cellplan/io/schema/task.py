@@ -24,6 +24,7 @@ from cellplan.io.schema.robot import SlidingSpeed
 PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
 LONGEST_S: Final = 1e6  # [s] eleven days: longer is a slip of the unit
+MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
 PlaneWord = Literal["xy", "yz", "xz"]
 Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
@@ -239,6 +240,14 @@ class TaskEntry(Entry):
     )
     feed_mm_s: SlidingSpeed | None = Field(
         default=None, description="Largest speed along the path on the surface; excludes duration_s."
+    )
+    repeat: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
+        default=1, description="How often a closed path is gone through; the duration is that of all cycles together."
+    )
+    settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
+        default=0.0,
+        description="Time after the start during which the tool may come from beside its path: its error is reported "
+        "and not judged. Shorter than the task.",
     )
     time_law: TimeLawChoice | None = Field(
         default=None, description="Law of each stretch between stops; the motion's when absent."
