@@ -15,10 +15,10 @@ from cellplan.model.cell import (
     Origin,
     Part,
     Robot,
-    SolverSettings,
     Tool,
 )
 from cellplan.model.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
+from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
 
 

@@ -16,11 +16,11 @@ from cellplan.model.cell import (
     Origin,
     Part,
     Robot,
-    SolverSettings,
     Tool,
 )
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.robot import Body, Joint, JointKind, RobotModel
+from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
 
 QUARTER = 0.5 * np.pi

@@ -9,7 +9,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.io.cell_rules import needs_surface
 from cellplan.io.robot_rules import start_posture
 from cellplan.io.schema import CellDocument
-from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry, SolverEntry
+from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry
 from cellplan.io.schema.robot import RobotEntry, ToolEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.task import (
@@ -26,12 +26,12 @@ from cellplan.model.cell import (
     CheckSettings,
     Exclusion,
     Grasp,
+    LockedJoint,
     Mode,
     MotionSettings,
     Obstacle,
     Part,
     Robot,
-    SolverSettings,
     Tool,
 )
 from cellplan.model.robot import BASE, Body, RobotModel
@@ -50,7 +50,6 @@ from cellplan.model.task import (
 
 COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
 PLANE_NORMAL: Final = {"xy": "z", "yz": "x", "xz": "y"}
-HALF_FEEDBACK: Final = 0.5  # gain_per_s * step_s by default: a quarter of where Euler's steps begin to swing
 
 TargetReader = Callable[[str], SampledPath]  # name of the task -> its file, read
 
@@ -79,7 +78,7 @@ def _tool(entry: ToolEntry, read_mesh: MeshReader) -> Tool:
         Body(name="tool" if number == 1 else f"tool_{number}", link=BASE, shape=solid, X_BS=X_FS)
         for number, (solid, X_FS) in enumerate(placed, start=1)
     ]
-    return Tool(X_FT=X_FT, bodies=tuple(bodies))
+    return Tool(X_FT=X_FT, bodies=tuple(bodies), mass=entry.mass_kg)
 
 
 def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
@@ -90,6 +89,7 @@ def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
         X_PS=X_PS,
         held_by=tuple(Grasp(robot=grasp.robot, X_PT=pose_from_entry(grasp.at)) for grasp in entry.held_by),
         X_WP=None if entry.at is None else pose_from_entry(entry.at),
+        mass=entry.mass_kg,
     )
 
 
@@ -220,15 +220,14 @@ def _time_law(law: str | TrapezoidEntry) -> TimeLaw:
 
 
 def build_motion(entry: MotionEntry) -> MotionSettings:
-    """Mode and clock."""
-    return MotionSettings(mode=Mode(entry.mode), duration=entry.duration_s, step=entry.step_s)
-
-
-def build_solver(entry: SolverEntry, step: float) -> SolverSettings:
-    """Method and gains; the gain follows from the step in [s] when it is not given."""
-    gain = HALF_FEEDBACK / step if entry.gain_per_s is None else entry.gain_per_s
-    damping = None if isinstance(entry.damping, str) else entry.damping
-    return SolverSettings(method=entry.method, gain=gain, damping=damping, seed=entry.seed)
+    """Mode, clock, and joints that fail."""
+    return MotionSettings(
+        mode=Mode(entry.mode),
+        duration=entry.duration_s,
+        step=entry.step_s,
+        cyclic=entry.cyclic,
+        locked=tuple(LockedJoint(robot=it.robot, joint=it.joint, since=it.from_s) for it in entry.locked_joints),
+    )
 
 
 def build_checks(entry: ChecksEntry) -> CheckSettings:

@@ -13,7 +13,6 @@ from cellplan.io.cell_build import (
     build_obstacle,
     build_part,
     build_robot,
-    build_solver,
     build_task,
     resolved_document,
 )
@@ -24,6 +23,8 @@ from cellplan.io.robot_rules import robot_complaints
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.pieces import Pieces, read_pieces
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry, ToolBodyEntry, ToolShapeEntry
+from cellplan.io.solver_build import build_solver
+from cellplan.io.solver_rules import solver_complaints
 from cellplan.io.yaml_reader import YamlDocument, read_yaml
 from cellplan.model.cell import Cell, Origin
 from cellplan.model.robot import RobotModel
@@ -59,6 +60,7 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> Cell:
     for name, model in models.items():
         complaints += robot_complaints(name, pieces.robots[name], model, document)
     complaints += _unknown_bodies(pieces, models, document)
+    complaints += solver_complaints(pieces, models, document)
     complaints += _part_extent(pieces, document)
     _read_meshes(pieces, sources)
     targets = _targets(pieces, sources)
@@ -180,7 +182,7 @@ def _cell(
         tasks=tuple(build_task(name, whole, targets.__getitem__) for name in whole.tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),
         motion=build_motion(whole.motion),
-        solver=build_solver(whole.solver, whole.motion.step_s),
+        solver=build_solver(whole.solver, whole.motion.step_s, models),
         checks=build_checks(whole.checks),
         origin=Origin(file=document.file, lines=document.lines(), document=resolved_document(whole)),
         inputs=dict(sorted(sources.inputs.items())),

@@ -6,11 +6,11 @@ from typing import Final
 from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, listed
 from cellplan.io.schema.pieces import Pieces
 from cellplan.io.schema.task import TaskEntry
+from cellplan.io.solver_rules import feedback_complaints
 from cellplan.io.yaml_reader import YamlDocument
 
 TIME_ROOM: Final = 1e-9  # [-] of the duration: rounding of start_s + duration_s
 ORIENTATION_AXES: Final = frozenset({"rx", "ry", "rz"})
-FEEDBACK_LIMIT: Final = 2.0  # gain_per_s * step_s at which Euler's steps begin to swing ever wider
 ANGLE_RANGES: Final = ("base", "start_deg", "start")
 
 
@@ -22,7 +22,7 @@ def rule_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Complain
     for name, task in pieces.tasks.items():
         yield from _times(pieces, document, name)
         yield from _tool_axis(task, document, name)
-    yield from _feedback(pieces, document)
+    yield from feedback_complaints(pieces, document)
     yield from _layout(pieces, document)
 
 
@@ -118,19 +118,6 @@ def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[C
         )
         key = "path" if task.tool_axis is None else "tool_axis"
         yield document.complaint(("tasks", name, key), text)
-
-
-def _feedback(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
-    """The error feedback dies away with Euler's steps."""
-    if pieces.motion is None or pieces.solver is None or pieces.solver.gain_per_s is None:
-        return
-    gain, step = pieces.solver.gain_per_s, pieces.motion.step_s
-    if gain * step >= FEEDBACK_LIMIT:
-        text = (
-            f"expected a gain below {FEEDBACK_LIMIT / step:g} (2 / step_s), got {gain:g}; "
-            "the error feedback would swing ever wider"
-        )
-        yield document.complaint(("solver", "gain_per_s"), text)
 
 
 def _layout(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:

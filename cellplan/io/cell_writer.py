@@ -11,6 +11,7 @@ from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml_writer import yaml_text
 from cellplan.model.cell import Cell, Part, Robot
 from cellplan.model.robot import RobotModel
+from cellplan.model.solver import SolverSettings
 from cellplan.model.task import SampledPath, Task
 
 NEIGHBOURS: Final = 3  # units in the last place round the quotient in which the written number is sought
@@ -39,12 +40,7 @@ def render_cell(cell: Cell, starts: Mapping[str, Array] | None = None) -> str:
     document["part"] = _part(document["part"], cell.part)
     document["tasks"] = {task.name: _task(tasks[task.name], task) for task in cell.tasks}
     document["motion"] = _motion(document["motion"], cell)
-    document["solver"] = {
-        "method": cell.solver.method,
-        "gain_per_s": cell.solver.gain,
-        "damping": "auto" if cell.solver.damping is None else cell.solver.damping,
-        "seed": cell.solver.seed,
-    }
+    document["solver"] = _solver(document["solver"], cell.solver)
     return yaml_text(document)
 
 
@@ -102,6 +98,17 @@ def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
         settings = {"file": task.path.source, "smooth": task.path.is_smooth, "closed": task.path.is_closed}
         written["path"] = {**entry["path"], "csv": settings}
     return written
+
+
+def _solver(entry: Mapping[str, Any], solver: SolverSettings) -> dict[str, Any]:
+    """The solver, its gain and method as they were used; what the cell gives besides stays."""
+    used = {
+        "method": solver.method,
+        "gain_per_s": solver.gain,
+        "damping": "auto" if solver.damping is None else solver.damping,
+        "seed": solver.seed,
+    }
+    return used | {key: value for key, value in entry.items() if key not in used}
 
 
 def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:

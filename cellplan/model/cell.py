@@ -3,14 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Literal
 
 from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array
 from cellplan.model.robot import Body, RobotModel
+from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Task
-
-MethodName = Literal["weighted_pseudo_inverse"]  # each is the name of a file and a function in planning/methods/
 
 
 class Mode(StrEnum):
@@ -51,10 +49,12 @@ class Tool:
     Attributes:
         X_FT: Tool tip in the flange frame, z out of the tool.
         bodies: Solids, their poses ``X_BS`` given in F, ``link`` unused.
+        mass: Mass in [kg], thought of at the tip.
     """
 
     X_FT: Array
     bodies: tuple[Body, ...]
+    mass: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,12 +95,14 @@ class Part:
         X_PS: Pose of the shape's frame in the part frame P.
         held_by: The robots that hold it; empty when it is fixed in the world.
         X_WP: Pose in the world when nobody holds it; None otherwise.
+        mass: Mass in [kg], thought of at the origin of the shape's frame.
     """
 
     shape: Solid
     X_PS: Array
     held_by: tuple[Grasp, ...]
     X_WP: Array | None
+    mass: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -113,29 +115,31 @@ class Obstacle:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LockedJoint:
+    """A joint that fails: from the instant ``since`` in [s] on it stays where it is."""
+
+    robot: str
+    joint: str
+    since: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MotionSettings:
-    """Who moves and on which clock: ``duration`` and ``step`` in [s]."""
+    """Who moves and on which clock.
+
+    Attributes:
+        mode: Who moves.
+        duration: Length of the common clock in [s].
+        step: Time between two instants in [s].
+        cyclic: Whether all joints are to end where they started.
+        locked: Joints that fail on the way.
+    """
 
     mode: Mode
     duration: float
     step: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SolverSettings:
-    """How joint speeds are found.
-
-    Attributes:
-        method: The resolution method.
-        gain: Error feedback gain in [1/s].
-        damping: Largest damping factor; None lets the smallest singular value decide (``auto``).
-        seed: Seed of every random search.
-    """
-
-    method: MethodName
-    gain: float
-    damping: float | None
-    seed: int
+    cyclic: bool = False
+    locked: tuple[LockedJoint, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -54,10 +54,15 @@ class Motion:
     Attributes:
         times: Instants in [s], shape (N,).
         q: Stacked joint positions in [rad] or [m], shape (N, nq), in the order of ``Cell.robots``.
+        iterations: How often the method looked at the tasks for each step, shape (N - 1,); None when nobody counted.
+        slack: By how much each step leaves the tasks on purpose, as the norm of the twist that it gives up (metres
+            and radians per second as they come), shape (N - 1,); None when nobody measured it.
     """
 
     times: Array
     q: Array
+    iterations: Array | None = None
+    slack: Array | None = None
 
     def __post_init__(self) -> None:
         """Check at the door that nothing is missing or not finite."""

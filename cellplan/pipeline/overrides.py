@@ -3,11 +3,11 @@
 from collections.abc import Iterable
 from dataclasses import replace
 from difflib import get_close_matches
-from typing import cast
+from typing import cast, get_args
 
 from cellplan.errors import InputError
-from cellplan.model.cell import Cell, MethodName, Mode
-from cellplan.planning.methods import METHODS
+from cellplan.model.cell import Cell, Mode
+from cellplan.model.solver import NULL_SPACE_METHODS, MethodName
 
 SHORTEST = 1e-3  # [s] shorter cycles are slips of the pen
 
@@ -34,9 +34,7 @@ def with_overrides(
         motion = replace(cell.motion, mode=Mode(_known("--mode", mode, [str(each) for each in Mode])))
         cell = replace(cell, motion=motion)
     if method is not None:
-        name = cast(MethodName, _known("--method", method, METHODS))
-        solver = replace(cell.solver, method=name)
-        cell = replace(cell, solver=solver)
+        cell = _with_method(cell, cast(MethodName, _known("--method", method, get_args(MethodName))))
     if duration is not None:
         cell = _with_duration(cell, duration)
     return cell
@@ -50,6 +48,17 @@ def require_task(cell: Cell, name: str | None) -> None:
     """
     if name is not None:
         _known("--task", name, [task.name for task in cell.tasks])
+
+
+def _with_method(cell: Cell, name: MethodName) -> Cell:
+    """The cell with another resolution method, which must be able to do all that is asked."""
+    asked = ["solver.secondary"] * bool(cell.solver.goals) + ["motion.cyclic"] * cell.motion.cyclic
+    if asked and name not in NULL_SPACE_METHODS:
+        raise InputError(
+            f"--method: expected a method that leaves room besides the tasks, as {cell.origin.at(asked[0])} asks for "
+            f"it ({', '.join(sorted(NULL_SPACE_METHODS))}), got '{name}'"
+        )
+    return replace(cell, solver=replace(cell.solver, method=name))
 
 
 def _with_duration(cell: Cell, duration: float) -> Cell:

@@ -5,21 +5,25 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.errors import NoSolutionError
+from cellplan.errors import DivergedError, NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.planning.methods import METHODS
-from cellplan.planning.tracking_problem import TrackingProblem
+from cellplan.planning.closing import closing_drift
+from cellplan.planning.methods import method_named
+from cellplan.planning.tracking_problem import Advance, TrackingProblem
 
 TOLD_EVERY: Final = 200  # [samples] between two words on progress
+LARGEST_STEP: Final = np.pi  # [rad] or [m]: a joint that goes farther in one step is not integrated any more
 
 
 def follow(
     cell: Cell, schedule: Schedule, *, start: Array, moving: Sequence[str], progress: Progress = silent
 ) -> Motion:
     """Let the cell's resolution method carry the joints from each instant of the clock to the next.
+
+    A cyclic motion gets a constant drift in the null space of the tasks that brings all joints back.
 
     Args:
         cell: The cell.
@@ -30,16 +34,43 @@ def follow(
 
     Raises:
         DivergedError: A tool lost its path.
-        NoSolutionError: The method found no way on.
+        NoSolutionError: The method found no way on, or no cycle closes.
     """
-    advance = METHODS[cell.solver.method](TrackingProblem(cell, schedule, moving))
-    q = np.empty((len(schedule.times), cell.joint_count))
+    problem = TrackingProblem(cell, schedule, moving)
+    if cell.motion.cyclic:
+
+        def cycle(drift: Array, last: int) -> Array:
+            problem.drift = drift
+            return _carry(problem, start, last=last, progress=progress).q
+
+        problem.drift = closing_drift(problem, schedule, start, cycle)
+    return _carry(problem, start, last=len(schedule.times) - 1, progress=progress)
+
+
+def _carry(problem: TrackingProblem, start: Array, *, last: int, progress: Progress) -> Motion:
+    """Motion from the first instant to the instant ``last``."""
+    cell = problem.cell
+    advance = method_named(cell.solver.method)(problem)
+    q = np.empty((last + 1, cell.joint_count))
+    iterations, slack = np.empty(last), np.empty(last)
     q[0] = start
-    for k in range(len(q) - 1):
+    for k in range(last):
         try:
-            q[k + 1] = advance(k, q[k])
+            step = advance(k, q[k])
+            _refuse_leap(q[k], step)
         except NoSolutionError as error:
-            raise type(error)(f"{cell.origin.at('motion')}: at {schedule.times[k]:.3f} s {error}") from None
+            raise type(error)(f"{cell.origin.at('motion')}: at {problem.times[k]:.3f} s {error}") from None
+        q[k + 1], iterations[k], slack[k] = step.q, step.iterations, step.slack
         if k % TOLD_EVERY == 0:
             progress("planning", k / len(q))
-    return Motion(times=schedule.times, q=q)
+    return Motion(times=problem.times[: last + 1], q=q, iterations=iterations, slack=slack)
+
+
+def _refuse_leap(q: Array, step: Advance) -> None:
+    """Stop when a step is no number, or so long that the first order says nothing about it any more."""
+    longest = float(np.max(np.abs(step.q - q), initial=0.0))
+    if not longest < LARGEST_STEP:  # also for what is not a number
+        raise DivergedError(
+            "a joint would leap by half a turn or more in one step: shorten motion.step_s, lower the gain or allow "
+            "damping (auto)"
+        )

@@ -12,6 +12,8 @@ from cellplan.kinematics.combined import CellState, CombinedModel
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian, pose_errors
+from cellplan.planning.secondary_goals import goal_pulls
+from cellplan.planning.weighting import JointWeights
 
 LOST_DISTANCE: Final = 0.5  # [m] a tool this far from its path has left it for good: the posture means nothing any more
 
@@ -21,28 +23,49 @@ class FirstOrder:
     """All tasks at one instant and posture, to first order; only the components that they constrain.
 
     Attributes:
-        J: Rows of the cooperation Jacobian, shape (m, nq).
+        J: Rows of the cooperation Jacobian, shape (m, nq); zero columns for joints that may not move.
         twist: Wanted tool twists relative to the part, shape (m,).
         error: Pose errors, wanted minus actual, shape (m,).
+        weights: Joint weights, the diagonal of W, shape (nq,).
+        secondary: Joint speeds that the secondary goals ask for, shape (nq,); None when there are none.
     """
 
     J: Array
     twist: Array
     error: Array
+    weights: Array
+    secondary: Array | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Advance:
+    """One step of a resolution method.
+
+    Attributes:
+        q: Stacked joint vector at the next instant, shape (nq,).
+        iterations: How often the method looked at the tasks.
+        slack: Norm of the twist that was given up on purpose, metres and radians per second as they come.
+    """
+
+    q: Array
+    iterations: int = 1
+    slack: float = 0.0
 
 
 class TrackingProblem:
     """All tasks of one run on the common clock, and the joints that may move for them.
 
     Attributes:
+        cell: The cell.
         times: Instants in [s], shape (N,).
         tasks: The tasks, one block row each.
+        operators: Index of each task's robot in the cell.
         wanted: Wanted tool poses X_PT, shape (N, tasks, 4, 4).
         twists: Wanted tool twists in P, linear first, shape (N, tasks, 6).
         signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
-        weights: Joint weights, shape (nq,).
         gain: Error feedback gain in [1/s].
         damping: Largest damping factor; None leaves it to the method.
+        drift: Joint speeds that are asked for at all times besides the tasks, shape (nq,): what closes a cycle.
     """
 
     def __init__(self, cell: Cell, schedule: Schedule, moving: Sequence[str]) -> None:
@@ -50,17 +73,23 @@ class TrackingProblem:
         tasks = tuple(scheduled.task for scheduled in schedule.tasks)
         names = [robot.name for robot in cell.robots]
         self._model = CombinedModel(cell)
-        self._operators = [names.index(task.robot) for task in tasks]
         self._rows = [constraint_rows(scheduled.task, scheduled.X_PT) for scheduled in schedule.tasks]
         self._is_whole = all(len(task.axes) == 6 and not task.is_spin_free for task in tasks)
         self._is_spin_free = [task.is_spin_free for task in tasks]
         self._is_linear = np.array([[float(axis in task.axes) for axis in range(3)] for task in tasks])
-        self.times, self.tasks = schedule.times, tasks
+        self._lost = np.array([max(LOST_DISTANCE, 2.0 * task.tolerance.position) for task in tasks])
+        self._settled = np.array([task.start + task.settle if task.settle else -np.inf for task in tasks])
+        self._weights = JointWeights(cell)
+        self._pulls = goal_pulls(cell)
+        self.cell, self.times, self.tasks = cell, schedule.times, tasks
+        self.operators = [names.index(task.robot) for task in tasks]
         self.wanted = np.stack([scheduled.X_PT for scheduled in schedule.tasks], axis=1)
         self.twists = np.stack([scheduled.V_PT_P for scheduled in schedule.tasks], axis=1)
         self.signs = column_signs(cell, self._model, tasks, moving)
-        self.weights = np.concatenate([robot.weights for robot in cell.robots])
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
+        self.drift: Array | None = None
+        self._locked_since = _locked_since(cell)
+        self._may_move = np.isin(_owners(cell), moving)
 
     def step(self, k: int) -> float:
         """Time from instant k to the next in [s]."""
@@ -70,6 +99,11 @@ class TrackingProblem:
         """Kinematics of the whole cell at a stacked joint vector, shape (nq,)."""
         return self._model.state(q)
 
+    def mobile(self, k: int) -> Array:
+        """1 for joints that may move at instant k, 0 for those that stand still or are locked, shape (nq,)."""
+        mobile: Array = (self._may_move & (self.times[k] < self._locked_since)).astype(float)
+        return mobile
+
     def first_order(self, k: int, q: Array) -> FirstOrder:
         """The tasks at instant k and posture q, to first order.
 
@@ -77,23 +111,44 @@ class TrackingProblem:
             DivergedError: A tool lost its path.
         """
         state = self.state(q)
-        X_WT = state.X_WT[self._operators]
-        J = cooperation_jacobian(state, X_WT[:, :3, 3], self.signs)
+        mobile = self.mobile(k)
+        X_WT = state.X_WT[self.operators]
+        J = cooperation_jacobian(state, X_WT[:, :3, 3], self.signs * mobile)
         error = pose_errors(self.wanted[k], inverse(state.X_WP) @ X_WT, self._is_spin_free)
-        self._refuse_lost_path(error)
+        self._refuse_lost_path(k, error)
+        rows, twist, errors = self._constrained(k, J, error)
+        return FirstOrder(rows, twist, errors, self._weights.at(q), self._secondary(q, mobile))
+
+    def _constrained(self, k: int, J: Array, error: Array) -> tuple[Array, Array, Array]:
+        """Rows, wanted twists and errors of the components that the tasks constrain."""
         if self._is_whole:
-            return FirstOrder(J.reshape(-1, J.shape[2]), self.twists[k].reshape(-1), error.reshape(-1))
+            return J.reshape(-1, J.shape[2]), self.twists[k].reshape(-1), error.reshape(-1)
         picks = [rows[k] for rows in self._rows]
-        return FirstOrder(
+        return (
             np.concatenate([pick @ block for pick, block in zip(picks, J, strict=True)]),
             np.concatenate([pick @ twist for pick, twist in zip(picks, self.twists[k], strict=True)]),
             np.concatenate([pick @ part for pick, part in zip(picks, error, strict=True)]),
         )
 
-    def _refuse_lost_path(self, error: Array) -> None:
-        """Stop where going on would be meaningless; not a number counts as lost."""
+    def _secondary(self, q: Array, mobile: Array) -> Array | None:
+        """Joint speeds that serve the secondary goals, before the tasks are given their due."""
+        if not self._pulls and self.drift is None:
+            return None
+        wanted = np.zeros_like(q) if self.drift is None else self.drift.copy()
+        for gain, pull in self._pulls:
+            wanted += gain * pull(q)
+        speeds: Array = wanted * mobile
+        return speeds
+
+    def _refuse_lost_path(self, k: int, error: Array) -> None:
+        """Stop where going on would be meaningless; not a number counts as lost.
+
+        A tool that is still on its way to the path is not lost. With a joint that fails the report is to say how far
+        the others get.
+        """
         distances = np.linalg.norm(error[:, :3] * self._is_linear, axis=1)
-        if distances.max() < LOST_DISTANCE and np.isfinite(error.sum()):
+        is_lost = (distances >= self._lost) & (self.times[k] >= self._settled) & (not self.cell.motion.locked)
+        if not is_lost.any() and np.isfinite(error.sum()):
             return
         worst = int(np.argmax(distances))
         task = self.tasks[worst]
@@ -101,3 +156,17 @@ class TrackingProblem:
             f"the tool of '{task.robot}' is {1e3 * distances[worst]:.0f} mm from task '{task.name}': "
             "the path cannot be followed from this start posture"
         )
+
+
+def _owners(cell: Cell) -> list[str]:
+    """Name of the robot of each joint."""
+    return [robot.name for robot in cell.robots for _ in robot.model.joints]
+
+
+def _locked_since(cell: Cell) -> Array:
+    """Instant in [s] from which each joint stays where it is, inf for those that do not fail, shape (nq,)."""
+    since = np.full(cell.joint_count, np.inf)
+    for lock in cell.motion.locked:
+        index = cell.columns(lock.robot).start + cell.robot(lock.robot).model.joint_names.index(lock.joint)
+        since[index] = min(since[index], lock.since)
+    return since

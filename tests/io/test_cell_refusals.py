@@ -98,8 +98,9 @@ Refuse = Callable[..., list[str]]
         (
             "environment:",
             "solver: {method: wieghted_pseudo_inverse}\nenvironment:",
-            "c:22: solver.method: expected weighted_pseudo_inverse, got 'wieghted_pseudo_inverse', did you mean "
-            "'weighted_pseudo_inverse'?",
+            "c:22: solver.method: expected weighted_pseudo_inverse, damped_least_squares, jacobian_transpose, "
+            "filtered_inverse, filtered_inverse_ii, heuristic_search, recursive_search or quadratic_program, "
+            "got 'wieghted_pseudo_inverse', did you mean 'weighted_pseudo_inverse'?",
         ),
         (
             "environment:",
@@ -190,7 +191,7 @@ def test_all_complaints_come_at_once_in_the_order_of_the_file(refuse: Refuse) ->
         "c:21: motion.duration_s: missing, expected length of the common clock; every task ends within it",
         "c:21: motion.duratoin_s: unknown key, did you mean 'duration_s'?; allowed: mode, duration_s, step_s, "
         "time_law, "
-        "corners",
+        "corners, cyclic, locked_joints",
     ]
 
 

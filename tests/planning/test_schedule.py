@@ -15,9 +15,9 @@ from cellplan.model.cell import (
     MotionSettings,
     Origin,
     Part,
-    SolverSettings,
 )
 from cellplan.model.motion import Schedule
+from cellplan.model.solver import SolverSettings
 from cellplan.model.task import (
     CirclePath,
     PathSpec,

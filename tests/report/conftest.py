@@ -19,7 +19,6 @@ from cellplan.model.cell import (
     Origin,
     Part,
     Robot,
-    SolverSettings,
     Tool,
 )
 from cellplan.model.report import (
@@ -35,6 +34,7 @@ from cellplan.model.report import (
     TaskAccuracy,
 )
 from cellplan.model.robot import Joint, JointKind, RobotModel
+from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
 from cellplan.report.record import Provenance
 

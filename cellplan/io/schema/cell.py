@@ -5,24 +5,16 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.io.schema.common import Angle, Coordinate, Entry, Name, PoseEntry, Text, by_kind, rule
-from cellplan.io.schema.robot import RobotEntry
+from cellplan.io.schema.robot import Mass, RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
-from cellplan.io.schema.task import CornerChoice, Seconds, TaskEntry, TimeLawChoice
-from cellplan.model.cell import MethodName
+from cellplan.io.schema.solver import SolverEntry
+from cellplan.io.schema.task import LONGEST_S, CornerChoice, Seconds, TaskEntry, TimeLawChoice
 
 SCHEMA_VERSION: Final = 1
 ROBOT_LIMIT: Final = 16
 TASK_LIMIT: Final = 200
 OBSTACLE_LIMIT: Final = 500
 SAMPLE_LIMIT: Final = 2_000_000  # tables longer than this fill disks, not controllers
-LARGEST_SEED: Final = 2**32 - 1
-DAMPING_WORDS: Final = "auto or a number of at least 0"
-
-DampingChoice = Annotated[
-    Annotated[Literal["auto"], Tag(f"<{DAMPING_WORDS}>")]
-    | Annotated[Annotated[float, Field(ge=0.0, le=1e6)], Tag("<number>")],
-    by_kind(DAMPING_WORDS, number=(int, float)),
-]
 
 
 class GraspEntry(Entry):
@@ -50,6 +42,7 @@ class PartEntry(Entry):
     at: PoseEntry | None = Field(
         default=None, description="Pose of the part frame in the world; required exactly when nobody holds the part."
     )
+    mass_kg: Mass = Field(default=0.0, description="Mass, for weights that grow with the load.")
 
     @model_validator(mode="after")
     def _stands_somewhere(self) -> Self:
@@ -59,6 +52,16 @@ class PartEntry(Entry):
         if not self.held_by and self.at is None:
             raise rule("missing, expected the pose of the part in the world, or a robot under held_by", "at")
         return self
+
+
+class LockedJointEntry(Entry):
+    """A joint that fails on the way."""
+
+    robot: Name = Field(description="Robot of the joint.")
+    joint: Text = Field(description="Joint that stays where it is.")
+    from_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
+        default=0.0, description="Instant from which on it stays where it is."
+    )
 
 
 class MotionEntry(Entry):
@@ -72,6 +75,10 @@ class MotionEntry(Entry):
     step_s: Seconds = Field(default=0.001, description="Time between two samples.")
     time_law: TimeLawChoice = Field(default="quintic", description="Law of each stretch of path between stops.")
     corners: CornerChoice = Field(default="stop", description="Stop at corners, or round them.")
+    cyclic: bool = Field(default=False, description="Whether all joints are to end where they started.")
+    locked_joints: tuple[LockedJointEntry, ...] = Field(
+        default=(), description="Joints that fail on the way; the others take over as far as they can."
+    )
 
     @model_validator(mode="after")
     def _has_a_sensible_clock(self) -> Self:
@@ -82,21 +89,6 @@ class MotionEntry(Entry):
             steps = self.duration_s / self.step_s
             raise rule(f"expected at most {SAMPLE_LIMIT} samples (duration_s / step_s), got {steps:.0f}", "step_s")
         return self
-
-
-class SolverEntry(Entry):
-    """How joint speeds are found."""
-
-    method: MethodName = Field(default="weighted_pseudo_inverse", description="Resolution method.")
-    gain_per_s: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
-        default=None,
-        description="Gain of the pose-error feedback; 0.5 / step_s when absent. gain_per_s * step_s is below 2.",
-    )
-    damping: DampingChoice = Field(
-        default="auto",
-        description="Largest damping factor; auto lets the smallest singular value decide, 0 turns it off.",
-    )
-    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(default=0, description="Seed of every random search.")
 
 
 class ExclusionEntry(Entry):

@@ -14,11 +14,11 @@ from cellplan.io.schema.cell import (
     LayoutEntry,
     MotionEntry,
     PartEntry,
-    SolverEntry,
 )
 from cellplan.io.schema.messages import AnyEntry, understood, validate
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry
+from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml_reader import YamlDocument
 

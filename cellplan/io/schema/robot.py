@@ -11,11 +11,13 @@ LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a slip of the uni
 FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a slip of the unit
 FASTEST_MM_S: Final = 10_000.0  # 10 m/s: faster is a slip of the unit
 WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses all its digits
+HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
 AXIS_LIMIT: Final = 64  # joints of one robot
 
 JointAngle = Annotated[float, Field(ge=-LARGEST_JOINT_DEG, le=LARGEST_JOINT_DEG)]
 TurningSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_DEG_S)]
 SlidingSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_MM_S)]
+Mass = Annotated[float, Field(ge=0.0, le=HEAVIEST_KG)]
 Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
 JointPosition = Annotated[float, Field(ge=-100_000.0, le=100_000.0)]
 
@@ -40,6 +42,7 @@ class ToolEntry(PoseEntry):
         default=None, description="Shape that ends at the tool tip; none when absent."
     )
     bodies: tuple[ToolBodyEntry, ...] = Field(default=(), description="Further solids, placed in the flange frame.")
+    mass_kg: Mass = Field(default=0.0, description="Mass, for weights that grow with the load.")
 
 
 class LimitsEntry(Entry):

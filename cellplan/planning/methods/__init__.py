@@ -1,24 +1,21 @@
 """Resolution methods: one file and one signature each, found by the name that ``MethodName`` lists.
 
 A method is given the tracking problem and returns the step it takes: from an instant k and the stacked joint vector
-there to the joint vector at the next instant. What a method remembers from step to step lives inside that step.
+there to the posture at the next instant. What a method remembers from step to step lives inside that step.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib import import_module
-from typing import cast, get_args
+from typing import cast
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import MethodName
-from cellplan.planning.tracking_problem import TrackingProblem
+from cellplan.model.solver import MethodName
+from cellplan.planning.tracking_problem import Advance, TrackingProblem
 
-Step = Callable[[int, Array], Array]
+Step = Callable[[int, Array], Advance]
 Method = Callable[[TrackingProblem], Step]
 
 
-def _method(name: MethodName) -> Method:
-    """The function of that name in the file of that name."""
+def method_named(name: MethodName) -> Method:
+    """The function of that name in the file of that name; only this file and what it needs is imported."""
     return cast(Method, getattr(import_module(f"cellplan.planning.methods.{name}"), name))
-
-
-METHODS: Mapping[MethodName, Method] = {name: _method(name) for name in get_args(MethodName)}

@@ -1,0 +1,151 @@
+"""Solver of a cell: method, gains, secondary goals and joint weights that change along the motion."""
+
+from typing import Annotated, Final, Literal
+
+from pydantic import Field, Tag
+
+from cellplan.io.schema.common import Entry, Name, Text, by_kind
+from cellplan.io.schema.robot import JointPosition
+from cellplan.model.solver import MethodName
+
+LARGEST_SEED: Final = 2**32 - 1
+MOST_ROUNDS: Final = 1_000_000
+DAMPING_WORDS: Final = "auto or a number of at least 0"
+
+DampingChoice = Annotated[
+    Annotated[Literal["auto"], Tag(f"<{DAMPING_WORDS}>")]
+    | Annotated[Annotated[float, Field(ge=0.0, le=1e6)], Tag("<number>")],
+    by_kind(DAMPING_WORDS, number=(int, float)),
+]
+Gain = Annotated[float, Field(gt=0.0, le=1e9)]
+
+
+class DampedLeastSquaresEntry(Entry):
+    """When the damping of `damped_least_squares` sets in; `damping` says how large it grows."""
+
+    measure: Literal["singular_value", "manipulability"] = Field(
+        default="singular_value", description="What tells how near a singularity is."
+    )
+    region: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
+        default=0.02, description="Value of the measure below which damping sets in."
+    )
+    shape_gain: bool = Field(default=False, description="Whether the feedback gain falls near a singularity.")
+
+
+class FilteredInverseEntry(Entry):
+    """How `filtered_inverse` and `filtered_inverse_ii` follow the Jacobian."""
+
+    gain_per_s: Gain = Field(default=1000.0, description="Update gain.")
+    start: Literal["zero", "inverse"] = Field(
+        default="inverse", description="Whether the filter starts at zero, as in the paper, or at the pseudo-inverse."
+    )
+
+
+class SearchJointEntry(Entry):
+    """One joint of a sequence."""
+
+    robot: Name = Field(description="Robot of the joint.")
+    joint: Text = Field(description="The joint.")
+
+
+class SearchEntry(Entry):
+    """How `heuristic_search` and `recursive_search` look for the next posture."""
+
+    tolerance_mm: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(
+        default=1e-4, description="Largest root of the cost at which an instant counts as reached."
+    )
+    orientation_weight_m2: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
+        default=0.01, description="Weight of the orientation in the cost."
+    )
+    rounds: Annotated[int, Field(ge=1, le=MOST_ROUNDS)] = Field(
+        default=2000, description="Rounds over all joints before an instant counts as out of reach."
+    )
+    brakes: bool = Field(default=False, description="Whether joints slow down on their way to a limit.")
+    sequence: tuple[SearchJointEntry, ...] | None = Field(
+        default=None,
+        description="Joints in the order in which `recursive_search` moves them; all in the order of the file when "
+        "absent. Joints left out stand still.",
+    )
+
+
+class QuadraticProgramEntry(Entry):
+    """Limits and slack of `quadratic_program`."""
+
+    slack_weight: Annotated[float, Field(gt=0.0, le=1e12)] = Field(
+        default=1e8, description="Weight of the task's slack against the weighted joint speeds."
+    )
+    ramp_s: Annotated[float, Field(gt=0.0, le=1e3)] | None = Field(
+        default=None,
+        description="Time in which a joint without an acceleration limit reaches its top speed; absent: at once.",
+    )
+
+
+class GoalEntry(Entry):
+    """A goal that is pursued as far as the tasks leave room."""
+
+    gain: Gain = Field(default=1.0, description="How strongly.")
+
+
+class ObstacleGoalEntry(GoalEntry):
+    """Distance from obstacles and from other robots."""
+
+    within_mm: Annotated[float, Field(gt=0.0, le=10_000.0)] = Field(
+        default=200.0, description="Distance below which bodies push each other away."
+    )
+
+
+class PostureGoalEntry(GoalEntry):
+    """A wanted posture."""
+
+    at: dict[Name, dict[str, JointPosition]] = Field(
+        default={}, description="Wanted positions by robot, one key per joint; robots left out: their start posture."
+    )
+
+
+class SecondaryEntry(Entry):
+    """Goals in the null space of the tasks."""
+
+    manipulability: GoalEntry | None = Field(default=None, description="Away from singularities.")
+    joint_limits: GoalEntry | None = Field(default=None, description="Towards the middle of the joint ranges.")
+    obstacles: ObstacleGoalEntry | None = Field(default=None, description="Away from obstacles and other robots.")
+    posture: PostureGoalEntry | None = Field(default=None, description="Towards a wanted posture.")
+
+
+class WeightingEntry(Entry):
+    """Joint weights that change along the motion."""
+
+    near_limits: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
+        default=0.0, description="How strongly a joint is held back on its way to a limit; 0: not at all."
+    )
+    load: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
+        default=0.0, description="How strongly a joint is held back by the weight it has to lift; 0: not at all."
+    )
+
+
+class SolverEntry(Entry):
+    """How joint motion is found."""
+
+    method: MethodName = Field(default="weighted_pseudo_inverse", description="Resolution method.")
+    gain_per_s: Gain | None = Field(
+        default=None,
+        description="Gain of the pose-error feedback; 0.5 / step_s when absent. gain_per_s * step_s is below 2.",
+    )
+    damping: DampingChoice = Field(
+        default="auto",
+        description="Largest damping factor; auto lets the smallest singular value decide, 0 turns it off.",
+    )
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(default=0, description="Seed of every random search.")
+    damped_least_squares: DampedLeastSquaresEntry = Field(
+        default=DampedLeastSquaresEntry(), description="Settings of that method."
+    )
+    filtered_inverse: FilteredInverseEntry = Field(
+        default=FilteredInverseEntry(), description="Settings of both filtered inverses."
+    )
+    search: SearchEntry = Field(default=SearchEntry(), description="Settings of both searches.")
+    quadratic_program: QuadraticProgramEntry = Field(
+        default=QuadraticProgramEntry(), description="Settings of that method."
+    )
+    weighting: WeightingEntry = Field(
+        default=WeightingEntry(), description="Joint weights that change along the motion."
+    )
+    secondary: SecondaryEntry = Field(default=SecondaryEntry(), description="Goals in the null space of the tasks.")

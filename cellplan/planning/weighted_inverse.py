@@ -1,0 +1,61 @@
+"""Weighted inverse of the task rows: smallest weighted joint speeds, and the motion that no task notices."""
+
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+
+ROUNDING: Final = 1e-12  # eigenvalues of J W^-1 J^T below this share of the largest are rounding: rank is lost
+
+
+class WeightedInverse:
+    r"""Inverse of ``J`` in the metric of the joint weights, from the eigenvalues of ``J W^-1 J^T``.
+
+    Attributes:
+        smallest: Smallest singular value of ``J W^-1/2``.
+        is_singular: Whether a row is lost to rounding.
+    """
+
+    def __init__(self, J: Array, weights: Array) -> None:
+        """Decompose once.
+
+        Args:
+            J: Task rows, shape (m, nq).
+            weights: Positive joint weights, the diagonal of W, shape (nq,).
+        """
+        self._J = J
+        self._JW = J / weights
+        self._s_squared, self._U = np.linalg.eigh(self._JW @ J.T)
+        self.smallest = float(np.sqrt(max(self._s_squared[0], 0.0)))
+        self.is_singular = bool(self._s_squared[0] <= ROUNDING * self._s_squared[-1])
+
+    def speeds(self, xdot: Array, lambda_squared: float) -> Array:
+        r"""Joint speeds ([Ribeiro2010]_ Eqs. D.28-D.30, damped as in [Nicolato2007]_ Eq. 2.11).
+
+        .. math:: \dot q = W^{-1} J^T (J W^{-1} J^T + \lambda^2 I)^{-1} \dot x
+
+        Args:
+            xdot: Wanted twist components, shape (m,).
+            lambda_squared: Square of the damping factor; above 0 where a row is lost.
+
+        Returns:
+            Speeds in [rad/s] or [m/s], shape (nq,).
+        """
+        speeds: Array = self._JW.T @ (self._U @ ((self._U.T @ xdot) / (self._s_squared + lambda_squared)))
+        return speeds
+
+    def unnoticed(self, speeds: Array) -> Array:
+        r"""What of given joint speeds moves no task ([Ribeiro2010]_ Eq. D.43), projected in the metric of W.
+
+        .. math:: (I - J^\# J) \dot q_0
+
+        Damping has no place here: it would let the speeds leak into the tasks. Lost rows count as no task.
+
+        Args:
+            speeds: Any joint speeds, shape (nq,).
+        """
+        kept = self._s_squared > ROUNDING * self._s_squared[-1]
+        U = self._U[:, kept]
+        rest: Array = speeds - self._JW.T @ (U @ ((U.T @ (self._J @ speeds)) / self._s_squared[kept]))
+        return rest
