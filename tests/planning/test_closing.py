@@ -1,0 +1,90 @@
+"""A cyclic motion brings every joint back, and no task notices."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cellplan.errors import InputError
+from cellplan.io.cell_file import load_cell
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Motion, Schedule
+from cellplan.planning.follow import follow
+from cellplan.planning.schedule import schedule_tasks
+from cellplan.planning.toolpaths import build_toolpath
+
+FOLDER = Path(__file__).parents[2] / "cells"
+PLANAR_START = np.radians([50.0, -85.0, 35.0])
+
+
+def planned(cell: Cell, start: np.ndarray) -> tuple[Schedule, Motion]:
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    moving = tuple(robot.name for robot in cell.robots)
+    return schedule, follow(cell, schedule, start=start, moving=moving)
+
+
+def four_robots(*, cyclic: bool) -> tuple[Cell, np.ndarray]:
+    cell = load_cell(FOLDER / "four_robots.yaml")
+    cell = replace(
+        cell,
+        motion=replace(cell.motion, step=0.01, cyclic=cyclic),
+        solver=replace(cell.solver, gain=50.0),
+    )
+    return cell, np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
+
+
+def test_four_robots_come_back_only_when_they_are_asked_to() -> None:
+    drift = {}
+    for cyclic in (False, True):
+        cell, start = four_robots(cyclic=cyclic)
+        _, motion = planned(cell, start)
+        drift[cyclic] = float(np.max(np.abs(motion.q[-1] - motion.q[0])))
+
+    assert drift[False] > np.radians(0.5)
+    assert drift[True] < np.radians(0.005)  # the tools come back to within the tracking error of a step of 10 ms
+
+
+def test_a_closed_motion_follows_the_tasks_as_well_as_an_open_one() -> None:
+    """The drift lies in the null space of the tasks, so that the error stays that of Euler's method."""
+    errors = {}
+    for cyclic in (False, True):
+        cell, start = four_robots(cyclic=cyclic)
+        schedule, motion = planned(cell, start)
+        errors[cyclic] = tool_error(cell, schedule, motion)
+
+    assert errors[True] < 1.1 * errors[False]
+
+
+def test_a_path_that_does_not_come_back_is_refused_by_name() -> None:
+    cell, start = four_robots(cyclic=True)
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    half = len(schedule.times) // 2
+    cut = replace(
+        schedule,
+        times=schedule.times[:half],
+        tasks=tuple(
+            replace(task, X_PT=task.X_PT[:half], V_PT_P=task.V_PT_P[:half], end=float(schedule.times[half - 1]))
+            for task in schedule.tasks
+        ),
+    )
+
+    with pytest.raises(InputError, match=r"motion\.cyclic: expected closed paths .* task 'circle' is not back at its"):
+        follow(cell, cut, start=start, moving=tuple(robot.name for robot in cell.robots))
+
+
+def tool_error(cell: Cell, schedule: Schedule, motion: Motion) -> float:
+    """Largest position error in [m], by the kinematics of the checks."""
+    from cellplan.checks.tracking import part_poses, task_accuracy
+    from cellplan.scene.scene import Scene
+
+    scene = Scene.from_cell(cell)
+    q = {robot.name: motion.q[:, cell.columns(robot.name)] for robot in cell.robots}
+    X_WP = part_poses(cell, scene.chains, q)
+    return max(
+        float(np.linalg.norm(found.position_error, axis=1).max())
+        for found in (
+            task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP)
+            for task in schedule.tasks
+        )
+    )
