@@ -114,7 +114,7 @@ HEADERS = {
     "a slip": ("x_mm,y_mn,z_mm", ["weld.csv:1: unknown column 'y_mn', did you mean 'y_mm'?"]),
     "a stranger": (
         "x_mm,y_mm,z_mm,speed",
-        ["weld.csv:1: unknown column 'speed', allowed are x_mm, y_mm, z_mm, i, j, k, qw, qx, qy, qz"],
+        ["weld.csv:1: unknown column 'speed', allowed are t_s, x_mm, y_mm, z_mm, i, j, k, qw, qx, qy, qz"],
     ),
     "a column twice": ("x_mm,y_mm,z_mm,x_mm", ["weld.csv:1: expected column 'x_mm' once, got it 2 times"]),
     "no z": ("x_mm,y_mm", ["weld.csv:1: expected columns x_mm, y_mm, z_mm, but z_mm is missing"]),
