@@ -7,6 +7,7 @@ import numpy as np
 from cellplan.checks.clearance import check_clearance
 from cellplan.checks.conditioning import conditioning
 from cellplan.checks.limits import check_joints, joint_uses
+from cellplan.checks.repeatability import repeatability
 from cellplan.checks.speeds import robot_speed
 from cellplan.checks.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.errors import InputError
@@ -73,6 +74,7 @@ def verify(
         },
         times=schedule.times,
         q=q,
+        repeatability=repeatability(cell, schedule, q),
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
     )
 

@@ -2,10 +2,13 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+
+INSTANT_ROOM: Final = 1e-9  # [s] instants nearer than this are the same: rounding of sums of durations
 
 
 class PlaneName(StrEnum):
@@ -187,3 +190,8 @@ class Task:
     def judged_from(self) -> float:
         """Instant in [s] from which on errors are judged: all along, unless the tool needs time to settle."""
         return self.start + self.settle if self.settle > 0.0 else 0.0
+
+    def first_judged(self, times: Array) -> int:
+        """Index of the first of these instants in [s], shape (N,), at which errors are judged; at most the last."""
+        first = int(np.searchsorted(times, self.judged_from - INSTANT_ROOM))
+        return min(first, len(times) - 1) if self.settle > 0.0 else 0

@@ -9,7 +9,7 @@ from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, rotation_about, rotation_vector
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.task import Task
+from cellplan.model.task import INSTANT_ROOM, Task
 from cellplan.model.toolpath import TOOL_Z, Toolpath, Trajectory
 from cellplan.planning.time_laws import advance, peak_rate, reached_at
 
@@ -17,7 +17,6 @@ ROTATIONS: Final = 3  # components of a task from here on are rotations
 MOST_SAMPLES: Final = 2_000_000  # tables longer than this fill disks, not controllers
 FEWEST_STEPS: Final = 10  # a task of fewer has so few samples that checks at them say nothing about its path
 STEP_ROOM: Final = 1e-9  # [-] share of a step by which the last task may outlast the clock: rounding of a quotient
-INSTANT_ROOM: Final = 1e-9  # [s] instants nearer than this are the same: rounding of sums of durations
 WHOLE_TURN: Final = 1e-9  # [rad] a turn per cycle this near to whole turns brings the tool back
 TIME_DECIMALS: Final = 12  # decimals kept of k * step, so that 0.001 * 3 reads 0.003
 

@@ -106,8 +106,8 @@ class CsvEntry(Entry):
     """Tool targets from a CSV file."""
 
     file: Text = Field(
-        description="File with the header x_mm,y_mm,z_mm and optionally i,j,k or qw,qx,qy,qz. With a column "
-        "t_s it is a trajectory that keeps its own times."
+        description="File with the header x_mm,y_mm,z_mm and optionally i,j,k or qw,qx,qy,qz, and t_s for a trajectory "
+        "that brings its own clock."
     )
     smooth: bool = Field(
         default=True, description="Whether a curve is laid through the points instead of straight sides."
@@ -227,7 +227,7 @@ class TaskEntry(Entry):
     tool_turn_deg: Angle = Field(
         default=0.0,
         description="Angle by which the tool turns about its own z axis, evenly over the length of the path, "
-        "and on and on in every further cycle.",
+        "and on by as much in every further cycle.",
     )
     axes: tuple[TaskAxis, ...] = Field(
         default=("x", "y", "z", "rx", "ry", "rz"),
