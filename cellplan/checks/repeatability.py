@@ -107,6 +107,6 @@ def _check(found: Repeatability, drift: JointDrift) -> Check:
         limit=limit,
         unit=unit,
         at_s=float(found.instants[drift.at_cycle]),
-        message=f"{drift.robot} {drift.joint} is {value:.3g} {unit} from where cycle {drift.at_cycle} of {found.cycles} "
-        f"began when it ends at {found.instants[drift.at_cycle]:.3f} s, allowed {limit:g} {unit}",
+        message=f"{drift.robot} {drift.joint} is {value:.3g} {unit} from where it was a cycle before, "
+        f"at {found.instants[drift.at_cycle]:.3f} s, the end of cycle {drift.at_cycle}; allowed {limit:g} {unit}",
     )
