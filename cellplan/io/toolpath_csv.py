@@ -201,7 +201,7 @@ def _read_row(line: int, text: str, columns: list[str], complaints: _Complaints)
         value = float(word)
         limit, unit = _LIMITS.get(column, (1.0 + UNIT_ROOM, ""))
         if abs(value) > limit:
-            complaints.add(line, f"expected at most {limit:g}{unit} either way, got {word}", column=column)
+            complaints.add(line, f"expected at most {limit:.10g}{unit} either way, got {word}", column=column)
             continue
         yield value
 
