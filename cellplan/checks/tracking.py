@@ -53,7 +53,7 @@ def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP:
 
 
 def check_accuracy(schedule: Schedule, accuracy: TaskAccuracy, task: Task) -> tuple[Check, Check]:
-    """Position and orientation error of one task against its tolerance."""
+    """Position and orientation error of one task against its tolerance, from the instant on that it has settled."""
     position = np.linalg.norm(accuracy.position_error, axis=1)
     orientation = np.linalg.norm(accuracy.orientation_error, axis=1)
     return (
@@ -71,9 +71,11 @@ def check_accuracy(schedule: Schedule, accuracy: TaskAccuracy, task: Task) -> tu
 
 def _check(name: str, schedule: Schedule, error: Array, *, task: Task, limit: float, unit: str) -> Check:
     """The worst instant of one error."""
-    worst = int(np.argmax(error))
+    first = task.first_judged(schedule.times)
+    worst = first + int(np.argmax(error[first:]))
     value, at_s = float(error[worst]), float(schedule.times[worst])
     words = name.replace("_", " ")
+    since = f", judged from {task.judged_from:g} s" if task.settle > 0.0 else ""
     return Check(
         name=name,
         subject=task.name,
@@ -82,7 +84,7 @@ def _check(name: str, schedule: Schedule, error: Array, *, task: Task, limit: fl
         limit=limit,
         unit=unit,
         at_s=at_s,
-        message=f"{words} of task '{task.name}': {value:.3g} {unit} at {at_s:.3f} s, allowed {limit:g} {unit}",
+        message=f"{words} of task '{task.name}': {value:.3g} {unit} at {at_s:.3f} s, allowed {limit:g} {unit}{since}",
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from cellplan.checks.clearance import check_clearance
 from cellplan.checks.conditioning import conditioning
 from cellplan.checks.limits import check_joints, joint_uses
+from cellplan.checks.repeatability import check_joint_drift, repeatability
 from cellplan.checks.speeds import robot_speed
 from cellplan.checks.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.errors import InputError
@@ -55,6 +56,8 @@ def verify(
         own = joint_uses(robot, schedule.times, q[robot.name])
         uses += own
         checks += check_joints(robot, own, schedule.times, q[robot.name])
+    drift = repeatability(cell, schedule, q)
+    checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
     stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
     clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
     return Report(
@@ -73,6 +76,7 @@ def verify(
         },
         times=schedule.times,
         q=q,
+        repeatability=drift,
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
     )
 

@@ -22,6 +22,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
         *_task_lines(record["tasks"]),
         *_margin_lines(record["joints"]),
         *_speed_lines(record["joints"]),
+        *_drift_lines(record.get("repeatability", {})),
         *_clearance_lines(record["clearance"]["whole"]),
         *_failure_lines(record["checks"]),
         *(f"  before you run it: {line}" for line in record.get("before_you_run", [])),
@@ -59,6 +60,20 @@ def _speed_lines(joints: Record) -> Iterator[str]:
     if driven:
         ratio, joint, at_s = max(driven)
         yield f"  largest joint speed {100.0 * ratio:.4g} % of its limit: {joint}{_instant(at_s)}"
+
+
+def _drift_lines(repeatability: Record) -> Iterator[str]:
+    """The joint that is farthest from where a cycle began; nothing when all come back."""
+    for name, found in repeatability.items():
+        if found["closes"]:
+            continue
+        subject = "all tasks" if name == "all" else f"task {name}"
+        of_cycles = f"cycle {{}} of {found['cycles']}" if found["cycles"] > 1 else "the cycle"
+        for unit, joint, cycle in (("deg", "joint", "at_cycle"), ("mm", "sliding_joint", "sliding_at_cycle")):
+            if f"worst_drift_{unit}" in found:
+                where = of_cycles.format(found[cycle])
+                drift = found[f"worst_drift_{unit}"]
+                yield f"  joint drift {drift:.4g} {unit} in {where} of {subject}: {found[joint]}"
 
 
 def _clearance_lines(whole: Record) -> Iterator[str]:

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from cellplan.geometry.transforms import Array
 
 CAUTION = (
@@ -11,6 +13,7 @@ CAUTION = (
 )
 
 
+EVEN = 1e-9  # [-] of the whole time: cycles that differ by less are equally long
 REDUCED_SPEED = 0.25  # [m/s] of the tool tip: what ISO 10218-1 allows while people are near
 
 
@@ -173,6 +176,53 @@ class Conditioning:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointDrift:
+    """How far one joint is at the end of each cycle from where it was at its start.
+
+    Attributes:
+        robot: Name of the robot.
+        joint: Name of the joint.
+        is_revolute: Whether it turns rather than slides.
+        drift: Position at the end less position at the start of each cycle in [rad] or [m], shape (cycles,).
+        worst: Largest drift of a cycle, without its sign.
+        at_cycle: The cycle in which it is largest, counted from 1.
+    """
+
+    robot: str
+    joint: str
+    is_revolute: bool
+    drift: Array
+    worst: float
+    at_cycle: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Repeatability:
+    """Whether the joints come back when all tools do.
+
+    Attributes:
+        instants: Instants in [s] at which all tools are at their start together, shape (cycles + 1,).
+        drifts: One entry per joint of every robot.
+        closes: Whether every joint comes back in every cycle, so that the program may be repeated as it is.
+    """
+
+    instants: Array
+    drifts: tuple[JointDrift, ...]
+    closes: bool
+
+    @property
+    def cycles(self) -> int:
+        """How many cycles there are."""
+        return len(self.instants) - 1
+
+    @property
+    def period(self) -> float | None:
+        """Length of a cycle in [s]; None when the cycles differ in length."""
+        lengths = np.diff(self.instants)
+        return float(lengths.mean()) if np.ptp(lengths) <= EVEN * self.instants[-1] else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Report:
     """The verdict of one run and everything behind it.
 
@@ -190,6 +240,7 @@ class Report:
         times: The common clock in [s], shape (N,).
         q: Positions read back from the tables in [rad] or [m], shape (N, n), by robot.
         qd: Speeds between the samples, shape (N - 1, n), by robot.
+        repeatability: Whether the joints come back with the tools; None when not all tools come back.
     """
 
     cell: str
@@ -205,6 +256,7 @@ class Report:
     times: Array
     q: Mapping[str, Array]
     qd: Mapping[str, Array]
+    repeatability: Repeatability | None = None
 
     @property
     def passed(self) -> bool:

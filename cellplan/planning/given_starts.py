@@ -71,11 +71,14 @@ def _outside(cell: Cell, robot: Robot) -> list[InputError]:
 
 
 def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
-    """A complaint when a given start does not put the tool on the start of its task, within the task's tolerance."""
+    """A complaint when a given start does not put the tool on the start of its task, within the task's tolerance.
+
+    A task that gives its tool time to settle may start beside its path.
+    """
     robot = cell.robot(task.robot)
     holder = cell.robot(cell.positioners[0]).start if cell.positioners else None
     X_WP = part_pose(cell, holder)
-    if robot.start is None or X_WP is None:
+    if robot.start is None or X_WP is None or task.settle > 0.0:
         return []
     X_PT = inverse(X_WP) @ ScrewChain(robot).tool_poses(robot.start[None])
     wanted = toolpath.X_PT_start[None]

@@ -33,8 +33,8 @@ class Rehearsal:
     """
 
     def __init__(self, scene: Scene, toolpaths: Mapping[str, Toolpath]) -> None:
-        """Choose a step that makes few samples of the whole motion."""
-        cell = scene.cell
+        """Choose a step that makes few samples of the whole motion, of which every path is gone through once."""
+        cell = replace(scene.cell, tasks=tuple(_first_cycle(task) for task in scene.cell.tasks))
         schedule = schedule_tasks(cell, [toolpaths[task.name] for task in cell.tasks])
         step = float(max(cell.motion.step, schedule.times[-1] / SAMPLES))
         self._scene, self._toolpaths, self._step = scene, toolpaths, step
@@ -85,6 +85,12 @@ class Rehearsal:
             schedule = schedule_tasks(self._cell, [self._toolpaths[name] for name in run.tasks])
             motions.append(follow(self._cell, schedule, start=start, moving=run.moving).q)
         return motions
+
+
+def _first_cycle(task: Task) -> Task:
+    """A task that goes through its path once, as fast as it does on the whole."""
+    duration = None if task.duration is None else task.duration / task.repeat
+    return replace(task, repeat=1, duration=duration)
 
 
 def _open_pairs(scene: Scene) -> NDArray[np.bool_]:

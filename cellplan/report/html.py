@@ -23,6 +23,7 @@ CHECKS = {
     "joint_acceleration": "joint accelerations within their limits",
     "position_error": "tool position on the part within tolerance",
     "orientation_error": "tool orientation on the part within tolerance",
+    "joint_drift": "joints back where each cycle began",
     "clearance": "required clearance kept",
     "collision": "no collision",
 }

@@ -90,3 +90,25 @@ def test_what_is_not_known_is_left_out(record: dict[str, Any], tmp_path: Path) -
     lines = summary_lines(record, tmp_path)
 
     assert not any("margin" in line or "speed" in line or "clearance" in line for line in lines)
+
+
+def test_a_joint_that_does_not_come_back_is_named(record: dict[str, Any], tmp_path: Path) -> None:
+    drifts = {
+        "cycles": 25,
+        "worst_drift_deg": 0.5312,
+        "joint": "pen B2",
+        "at_cycle": 7,
+        "worst_drift_mm": 1.25,
+        "sliding_joint": "rail X",
+        "sliding_at_cycle": 1,
+        "closes": False,
+    }
+
+    record["repeatability"] = {"ring": drifts}
+    drifting = summary_lines(record, tmp_path)
+    record["repeatability"] = {"all": drifts | {"closes": True}}
+    closing = summary_lines(record, tmp_path)
+
+    assert "  joint drift 0.5312 deg in cycle 7 of 25 of task ring: pen B2" in drifting
+    assert "  joint drift 1.25 mm in cycle 1 of 25 of task ring: rail X" in drifting
+    assert not any("drift" in line for line in closing)
