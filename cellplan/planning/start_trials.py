@@ -1,4 +1,4 @@
-"""Rehearsal: what a start posture is worth, seen from the motion that follows from it on a coarse clock."""
+"""Start trials: what a start posture is worth, seen from the motion that follows from it on a coarse clock."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -24,7 +24,7 @@ TOUCH_INSTANTS: Final = 12  # instants of the coarse motion that are looked at f
 TOUCHING: Final = 2.0  # taken off the quality of a posture that collides on the way
 
 
-class Rehearsal:
+class StartTrials:
     """The coarse clock of one cell, on which start postures are tried.
 
     Attributes:
