@@ -32,7 +32,11 @@ def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP:
         q: The operator's positions, shape (N, n).
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """
-    X_PT = inverse(X_WP) @ chain.tool_poses(q)
+    return pose_accuracy(scheduled, inverse(X_WP) @ chain.tool_poses(q))
+
+
+def pose_accuracy(scheduled: TaskSchedule, X_PT: Array) -> TaskAccuracy:
+    """Errors of one task in P, from its tool poses on the part, shape (N, 4, 4); open components are zero."""
     wanted, task = scheduled.X_PT, scheduled.task
     position = wanted[:, :3, 3] - X_PT[:, :3, 3]
     if task.is_spin_free:

@@ -7,10 +7,12 @@ from functools import cache
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from cellplan.model.cell import Cell
+from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Check, Report
 from cellplan.report.json_report import summary_record
 from cellplan.report.palette import ROBOTS, robot_colours
 from cellplan.report.record import Provenance, Record, report_record, rounded_down
+from cellplan.report.rehearsal_record import rehearsal_record
 
 MODES = {
     "simultaneous": "all robots move",
@@ -33,6 +35,17 @@ CLASSES = {
     "self": "robot to itself",
     "part": "part",
     "environment": "environment",
+}
+EXECUTION_TITLES = {
+    "before": "as solved",
+    "after": "corrected from pass to pass",
+    "in_pass": "corrected within the pass",
+}
+OUTCOMES = {
+    "converged": "converged",
+    "stalled": "does not converge: the error falls no more and is beyond the tolerance",
+    "diverged": "does not converge: the error grew, or the corrected references cannot be followed",
+    "unfinished": "not converged yet: the rounds are used up",
 }
 NARROW = 0.05  # [-] of the half range: a joint whose margin is smaller is marked
 FAST = 0.95  # [-] of the speed limit: likewise
@@ -67,6 +80,13 @@ def overview_html(reports: Mapping[str, Report], *, cell: Cell, provenance: Prov
     """The page of a job done in several runs, with a link to the page of each; see ``summary_record``."""
     record = summary_record(reports, cell=cell, provenance=provenance)
     return _render("overview.html", record, cell, {"figures": _figures(record)})
+
+
+def rehearsal_html(rehearsal: Rehearsal, *, provenance: Provenance, plots: Mapping[str, bytes]) -> str:
+    """The page of a rehearsal; ``plots`` as ``draw_rehearsal`` returns them."""
+    record = rehearsal_record(rehearsal, provenance=provenance)
+    parts = {"plots": _inline_plots(plots), "executions": EXECUTION_TITLES, "outcomes": OUTCOMES}
+    return _render("rehearsal.html", record, rehearsal.cell, parts)
 
 
 def _render(template: str, record: Record, cell: Cell, parts: Mapping[str, object]) -> str:

@@ -73,16 +73,16 @@ def _draw_task(accuracy: TaskAccuracy, times: Array, cell: Cell) -> dict[str, by
     """Total and per-axis error of position and orientation."""
     tolerance = cell.task(accuracy.task).tolerance
     sheet = Sheet(f"{accuracy.task} ({accuracy.robot}): tool error on the part", rows=2, columns=2, times=times)
-    _draw_error(sheet, 0, accuracy.position_error, allowed=tolerance.position, kind=POSITION)
-    _draw_error(sheet, 1, accuracy.orientation_error, allowed=tolerance.orientation, kind=ORIENTATION)
+    draw_error(sheet, 0, accuracy.position_error, allowed=tolerance.position, kind=POSITION)
+    draw_error(sheet, 1, accuracy.orientation_error, allowed=tolerance.orientation, kind=ORIENTATION)
     return pictures(sheet, f"task_{accuracy.task}")
 
 
-def _draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: ErrorKind) -> None:
+def draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: ErrorKind) -> None:
     """One row: the total, with the tolerance where it lies within the picture, and the three axes beside it."""
     total = np.linalg.norm(error, axis=1)
     largest = float(total.max())
-    unit, scale = _readable_unit(largest, kind.units)
+    unit, scale = readable_unit(largest, kind.units)
     main_unit, main_scale = kind.units[0]
     is_in_sight = allowed <= 4.0 * largest
     span = (0.0, scale * (max(largest, allowed) if is_in_sight else largest) or 1.0)
@@ -101,7 +101,7 @@ def _draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: E
         sheet.write(x, y, axis, size=8.5, color=colour, weight="bold", ha="right")
 
 
-def _readable_unit(largest: float, units: tuple[tuple[str, float], ...]) -> tuple[str, float]:
+def readable_unit(largest: float, units: tuple[tuple[str, float], ...]) -> tuple[str, float]:
     """The largest unit in which the value is at least one half; the first of all for zero."""
     if largest == 0.0:
         return units[0]
