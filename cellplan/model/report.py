@@ -164,15 +164,26 @@ class ClearanceReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Conditioning:
-    """Smallest singular values along the motion (metres and radians as they come).
+    """How far the motion stays from singularities (metres and radians as they come).
 
     Attributes:
-        stack: Of the cooperation Jacobian's constrained rows, shape (N,).
-        robots: Of each operator's own block and of each positioner's, shape (N,) each.
+        stack: Smallest singular value of the cooperation Jacobian's constrained rows J, over the joints that may move,
+            shape (N,).
+        condition: Smallest by largest singular value of J, shape (N,): 1 when all directions are alike, 0 when it is
+            singular.
+        manipulability: ``sqrt(det(J J^T))``, the product of the singular values of J, shape (N,).
+        robots: Smallest singular value of each operator's own block and of each positioner's, shape (N,) each.
     """
 
     stack: Array
+    condition: Array
+    manipulability: Array
     robots: Mapping[str, Array]
+
+    @property
+    def squared_condition(self) -> Array:
+        """Smallest by largest singular value of ``J J^T``, as [Vargas2012]_ draws it, shape (N,)."""
+        return self.condition**2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -234,7 +245,7 @@ class Report:
         accuracy: Tool errors, one entry per task.
         joints: One entry per joint of every robot.
         clearance: Distances.
-        conditioning: Smallest singular values.
+        conditioning: How far the motion stays from singularities.
         motion_share: Share of all joint travel per robot, 0..1, and the busiest joint of each, as (share, joint).
         speeds: How fast each robot moves in the world.
         times: The common clock in [s], shape (N,).

@@ -7,11 +7,13 @@ from functools import cache
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from cellplan.model.cell import Cell
+from cellplan.model.motion import Motion
 from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Check, Report
-from cellplan.report.json_report import summary_record
+from cellplan.report.json_report import run_record, summary_record
+from cellplan.report.method import method_lines
 from cellplan.report.palette import ROBOTS, robot_colours
-from cellplan.report.record import Provenance, Record, report_record, rounded_down
+from cellplan.report.record import Provenance, Record, rounded_down
 from cellplan.report.rehearsal_record import rehearsal_record
 
 MODES = {
@@ -50,9 +52,12 @@ OUTCOMES = {
 NARROW = 0.05  # [-] of the half range: a joint whose margin is smaller is marked
 FAST = 0.95  # [-] of the speed limit: likewise
 SMALLEST_SHOWN = 1e-6  # [mm] or [deg]: below it more digits tell nothing
+LEAST_PLAIN = 1e-4  # [-] of a manipulability: smaller ones are shown with a power of ten
 
 
-def report_html(report: Report, *, cell: Cell, provenance: Provenance, plots: Mapping[str, bytes]) -> str:
+def report_html(
+    report: Report, *, cell: Cell, provenance: Provenance, plots: Mapping[str, bytes], motion: Motion | None = None
+) -> str:
     """The page of one run.
 
     Args:
@@ -60,8 +65,9 @@ def report_html(report: Report, *, cell: Cell, provenance: Provenance, plots: Ma
         cell: Its cell.
         provenance: Where the result comes from.
         plots: SVG pictures by file name, as ``draw_plots`` returns them; others are ignored.
+        motion: The motion as it was planned, for what its steps took; None when it is not at hand.
     """
-    record = report_record(report, cell=cell, provenance=provenance)
+    record = run_record(report, cell=cell, provenance=provenance, motion=motion)
     return _render(
         "report.html",
         record,
@@ -71,6 +77,7 @@ def report_html(report: Report, *, cell: Cell, provenance: Provenance, plots: Ma
             "check_groups": _check_groups(report.checks),
             "shares": _shares(record),
             "excluded": _by_reason(record["exclusions"]),
+            "method": list(method_lines(record["solver"])),
             "plots": _inline_plots(plots),
         },
     )
@@ -107,6 +114,7 @@ def _environment() -> Environment:
     environment.filters |= {
         "fixed": _fixed,
         "small": _small,
+        "power": _power,
         "percent": _percent,
         "floored": _floored,
         "range_bar": _range_bar,
@@ -132,6 +140,14 @@ def _small(value: float | None) -> str:
         return f"< {SMALLEST_SHOWN:.6f}"
     text = f"{float(f'{value:.3g}'):.9f}".rstrip("0").rstrip(".")
     return text.replace("-", "−")
+
+
+def _power(value: float | None) -> str:
+    """The value with three telling digits, small ones as a multiple of a power of ten."""
+    if value is None or value == 0.0 or abs(value) >= LEAST_PLAIN:
+        return _small(value)
+    digits, _, exponent = f"{value:.2e}".partition("e")
+    return f"{digits} · 10^{int(exponent)}".replace("-", "−")
 
 
 def _floored(value: float | None) -> str:

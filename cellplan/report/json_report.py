@@ -6,7 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from cellplan.model.cell import Cell
+from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, JointUse, Report
+from cellplan.report.method import solver_record
 from cellplan.report.record import (
     SCHEMA,
     Provenance,
@@ -22,11 +24,27 @@ from cellplan.report.record import (
     tasks_record,
     withdrawals,
 )
+from cellplan.report.series import INDENT, series, series_text
 
 
-def report_json(report: Report, *, cell: Cell, provenance: Provenance) -> str:
-    """The record of one run as text; values without a finite number are null."""
-    return _as_text(report_record(report, cell=cell, provenance=provenance))
+def report_json(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> str:
+    """The record of one run as text, its series last; values without a finite number are null.
+
+    Args:
+        report: The run.
+        cell: Its cell.
+        provenance: Where the result comes from.
+        motion: The motion as it was planned, for what its steps took; None when it is not at hand.
+    """
+    record = run_record(report, cell=cell, provenance=provenance, motion=motion)
+    last = f',\n{INDENT}"series": {series_text(series(report, motion), 1)}\n}}\n'
+    return _as_text(record).removesuffix("\n}\n") + last
+
+
+def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> Record:
+    """The record of one run and of how its motion was found, without the series."""
+    record = report_record(report, cell=cell, provenance=provenance)
+    return record | {"solver": solver_record(cell.solver, motion)}
 
 
 def summary_json(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> str:
@@ -63,6 +81,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "before_you_run": [f"{name}: {line}" for name, report in reports.items() for line in withdrawals(report, cell)],
         **origin_record(cell, provenance),
         "caution": CAUTION,
+        "solver": solver_record(cell.solver),
     }
 
 

@@ -15,6 +15,8 @@ from cellplan.report.plots_canvas import Sheet, pictures, style
 from cellplan.report.record import rounded_down
 
 JOINT_COLUMNS = 3
+LEAST_PLAIN, SMALLEST_DRAWN = 1e-2, 1e-200  # [-] of a manipulability: below, in powers of ten; below, as zero
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 CLASS_TITLES: Mapping[ClearanceClass, str] = {
     ClearanceClass.ROBOT_ROBOT: "robot to robot",
     ClearanceClass.SELF: "robot to itself",
@@ -208,20 +210,38 @@ def _draw_clearance(report: Report, required: float) -> dict[str, bytes]:
 
 
 def _draw_singularity(report: Report, colours: Mapping[str, str]) -> dict[str, bytes]:
-    """Smallest singular value of the whole stack and of each robot along the motion."""
-    series = {"all robots together": report.conditioning.stack, **report.conditioning.robots}
+    """Singular values, condition and manipulability of the whole stack, then the smallest value of each robot."""
+    conditioning = report.conditioning
+    series = {
+        "all robots together": conditioning.stack,
+        "their condition": conditioning.condition,
+        "their manipulability": conditioning.manipulability,
+        **conditioning.robots,
+    }
     rows = math.ceil(len(series) / JOINT_COLUMNS)
-    sheet = Sheet("smallest singular values along the motion", rows=rows, columns=JOINT_COLUMNS, times=report.times)
+    title = "smallest singular values, condition and manipulability along the motion"
+    sheet = Sheet(title, rows=rows, columns=JOINT_COLUMNS, times=report.times)
     for index, (name, values) in enumerate(series.items()):
         worst = int(np.argmin(values))
-        at_s, smallest = float(report.times[worst]), float(values[worst])
+        unit, scale = _power_of_ten(float(values.max()))
+        at_s, smallest = float(report.times[worst]), scale * float(values[worst])
         panel = sheet.panel(
             index,
-            name,
+            name + unit,
             note=f"smallest {smallest:.2g} at {at_s:.2f} s",
-            span=(0.0, float(values.max()) or 1.0),
+            span=(0.0, scale * float(values.max()) or 1.0),
             is_floored=True,
         )
-        sheet.curve(panel, report.times, values, colour=colours.get(name, INK))
+        sheet.curve(panel, report.times, scale * values, colour=colours.get(name, INK))
         sheet.dot(panel, at_s, smallest)
     return pictures(sheet, "singularity")
+
+
+def _power_of_ten(largest: float) -> tuple[str, float]:
+    """Words and factor that make small values readable; what is too small for that becomes zero."""
+    if largest >= LEAST_PLAIN:
+        return "", 1.0
+    if largest < SMALLEST_DRAWN:
+        return "", 0.0
+    exponent = math.floor(math.log10(largest))
+    return f", in 10{str(exponent).translate(SUPERSCRIPTS)}", 10.0**-exponent

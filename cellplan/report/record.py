@@ -321,9 +321,12 @@ def exclusions_record(clearance: ClearanceReport) -> list[Record]:
 
 
 def _singularity_record(conditioning: Conditioning, times: Array) -> Record:
-    """Smallest singular values; metres and radians as they come."""
+    """Smallest singular values, condition and manipulability; metres and radians as they come."""
     return {
         "stack": _smallest(conditioning.stack, times),
+        "condition": _smallest(conditioning.condition, times),
+        "squared_condition": _smallest(conditioning.squared_condition, times),
+        "manipulability": _smallest(conditioning.manipulability, times),
         "robots": {robot: _smallest(series, times) for robot, series in conditioning.robots.items()},
     }
 

@@ -29,6 +29,7 @@ def record() -> dict[str, Any]:
         "joints": {"holder": {"A1": use(), "A2": use(margin=37.25)}, "pen": {"B1": use(ratio=0.351)}},
         "clearance": {"whole": {"minimum_mm": 12.345, "pair": ["pen/tool", "holder/A2"], "at_s": 0.25}},
         "checks": [{"passed": True, "message": "fine"}],
+        "solver": {"method": "weighted_pseudo_inverse", "slack": {"max": 0.0, "max_at_s": 0.0, "unit": "m/s"}},
     }
 
 
@@ -45,6 +46,15 @@ def test_a_passed_run_is_told_in_a_few_lines(record: dict[str, Any], tmp_path: P
         f"report: {tmp_path / 'report.html'}",
         f"tables: {tmp_path / 'tables'}",
     ]
+
+
+def test_a_method_of_ones_own_choice_and_what_it_gave_up_are_told(record: dict[str, Any], tmp_path: Path) -> None:
+    record["solver"] = {"method": "quadratic_program", "slack": {"max": 0.01234, "max_at_s": 1.5, "unit": "m/s"}}
+
+    lines = summary_lines(record, tmp_path)
+
+    assert lines[1] == "  mode simultaneous, 4 s, method quadratic_program"
+    assert "  tasks left on purpose by at most 0.012 (m/s) at 1.500 s" in lines
 
 
 def test_every_failed_check_has_a_line_and_no_tables_are_offered(record: dict[str, Any], tmp_path: Path) -> None:
