@@ -8,8 +8,9 @@ import numpy as np
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
 
-BOUND_TOLERANCE: Final = 1e-9  # [-] by which the engine may miss a bound, for rows of length 1
-PROOF_TOLERANCE: Final = 1e-7  # [-] beyond which its answer is not believed
+BOUND_TOLERANCE: Final = 1e-12  # [-] by which the engine may miss a bound, for rows of length 1
+NOTHING: Final = 1e-14  # [-] below which a pivot is taken for zero: rows may differ by 1e-10 of their squared length
+PROOF_TOLERANCE: Final = 1e-7  # [-] of row times point, beyond which the answer is not believed
 SOLVED: Final = 1  # exit flag of daqp
 TROUBLES: Final = {-1: "contradictory bounds", -2: "cycling", -3: "no bounded solution", -4: "too many iterations"}
 
@@ -39,12 +40,15 @@ def nearest_to_origin(A: Array, *, lower: Array, upper: Array) -> Array:
         np.ascontiguousarray(lower),
         np.zeros(len(A), dtype=np.intc),
         primal_tol=BOUND_TOLERANCE,
+        sing_tol=NOTHING,
+        zero_tol=NOTHING,
     )
     if flag != SOLVED:
         raise NoSolutionError(f"the quadratic program has no solution ({TROUBLES.get(flag, f'exit flag {flag}')})")
     rows = A @ y
     excess = np.maximum(lower - rows, rows - upper)
-    if not np.all(excess <= PROOF_TOLERANCE * np.linalg.norm(A, axis=1)):  # also for what is not a number
+    size = np.linalg.norm(A, axis=1) * (1.0 + np.linalg.norm(y))
+    if not np.all(excess <= PROOF_TOLERANCE * size):  # also for what is not a number
         raise NoSolutionError("the quadratic program was not solved: its answer breaks the bounds")
     nearest: Array = np.asarray(y)
     return nearest

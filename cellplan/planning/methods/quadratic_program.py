@@ -11,7 +11,7 @@ from cellplan.planning.qp_engine import nearest_to_origin
 from cellplan.planning.speed_bounds import JointBounds, SpeedBounds
 from cellplan.planning.tracking_problem import Advance, FirstOrder, TrackingProblem
 
-STEEPEST: Final = 1e12  # largest ratio of the tasks' weight to that of joint speeds: beyond it digits are lost
+STEEPEST: Final = 1e10  # largest ratio of the tasks' weight to that of joint speeds: beyond it digits are lost
 
 
 def quadratic_program(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
