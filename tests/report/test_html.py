@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from cellplan.model.cell import LockedJoint
 from cellplan.model.report import Check
 from cellplan.report.html import overview_html, report_html
 from cellplan.report.plots import draw_plots
@@ -213,3 +214,13 @@ def test_overview_leads_to_the_report_of_every_run(pairwise_runs: Any) -> None:
 def test_same_run_gives_the_same_page(failed_run: Any, failed_page: str, pairwise_runs: Any) -> None:
     assert page_of(failed_run) == failed_page
     assert overview_of(pairwise_runs) == overview_of(pairwise_runs)
+
+
+def test_a_failed_joint_is_told_in_plain_words(passed_run: Any) -> None:
+    locked = (LockedJoint(robot="kuka", joint="B2", since=2.0),)
+    cell = replace(passed_run.cell, motion=replace(passed_run.cell.motion, locked=locked))
+
+    page = report_html(passed_run.report, cell=cell, provenance=passed_run.provenance, plots={})
+
+    assert "Joint kuka/B2 fails at 2.000 s and stays at " in page
+    assert "the other joints take over, and every task is kept." in page
