@@ -26,6 +26,7 @@ DOORS = {
     "pinocchio": ["kinematics/combined.py"],
     "fcl": ["collision/engine.py"],
     "coal": ["collision/hulls.py"],
+    "daqp": ["planning/qp_engine.py"],
     "trimesh": ["geometry/mesh_files.py"],
     "matplotlib": ["report/plots*.py"],
     "jinja2": ["report/html.py"],
@@ -36,7 +37,7 @@ DOORS = {
     "typer": ["cli/*.py"],
 }
 EVERYWHERE = {"cellplan", "numpy"}
-HEAVY = {"numpy", "pinocchio", "fcl", "coal", "trimesh", "matplotlib", "pydantic", "jinja2", "yaml"}
+HEAVY = {"numpy", "pinocchio", "fcl", "coal", "daqp", "trimesh", "matplotlib", "pydantic", "jinja2", "yaml"}
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 

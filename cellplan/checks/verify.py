@@ -7,6 +7,7 @@ import numpy as np
 from cellplan.checks.clearance import check_clearance
 from cellplan.checks.conditioning import conditioning
 from cellplan.checks.limits import check_joints, joint_uses
+from cellplan.checks.locked import check_locked, told_with_failures
 from cellplan.checks.repeatability import check_joint_drift, repeatability
 from cellplan.checks.speeds import robot_speed
 from cellplan.checks.tracking import check_accuracy, part_poses, task_accuracy
@@ -50,7 +51,8 @@ def verify(
     )
     checks: list[Check] = []
     for scheduled, errors in zip(schedule.tasks, accuracy, strict=True):
-        checks += check_accuracy(schedule, errors, scheduled.task)
+        own_checks, tolerance = check_accuracy(schedule, errors, scheduled.task), scheduled.task.tolerance
+        checks += told_with_failures(own_checks, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
     uses: list[JointUse] = []
     for robot in cell.robots:
         own = joint_uses(robot, schedule.times, q[robot.name])
@@ -58,6 +60,7 @@ def verify(
         checks += check_joints(robot, own, schedule.times, q[robot.name])
     drift = repeatability(cell, schedule, q)
     checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
+    checks += check_locked(cell, schedule.times, q)
     stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
     clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
     return Report(

@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.complaints import Complaint, did_you_mean, listed, shown
-from cellplan.io.schema.robot import LimitsEntry, RobotEntry
+from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
 from cellplan.io.urdf_limits import JointLimits
 from cellplan.io.yaml_reader import YamlDocument
 from cellplan.model.robot import Joint, RobotModel
@@ -33,14 +33,13 @@ def start_posture(entry: RobotEntry, model: RobotModel) -> Array | None:
 
 
 def limits_in_si(entry: LimitsEntry) -> JointLimits:
-    """Limits of a cell in [rad], [m], [rad/s] and [m/s]."""
-    if entry.unit == "mm":
-        values = (entry.lower_mm, entry.upper_mm, entry.velocity_mm_s)
-        lower, upper, velocity = (None if value is None else value / 1000.0 for value in values)
-    else:
-        values = (entry.lower_deg, entry.upper_deg, entry.velocity_deg_s)
-        lower, upper, velocity = (None if value is None else float(np.deg2rad(value)) for value in values)
-    return JointLimits(lower=lower, upper=upper, velocity=velocity, wraps=entry.wrap)
+    """Limits of a cell in [rad], [m], [rad/s], [m/s], [rad/s^2] and [m/s^2]."""
+    slides = entry.unit == "mm"
+    given = (getattr(entry, name) for name in (SLIDING_LIMITS if slides else TURNING_LIMITS))
+    lower, upper, velocity, acceleration = (
+        None if value is None else value / 1000.0 if slides else float(np.deg2rad(value)) for value in given
+    )
+    return JointLimits(lower=lower, upper=upper, velocity=velocity, acceleration=acceleration, wraps=entry.wrap)
 
 
 def robot_complaints(name: str, entry: RobotEntry, model: RobotModel, document: YamlDocument) -> Iterator[Complaint]:
@@ -122,14 +121,17 @@ def _wider(joint: Joint, entry: LimitsEntry) -> Iterator[tuple[str, str]]:
     if limits.wraps:
         yield "wrap", "unexpected key, only a continuous joint of a URDF may turn without end"
         return
-    own = {"lower": joint.lower, "upper": joint.upper, "velocity": joint.velocity}
-    for key, value in (("lower", limits.lower), ("upper", limits.upper), ("velocity", limits.velocity)):
-        if value is None:
+    for key, value, own, ending in (
+        ("lower", limits.lower, joint.lower, unit),
+        ("upper", limits.upper, joint.upper, unit),
+        ("velocity", limits.velocity, joint.velocity, f"{unit}_s"),
+        ("acceleration", limits.acceleration, joint.acceleration, f"{unit}_s2"),
+    ):
+        if value is None or own is None:
             continue
         sign = -1.0 if key == "lower" else 1.0
-        ending = f"{unit}_s" if key == "velocity" else unit
-        if sign * (value - own[key]) > ROOM:
-            bound = f"at {'least' if key == 'lower' else 'most'} {shown(_in_file_unit(joint, own[key]))}"
+        if sign * (value - own) > ROOM:
+            bound = f"at {'least' if key == 'lower' else 'most'} {shown(_in_file_unit(joint, own))}"
             text = f"expected {bound}, the limit of the model, got {shown(_in_file_unit(joint, value))}"
             yield f"{key}_{ending}", text
     lower = joint.lower if limits.lower is None else limits.lower
@@ -141,9 +143,11 @@ def _wider(joint: Joint, entry: LimitsEntry) -> Iterator[tuple[str, str]]:
 
 
 def _within(joint: Joint, limits: JointLimits) -> Joint:
-    """The joint with tighter limits."""
+    """The joint with tighter limits; an acceleration limit may also be a new one."""
+    accelerations = [value for value in (joint.acceleration, limits.acceleration) if value is not None]
     return replace(
         joint,
+        acceleration=min(accelerations, default=None),
         lower=joint.lower if limits.lower is None else max(joint.lower, limits.lower),
         upper=joint.upper if limits.upper is None else min(joint.upper, limits.upper),
         velocity=joint.velocity if limits.velocity is None else min(joint.velocity, limits.velocity),

@@ -93,7 +93,8 @@ def _require_known_limits(document: UrdfDocument, roles: Roles, limits: Mapping[
 def _driven(joint: UrdfJoint, roles: Roles, posture: ZeroPosture, *, limits: Mapping[str, JointLimits]) -> Joint:
     """A driven joint with its axis in B."""
     followers = [other for other in roles.followers if other.mimic and other.mimic.leader == joint.name]
-    allowed = joint_range(joint, limits.get(joint.name, JointLimits()), followers)
+    wanted = limits.get(joint.name, JointLimits())
+    allowed = joint_range(joint, wanted, followers)
     axis_B, point_B = _axis_in_base(joint, posture)
     return Joint(
         name=joint.name,
@@ -104,6 +105,7 @@ def _driven(joint: UrdfJoint, roles: Roles, posture: ZeroPosture, *, limits: Map
         lower=allowed.lower,
         upper=allowed.upper,
         velocity=allowed.velocity,
+        acceleration=wanted.acceleration,
     )
 
 

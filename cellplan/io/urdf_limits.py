@@ -18,18 +18,20 @@ MAX_TRAVEL_SPEED: Final = 10.0  # [m/s]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointLimits:
-    """Limits of one joint from the cell in [rad], [m], [rad/s], [m/s]; None leaves the URDF's.
+    """Limits of one joint from the cell in [rad], [m] and their rates; None leaves the URDF's.
 
     Attributes:
         lower: Lowest position.
         upper: Highest position.
         velocity: Largest speed.
+        acceleration: Largest acceleration, if known.
         wraps: Whether a continuous joint may turn without end.
     """
 
     lower: float | None = None
     upper: float | None = None
     velocity: float | None = None
+    acceleration: float | None = None
     wraps: bool = False
 
 

@@ -40,7 +40,7 @@ class StartTrials:
         self._scene, self._toolpaths, self._step = scene, toolpaths, step
         self._cell = replace(
             cell,
-            motion=replace(cell.motion, step=step),
+            motion=replace(cell.motion, step=step, locked=()),  # nobody knows beforehand which joint will fail
             solver=replace(cell.solver, gain=GAIN / step),
         )
         self.open_pairs = _open_pairs(scene)

@@ -79,7 +79,7 @@ class TrackingProblem:
         self._is_linear = np.array([[float(axis in task.axes) for axis in range(3)] for task in tasks])
         self._lost = np.array([max(LOST_DISTANCE, 2.0 * task.tolerance.position) for task in tasks])
         self._settled = np.array([task.start + task.settle if task.settle else -np.inf for task in tasks])
-        self._weights = JointWeights(cell)
+        self._weights = JointWeights(cell, self._model)
         self._pulls = goal_pulls(cell)
         self.cell, self.times, self.tasks = cell, schedule.times, tasks
         self.operators = [names.index(task.robot) for task in tasks]
@@ -117,7 +117,9 @@ class TrackingProblem:
         error = pose_errors(self.wanted[k], inverse(state.X_WP) @ X_WT, self._is_spin_free)
         self._refuse_lost_path(k, error)
         rows, twist, errors = self._constrained(k, J, error)
-        return FirstOrder(rows, twist, errors, self._weights.at(q), self._secondary(q, mobile))
+        secondary = self._secondary(q, mobile)
+        weights = self._weights.at(state, q, J=rows, xdot=twist + self.gain * errors, secondary=secondary)
+        return FirstOrder(rows, twist, errors, weights, secondary)
 
     def _constrained(self, k: int, J: Array, error: Array) -> tuple[Array, Array, Array]:
         """Rows, wanted twists and errors of the components that the tasks constrain."""

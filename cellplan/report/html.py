@@ -25,6 +25,7 @@ CHECKS = {
     "joint_position": "joint positions within their limits",
     "joint_velocity": "joint velocities within their limits",
     "joint_acceleration": "joint accelerations within their limits",
+    "locked_joint": "joints that failed stand still",
     "position_error": "tool position on the part within tolerance",
     "orientation_error": "tool orientation on the part within tolerance",
     "joint_drift": "joints back where each cycle began",

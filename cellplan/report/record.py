@@ -59,6 +59,7 @@ def report_record(report: Report, *, cell: Cell, provenance: Provenance) -> Reco
         "tasks": tasks_record(report, cell),
         "joints": joints_record(report.joints),
         "repeatability": repeatability_record(report),
+        "locked_joints": _locked_record(report, cell),
         "clearance": clearance_record(report.clearance.minima),
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
         "pair_count": report.clearance.pair_count,
@@ -236,6 +237,29 @@ def _joint_record(use: JointUse) -> Record:
         "worst_at_s": number(use.margin_at_s if _is_position_worse(use) else use.peak_velocity_at_s),
         "travel": number(scale * use.travel),
     }
+
+
+def _locked_record(report: Report, cell: Cell) -> list[Record]:
+    """Joints that fail: when, where they stay, and whether all tasks are kept within their tolerances all the same."""
+    accuracy = ("position_error", "orientation_error")
+    are_tasks_kept = all(check.passed for check in report.checks if check.name in accuracy)
+    records = []
+    for lock in cell.motion.locked:
+        names = cell.robot(lock.robot).model.joint_names
+        is_revolute = cell.robot(lock.robot).model.joints[names.index(lock.joint)].is_revolute
+        positions = report.q[lock.robot][report.times >= lock.since, names.index(lock.joint)]
+        scale = math.degrees(1.0) if is_revolute else 1e3
+        records.append(
+            {
+                "robot": lock.robot,
+                "joint": lock.joint,
+                "from_s": number(lock.since),
+                "position": number(scale * positions[0]) if len(positions) else None,
+                "unit": "deg" if is_revolute else "mm",
+                "tasks_kept": are_tasks_kept,
+            }
+        )
+    return records
 
 
 def velocity_ratio(use: JointUse) -> float:

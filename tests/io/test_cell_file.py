@@ -168,6 +168,37 @@ def test_limits_of_the_cell_tighten_those_of_the_model(load: Load) -> None:
     assert model.joints[1].lower < 0.0
 
 
+def test_acceleration_limits_of_the_cell_stand_in_for_those_that_a_model_lacks(load: Load, tmp_path: Path) -> None:
+    limits = "limits: {A3: {acceleration_deg_s2: 400}}"
+    assert load().robot("worker").model.joints[0].acceleration is None
+
+    model = load(("weights: [1, 1, 1, 1, 1, 1]", limits)).robot("worker").model
+
+    assert model.joints[0].acceleration == pytest.approx(math.radians(400.0))
+    assert model.joints[1].acceleration is None
+
+
+def test_acceleration_limits_of_the_cell_may_not_widen_those_of_the_model(
+    load: Load, refuse: Refuse, tmp_path: Path
+) -> None:
+    (tmp_path / "rail.yaml").write_text(
+        "robot: rail\njoints:\n"
+        "  rail: {type: prismatic, axis: [1, 0, 0], lower_mm: 0, upper_mm: 3000, velocity_mm_s: 500, "
+        "acceleration_mm_s2: 900}\n"
+        "flange: {xyz_mm: [0, 0, 500]}\n",
+        encoding="utf-8",
+    )
+    model, weights = ("model: abb_irb1600", "model: rail.yaml"), "weights: [1, 1, 1, 1, 1, 1]"
+
+    joint = load(model, (weights, "limits: {rail: {acceleration_mm_s2: 600}}")).robot("worker").model.joints[0]
+    told = refuse(model, (weights, "limits: {rail: {acceleration_mm_s2: 1000}}"))
+
+    assert joint.acceleration == pytest.approx(0.6)
+    assert told == [
+        "c:11: robots.worker.limits.rail.acceleration_mm_s2: expected at most 900, the limit of the model, got 1000"
+    ]
+
+
 def test_meshes_and_toolpaths_below_the_cell_are_read_and_digested(load: Load, tmp_path: Path) -> None:
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "part.obj").write_text(TETRAHEDRON, encoding="utf-8")

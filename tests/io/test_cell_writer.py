@@ -71,7 +71,10 @@ def test_a_csv_that_is_named_only_is_written_with_its_defaults(cells: Path, tmp_
         ("tool_axis: normal", "start_s: 0.1\n    free: [spin]\n    tolerance: {position_mm: 0.03}"),
         ("tool: {xyz_mm: [0, 0, 100]}", "tool: {geometry: {capsule: {radius_mm: 3.3, length_mm: 70}}}"),
         ("tool: {xyz_mm: [0, 0, 100]}", "tool: {bodies: [{box: {size_mm: [1, 2, 3.3]}, at: {rpy_deg: [1, 2, 3]}}]}"),
-        ("weights: [1, 1, 1, 1, 1, 1]", "limits: {A3: {lower_deg: -33.3}}\n    weights: [1, 2, 3, 0.1, 1e-3, 7]"),
+        (
+            "weights: [1, 1, 1, 1, 1, 1]",
+            "limits: {A3: {lower_deg: -33.3, acceleration_deg_s2: 350}}\n    weights: [1, 2, 3, 0.1, 1e-3, 7]",
+        ),
         ("  floor: {plane: {z_mm: 0}}", '  floor: {plane: {z_mm: -7}}\n  "no": {sphere: {radius_mm: 5}}'),
         (
             "environment:",

@@ -126,6 +126,17 @@ Refuse = Callable[..., list[str]]
         ),
         (
             "weights: [1, 1, 1, 1, 1, 1]",
+            "limits: {A3: {acceleration_mm_s2: 5}}",
+            "c:11: robots.worker.limits.A3: expected limits in deg, the joint is revolute, got mm",
+        ),
+        (
+            "weights: [1, 1, 1, 1, 1, 1]",
+            "limits: {A3: {acceleration_deg_s2: -5}}",
+            "c:11: robots.worker.limits.A3.acceleration_deg_s2: expected a positive number of degrees per "
+            "second², got -5",
+        ),
+        (
+            "weights: [1, 1, 1, 1, 1, 1]",
             "flange: tool0",
             "c:11: robots.worker.flange: unexpected key, it goes with a URDF only",
         ),

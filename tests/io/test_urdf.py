@@ -154,6 +154,12 @@ def test_the_cell_tightens_and_supplies_limits(tmp_path: Path) -> None:
     assert limits_of(LIMIT, JointLimits(wraps=True), "continuous") == (-np.inf, np.inf, 3.0)
 
 
+def test_the_cell_supplies_an_acceleration_limit(tmp_path: Path) -> None:
+    path = write(tmp_path, *arm())
+    wanted = {"a1": JointLimits(acceleration=5.0)}
+    assert [joint.acceleration for joint in read_urdf(path, UrdfOptions(limits=wanted)).joints][:1] == [5.0]
+
+
 def test_a_follower_limits_its_leader(tmp_path: Path) -> None:
     mimic = '<mimic joint="a1" multiplier="-2" offset="1"/><limit lower="-2" upper="2" velocity="1" effort="0"/>'
     model = read_urdf(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cellplan.model.cell import LockedJoint
 from cellplan.model.report import Check, JointDrift, Repeatability
 from cellplan.report.html import overview_html, report_html
 from cellplan.report.plots import draw_plots
@@ -229,3 +230,13 @@ def test_joints_that_do_not_come_back_have_a_table(passed_run: Any) -> None:
     assert "after each of the 2 cycles of 1 s" in text
     assert "1.15 deg" in text
     assert "Repeatability" not in page_of(passed_run)
+
+
+def test_a_failed_joint_is_told_in_plain_words(passed_run: Any) -> None:
+    locked = (LockedJoint(robot="kuka", joint="B2", since=2.0),)
+    cell = replace(passed_run.cell, motion=replace(passed_run.cell.motion, locked=locked))
+
+    page = report_html(passed_run.report, cell=cell, provenance=passed_run.provenance, plots={})
+
+    assert "Joint kuka/B2 fails at 2.000 s and stays at " in page
+    assert "the other joints take over, and every task is kept." in page

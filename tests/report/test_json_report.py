@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.io.run_folder import RunFolder
+from cellplan.model.cell import LockedJoint
 from cellplan.model.report import ClearanceClass, JointDrift, Repeatability
 from cellplan.report.json_report import merge_joint_uses, report_json, summary_json
 from cellplan.report.record import number
@@ -191,6 +192,20 @@ def test_numbers_keep_twelve_digits(value: float) -> None:
 def test_conversion_leaves_no_noise() -> None:
     assert number(math.degrees(math.radians(-185.0))) == -185.0
     assert (number(math.nan), number(math.inf), number(None), number(-0.0)) == (None, None, None, 0.0)
+
+
+def test_failed_joints_are_told_with_instant_and_place(passed_run: Any, failed_run: Any) -> None:
+    for run, is_kept in ((passed_run, True), (failed_run, None)):
+        locked = (LockedJoint(robot="kuka", joint="B2", since=2.0),)
+        cell = replace(run.cell, motion=replace(run.cell.motion, locked=locked))
+
+        (record,) = read(report_json(run.report, cell=cell, provenance=run.provenance))["locked_joints"]
+
+        index = list(run.report.times).index(2.0)
+        assert (record["robot"], record["joint"], record["from_s"], record["unit"]) == ("kuka", "B2", 2.0, "deg")
+        assert record["position"] == pytest.approx(math.degrees(run.report.q["kuka"][index, 1]))
+        assert is_kept is None or record["tasks_kept"] is is_kept
+    assert record_of(passed_run)["locked_joints"] == []
 
 
 def test_speeds_in_the_world_are_told_in_millimetres_per_second(passed_run: Any) -> None:

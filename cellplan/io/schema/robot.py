@@ -10,6 +10,7 @@ from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
 LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a slip of the unit
 FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a slip of the unit
 FASTEST_MM_S: Final = 10_000.0  # 10 m/s: faster is a slip of the unit
+STEEPEST: Final = 1e9  # deg/s2 or mm/s2, as in robot files
 WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses all its digits
 HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
 AXIS_LIMIT: Final = 64  # joints of one robot
@@ -17,9 +18,13 @@ AXIS_LIMIT: Final = 64  # joints of one robot
 JointAngle = Annotated[float, Field(ge=-LARGEST_JOINT_DEG, le=LARGEST_JOINT_DEG)]
 TurningSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_DEG_S)]
 SlidingSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_MM_S)]
+Acceleration = Annotated[float, Field(gt=0.0, le=STEEPEST)]
 Mass = Annotated[float, Field(ge=0.0, le=HEAVIEST_KG)]
 Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
 JointPosition = Annotated[float, Field(ge=-100_000.0, le=100_000.0)]
+
+TURNING_LIMITS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2")
+SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2")
 
 POSTURE_WORDS: Final = "auto or a list of joint angles"
 POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
@@ -51,16 +56,22 @@ class LimitsEntry(Entry):
     lower_deg: JointAngle | None = Field(default=None, description="Lowest angle of a revolute joint.")
     upper_deg: JointAngle | None = Field(default=None, description="Highest angle of a revolute joint.")
     velocity_deg_s: TurningSpeed | None = Field(default=None, description="Largest speed of a revolute joint.")
+    acceleration_deg_s2: Acceleration | None = Field(
+        default=None, description="Largest acceleration of a revolute joint."
+    )
     lower_mm: Coordinate | None = Field(default=None, description="Lowest position of a prismatic joint.")
     upper_mm: Coordinate | None = Field(default=None, description="Highest position of a prismatic joint.")
     velocity_mm_s: SlidingSpeed | None = Field(default=None, description="Largest speed of a prismatic joint.")
+    acceleration_mm_s2: Acceleration | None = Field(
+        default=None, description="Largest acceleration of a prismatic joint."
+    )
     wrap: bool = Field(default=False, description="Whether a continuous joint may turn without end.")
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         """One unit, lower below upper, and either limits or none."""
-        turning = [name for name in ("lower_deg", "upper_deg", "velocity_deg_s") if getattr(self, name) is not None]
-        sliding = [name for name in ("lower_mm", "upper_mm", "velocity_mm_s") if getattr(self, name) is not None]
+        turning = [name for name in TURNING_LIMITS if getattr(self, name) is not None]
+        sliding = [name for name in SLIDING_LIMITS if getattr(self, name) is not None]
         if turning and sliding:
             raise rule(f"expected degrees or millimetres, got both ({turning[0]} and {sliding[0]})", sliding[0])
         for unit in ("deg", "mm"):

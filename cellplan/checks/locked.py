@@ -1,0 +1,84 @@
+"""Joints that fail on the way: whether they stand still from then on, and what the tasks lose by it."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell, LockedJoint
+from cellplan.model.report import Check, TaskAccuracy
+from cellplan.model.task import Tolerance
+
+STILL: Final = 1e-9  # [deg] or [mm] by which a joint that stands still may differ: a thousand units in the tables
+
+
+def check_locked(cell: Cell, times: Array, q: Mapping[str, Array]) -> list[Check]:
+    """Whether each joint that fails stays where it is from its instant on.
+
+    Args:
+        cell: The cell.
+        times: Instants in [s], shape (N,).
+        q: Positions by robot, shape (N, n) each.
+    """
+    return [_check(cell, lock, times, q[lock.robot]) for lock in cell.motion.locked]
+
+
+def told_with_failures(
+    checks: Iterable[Check], errors: TaskAccuracy, tolerance: Tolerance, *, times: Array, locked: Iterable[LockedJoint]
+) -> list[Check]:
+    """Failed checks on the accuracy of one task, with the joints that had failed when its tool left the path.
+
+    Args:
+        checks: The checks of the task.
+        errors: Its errors.
+        tolerance: What it allows.
+        times: Instants in [s], shape (N,).
+        locked: Joints that fail.
+    """
+    outside = np.linalg.norm(errors.position_error, axis=1) > tolerance.position
+    outside |= np.linalg.norm(errors.orientation_error, axis=1) > tolerance.orientation
+    if not outside.any():
+        return list(checks)
+    left = float(times[np.argmax(outside)])
+    names = [f"{lock.robot}/{lock.joint} locked at {lock.since:.3f} s" for lock in locked if lock.since <= left]
+    if not names:
+        return list(checks)
+    reason = f"after {' and '.join(names)}: the other joints cannot make up for it"
+    return [check if check.passed else replace(check, message=f"{check.message}, {reason}") for check in checks]
+
+
+def _check(cell: Cell, lock: LockedJoint, times: Array, q: Array) -> Check:
+    """One joint: the farthest it goes from where it was when it failed."""
+    index = cell.robot(lock.robot).model.joint_names.index(lock.joint)
+    is_revolute = cell.robot(lock.robot).model.joints[index].is_revolute
+    scale, unit = (float(np.degrees(1.0)), "deg") if is_revolute else (1e3, "mm")
+    after = np.flatnonzero(times >= lock.since)
+    name = f"joint {lock.robot}/{lock.joint}"
+    if not len(after):
+        message = f"{name} is locked from {lock.since:.3f} s on, after the end at {times[-1]:.3f} s"
+        return _verdict(lock, message, value=0.0, unit=unit, at_s=None)
+    first = int(after[0])
+    moved = scale * np.abs(q[first:, index] - q[first, index])
+    worst = int(np.argmax(moved))
+    value, at_s = float(moved[worst]), float(times[first + worst])
+    if value <= STILL:
+        message = f"{name} stands still at {scale * q[first, index]:.4f} {unit} from {lock.since:.3f} s on"
+    else:
+        message = f"{name} is locked from {lock.since:.3f} s on but moves by {value:.4g} {unit}, worst at {at_s:.3f} s"
+    return _verdict(lock, message, value=value, unit=unit, at_s=at_s)
+
+
+def _verdict(lock: LockedJoint, message: str, *, value: float, unit: str, at_s: float | None) -> Check:
+    """The check of one joint."""
+    return Check(
+        name="locked_joint",
+        subject=f"{lock.robot}/{lock.joint}",
+        passed=value <= STILL,
+        value=value,
+        limit=STILL,
+        unit=unit,
+        at_s=at_s,
+        message=message,
+    )

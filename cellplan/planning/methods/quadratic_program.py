@@ -1,0 +1,88 @@
+"""Quadratic program: the smallest weighted joint speeds within hard limits, the tasks given up only where they must."""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.transforms import Array
+from cellplan.planning.qp_engine import nearest_to_origin
+from cellplan.planning.speed_bounds import JointBounds, SpeedBounds
+from cellplan.planning.tracking_problem import Advance, FirstOrder, TrackingProblem
+
+STEEPEST: Final = 1e10  # largest ratio of the tasks' weight to that of joint speeds: beyond it digits are lost
+
+
+def quadratic_program(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
+    r"""Integrate by Euler's method; every step is a quadratic program with the limits as hard bounds.
+
+    .. math:: \min_{\dot q, s} \tfrac12 (\dot q - \dot q_0)^T W (\dot q - \dot q_0) + \tfrac12 \rho \, s^T s
+              \quad \text{where} \quad J \dot q + s = \dot x_d + K e, \quad l \le \dot q \le u
+
+    Position, speed and acceleration limits, and the room to brake before a position limit, are in ``l`` and ``u``.
+    Where no bound is active this is the weighted, damped inverse with ``lambda^2 = 1 / rho`` ([Ribeiro2010]_ Eq. D.43).
+    What the slack ``s`` leaves of the tasks is made up for by the feedback as soon as there is room.
+    """
+    limits = JointBounds(problem.cell)
+    speeds: Array | None = None
+
+    def advance(k: int, q: Array) -> Advance:
+        nonlocal speeds
+        if speeds is None:
+            limits.refuse_outside(q)
+            speeds = np.zeros_like(q)
+        tasks, dt = problem.first_order(k, q), problem.step(k)
+        xdot = tasks.twist + problem.gain * tasks.error
+        bounds = limits.at(q, speeds, dt)
+        speeds = bounded_speeds(
+            tasks,
+            xdot,
+            bounds,
+            mobile=problem.mobile(k) > 0.0,
+            slack_weight=problem.cell.solver.quadratic_program.slack_weight,
+        )
+        return Advance(q=q + speeds * dt, slack=float(np.linalg.norm(xdot - tasks.J @ speeds)))
+
+    return advance
+
+
+def bounded_speeds(
+    tasks: FirstOrder, xdot: Array, bounds: SpeedBounds, *, mobile: NDArray[np.bool_], slack_weight: float
+) -> Array:
+    r"""Solve the program of one step.
+
+    The slack is eliminated. With ``z = W^1/2 (qd - qd_0)``, ``B = J W^-1/2 = U S V^T`` and the optimum without bounds
+    ``z_0``, the cost is ``1/2 |y|^2`` for ``z = z_0 + V (I + rho S^2)^-1/2 y``: what remains is the point ``y`` nearest
+    to the origin between the bounds. In these coordinates metres, radians, weights and the weight of the slack have no
+    say in how well the program is conditioned.
+
+    Args:
+        tasks: Rows, weights and secondary speeds.
+        xdot: Wanted twist components with error feedback, shape (m,).
+        bounds: Bounds on the joint speeds.
+        mobile: Whether a joint may move, shape (nq,); the others have speed 0.
+        slack_weight: ``rho``.
+
+    Returns:
+        Joint speeds within the bounds to the last bit, shape (nq,).
+
+    Raises:
+        NoSolutionError: The program could not be solved.
+    """
+    speeds = np.zeros(len(tasks.weights))
+    if not mobile.any():
+        return speeds
+    J, root = tasks.J[:, mobile], np.sqrt(tasks.weights[mobile])
+    wanted = speeds[mobile] if tasks.secondary is None else tasks.secondary[mobile]
+    U, s, Vt = np.linalg.svd(J / root, full_matrices=True)
+    lambda_squared = max(1.0 / slack_weight, float(s[0]) ** 2 / STEEPEST)
+    z_0 = Vt[: len(s)].T @ (s / (s**2 + lambda_squared) * (U[:, : len(s)].T @ (xdot - J @ wanted)))
+    steepness = np.ones(len(root))
+    steepness[: len(s)] += s**2 / lambda_squared
+    A = Vt.T / np.sqrt(steepness)
+    lower, upper = bounds.lower[mobile], bounds.upper[mobile]
+    offset = z_0 + root * wanted
+    y = nearest_to_origin(A, lower=root * lower - offset, upper=root * upper - offset)
+    speeds[mobile] = np.clip((offset + A @ y) / root, lower, upper)
+    return speeds
