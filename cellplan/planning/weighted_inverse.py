@@ -14,6 +14,8 @@ class WeightedInverse:
 
     Attributes:
         smallest: Smallest singular value of ``J W^-1/2``.
+        largest: Largest singular value of ``J W^-1/2``.
+        manipulability: Product of these singular values: ``sqrt(det(J W^-1 J^T))``.
         is_singular: Whether a row is lost to rounding.
     """
 
@@ -28,6 +30,8 @@ class WeightedInverse:
         self._JW = J / weights
         self._s_squared, self._U = np.linalg.eigh(self._JW @ J.T)
         self.smallest = float(np.sqrt(max(self._s_squared[0], 0.0)))
+        self.largest = float(np.sqrt(max(self._s_squared[-1], 0.0)))
+        self.manipulability = float(np.prod(np.sqrt(np.maximum(self._s_squared, 0.0))))
         self.is_singular = bool(self._s_squared[0] <= ROUNDING * self._s_squared[-1])
 
     def speeds(self, xdot: Array, lambda_squared: float) -> Array:

@@ -27,7 +27,9 @@ class DampedLeastSquaresEntry(Entry):
         default="singular_value", description="What tells how near a singularity is."
     )
     region: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
-        default=0.02, description="Value of the measure below which damping sets in."
+        default=0.02,
+        description="Value of the measure below which damping sets in; with `damping: auto` the largest damping factor "
+        "as well (0.02 with manipulability).",
     )
     shape_gain: bool = Field(default=False, description="Whether the feedback gain falls near a singularity.")
 

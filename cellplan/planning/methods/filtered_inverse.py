@@ -1,0 +1,16 @@
+"""Filtered inverse, law I: an inverse that follows the Jacobian as a filter does multiplies the wanted twist."""
+
+from collections.abc import Callable
+
+from cellplan.geometry.transforms import Array
+from cellplan.planning.filtered_jacobian import FilteredMotion
+from cellplan.planning.tracking_problem import Advance, TrackingProblem
+
+
+def filtered_inverse(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
+    r"""Joint speeds ``u_I = Theta v`` ([Vargas2012]_ Eq. 35), with ``v`` the wanted twist and its feedback."""
+
+    def law(theta: Array, _J: Array) -> Array:
+        return theta
+
+    return FilteredMotion(problem, law).advance
