@@ -36,7 +36,7 @@ def follow(
         DivergedError: A tool lost its path.
         NoSolutionError: The method found no way on, or no cycle closes.
     """
-    problem = TrackingProblem(cell, schedule, moving)
+    problem = TrackingProblem(cell, schedule, moving, start=start)
     if cell.motion.cyclic:
 
         def cycle(drift: Array, last: int) -> Array:
