@@ -185,9 +185,9 @@ def _joint_limits(cell: Cell) -> Pull:
     for robot in cell.robots:
         lower, upper = robot.model.lower, robot.model.upper
         is_limited = np.isfinite(lower) & np.isfinite(upper)
-        span = np.where(is_limited, upper - lower, np.inf)
-        stiffness.append(1.0 / (max(1, int(is_limited.sum())) * span**2))
-        middles.append(np.where(is_limited, 0.5 * (lower + upper), 0.0))
+        lower, upper = np.where(is_limited, lower, -np.inf), np.where(is_limited, upper, np.inf)
+        stiffness.append(1.0 / (max(1, int(is_limited.sum())) * (upper - lower) ** 2))
+        middles.append(0.5 * (np.where(is_limited, lower, 0.0) + np.where(is_limited, upper, 0.0)))
     return _springs(np.concatenate(stiffness), np.concatenate(middles))
 
 
