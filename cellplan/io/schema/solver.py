@@ -91,8 +91,8 @@ class JointLimitsGoalEntry(Entry):
 
     gain: Gain = Field(
         default=100.0,
-        description="How strongly, in rad^2/s: a joint with range r in an arm of n joints is drawn back at gain / (n r^2) "
-        "per second.",
+        description="How strongly, in rad^2/s: a joint of range r in an arm of n joints is drawn back at the rate "
+        "gain / (n r^2).",
     )
 
 
