@@ -51,6 +51,29 @@ class Engine:
         p, q = result.nearest_points
         return float(distance), np.subtract(q, p)
 
+    def proposed_points(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[Array, Array]:
+        """FCL's nearest points of the hulls of two bodies in the world, shape (3,) each: unproven."""
+        a, b = self._placed("hull", first, poses, sample), self._placed("hull", second, poses, sample)
+        result = fcl.DistanceResult()
+        fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
+        p, q = result.nearest_points
+        return np.array(p), np.array(q)
+
+    def surface_points(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[Array, Array] | None:
+        """Nearest points of the surfaces of two bodies in the world, shape (3,) each; None when they touch.
+
+        Exact but slow.
+        """
+        a, b = self._placed("core", first, poses, sample), self._placed("core", second, poses, sample)
+        result = fcl.DistanceResult()
+        distance = fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
+        p, q = (np.array(point) for point in result.nearest_points)
+        inner, outer = self.bodies[first].inflation, self.bodies[second].inflation
+        if not distance > inner + outer:
+            return None
+        along = (q - p) / np.linalg.norm(q - p)
+        return p + inner * along, q - outer * along
+
     def surface_distance(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> float:
         """Distance in [m] between two bodies that do not touch, never above the truth; exact but slow.
 

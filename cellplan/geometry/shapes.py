@@ -5,10 +5,13 @@ region z <= 0. Lengths are in [m].
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+
+FACING: Final = 1e-9  # [-] a direction this near to the normal of a face is the normal: rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +86,34 @@ def support(shape: Solid, directions: Array) -> Array:
         case Mesh():
             reach = np.max(n @ shape.vertices.T, axis=-1)
     return reach
+
+
+def support_point(shape: Solid, n: Array) -> Array:
+    """Point of the shape farthest along a unit direction, shape (3,); the middle of the face or edge that is so."""
+    toward = np.where(np.abs(n) > FACING, np.sign(n), 0.0)
+    point: Array
+    match shape:
+        case Box(size):
+            point = toward * (0.5 * np.asarray(size))
+        case Cylinder(radius, length):
+            across = float(np.hypot(n[0], n[1]))
+            point = np.array([0.0, 0.0, 0.5 * length * toward[2]])
+            point[:2] = radius * n[:2] / across if across > FACING else 0.0
+        case Capsule(radius, length):
+            point = radius * n + np.array([0.0, 0.0, 0.5 * length * toward[2]])
+        case Sphere(radius):
+            point = radius * n
+        case Mesh():
+            reach = shape.vertices @ n
+            highest = reach >= reach.max() - FACING * float(np.ptp(reach))
+            point = 0.5 * (shape.vertices[highest].min(axis=0) + shape.vertices[highest].max(axis=0))
+    return point
+
+
+def bounding_box(shape: Solid) -> tuple[Array, Array]:
+    """Middle and half edges of the box along the shape's axes that holds it, shape (3,) each."""
+    highest, lowest = support(shape, np.eye(3)), -support(shape, -np.eye(3))
+    return 0.5 * (highest + lowest), 0.5 * (highest - lowest)
 
 
 def bounding_sphere(shape: Solid) -> tuple[Array, float]:

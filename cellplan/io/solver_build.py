@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.io.robot_rules import start_keys
-from cellplan.io.schema.solver import GoalEntry, PostureGoalEntry, SecondaryEntry, SolverEntry
+from cellplan.io.schema.solver import PostureGoalEntry, SecondaryEntry, SolverEntry
 from cellplan.io.shape_build import MM
 from cellplan.model.robot import RobotModel
 from cellplan.model.solver import (
@@ -58,11 +58,10 @@ def build_solver(entry: SolverEntry, step: float, models: Mapping[str, RobotMode
 def _goals(entry: SecondaryEntry, models: Mapping[str, RobotModel]) -> tuple[SecondaryGoal, ...]:
     """The goals that are given, in the order of the format."""
     goals: list[SecondaryGoal] = []
-    simple: tuple[tuple[GoalKind, GoalEntry | None], ...] = (
-        (GoalKind.MANIPULABILITY, entry.manipulability),
-        (GoalKind.JOINT_LIMITS, entry.joint_limits),
-    )
-    goals += [SecondaryGoal(kind=kind, gain=goal.gain) for kind, goal in simple if goal is not None]
+    if entry.manipulability is not None:
+        goals.append(SecondaryGoal(kind=GoalKind.MANIPULABILITY, gain=entry.manipulability.gain))
+    if entry.joint_limits is not None:
+        goals.append(SecondaryGoal(kind=GoalKind.JOINT_LIMITS, gain=entry.joint_limits.gain))
     if entry.obstacles is not None:
         within = entry.obstacles.within_mm / MM
         goals.append(SecondaryGoal(kind=GoalKind.OBSTACLES, gain=entry.obstacles.gain, within=within))

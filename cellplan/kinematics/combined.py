@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.cell import Cell, Robot
@@ -26,11 +27,28 @@ class CellState:
     X_WP: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class LinkState:
+    """Every link of the cell at one stacked joint vector; robot by robot, driven links before followers.
+
+    Attributes:
+        screws_W: Twist that unit speed of each axis, driven or follower, gives what it carries, taken at the world
+            origin, linear part first, shape (6, links), expressed in W.
+        D: Displacement of each link from its place in B at the reference posture to its place in the world, shape
+            (links, 4, 4): anything fixed to it is at ``D @ X_BS``.
+    """
+
+    screws_W: Array
+    D: Array
+
+
 class CombinedModel:
     """One pinocchio model of all robots; joint columns stand in the order of the stacked joint vector.
 
     Attributes:
         carries_flange: Whether a joint moves a robot's flange, shape (robots, nq).
+        carries_link: Whether an axis moves a link, itself included, shape (links, links): ``[link, axis]``.
+        first_link: Place of each robot's first link among all links, by the robot's index.
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -43,6 +61,8 @@ class CombinedModel:
         self.carries_flange = np.zeros((len(cell.robots), cell.joint_count), dtype=bool)
         self._flange_ids: list[int] = []
         self._X_JT: list[Array] = []
+        self.first_link: list[int] = []
+        self._points: list[Array] = []
         for index, robot in enumerate(cell.robots):
             self._add_robot(robot, cell.columns(robot.name), self.carries_flange[index])
         self._data = self._model.createData()
@@ -52,6 +72,8 @@ class CombinedModel:
         self._offset = np.array(self._offsets)
         self._is_plain = bool(np.array_equal(self._spread, np.eye(cell.joint_count)))
         self._X_WT = np.tile(np.eye(4), (len(cell.robots), 1, 1))
+        self.carries_link = _carriers(self._model)
+        self._X_JB = np.array([_at(-point) for point in self._points]).reshape(-1, 4, 4)
         self._holder, self._X_TP = _part_carrier(cell)
 
     def state(self, q: Array) -> CellState:
@@ -65,12 +87,30 @@ class CombinedModel:
         X_WP = self._X_TP if self._holder is None else X_WT[self._holder] @ self._X_TP
         return CellState(screws, X_WT, X_WP)
 
+    def links(self, q: Array) -> LinkState:
+        """All links at the stacked joint vector ``q``, shape (nq,); the result owns its arrays."""
+        pin.computeJointJacobians(self._model, self._data, self._spread @ q + self._offset)
+        X_WJ = np.array([self._data.oMi[link].homogeneous for link in range(1, self._model.njoints)])
+        return LinkState(self._data.J.copy(), X_WJ.reshape(-1, 4, 4) @ self._X_JB)
+
+    def along_joints(self, per_axis: Array) -> Array:
+        """Sum what belongs to the axes over those that each driven joint turns, shape (..., links) to (..., nq)."""
+        summed: Array = per_axis @ self._spread
+        return summed
+
+    def to_flange(self, per_joint: Array) -> Array:
+        """Share of each axis on the way to a flange in what belongs to the joints, shape (..., nq) to (..., links)."""
+        shares: Array = per_joint @ self._spread_to_flange.T
+        return shares
+
     def _add_robot(self, robot: Robot, columns: slice, carries: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> None:
         """Add one robot's joints; every joint frame is parallel to B at the reference posture."""
         model = robot.model
         axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
         ids: list[int] = []
+        self.first_link.append(len(self._leaders))
         for axis in axes:
+            self._points.append(axis.point_B)
             if axis.parent == BASE:
                 parent_id, X_parent = 0, robot.X_WB @ _at(axis.point_B)
             else:
@@ -95,6 +135,16 @@ class CombinedModel:
             carries[columns.start + (axis.leader if isinstance(axis, FollowerJoint) else link)] = True
             link = axis.parent
         self._is_on_the_way += on_the_way
+
+
+def _carriers(model: pin.Model) -> NDArray[np.bool_]:
+    """Whether an axis moves a link, shape (links, links); pinocchio counts the world as joint 0."""
+    count = model.njoints - 1
+    carries = np.eye(count, dtype=bool)
+    for link in range(count):
+        if model.parents[link + 1] > 0:
+            carries[link] |= carries[model.parents[link + 1] - 1]
+    return carries
 
 
 def _at(point: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Closing a cycle: the constant drift in the null space of the tasks that brings every joint back to its start."""
+"""Closing a cycle: the drift in the null space of the tasks that brings every joint back to its start."""
 
 from collections.abc import Callable
 from typing import Final
@@ -14,11 +14,46 @@ from cellplan.planning.tracking_problem import TrackingProblem
 CLOSED: Final = 1e-9  # [rad] or [m] of drift in the null space per cycle that counts as none
 ROUNDS: Final = 40  # cycles tried; four robots need about ten
 SAME_POSE: Final = 1e-9  # largest difference of pose entries at both ends of a closed path: rounding
+SAME_PERIOD: Final = 1e-9  # [s] difference of cycles that take equally long: rounding
 SINGULAR: Final = 1e-9  # singular values below this share of the largest one are zero: rounding of the matrix
 
 
-def closing_drift(
-    problem: TrackingProblem, schedule: Schedule, start: Array, cycle: Callable[[Array, int], Array]
+def close(problem: TrackingProblem, schedule: Schedule, start: Array, carry: Callable[[int], Array]) -> None:
+    """Give the problem a drift with which the joint motion closes, cycle after cycle.
+
+    The first cycle gets a constant drift. What is left of the error would grow from cycle to cycle where the map of one
+    cycle onto the next is not a contraction, so every later cycle is drawn towards the first one at the feedback gain.
+
+    Args:
+        problem: The tasks; their drift is set.
+        schedule: Their schedule.
+        start: Stacked start posture, shape (nq,).
+        carry: Motion up to an instant under the drift that is set, shape (k + 1, nq).
+
+    Raises:
+        InputError: A path is open, or its cycle does not end on an instant of the clock.
+        NoSolutionError: The cycle does not close.
+    """
+    begin, end = _first_cycle(problem.cell, schedule)
+
+    def cycle(constant: Array) -> Array:
+        problem.drift = lambda _k, _q: constant
+        return carry(end)
+
+    constant = _closing_drift(problem, start, cycle, duration=float(schedule.times[end]))
+    first = cycle(constant)
+
+    def held(k: int, q: Array) -> Array:
+        if k < end:
+            return constant
+        drawn: Array = constant + problem.gain * (first[begin + (k - begin) % (end - begin)] - q)
+        return drawn
+
+    problem.drift = held
+
+
+def _closing_drift(
+    problem: TrackingProblem, start: Array, cycle: Callable[[Array], Array], *, duration: float
 ) -> Array:
     r"""Joint speeds that, added in the null space at all times, close the joint motion over one cycle.
 
@@ -28,29 +63,27 @@ def closing_drift(
 
     Args:
         problem: The tasks.
-        schedule: Their schedule.
         start: Stacked start posture, shape (nq,).
-        cycle: Motion up to an instant under a drift, shape (k + 1, nq).
+        cycle: Motion of one cycle under a constant drift, shape (k + 1, nq).
+        duration: Its length ``T`` in [s].
 
     Returns:
         Speeds in [rad/s] or [m/s], shape (nq,).
 
     Raises:
-        InputError: A path is open, or its cycle does not end on an instant of the clock.
         NoSolutionError: The cycle does not close.
     """
-    last = _end_of_cycle(problem.cell, schedule)
     N = _null_space(problem, start)
     u = np.zeros(N.shape[1])
     if not len(u):
         return N @ u
-    B = np.eye(len(u)) / float(schedule.times[last])  # inverse of the derivative
-    drift = N.T @ (cycle(N @ u, last)[-1] - start)
+    B = np.eye(len(u)) / duration  # inverse of the derivative
+    drift = N.T @ (cycle(N @ u)[-1] - start)
     for _ in range(ROUNDS):
         if np.max(np.abs(drift)) <= CLOSED:
             return N @ u
         change = -B @ drift
-        found = N.T @ (cycle(N @ (u + change), last)[-1] - start)
+        found = N.T @ (cycle(N @ (u + change))[-1] - start)
         gained = found - drift
         B += np.outer(change - B @ gained, change @ B) / (change @ B @ gained)
         u, drift = u + change, found
@@ -60,26 +93,26 @@ def closing_drift(
     )
 
 
-def _end_of_cycle(cell: Cell, schedule: Schedule) -> int:
-    """Index of the instant at which all tools are back for the first time.
+def _first_cycle(cell: Cell, schedule: Schedule) -> tuple[int, int]:
+    """Instants at which the first cycle begins and ends: the whole motion when the tasks keep no common cycle.
 
     Raises:
-        InputError: There is no such instant.
+        InputError: The tools are not back at its end.
     """
     place = cell.origin.at("motion.cyclic")
-    cycles = {(task.task.start, task.end, task.task.repeat) for task in schedule.tasks}
-    last = len(schedule.times) - 1
-    if len(cycles) == 1:
-        begin, end, repeat = cycles.pop()
-        last = int(np.searchsorted(schedule.times, begin + (end - begin) / repeat - 0.5 * schedule.step))
+    first, last = 0, len(schedule.times) - 1
+    cycles = {(task.task.start, *task.cycle_ends) for task in schedule.tasks}
+    ends = np.array(cycles.pop())
+    if not cycles and len(ends) > 1 and np.ptp(np.diff(ends)) <= SAME_PERIOD:
+        first, last = np.searchsorted(schedule.times, ends[:2] - 0.5 * schedule.step).tolist()
     for task in schedule.tasks:
-        gap = float(np.max(np.abs(task.X_PT[last] - task.X_PT[0])))
+        gap = float(np.max(np.abs(task.X_PT[last] - task.X_PT[first])))
         if gap > SAME_POSE:
             raise InputError(
                 f"{place}: expected closed paths whose cycles end on a multiple of motion.step_s, but the tool of task "
                 f"'{task.task.name}' is not back at its start at {schedule.times[last]:g} s"
             )
-    return last
+    return first, last
 
 
 def _null_space(problem: TrackingProblem, start: Array) -> Array:

@@ -10,7 +10,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.planning.closing import closing_drift
+from cellplan.planning.closing import close
 from cellplan.planning.methods import method_named
 from cellplan.planning.tracking_problem import Advance, TrackingProblem
 
@@ -23,7 +23,7 @@ def follow(
 ) -> Motion:
     """Let the cell's resolution method carry the joints from each instant of the clock to the next.
 
-    A cyclic motion gets a constant drift in the null space of the tasks that brings all joints back.
+    A cyclic motion gets a drift in the null space of the tasks that brings all joints back.
 
     Args:
         cell: The cell.
@@ -36,14 +36,9 @@ def follow(
         DivergedError: A tool lost its path.
         NoSolutionError: The method found no way on, or no cycle closes.
     """
-    problem = TrackingProblem(cell, schedule, moving)
+    problem = TrackingProblem(cell, schedule, moving, start=start)
     if cell.motion.cyclic:
-
-        def cycle(drift: Array, last: int) -> Array:
-            problem.drift = drift
-            return _carry(problem, start, last=last, progress=progress).q
-
-        problem.drift = closing_drift(problem, schedule, start, cycle)
+        close(problem, schedule, start, lambda last: _carry(problem, start, last=last, progress=progress).q)
     return _carry(problem, start, last=len(schedule.times) - 1, progress=progress)
 
 

@@ -1,7 +1,7 @@
 """Tracking problem: what a resolution method is asked at every instant, and what it may ask back."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -12,8 +12,10 @@ from cellplan.kinematics.combined import CellState, CombinedModel
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian, pose_errors
-from cellplan.planning.secondary_goals import goal_pulls
+from cellplan.planning.secondary_goals import SecondaryGoals, Stance, share_within
 from cellplan.planning.weighting import JointWeights
+
+Drift = Callable[[int, Array], Array]
 
 LOST_DISTANCE: Final = 0.5  # [m] a tool this far from its path has left it for good: the posture means nothing any more
 
@@ -28,6 +30,7 @@ class FirstOrder:
         error: Pose errors, wanted minus actual, shape (m,).
         weights: Joint weights, the diagonal of W, shape (nq,).
         secondary: Joint speeds that the secondary goals ask for, shape (nq,); None when there are none.
+        bounds: Lowest and highest joint speeds that goals may lead to, shape (nq,) each; None when there are no goals.
     """
 
     J: Array
@@ -35,6 +38,21 @@ class FirstOrder:
     error: Array
     weights: Array
     secondary: Array | None
+    bounds: tuple[Array, Array] | None = None
+
+    def bounded(self, unnoticed: Array, *, beside: Array) -> Array:
+        """What of joint speeds that no task notices may be added to the speeds that the tasks need, shape (nq,).
+
+        They are scaled together, so they still move no tool.
+
+        Args:
+            unnoticed: What the tasks leave of the secondary goals, shape (nq,).
+            beside: Joint speeds that the tasks need, shape (nq,).
+        """
+        if self.bounds is None:
+            return unnoticed
+        lowest, highest = self.bounds
+        return share_within(beside, unnoticed, lowest=lowest, highest=highest) * unnoticed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,11 +83,19 @@ class TrackingProblem:
         signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
         gain: Error feedback gain in [1/s].
         damping: Largest damping factor; None leaves it to the method.
-        drift: Joint speeds that are asked for at all times besides the tasks, shape (nq,): what closes a cycle.
+        drift: Joint speeds that are asked for at instant k and posture q besides the tasks, shape (nq,): what closes a
+            cycle.
     """
 
-    def __init__(self, cell: Cell, schedule: Schedule, moving: Sequence[str]) -> None:
-        """Gather what stays the same from step to step."""
+    def __init__(self, cell: Cell, schedule: Schedule, moving: Sequence[str], *, start: Array | None = None) -> None:
+        """Gather what stays the same from step to step.
+
+        Args:
+            cell: The cell.
+            schedule: Wanted tool poses and twists on the common clock.
+            moving: Names of the robots that may move.
+            start: Stacked start posture, shape (nq,), which goals may lead back to; needed with goals only.
+        """
         tasks = tuple(scheduled.task for scheduled in schedule.tasks)
         names = [robot.name for robot in cell.robots]
         self._model = CombinedModel(cell)
@@ -80,14 +106,14 @@ class TrackingProblem:
         self._lost = np.array([max(LOST_DISTANCE, 2.0 * task.tolerance.position) for task in tasks])
         self._settled = np.array([task.start + task.settle if task.settle else -np.inf for task in tasks])
         self._weights = JointWeights(cell, self._model)
-        self._pulls = goal_pulls(cell)
         self.cell, self.times, self.tasks = cell, schedule.times, tasks
         self.operators = [names.index(task.robot) for task in tasks]
         self.wanted = np.stack([scheduled.X_PT for scheduled in schedule.tasks], axis=1)
         self.twists = np.stack([scheduled.V_PT_P for scheduled in schedule.tasks], axis=1)
         self.signs = column_signs(cell, self._model, tasks, moving)
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
-        self.drift: Array | None = None
+        self.drift: Drift | None = None
+        self._goals = self._secondary_goals(start) if cell.solver.goals else None
         self._locked_since = _locked_since(cell)
         self._may_move = np.isin(_owners(cell), moving)
 
@@ -111,15 +137,15 @@ class TrackingProblem:
             DivergedError: A tool lost its path.
         """
         state = self.state(q)
-        mobile = self.mobile(k)
+        signs = self.signs * self.mobile(k)
         X_WT = state.X_WT[self.operators]
-        J = cooperation_jacobian(state, X_WT[:, :3, 3], self.signs * mobile)
+        J = cooperation_jacobian(state, X_WT[:, :3, 3], signs)
         error = pose_errors(self.wanted[k], inverse(state.X_WP) @ X_WT, self._is_spin_free)
         self._refuse_lost_path(k, error)
         rows, twist, errors = self._constrained(k, J, error)
-        secondary = self._secondary(q, mobile)
-        weights = self._weights.at(state, q, J=rows, xdot=twist + self.gain * errors, secondary=secondary)
-        return FirstOrder(rows, twist, errors, weights, secondary)
+        drift = self._drift(k, q)
+        weights = self._weights.at(state, q, J=rows, xdot=twist + self.gain * errors, secondary=drift)
+        return self._with_goals(k, q, state, FirstOrder(rows, twist, errors, weights, drift), signs=signs)
 
     def _constrained(self, k: int, J: Array, error: Array) -> tuple[Array, Array, Array]:
         """Rows, wanted twists and errors of the components that the tasks constrain."""
@@ -132,15 +158,35 @@ class TrackingProblem:
             np.concatenate([pick @ part for pick, part in zip(picks, error, strict=True)]),
         )
 
-    def _secondary(self, q: Array, mobile: Array) -> Array | None:
-        """Joint speeds that serve the secondary goals, before the tasks are given their due."""
-        if not self._pulls and self.drift is None:
+    def _secondary_goals(self, start: Array | None) -> SecondaryGoals:
+        """The goals of the cell, which may lead back to the start posture."""
+        if start is None:
+            raise ValueError("secondary goals need the start posture of the motion")
+        return SecondaryGoals(self.cell, self._model, operators=self.operators, times=self.times, start=start)
+
+    def _drift(self, k: int, q: Array) -> Array | None:
+        """Joint speeds that are asked for to close a cycle, of those joints that may move."""
+        if self.drift is None:
             return None
-        wanted = np.zeros_like(q) if self.drift is None else self.drift.copy()
-        for gain, pull in self._pulls:
-            wanted += gain * pull(q)
-        speeds: Array = wanted * mobile
+        speeds: Array = self.drift(k, q) * self.mobile(k)
         return speeds
+
+    def _with_goals(self, k: int, q: Array, state: CellState, first: FirstOrder, *, signs: Array) -> FirstOrder:
+        """The tasks, with what the secondary goals ask for besides."""
+        if self._goals is None:
+            return first
+        stance = Stance(
+            q=q,
+            state=state,
+            J=first.J,
+            picks=[rows[k] for rows in self._rows],
+            signs=signs,
+            mobility=np.any(signs != 0.0, axis=0) / first.weights,
+        )
+        asked = self._goals.speeds(k, stance)
+        if first.secondary is not None:
+            asked = asked + first.secondary
+        return replace(first, secondary=asked, bounds=self._goals.bounds(q))
 
     def _refuse_lost_path(self, k: int, error: Array) -> None:
         """Stop where going on would be meaningless; not a number counts as lost.

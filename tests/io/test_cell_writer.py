@@ -169,3 +169,17 @@ def test_texts_are_written_so_that_they_stay_texts(text: str) -> None:
 @pytest.mark.parametrize("text", ["no", "010", "1:30", "null", "", "1e5", "-", "a: b", "# x", "true", "~", '"', "\\"])
 def test_words_with_a_meaning_of_their_own_are_quoted(text: str) -> None:
     assert parse_yaml(yaml_text({"a": [text], "b": {text or "x": text}}).encode(), file="f").root["a"] == (text,)
+
+
+def test_secondary_goals_are_written_with_their_defaults(cells: Path, tmp_path: Path) -> None:
+    text = (cells / "four_robots.yaml").read_text(encoding="utf-8")
+    asked = "gain_per_s: 650, secondary: {manipulability: {}, joint_limits: {}, obstacles: {}, posture: {}}}"
+    assert "gain_per_s: 650}" in text
+    (tmp_path / "cell.yaml").write_text(text.replace("gain_per_s: 650}", asked), encoding="utf-8")
+    cell = load_cell(tmp_path / "cell.yaml")
+
+    again = reload(cell, tmp_path)
+
+    assert [goal.gain for goal in cell.solver.goals] == [1.0, 100.0, 0.1, 1.0]
+    assert "obstacles: {gain: 0.1, within_mm: 200}" in render_cell(cell)
+    assert same(cell.solver, again.solver)

@@ -82,23 +82,37 @@ class QuadraticProgramEntry(Entry):
     )
 
 
-class GoalEntry(Entry):
-    """A goal that is pursued as far as the tasks leave room."""
+class ManipulabilityGoalEntry(Entry):
+    """Away from singularities."""
 
-    gain: Gain = Field(default=1.0, description="How strongly.")
+    gain: Gain = Field(default=1.0, description="How strongly, in rad^2/s per unit of log manipulability.")
 
 
-class ObstacleGoalEntry(GoalEntry):
+class JointLimitsGoalEntry(Entry):
+    """Towards the middle of the joint ranges."""
+
+    gain: Gain = Field(
+        default=100.0,
+        description="How strongly, in rad^2/s: a joint of range r in an arm of n joints is drawn back at the rate "
+        "gain / (n r^2).",
+    )
+
+
+class ObstacleGoalEntry(Entry):
     """Distance from obstacles and from other robots."""
 
+    gain: Gain = Field(default=0.1, description="How strongly, in rad^2/s.")
     within_mm: Annotated[float, Field(gt=0.0, le=10_000.0)] = Field(
         default=200.0, description="Distance below which bodies push each other away."
     )
 
 
-class PostureGoalEntry(GoalEntry):
+class PostureGoalEntry(Entry):
     """A wanted posture."""
 
+    gain: Gain = Field(
+        default=1.0, description="How strongly, in 1/s: the rate at which a joint of weight 1 goes there."
+    )
     at: dict[Name, dict[str, JointPosition]] = Field(
         default={}, description="Wanted positions by robot, one key per joint; robots left out: their start posture."
     )
@@ -107,8 +121,10 @@ class PostureGoalEntry(GoalEntry):
 class SecondaryEntry(Entry):
     """Goals in the null space of the tasks."""
 
-    manipulability: GoalEntry | None = Field(default=None, description="Away from singularities.")
-    joint_limits: GoalEntry | None = Field(default=None, description="Towards the middle of the joint ranges.")
+    manipulability: ManipulabilityGoalEntry | None = Field(default=None, description="Away from singularities.")
+    joint_limits: JointLimitsGoalEntry | None = Field(
+        default=None, description="Towards the middle of the joint ranges."
+    )
     obstacles: ObstacleGoalEntry | None = Field(default=None, description="Away from obstacles and other robots.")
     posture: PostureGoalEntry | None = Field(default=None, description="Towards a wanted posture.")
 

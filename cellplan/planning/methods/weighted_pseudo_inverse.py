@@ -25,7 +25,7 @@ def weighted_pseudo_inverse(problem: TrackingProblem) -> Callable[[int, Array], 
         inverse = WeightedInverse(tasks.J, tasks.weights)
         speeds = damped_speeds(inverse, tasks.twist + problem.gain * tasks.error, problem.damping)
         if tasks.secondary is not None:
-            speeds += inverse.unnoticed(tasks.secondary)
+            speeds += tasks.bounded(inverse.unnoticed(tasks.secondary), beside=speeds)
         return Advance(q=q + speeds * problem.step(k))
 
     return advance

@@ -1,0 +1,44 @@
+"""Links and axes of the combined model against the other kinematics."""
+
+import numpy as np
+import pytest
+from random_cells import random_cell
+
+from cellplan.kinematics.combined import CombinedModel
+from cellplan.kinematics.screws import ScrewChain
+
+ROUNDING = 1e-12  # [-] products of a dozen matrices of order one
+H = 1e-6  # [rad] or [m]
+
+
+@pytest.mark.parametrize("with_follower", [False, True], ids=["plain", "follower"])
+def test_links_stand_where_successive_screws_put_them(with_follower: bool) -> None:
+    cell = random_cell(2, operators=2, with_follower=with_follower)
+    q = np.random.default_rng(2).uniform(-1.5, 1.5, cell.joint_count)
+    D = CombinedModel(cell).links(q).D
+    expected = [ScrewChain(r).link_displacements(q[None, cell.columns(r.name)])[0, 1:] for r in cell.robots]
+    np.testing.assert_allclose(D, np.concatenate(expected), atol=100 * ROUNDING)
+
+
+@pytest.mark.parametrize("with_follower", [False, True], ids=["plain", "follower"])
+def test_points_of_links_move_as_their_screws_say(with_follower: bool) -> None:
+    """Also links beside the way to the flange, which the screws of the flange do not know."""
+    cell = random_cell(3, operators=1, with_follower=with_follower)
+    rng = np.random.default_rng(3)
+    q = rng.uniform(-1.5, 1.5, cell.joint_count)
+    model = CombinedModel(cell)
+    links, point = model.links(q), np.append(rng.normal(size=3), 1.0)
+    places = (links.D @ point)[:, :3]
+    speeds = links.screws_W[:3, None] + np.cross(links.screws_W[3:, None], places.T[:, :, None], axis=0)
+
+    velocities = model.along_joints(speeds * model.carries_link)
+
+    for joint, e in enumerate(np.eye(len(q))):
+        expected = ((model.links(q + H * e).D - model.links(q - H * e).D) @ point)[:, :3] / (2 * H)
+        np.testing.assert_allclose(velocities[:, :, joint].T, expected, atol=1e-8)  # eps / H
+
+
+def test_first_links_follow_the_order_of_the_robots() -> None:
+    cell = random_cell(4, operators=2, with_follower=True)
+    counts = [len(robot.model.joints) + len(robot.model.followers) for robot in cell.robots]
+    assert CombinedModel(cell).first_link == [0, counts[0], counts[0] + counts[1]]
