@@ -104,7 +104,7 @@ def _first_cycle(cell: Cell, schedule: Schedule) -> tuple[int, int]:
     cycles = {(task.task.start, *task.cycle_ends) for task in schedule.tasks}
     ends = np.array(cycles.pop())
     if not cycles and len(ends) > 1 and np.ptp(np.diff(ends)) <= SAME_PERIOD:
-        first, last = np.searchsorted(schedule.times, ends[:2] - 0.5 * schedule.step).tolist()
+        first, last = np.searchsorted(schedule.times[:-1], ends[:2] - 0.5 * schedule.step).tolist()
     for task in schedule.tasks:
         gap = float(np.max(np.abs(task.X_PT[last] - task.X_PT[first])))
         if gap > SAME_POSE:
