@@ -6,10 +6,10 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screws import ScrewChain
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, Relation
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.report import Check, TaskAccuracy
-from cellplan.model.task import Task
+from cellplan.model.task import Frame, Task
 
 
 def part_poses(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> Array:
@@ -24,7 +24,7 @@ def part_poses(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Arr
 
 
 def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP: Array) -> TaskAccuracy:
-    """Errors of one task in P; components that the task leaves open are zero.
+    """Errors of one task in P, or in W for a task in the world; components that the task leaves open are zero.
 
     Args:
         scheduled: Wanted tool poses.
@@ -32,16 +32,10 @@ def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP:
         q: The operator's positions, shape (N, n).
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """
-    X_PT = inverse(X_WP) @ chain.tool_poses(q)
-    wanted, task = scheduled.X_PT, scheduled.task
-    position = wanted[:, :3, 3] - X_PT[:, :3, 3]
-    if task.is_spin_free:
-        orientation = _turn_between(X_PT[:, None, :3, 2], wanted[:, None, :3, 2])
-    else:
-        orientation = _turn_between(np.swapaxes(X_PT[:, :3, :3], 1, 2), np.swapaxes(wanted[:, :3, :3], 1, 2))
-    open_axes = [axis for axis in range(6) if axis not in task.axes]
-    error = np.concatenate([position, orientation], axis=1)
-    error[:, open_axes] = 0.0
+    task = scheduled.task
+    X_WT = chain.tool_poses(q)
+    X_PT = X_WT if task.relative_to is Frame.WORLD else inverse(X_WP) @ X_WT
+    error = errors_on_part(X_PT, scheduled.X_PT, task)
     return TaskAccuracy(
         task=task.name,
         robot=task.robot,
@@ -52,37 +46,72 @@ def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP:
     )
 
 
+def errors_on_part(X_PT: Array, wanted: Array, relation: Relation) -> Array:
+    """Position errors in [m], then rotation vectors in [rad], wanted against actual, in P, shape (N, 6).
+
+    Args:
+        X_PT: Tool poses, shape (N, 4, 4).
+        wanted: Wanted ones, shape (N, 4, 4).
+        relation: The task or grasp; components that it leaves open are zero.
+    """
+    position = wanted[:, :3, 3] - X_PT[:, :3, 3]
+    if relation.is_spin_free:
+        orientation = _turn_between(X_PT[:, None, :3, 2], wanted[:, None, :3, 2])
+    else:
+        orientation = _turn_between(np.swapaxes(X_PT[:, :3, :3], 1, 2), np.swapaxes(wanted[:, :3, :3], 1, 2))
+    error = np.concatenate([position, orientation], axis=1)
+    error[:, [axis for axis in range(6) if axis not in relation.axes]] = 0.0
+    return error
+
+
 def check_accuracy(schedule: Schedule, accuracy: TaskAccuracy, task: Task) -> tuple[Check, Check]:
     """Position and orientation error of one task against its tolerance."""
     position = np.linalg.norm(accuracy.position_error, axis=1)
     orientation = np.linalg.norm(accuracy.orientation_error, axis=1)
+    allowed = task.tolerance
     return (
-        _check("position_error", schedule, 1e3 * position, task=task, limit=1e3 * task.tolerance.position, unit="mm"),
-        _check(
+        worst_error(
+            "position_error",
+            schedule.times,
+            1e3 * position,
+            subject=task.name,
+            limit=1e3 * allowed.position,
+            words=("mm", f"of task '{task.name}'"),
+        ),
+        worst_error(
             "orientation_error",
-            schedule,
+            schedule.times,
             np.degrees(orientation),
-            task=task,
-            limit=float(np.degrees(task.tolerance.orientation)),
-            unit="deg",
+            subject=task.name,
+            limit=float(np.degrees(allowed.orientation)),
+            words=("deg", f"of task '{task.name}'"),
         ),
     )
 
 
-def _check(name: str, schedule: Schedule, error: Array, *, task: Task, limit: float, unit: str) -> Check:
-    """The worst instant of one error."""
+def worst_error(name: str, times: Array, error: Array, *, subject: str, limit: float, words: tuple[str, str]) -> Check:
+    """The worst instant of one error against its limit.
+
+    Args:
+        name: What is checked.
+        times: Instants in [s], shape (N,).
+        error: Lengths of the error in the unit of the limit, shape (N,).
+        subject: Task or robot that is looked at.
+        limit: What is allowed.
+        words: Unit, and whose error it is.
+    """
     worst = int(np.argmax(error))
-    value, at_s = float(error[worst]), float(schedule.times[worst])
-    words = name.replace("_", " ")
+    value, at_s = float(error[worst]), float(times[worst])
+    unit, of = words
     return Check(
         name=name,
-        subject=task.name,
+        subject=subject,
         passed=value <= limit,
         value=value,
         limit=limit,
         unit=unit,
         at_s=at_s,
-        message=f"{words} of task '{task.name}': {value:.3g} {unit} at {at_s:.3f} s, allowed {limit:g} {unit}",
+        message=f"{name.replace('_', ' ')} {of}: {value:.3g} {unit} at {at_s:.3f} s, allowed {limit:g} {unit}",
     )
 
 

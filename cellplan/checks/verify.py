@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from cellplan.checks.clearance import check_clearance
+from cellplan.checks.closure import check_closure, closure_accuracy
 from cellplan.checks.conditioning import conditioning
 from cellplan.checks.limits import check_joints, joint_uses
 from cellplan.checks.speeds import robot_speed
@@ -26,7 +27,7 @@ def verify(
     moving: Sequence[str],
     progress: Progress = silent,
 ) -> Report:
-    """Check tool errors, joint limits and clearance of a run.
+    """Check tool errors, closed grasps, joint limits and clearance of a run.
 
     The kinematics is that of successive screw displacements; nothing of the planner is used.
 
@@ -50,6 +51,8 @@ def verify(
     checks: list[Check] = []
     for scheduled, errors in zip(schedule.tasks, accuracy, strict=True):
         checks += check_accuracy(schedule, errors, scheduled.task)
+    closures = closure_accuracy(cell, scene.chains, q, X_WP)
+    checks += check_closure(cell, schedule.times, closures)
     uses: list[JointUse] = []
     for robot in cell.robots:
         own = joint_uses(robot, schedule.times, q[robot.name])
@@ -74,6 +77,7 @@ def verify(
         times=schedule.times,
         q=q,
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
+        closures=closures,
     )
 
 

@@ -13,6 +13,7 @@ from cellplan.report.record import (
     Record,
     check_record,
     clearance_record,
+    closures_record,
     joints_record,
     number,
     origin_record,
@@ -54,6 +55,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "cycle_time_s": number(sum(report.cycle_time for report in runs)),
         "runs": {name: _run_record(name, report, cell) for name, report in reports.items()},
         "tasks": {name: record for report in runs for name, record in tasks_record(report, cell).items()},
+        "closure": _worst_closures(runs, cell),
         "joints": joints_record(merge_joint_uses(use for report in runs for use in report.joints)),
         "clearance": clearance_record(minima),
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
@@ -77,6 +79,23 @@ def _run_record(name: str, report: Report, cell: Cell) -> Record:
     for task in tasks_record(report, cell).values():
         record |= {key: task[key] for key in errors}
     return record
+
+
+def _worst_closures(runs: Iterable[Report], cell: Cell) -> Record:
+    """Closure errors by robot: the largest distance and the largest angle of all runs, each with its instant."""
+    worst: Record = {}
+    for report in runs:
+        for robot, record in closures_record(report, cell).items():
+            known = worst[robot] = worst.get(robot) or record
+            for name, instant in (
+                ("max_position_error_mm", "at_s"),
+                ("max_orientation_error_deg", "max_orientation_error_at_s"),
+            ):
+                if record[name] > known[name]:
+                    known |= {name: record[name], instant: record[instant]}
+    return {
+        robot: {key: value for key, value in record.items() if "mean" not in key} for robot, record in worst.items()
+    }
 
 
 def merge_joint_uses(uses: Iterable[JointUse]) -> list[JointUse]:

@@ -16,6 +16,7 @@ from cellplan.model.report import (
     ClearanceClass,
     ClearanceMinimum,
     ClearanceReport,
+    ClosureAccuracy,
     Conditioning,
     Contact,
     JointUse,
@@ -56,6 +57,7 @@ def report_record(report: Report, *, cell: Cell, provenance: Provenance) -> Reco
         "samples": len(report.times),
         "step_s": number(report.cycle_time / (len(report.times) - 1)),
         "tasks": tasks_record(report, cell),
+        "closure": closures_record(report, cell),
         "joints": joints_record(report.joints),
         "clearance": clearance_record(report.clearance.minima),
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
@@ -126,6 +128,7 @@ def _task_record(accuracy: TaskAccuracy, report: Report, cell: Cell) -> Record:
     }
     return {
         "robot": accuracy.robot,
+        "relative_to": str(task.relative_to),
         **_error_record("position_error", "mm", 1e3 * accuracy.position_error, times=report.times, axes=AXES[:3]),
         **_error_record(
             "orientation_error", "deg", np.rad2deg(accuracy.orientation_error), times=report.times, axes=AXES[3:]
@@ -135,6 +138,30 @@ def _task_record(accuracy: TaskAccuracy, report: Report, cell: Cell) -> Record:
         "path_length_mm": number(1e3 * accuracy.path_length),
         "start_s": number(task.start),
         "end_s": number(accuracy.end_s),
+    }
+
+
+def closures_record(report: Report, cell: Cell) -> Record:
+    """Closure errors by robot, of every holder but the first."""
+    return {closure.robot: _closure_record(closure, report, cell) for closure in report.closures}
+
+
+def _closure_record(closure: ClosureAccuracy, report: Report, cell: Cell) -> Record:
+    position = np.linalg.norm(closure.position_error, axis=1)
+    orientation = np.linalg.norm(closure.orientation_error, axis=1)
+    worst, most_turned = int(np.argmax(position)), int(np.argmax(orientation))
+    return {
+        "max_position_error_mm": number(1e3 * position[worst]),
+        "max_orientation_error_deg": number(math.degrees(orientation[most_turned])),
+        "at_s": number(report.times[worst]),
+        "max_orientation_error_at_s": number(report.times[most_turned]),
+        "mean_position_error_mm": number(1e3 * position.mean()),
+        "mean_orientation_error_deg": number(math.degrees(orientation.mean())),
+        "allowed": {
+            "position_mm": number(1e3 * cell.checks.closure_position),
+            "orientation_deg": number(math.degrees(cell.checks.closure_orientation)),
+        },
+        "axes": [AXES[index] for index in closure.axes],
     }
 
 
