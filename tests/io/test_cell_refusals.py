@@ -73,7 +73,8 @@ Refuse = Callable[..., list[str]]
         (
             "    - {robot: holder, at: {xyz_mm: [-250, 0, 0]}}",
             "    - {robot: holder}\n    - {robot: worker, axes: [x, x]}",
-            "c:16: part.held_by[1].axes[1]: expected each word once, got 'x' twice",
+            "c:16: part.held_by[1].axes[1]: expected each word once, got 'x' twice\n"
+            "c:19: tasks.ring.robot: expected a robot that does not hold the part, got the positioner 'worker'",
         ),
         (
             "    - {robot: holder, at: {xyz_mm: [-250, 0, 0]}}",
@@ -88,7 +89,7 @@ Refuse = Callable[..., list[str]]
         (
             "plane: xy}, project: +z}",
             "plane: xy}}\n    relative_to: world",
-            "c:20: tasks.ring.tool_axis: tool_axis: normal needs a path that is laid on the part: give tool_axis a "
+            "c:21: tasks.ring.tool_axis: tool_axis: normal needs a path that is laid on the part: give tool_axis a "
             "direction",
         ),
         (
