@@ -1,6 +1,8 @@
 """Closure: how far the tools of further holders stray from their grasps, by the positions that were read back."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -9,6 +11,10 @@ from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check, ClosureAccuracy
+
+CURE: Final = (
+    "a shorter motion.step_s or a slower motion keeps the grasps better, and so does a way round singularities"
+)
 
 
 def closure_accuracy(
@@ -60,4 +66,4 @@ def check_closure(cell: Cell, times: Array, closures: Sequence[ClosureAccuracy])
                 words=("deg", of),
             ),
         ]
-    return checks
+    return [check if check.passed else replace(check, message=f"{check.message}; {CURE}") for check in checks]
