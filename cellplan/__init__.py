@@ -16,14 +16,17 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from cellplan.errors import CellplanError
     from cellplan.io.cell_file import load_cell
+    from cellplan.io.errors_file import load_errors
     from cellplan.model.cell import Cell, Part, Robot
     from cellplan.model.motion import Motion, Program
     from cellplan.model.report import Check, Report
     from cellplan.model.task import Task
     from cellplan.model.toolpath import Toolpath
+    from cellplan.pipeline.rehearse import rehearse
     from cellplan.pipeline.solution import Solution
     from cellplan.pipeline.solve import solve
     from cellplan.pipeline.verify import verify
+    from cellplan.pipeline.write_rehearsal import write_rehearsal
     from cellplan.pipeline.write_run import write_run
 
 _HOME: Final = {
@@ -39,8 +42,11 @@ _HOME: Final = {
     "Task": "model.task",
     "Toolpath": "model.toolpath",
     "load_cell": "io.cell_file",
+    "load_errors": "io.errors_file",
+    "rehearse": "pipeline.rehearse",
     "solve": "pipeline.solve",
     "verify": "pipeline.verify",
+    "write_rehearsal": "pipeline.write_rehearsal",
     "write_run": "pipeline.write_run",
 }
 
@@ -58,8 +64,11 @@ __all__ = [
     "Toolpath",
     "__version__",
     "load_cell",
+    "load_errors",
+    "rehearse",
     "solve",
     "verify",
+    "write_rehearsal",
     "write_run",
 ]
 

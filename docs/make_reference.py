@@ -1,4 +1,4 @@
-"""Write the reference of the cell file from its format: ``python docs/make_reference.py`` makes the page anew."""
+"""Write the reference of the files from their formats: ``python docs/make_reference.py`` makes the pages anew."""
 
 import json
 import re
@@ -6,9 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cellplan.io.schema import json_schema, robot_table_schema
+from cellplan.io.schema import errors_schema, json_schema, robot_table_schema
 
-PAGE = Path(__file__).resolve().parent / "reference" / "cell-file.md"
+FOLDER = Path(__file__).resolve().parent / "reference"
+PAGE, ERRORS_PAGE = FOLDER / "cell-file.md", FOLDER / "errors-file.md"
 INTRODUCTION = """\
 # The cell file
 
@@ -38,12 +39,36 @@ A robot may be given by the axes of its joints at the reference posture, where a
 one chain in the order of the file. Everything is given in the base frame at that posture, the solids of the links as
 well.
 """
+ERRORS_INTRODUCTION = """\
+# The errors file
+
+This page is made from the format itself by `docs/make_reference.py`; do not edit it by hand.
+
+An errors file says how a real cell differs from the written one. `cellplan rehearse CELL --errors FILE` reads it; the
+guide is [Rehearse with errors](../guides/rehearse-with-errors.md). It is read as strictly as the cell file, and its
+robots and joints must be those of the cell.
+
+- **A number is fixed**: the same in every trial. `{normal: S}` is drawn for every trial from a normal distribution with
+  mean zero and standard deviation S, `{uniform: H}` evenly between -H and H.
+- **Poses** are those of the real frame seen from the written one: the real base in the place of the written base, the
+  real tool tip in the place of the written tip, the real part in the place where the written part sits.
+- **A longer link**: the vector from the axis point of the joint before to that of the named joint, at the reference
+  posture, is lengthened; the named joint and all that it carries move along. Where the two points are one, there is no
+  direction, and the entry is refused. Before the first joint stands the origin of the base frame. What lies behind the
+  last joint is an error of the tool.
+"""
 
 
 def main() -> None:
-    """Write the page."""
-    PAGE.parent.mkdir(exist_ok=True)
+    """Write the pages."""
+    FOLDER.mkdir(exist_ok=True)
     PAGE.write_text(reference(), encoding="utf-8")
+    ERRORS_PAGE.write_text(errors_reference(), encoding="utf-8")
+
+
+def errors_reference() -> str:
+    """Text of the page about errors files."""
+    return "".join([ERRORS_INTRODUCTION, *sections(errors_schema(), "Errors", set())])
 
 
 def reference() -> str:

@@ -6,7 +6,15 @@ import numpy as np
 
 from cellplan.geometry.shapes import Cylinder, Solid
 from cellplan.geometry.transforms import Array, pose, rotation_vector
-from cellplan.model.cell import Origin, Part
+from cellplan.model.cell import (
+    Cell,
+    CheckSettings,
+    Mode,
+    MotionSettings,
+    Origin,
+    Part,
+)
+from cellplan.model.solver import SolverSettings
 from cellplan.model.task import (
     CirclePath,
     PathSpec,
@@ -53,6 +61,21 @@ def task_on(path: PathSpec, **words: Any) -> Task:
         "blend": None,
     }
     return Task(path=path, **(plain | words))
+
+
+def clocked(*tasks: Task, duration: float = 4.0, step: float = 0.001, origin: Origin = ORIGIN) -> Cell:
+    return Cell(
+        name="cell",
+        robots=(),
+        part=ROLLER,
+        tasks=tasks,
+        obstacles=(),
+        motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=duration, step=step),
+        solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
+        checks=CheckSettings(clearance=0.005, contact_zone=0.02),
+        origin=origin,
+        inputs={},
+    )
 
 
 def circle(

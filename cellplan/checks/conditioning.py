@@ -1,4 +1,4 @@
-"""How near the motion comes to a singularity: smallest singular values from the screws of all joints."""
+"""How near the motion comes to a singularity: singular values along it, from the screws of all joints."""
 
 from collections.abc import Mapping, Sequence
 
@@ -23,7 +23,10 @@ def conditioning(
     X_WP: Array,
     moving: Sequence[str],
 ) -> Conditioning:
-    """Smallest singular value of every moving robot's own Jacobian and of the whole stack, along the motion.
+    r"""Singular values of the whole stack and of every moving robot's own Jacobian, along the motion.
+
+    The manipulability of the stack J is ``w = sqrt(det(J J^T))`` ([Ribeiro2010]_ Eq. D.45), here the product of its
+    singular values: it also holds where ``det`` would lose its digits. A stack with more rows than columns has 0.
 
     An operator's Jacobian has the rows its task constrains, a further holder's those of its grasp; that of the robot
     that carries the part gives the twist of the part frame, or has the rows of the path it carries the part along.
@@ -48,15 +51,20 @@ def conditioning(
         rows = [
             _blocks(cell, each, chains, positions, X_WP=at_each[piece], R_PT=R_PT[piece]) for each, R_PT in relations
         ]
-        stack.append(_smallest(_stacked(rows, [*cell.positioners[:1], *(each.robot for each, _ in relations)], moving)))
+        names = [*cell.positioners[:1], *(each.robot for each, _ in relations)]
+        stack.append(_singular_values(_stacked(rows, names, moving)))
         for (relation, _), row in zip(relations, rows, strict=True):
             robots.setdefault(relation.robot, []).append(_smallest(row[relation.robot]))
         for name in cell.positioners[:1]:
             if name in moving and all(relation.robot != name for relation, _ in relations):
                 J_WP = _at_point(chains[name].flange_screws(positions[name]), at_each[piece])
                 robots.setdefault(name, []).append(_smallest(J_WP))
+    spectrum = np.concatenate(stack)
+    smallest, largest = spectrum[:, -1], spectrum[:, 0]
     return Conditioning(
-        stack=np.concatenate(stack),
+        stack=smallest,
+        condition=smallest / np.where(largest > 0.0, largest, 1.0),
+        manipulability=spectrum.prod(axis=1),
         robots={name: np.concatenate(values) for name, values in robots.items()},
     )
 
@@ -120,9 +128,14 @@ def _stacked(rows: Sequence[Mapping[str, Array]], robots: Sequence[str], moving:
     return np.concatenate(stacked, axis=1)
 
 
-def _smallest(J: Array) -> Array:
-    """Smallest singular value of each matrix; zero when there are fewer columns than rows."""
+def _singular_values(J: Array) -> Array:
+    """Singular values of each matrix, largest first, shape (N, rows); zeros when there are fewer columns than rows."""
     if J.shape[2] < J.shape[1]:
-        return np.zeros(len(J))
-    values = np.linalg.svd(J, compute_uv=False)[:, -1]
+        return np.zeros(J.shape[:2])
+    values = np.linalg.svd(J, compute_uv=False)
     return values.astype(np.float64, copy=False)
+
+
+def _smallest(J: Array) -> Array:
+    """Smallest singular value of each matrix, shape (N,)."""
+    return _singular_values(J)[:, -1]

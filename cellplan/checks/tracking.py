@@ -1,6 +1,7 @@
 """Tool error on the part, from the joint positions that were read back."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,9 +33,18 @@ def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP:
         q: The operator's positions, shape (N, n).
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """
-    task = scheduled.task
     X_WT = chain.tool_poses(q)
-    X_PT = X_WT if task.relative_to is Frame.WORLD else inverse(X_WP) @ X_WT
+    return pose_accuracy(scheduled, seen_from_task(scheduled.task, X_WT, X_WP))
+
+
+def seen_from_task(task: Task, X_WT: Array, X_WP: Array) -> Array:
+    """Tool poses relative to what a task is given in: the part, or the world, shape (N, 4, 4)."""
+    return X_WT if task.relative_to is Frame.WORLD else inverse(X_WP) @ X_WT
+
+
+def pose_accuracy(scheduled: TaskSchedule, X_PT: Array) -> TaskAccuracy:
+    """Errors of one task in P, from its tool poses on the part, shape (N, 4, 4); open components are zero."""
+    task = scheduled.task
     error = errors_on_part(X_PT, scheduled.X_PT, task)
     return TaskAccuracy(
         task=task.name,
@@ -65,28 +75,31 @@ def errors_on_part(X_PT: Array, wanted: Array, relation: Relation) -> Array:
 
 
 def check_accuracy(schedule: Schedule, accuracy: TaskAccuracy, task: Task) -> tuple[Check, Check]:
-    """Position and orientation error of one task against its tolerance."""
+    """Position and orientation error of one task against its tolerance, from the instant on that it has settled."""
     position = np.linalg.norm(accuracy.position_error, axis=1)
     orientation = np.linalg.norm(accuracy.orientation_error, axis=1)
-    allowed = task.tolerance
-    return (
+    first, allowed = task.first_judged(schedule.times), task.tolerance
+    checks = (
         worst_error(
             "position_error",
-            schedule.times,
-            1e3 * position,
+            schedule.times[first:],
+            1e3 * position[first:],
             subject=task.name,
             limit=1e3 * allowed.position,
             words=("mm", f"of task '{task.name}'"),
         ),
         worst_error(
             "orientation_error",
-            schedule.times,
-            np.degrees(orientation),
+            schedule.times[first:],
+            np.degrees(orientation[first:]),
             subject=task.name,
             limit=float(np.degrees(allowed.orientation)),
             words=("deg", f"of task '{task.name}'"),
         ),
     )
+    since = f", judged from {task.judged_from:g} s" if task.settle > 0.0 else ""
+    position_check, orientation_check = (replace(check, message=f"{check.message}{since}") for check in checks)
+    return position_check, orientation_check
 
 
 def worst_error(name: str, times: Array, error: Array, *, subject: str, limit: float, words: tuple[str, str]) -> Check:
@@ -94,7 +107,7 @@ def worst_error(name: str, times: Array, error: Array, *, subject: str, limit: f
 
     Args:
         name: What is checked.
-        times: Instants in [s], shape (N,).
+        times: Instants in [s] at which it is judged, shape (N,).
         error: Lengths of the error in the unit of the limit, shape (N,).
         subject: Task or robot that is looked at.
         limit: What is allowed.

@@ -8,6 +8,7 @@ from cellplan.checks.clearance import check_clearance
 from cellplan.checks.closure import check_closure, closure_accuracy
 from cellplan.checks.conditioning import conditioning
 from cellplan.checks.limits import check_joints, joint_uses
+from cellplan.checks.repeatability import check_joint_drift, repeatability
 from cellplan.checks.speeds import robot_speed
 from cellplan.checks.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.errors import InputError
@@ -51,13 +52,14 @@ def verify(
     checks: list[Check] = []
     for scheduled, errors in zip(schedule.tasks, accuracy, strict=True):
         checks += check_accuracy(schedule, errors, scheduled.task)
-    closures = closure_accuracy(cell, scene.chains, q, X_WP)
-    checks += check_closure(cell, schedule.times, closures)
+    checks += check_closure(cell, schedule.times, closures := closure_accuracy(cell, scene.chains, q, X_WP))
     uses: list[JointUse] = []
     for robot in cell.robots:
         own = joint_uses(robot, schedule.times, q[robot.name])
         uses += own
         checks += check_joints(robot, own, schedule.times, q[robot.name])
+    drift = repeatability(cell, schedule, q)
+    checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
     stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
     clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
     return Report(
@@ -76,6 +78,7 @@ def verify(
         },
         times=schedule.times,
         q=q,
+        repeatability=drift,
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
         closures=closures,
     )

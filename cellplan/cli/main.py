@@ -12,6 +12,7 @@ from cellplan.cli.check import check
 from cellplan.cli.errors import OutputError, report_failure
 from cellplan.cli.explain import explain
 from cellplan.cli.output import say
+from cellplan.cli.rehearse import rehearse
 from cellplan.cli.robots import robots
 from cellplan.cli.schema import schema
 from cellplan.cli.solve import solve
@@ -44,6 +45,7 @@ def program(
 app.command()(check)
 app.command()(explain)
 app.command()(solve)
+app.command()(rehearse)
 app.command()(robots)
 app.command()(schema)
 

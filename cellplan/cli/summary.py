@@ -5,29 +5,38 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from cellplan.report.method import USUAL_METHOD
+
 Record = dict[str, Any]
 
 
 def read_record(folder: Path) -> Record:
-    """The report of a run as it stands on disk."""
+    """The report of a run as it stands on disk, without its series, which are for files and not for screens."""
     record: Record = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-    return record
+    return {name: value for name, value in record.items() if name != "series"}
 
 
 def summary_lines(record: Record, folder: Path) -> list[str]:
     """Lines for people about one run folder."""
     return [
         f"{record['cell']}: {record['status']}",
-        f"  mode {record['mode']}, {record['cycle_time_s']:g} s",
+        f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_method_word(record['solver'])}",
         *_task_lines(record["tasks"]),
         *_closure_lines(record.get("closure", {})),
         *_margin_lines(record["joints"]),
         *_speed_lines(record["joints"]),
+        *_drift_lines(record.get("repeatability", {})),
         *_clearance_lines(record["clearance"]["whole"]),
+        *_slack_lines(record["solver"]["slack"]),
         *_failure_lines(record["checks"]),
         *(f"  before you run it: {line}" for line in record.get("before_you_run", [])),
         *_place_lines(record, folder),
     ]
+
+
+def _method_word(solver: Record) -> str:
+    """The method, unless it is the usual one."""
+    return "" if solver["method"] == USUAL_METHOD else f", method {solver['method']}"
 
 
 def _task_lines(tasks: Record) -> Iterator[str]:
@@ -68,10 +77,30 @@ def _speed_lines(joints: Record) -> Iterator[str]:
         yield f"  largest joint speed {100.0 * ratio:.4g} % of its limit: {joint}{_instant(at_s)}"
 
 
+def _drift_lines(repeatability: Record) -> Iterator[str]:
+    """The joint that is farthest from where a cycle began; nothing when all come back."""
+    for name, found in repeatability.items():
+        if found["closes"]:
+            continue
+        subject = "all tasks" if name == "all" else f"task {name}"
+        of_cycles = f"cycle {{}} of {found['cycles']}" if found["cycles"] > 1 else "the cycle"
+        for unit, joint, cycle in (("deg", "joint", "at_cycle"), ("mm", "sliding_joint", "sliding_at_cycle")):
+            if f"worst_drift_{unit}" in found:
+                where = of_cycles.format(found[cycle])
+                drift = found[f"worst_drift_{unit}"]
+                yield f"  joint drift {drift:.4g} {unit} in {where} of {subject}: {found[joint]}"
+
+
 def _clearance_lines(whole: Record) -> Iterator[str]:
     if whole["minimum_mm"] is not None and whole["pair"]:
         first, second = whole["pair"]
         yield f"  smallest clearance {whole['minimum_mm']:.4g} mm: {first} - {second}{_instant(whole['at_s'])}"
+
+
+def _slack_lines(slack: Record | None) -> Iterator[str]:
+    """By how much a method left the tasks on purpose."""
+    if slack and slack["max"]:
+        yield f"  tasks left on purpose by at most {slack['max']:.2g} ({slack['unit']}){_instant(slack['max_at_s'])}"
 
 
 def _failure_lines(checks: list[Record]) -> Iterator[str]:

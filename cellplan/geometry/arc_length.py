@@ -42,6 +42,14 @@ class ArcLength:
         """Length in [m] behind knots of the curve, shape (N,)."""
         return self.behind[np.searchsorted(self.edges, knots)]
 
+    def lengths(self, u: Array) -> Array:
+        """Length in [m] behind parameters of the curve, shape (N,)."""
+        panel = np.clip(np.searchsorted(self.edges, u, side="right") - 1, 0, len(self.series) - 1)
+        low, high = self.edges[panel], self.edges[panel + 1]
+        x = np.clip(2.0 * (u - low) / (high - low) - 1.0, -1.0, 1.0)
+        lengths: Array = self.behind[panel] + legendre.legval(x, self.series[panel].T, tensor=False)
+        return lengths
+
     def parameters(self, length: Array, interval: Interval) -> Array:
         """Parameters at lengths in [m] from the start of the curve, kept within an interval between two knots.
 

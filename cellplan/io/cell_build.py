@@ -1,6 +1,6 @@
 """Entries of a cell file, in millimetres and degrees, become the cell's frozen data in metres and radians."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -44,6 +44,7 @@ from cellplan.model.task import (
     SampledPath,
     SpacePolylinePath,
     Task,
+    TimedPath,
     TimeLaw,
     TimeLawKind,
     Tolerance,
@@ -52,7 +53,7 @@ from cellplan.model.task import (
 COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
 PLANE_NORMAL: Final = {"xy": "z", "yz": "x", "xz": "y"}
 
-TargetReader = Callable[[str], SampledPath]  # name of the task -> its file, read
+TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> its file, read
 
 
 def build_robot(name: str, entry: RobotEntry, model: RobotModel, read_mesh: MeshReader) -> Robot:
@@ -107,13 +108,14 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
     """One operator's work, with the motion's settings where it has none of its own."""
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
-    has_own_time = entry.duration_s is not None or entry.feed_mm_s is not None
+    path = _path(name, entry.path, read_targets)
+    has_own_time = entry.duration_s is not None or entry.feed_mm_s is not None or isinstance(path, TimedPath)
     law = entry.time_law or motion.time_law
     corners = entry.corners or motion.corners
     return Task(
         name=name,
         robot=entry.robot,
-        path=_path(name, entry.path, read_targets),
+        path=path,
         project=None if entry.path.project is None else direction(entry.path.project),
         plane_offset=(entry.path.offset_mm or 0.0) / MM,
         tool_axis=None if tool_axis is None else direction(tool_axis),
@@ -170,18 +172,24 @@ def direction(written: Direction) -> Array:
     return unit
 
 
-def resolved_document(document: CellDocument) -> dict[str, Any]:
-    """The file as plain values in its own units, with every default that follows from other entries filled in."""
+def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict[str, Any]:
+    """The file as plain values in its own units, with every default that follows from other entries filled in.
+
+    Args:
+        document: The file.
+        timed: Names of the tasks whose path brings its own clock.
+    """
     values = document.model_dump(exclude_none=True)
     motion, dumped_motion = document.motion, values["motion"]
     for name, task in document.tasks.items():
         entry = values["tasks"][name]
         tool_axis, entry["tool_x"] = tool_directions(task)
         entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
-        entry.setdefault("time_law", dumped_motion["time_law"])
-        entry.setdefault("corners", dumped_motion["corners"])
-        if task.duration_s is None and task.feed_mm_s is None:
-            entry["duration_s"] = motion.duration_s - task.start_s
+        if name not in timed:
+            entry.setdefault("time_law", dumped_motion["time_law"])
+            entry.setdefault("corners", dumped_motion["corners"])
+            if task.duration_s is None and task.feed_mm_s is None:
+                entry["duration_s"] = motion.duration_s - task.start_s
         if task.path.is_planar and task.path.project is None:
             entry["path"].setdefault("offset_mm", 0.0)
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}

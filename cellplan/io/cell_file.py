@@ -16,7 +16,7 @@ from cellplan.io.cell_build import (
     build_task,
     resolved_document,
 )
-from cellplan.io.cell_rules import needs_surface, rule_complaints
+from cellplan.io.cell_rules import rule_complaints
 from cellplan.io.cell_sources import Sources
 from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, raise_complaints
 from cellplan.io.robot_rules import robot_complaints
@@ -25,10 +25,11 @@ from cellplan.io.schema.pieces import Pieces, read_pieces
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry, ToolBodyEntry, ToolShapeEntry
 from cellplan.io.solver_build import build_solver
 from cellplan.io.solver_rules import solver_complaints
+from cellplan.io.target_rules import Targets, target_complaints
 from cellplan.io.yaml_reader import YamlDocument, read_yaml
 from cellplan.model.cell import Cell, Origin
 from cellplan.model.robot import RobotModel
-from cellplan.model.task import SampledPath
+from cellplan.model.task import TimedPath
 
 PART_EXTENT_MM: Final = (1.0, 20_000.0)  # smaller or larger parts are slips of the unit
 
@@ -64,7 +65,7 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> Cell:
     complaints += _part_extent(pieces, document)
     _read_meshes(pieces, sources)
     targets = _targets(pieces, sources)
-    complaints += _targets_without_axes(pieces, targets, document)
+    complaints += target_complaints(pieces, targets, document)
     raise_complaints(file, [*complaints, *sources.complaints], sources.errors)
     if pieces.whole is None:
         raise InputError(f"{file}: the cell cannot be understood")
@@ -81,7 +82,7 @@ def _models(pieces: Pieces, document: YamlDocument, sources: Sources) -> dict[st
     return {name: model for name, model in found.items() if model is not None}
 
 
-def _targets(pieces: Pieces, sources: Sources) -> dict[str, SampledPath]:
+def _targets(pieces: Pieces, sources: Sources) -> Targets:
     """Tool targets from files, by task."""
     found = {
         name: sources.targets(task.path.csv, ("tasks", name, "path", "csv"))
@@ -89,22 +90,6 @@ def _targets(pieces: Pieces, sources: Sources) -> dict[str, SampledPath]:
         if task.path.csv is not None
     }
     return {name: sampled for name, sampled in found.items() if sampled is not None}
-
-
-def _targets_without_axes(
-    pieces: Pieces, targets: Mapping[str, SampledPath], document: YamlDocument
-) -> Iterator[Complaint]:
-    """A file without orientations, not laid on the part, has no normals."""
-    for name, sampled in targets.items():
-        task = pieces.tasks[name]
-        has_axes = sampled.axes is not None or sampled.rotations is not None
-        if needs_surface(task) and task.path.project is None and not has_axes:
-            project = "" if task.relative_to == "world" else "add project: +z (or another side), "
-            text = (
-                "tool_axis: normal needs axes or quaternions in the file, or a path that is laid on the part: "
-                f"add columns i,j,k, {project}or give tool_axis a direction"
-            )
-            yield document.complaint(("tasks", name, "tool_axis" if task.tool_axis else "path"), text)
 
 
 def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Complaint]:
@@ -162,7 +147,7 @@ def _read_meshes(pieces: Pieces, sources: Sources) -> None:
 def _cell(
     whole: CellDocument,
     models: Mapping[str, RobotModel],
-    targets: Mapping[str, SampledPath],
+    targets: Targets,
     *,
     document: YamlDocument,
     sources: Sources,
@@ -176,6 +161,7 @@ def _cell(
             raise InputError(f"{document.file}: mesh '{written}' could not be read")
         return found
 
+    timed = {name for name, path in targets.items() if isinstance(path, TimedPath)}
     return Cell(
         name=whole.name,
         robots=tuple(build_robot(name, entry, models[name], mesh) for name, entry in whole.robots.items()),
@@ -185,6 +171,6 @@ def _cell(
         motion=build_motion(whole.motion),
         solver=build_solver(whole.solver, whole.motion.step_s, models),
         checks=build_checks(whole.checks),
-        origin=Origin(file=document.file, lines=document.lines(), document=resolved_document(whole)),
+        origin=Origin(file=document.file, lines=document.lines(), document=resolved_document(whole, timed=timed)),
         inputs=dict(sorted(sources.inputs.items())),
     )

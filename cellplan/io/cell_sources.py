@@ -22,7 +22,7 @@ from cellplan.io.toolpath_csv import read_toolpath_csv
 from cellplan.io.urdf import UrdfOptions, load_urdf
 from cellplan.io.yaml_reader import YamlDocument
 from cellplan.model.robot import RobotModel
-from cellplan.model.task import SampledPath
+from cellplan.model.task import SampledPath, TimedPath
 
 URDF_SUFFIXES = frozenset({".urdf"})
 TABLE_SUFFIXES = frozenset({".yaml", ".yml"})
@@ -63,7 +63,7 @@ class Sources:
             return None
         return mesh
 
-    def targets(self, entry: str | CsvEntry, path: KeyPath) -> SampledPath | None:
+    def targets(self, entry: str | CsvEntry, path: KeyPath) -> SampledPath | TimedPath | None:
         """Tool targets of a task; None after a complaint."""
         settings = CsvEntry(file=entry) if isinstance(entry, str) else entry
         place = self._file(settings.file, path if isinstance(entry, str) else (*path, "file"))

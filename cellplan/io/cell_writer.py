@@ -12,7 +12,7 @@ from cellplan.io.yaml_writer import yaml_text
 from cellplan.model.cell import Cell, Part, Robot
 from cellplan.model.robot import RobotModel
 from cellplan.model.solver import SolverSettings
-from cellplan.model.task import SampledPath, Task
+from cellplan.model.task import SampledPath, Task, TimedPath
 
 NEIGHBOURS: Final = 3  # units in the last place round the quotient in which the written number is sought
 MM: Final = 1000.0  # [mm/m]
@@ -93,7 +93,7 @@ def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
     written = {**entry, "start_s": task.start}
     if task.duration is not None:
         written["duration_s"] = task.duration
-    if isinstance(task.path, SampledPath):
+    if isinstance(task.path, SampledPath | TimedPath):
         settings = {"file": task.path.source, "smooth": task.path.is_smooth, "closed": task.path.is_closed}
         written["path"] = {**entry["path"], "csv": settings}
     return written
@@ -113,6 +113,7 @@ def _solver(entry: Mapping[str, Any], solver: SolverSettings) -> dict[str, Any]:
 def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:
     """The motion; its clock holds all tasks, also those with a time of their own that is longer."""
     ends = [task.start + task.duration for task in cell.tasks if task.duration is not None]
+    ends += [t.start + t.repeat * t.path.duration for t in cell.tasks if isinstance(t.path, TimedPath)]
     duration = max([cell.motion.duration, *ends])
     return {**entry, "mode": str(cell.motion.mode), "duration_s": duration, "step_s": cell.motion.step}
 

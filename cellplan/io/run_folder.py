@@ -14,10 +14,23 @@ from uuid import uuid4
 
 from cellplan.errors import InputError
 
-MARK = '"schema": "cellplan.'  # stands in the first lines of every report.json that cellplan writes
+MARK = '"schema": "cellplan.'  # stands in the first lines of every report.json and rehearsal.json
 MARK_WITHIN = 200  # [bytes]
+REPORTS = ("report.json", "rehearsal.json")
+REHEARSAL = "rehearsal"  # folder of a rehearsal, inside the run folder of its cell
 OWN_NAMES = frozenset(
-    {"cell.yaml", "plots", "programs", "rejected", "report.html", "report.json", "tables", "view.html", ".DS_Store"}
+    {
+        "cell.yaml",
+        "plots",
+        "programs",
+        "rehearsal.html",
+        "rejected",
+        "report.html",
+        *REPORTS,
+        "tables",
+        "view.html",
+        ".DS_Store",
+    }
 )
 
 
@@ -140,7 +153,11 @@ def refuse_unless_replaceable(path: Path) -> None:
 
 def is_run_folder(path: Path) -> bool:
     """Whether a folder holds a report that cellplan wrote."""
-    report = path / "report.json"
+    return any(_is_own_report(path / name) for name in REPORTS)
+
+
+def _is_own_report(report: Path) -> bool:
+    """Whether a file is a report that cellplan wrote."""
     if report.is_symlink() or not report.is_file():
         return False
     with report.open("rb") as file:
@@ -148,14 +165,24 @@ def is_run_folder(path: Path) -> bool:
 
 
 def _foreign_entry(path: Path) -> str | None:
-    """The first thing in a folder that is not part of a run; None when the folder is empty or a run."""
+    """The first thing in a folder that is not part of a run; None when the folder is empty or a run.
+
+    A folder that holds nothing but the rehearsal of its cell is to become a run.
+    """
     entries = sorted(path.iterdir())
     if entries and not is_run_folder(path):
+        if [entry.name for entry in entries] == [REHEARSAL] and _is_run_entry(entries[0]):
+            return None
         return entries[0].name
     for entry in entries:
-        if entry.is_symlink() or (entry.name not in OWN_NAMES and not (entry.is_dir() and is_run_folder(entry))):
+        if entry.is_symlink() or (entry.name not in OWN_NAMES and not _is_run_entry(entry)):
             return entry.name
     return None
+
+
+def _is_run_entry(entry: Path) -> bool:
+    """Whether something in a folder is a run folder of its own."""
+    return entry.is_dir() and not entry.is_symlink() and is_run_folder(entry)
 
 
 def _refuse_unless_writable(path: Path) -> None:

@@ -43,12 +43,14 @@ class TableHeader:
         mode: Who moves.
         verdict: ``passed``, ``REJECTED: <first violation>`` or ``not checked``.
         digests: SHA-256 in hexadecimal by what it is the digest of (``cell``, ``program``).
+        remark: What else has to be known of the rows; empty for the program of the cell as it is written.
     """
 
     cell: str
     mode: str
     verdict: str = NOT_CHECKED
     digests: Mapping[str, str]
+    remark: str = ""
 
 
 def render_table(robot: Robot, times: Array, q: Array, *, header: TableHeader) -> str:
@@ -128,12 +130,19 @@ def parse_header(text: str, source: str) -> TableHeader:
         for key, value in fields.items()
         if key.endswith(" digest")
     }
-    return TableHeader(cell=fields["cell"], mode=fields["mode"], verdict=fields["verdict"], digests=digests)
+    return TableHeader(
+        cell=fields["cell"],
+        mode=fields["mode"],
+        verdict=fields["verdict"],
+        digests=digests,
+        remark=fields.get("remark", ""),
+    )
 
 
 def _render_header(robot: str, header: TableHeader) -> str:
     fields = {"robot": robot, "cell": header.cell, "mode": header.mode}
     fields |= {f"{name} digest": f"{_SHA256}{digest}" for name, digest in header.digests.items()}
+    fields |= {"remark": header.remark} if header.remark else {}
     fields["verdict"] = header.verdict
     lines = [TITLE, *(f"{key}: {_one_line(value)}" for key, value in fields.items()), CAUTION]
     return "".join(f"# {line}\n" for line in lines)

@@ -12,22 +12,29 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, quaternion_to_rotation
 from cellplan.io.complaints import Complaint, did_you_mean, listed, raise_complaints, shown
-from cellplan.model.task import SampledPath
+from cellplan.model.task import SampledPath, TimedPath
 
+TIME: Final = "t_s"
 POSITION: Final = ("x_mm", "y_mm", "z_mm")
 AXIS: Final = ("i", "j", "k")
 QUATERNION: Final = ("qw", "qx", "qy", "qz")
-COLUMNS: Final = (*POSITION, *AXIS, *QUATERNION)
+COLUMNS: Final = (TIME, *POSITION, *AXIS, *QUATERNION)
 
 MOST_BYTES: Final = 50_000_000
 MOST_POINTS: Final = 200_000
 MOST_COMPLAINTS: Final = 20  # lines with complaints after which nobody reads on
 UNIT_ROOM: Final = 1e-3  # [-] room for axes and quaternions written with four digits
 FARTHEST: Final = 100_000.0  # [mm] no part is that large: a slip of the unit
+SHORTEST_S: Final = 1e-6  # [s] between two instants, halved for rounding; no controller tells nearer ones apart
+LATEST: Final = 1e6  # [s] eleven days: a slip of the unit
+CLOSING_ROOM: Final = 1e-3  # [mm] room for a return to the start written with three decimals
+FEWEST_CLOSED: Final = 4  # rows of a trajectory that encloses something and repeats its start
 MM: Final = 1e-3  # [m/mm]
 
+_LIMITS: Final = {TIME: (LATEST, " s")} | dict.fromkeys(POSITION, (FARTHEST, " mm"))
 _NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _CONTROL: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\x85\u2028\u2029]|\r(?!\n)")
+_TIME_WORDS: Final = ("t", "time", "time_s", "t_ms", "time_ms", "t[s]", "t [s]", "s", "seconds")
 _LENGTH_UNITS: Final = ("", "_m", "_cm", "_in", "_inch", "_um", "[mm]", " mm", " [mm]", "(mm)", " (mm)")
 
 
@@ -47,16 +54,18 @@ class _Complaints:
         return len(self.found) >= MOST_COMPLAINTS
 
 
-def read_toolpath_csv(path: Path, *, is_smooth: bool, is_closed: bool, source: str | None = None) -> SampledPath:
+def read_toolpath_csv(
+    path: Path, *, is_smooth: bool, is_closed: bool, source: str | None = None
+) -> SampledPath | TimedPath:
     """Read tool targets: ``x_mm, y_mm, z_mm`` and, where the file has them, ``i, j, k`` or ``qw, qx, qy, qz``.
 
     The header names the columns, in any order. Axes point into the part; quaternions turn the tool's axes into the
-    part frame. Both are brought to length one.
+    part frame. Both are brought to length one. A column ``t_s`` makes the path a trajectory.
 
     Args:
         path: The file.
-        is_smooth: Whether a smooth curve is laid through the points instead of straight sides.
-        is_closed: Whether the last point is joined to the first.
+        is_smooth: Whether a smooth curve is laid through the points instead of straight sides; a trajectory is smooth.
+        is_closed: Whether the last point is joined to the first; a closed trajectory repeats its start at its end.
         source: Name of the file for messages; by default its last part.
 
     Raises:
@@ -77,15 +86,19 @@ def read_toolpath_csv(path: Path, *, is_smooth: bool, is_closed: bool, source: s
         raise InputError(f"{name}: expected at least 2 points below the header, got {len(values)}")
     axes = _units(values, columns, complaints, wanted=AXIS, what="tool axis")
     quaternions = _units(values, columns, complaints, wanted=QUATERNION, what="quaternion")
+    times = values[:, columns.index(TIME)] if TIME in columns else None
+    if times is not None:
+        _examine_times(times, complaints)
+        if is_closed:
+            _close(values, columns, (axes, quaternions), complaints)
     raise_complaints(name, complaints.found)
-    return SampledPath(
-        source=name,
-        points=values[:, [columns.index(column) for column in POSITION]] * MM,
-        axes=axes,
-        rotations=None if quaternions is None else quaternion_to_rotation(quaternions),
-        is_smooth=is_smooth,
-        is_closed=is_closed,
-    )
+    points = values[:, [columns.index(column) for column in POSITION]] * MM
+    rotations = None if quaternions is None else quaternion_to_rotation(quaternions)
+    if times is None:
+        return SampledPath(
+            source=name, points=points, axes=axes, rotations=rotations, is_smooth=is_smooth, is_closed=is_closed
+        )
+    return TimedPath(source=name, times=times, points=points, axes=axes, rotations=rotations, is_closed=is_closed)
 
 
 def _read_text(path: Path, name: str) -> str:
@@ -141,6 +154,8 @@ def _unknown(column: str) -> str:
     for axis in "xyz":
         if column.lower() in {axis + unit for unit in _LENGTH_UNITS} | {f"{axis}_mm"}:
             return f"{text}, lengths are in mm: write {axis}_mm"
+    if column.lower() in _TIME_WORDS:
+        return f"{text}, times are in s: write {TIME}"
     if _NUMBER.fullmatch(column):
         return f"{text}, the first line names the columns: {listed(POSITION)}"
     return f"{text}{did_you_mean(column, COLUMNS) or f', allowed are {listed(COLUMNS)}'}"
@@ -184,10 +199,9 @@ def _read_row(line: int, text: str, columns: list[str], complaints: _Complaints)
             complaints.add(line, f"expected {_wanted(word)}, got {shown(word)}", column=column)
             continue
         value = float(word)
-        limit = FARTHEST if column in POSITION else 1.0 + UNIT_ROOM
+        limit, unit = _LIMITS.get(column, (1.0 + UNIT_ROOM, ""))
         if abs(value) > limit:
-            unit = " mm" if column in POSITION else ""
-            complaints.add(line, f"expected at most {limit:g}{unit} either way, got {word}", column=column)
+            complaints.add(line, f"expected at most {limit:.10g}{unit} either way, got {word}", column=column)
             continue
         yield value
 
@@ -212,3 +226,35 @@ def _units(
         complaints.add(int(row) + 2, text)
     unit: Array = vectors / np.where(norms > 0.0, norms, 1.0)[:, None]
     return unit
+
+
+def _examine_times(times: Array, complaints: _Complaints) -> None:
+    """Complain about instants that do not start at zero and grow from row to row."""
+    if times[0] != 0.0:
+        text = f"expected 0 in the first row, got {times[0]:.9g}; a task is shifted by its start_s"
+        complaints.add(2, text, column=TIME)
+    for row in np.flatnonzero(~(np.diff(times) > 0.5 * SHORTEST_S))[:MOST_COMPLAINTS]:
+        text = f"expected an instant after {times[row]:.9g} of the row before, got {times[row + 1]:.9g}"
+        complaints.add(int(row) + 3, text, column=TIME)
+
+
+def _close(
+    values: Array, columns: list[str], directions: tuple[Array | None, Array | None], complaints: _Complaints
+) -> None:
+    """Make the last row of a closed trajectory repeat the first to the last digit, or complain that it does not."""
+    last = len(values) + 1
+    if len(values) < FEWEST_CLOSED:
+        complaints.add(last, f"expected at least {FEWEST_CLOSED} rows for a closed trajectory, got {len(values)}")
+        return
+    place = [columns.index(column) for column in POSITION]
+    gap = np.abs(values[-1, place] - values[0, place]).max()
+    if gap > CLOSING_ROOM:
+        text = f"expected a closed trajectory to end at the point of its first row, but it ends {gap:.6g} mm from it"
+        complaints.add(last, f"{text}; repeat the first row at the end of the cycle")
+    values[-1, place] = values[0, place]
+    for vectors in directions:
+        if vectors is not None:
+            sign = -1.0 if vectors.shape[1] == len(QUATERNION) and vectors[-1] @ vectors[0] < 0.0 else 1.0
+            if np.linalg.norm(sign * vectors[-1] - vectors[0]) > UNIT_ROOM:
+                complaints.add(last, "expected a closed trajectory to end with the orientation of its first row")
+            vectors[-1] = vectors[0]

@@ -40,7 +40,7 @@ class ScrewChain:
         D = np.empty((len(q), len(self._axes) + 1, 4, 4))
         D[:, 0] = self._X_WB
         for link, (axis, position) in enumerate(zip(self._axes, self._positions(q), strict=True)):
-            np.matmul(D[:, axis.parent + 1], _screw_displacement(axis, position), out=D[:, link + 1])
+            np.matmul(D[:, axis.parent + 1], screw_displacement(axis, position), out=D[:, link + 1])
         return D
 
     def flange_poses(self, q: Array) -> Array:
@@ -93,7 +93,7 @@ class ScrewChain:
         return driven + [follower.ratio * driven[follower.leader] + follower.offset for follower in self._followers]
 
 
-def _screw_displacement(axis: Joint | FollowerJoint, position: Array) -> Array:
+def screw_displacement(axis: Joint | FollowerJoint, position: Array) -> Array:
     """Displacement by a turn about, or a slide along, one axis in its reference place, shape (N, 4, 4)."""
     if not axis.is_revolute:
         return pose_from(np.broadcast_to(np.eye(3), (len(position), 3, 3)), position[:, None] * axis.axis_B)

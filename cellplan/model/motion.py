@@ -16,9 +16,11 @@ class TaskSchedule:
         task: The task.
         X_PT: Wanted tool tip in P at each instant, shape (N, 4, 4); held still before the start and after the end.
         V_PT_P: Wanted twist of the tool relative to the part in P, linear first, shape (N, 6).
-        travelled: Length of path behind the tool in [m], shape (N,).
-        length: Length of the whole path on the surface in [m].
+        travelled: Length of path behind the tool in [m], shape (N,); it grows from cycle to cycle.
+        length: Length of the path on the surface in [m], of one cycle.
         end: Instant in [s] at which the path is done.
+        cycle_ends: Instants in [s] at which the tool has come back to the pose of its start, all constrained
+            components together, one per cycle; none when it does not come back.
     """
 
     task: Task
@@ -27,6 +29,7 @@ class TaskSchedule:
     travelled: Array
     length: float
     end: float
+    cycle_ends: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from cellplan.geometry.transforms import Array
 
 CAUTION = (
@@ -11,6 +13,7 @@ CAUTION = (
 )
 
 
+EVEN = 1e-9  # [-] of the whole time: cycles that differ by less are equally long
 REDUCED_SPEED = 0.25  # [m/s] of the tool tip: what ISO 10218-1 allows while people are near
 
 
@@ -178,15 +181,73 @@ class ClearanceReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Conditioning:
-    """Smallest singular values along the motion (metres and radians as they come).
+    """How far the motion stays from singularities (metres and radians as they come).
 
     Attributes:
-        stack: Of the cooperation Jacobian's constrained rows, shape (N,).
-        robots: Of each operator's own block and of each holder's, shape (N,) each.
+        stack: Smallest singular value of the cooperation Jacobian's constrained rows J, over the joints that may move,
+            shape (N,).
+        condition: Smallest by largest singular value of J, shape (N,): 1 when all directions are alike, 0 when it is
+            singular.
+        manipulability: ``sqrt(det(J J^T))``, the product of the singular values of J, shape (N,).
+        robots: Smallest singular value of each operator's own block and of each holder's, shape (N,) each.
     """
 
     stack: Array
+    condition: Array
+    manipulability: Array
     robots: Mapping[str, Array]
+
+    @property
+    def squared_condition(self) -> Array:
+        """Smallest by largest singular value of ``J J^T``, as [Vargas2012]_ draws it, shape (N,)."""
+        return self.condition**2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointDrift:
+    """How far one joint is at the end of each cycle from where it was at its start.
+
+    Attributes:
+        robot: Name of the robot.
+        joint: Name of the joint.
+        is_revolute: Whether it turns rather than slides.
+        drift: Position at the end less position at the start of each cycle in [rad] or [m], shape (cycles,).
+        worst: Largest drift of a cycle, without its sign.
+        at_cycle: The cycle in which it is largest, counted from 1.
+    """
+
+    robot: str
+    joint: str
+    is_revolute: bool
+    drift: Array
+    worst: float
+    at_cycle: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Repeatability:
+    """Whether the joints come back when all tools do.
+
+    Attributes:
+        instants: Instants in [s] at which all tools are at their start together, shape (cycles + 1,).
+        drifts: One entry per joint of every robot.
+        closes: Whether every joint comes back in every cycle, so that the program may be repeated as it is.
+    """
+
+    instants: Array
+    drifts: tuple[JointDrift, ...]
+    closes: bool
+
+    @property
+    def cycles(self) -> int:
+        """How many cycles there are."""
+        return len(self.instants) - 1
+
+    @property
+    def period(self) -> float | None:
+        """Length of a cycle in [s]; None when the cycles differ in length."""
+        lengths = np.diff(self.instants)
+        return float(lengths.mean()) if np.ptp(lengths) <= EVEN * self.instants[-1] else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -201,13 +262,14 @@ class Report:
         accuracy: Tool errors, one entry per task.
         joints: One entry per joint of every robot.
         clearance: Distances.
-        conditioning: Smallest singular values.
+        conditioning: How far the motion stays from singularities.
         motion_share: Share of all joint travel per robot, 0..1, and the busiest joint of each, as (share, joint).
         speeds: How fast each robot moves in the world.
         times: The common clock in [s], shape (N,).
         q: Positions read back from the tables in [rad] or [m], shape (N, n), by robot.
         qd: Speeds between the samples, shape (N - 1, n), by robot.
         closures: Closure errors, one entry per holder but the first.
+        repeatability: Whether the joints come back with the tools; None when not all tools come back.
     """
 
     cell: str
@@ -224,6 +286,7 @@ class Report:
     q: Mapping[str, Array]
     qd: Mapping[str, Array]
     closures: tuple[ClosureAccuracy, ...] = ()
+    repeatability: Repeatability | None = None
 
     @property
     def passed(self) -> bool:

@@ -2,8 +2,13 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
+
+import numpy as np
 
 from cellplan.geometry.transforms import Array
+
+INSTANT_ROOM: Final = 1e-9  # [s] instants nearer than this are the same: rounding of sums of durations
 
 
 class PlaneName(StrEnum):
@@ -68,7 +73,46 @@ class SampledPath:
     is_closed: bool
 
 
-PathSpec = CirclePath | PolygonPath | SpacePolylinePath | SampledPath
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TimedPath:
+    """Trajectory from a file: tool targets with the instants at which they are passed.
+
+    Attributes:
+        source: File name for messages.
+        times: Instants in [s] from the start of the task, increasing from 0, shape (N,).
+        points: Tool tip positions in [m], shape (N, 3), expressed in P.
+        axes: Unit tool axes pointing into the part, shape (N, 3), or None.
+        rotations: Tool orientations, shape (N, 3, 3), or None; at most one of axes and rotations is given.
+        is_closed: Whether the last row repeats the first and the trajectory may go on from there.
+    """
+
+    source: str
+    times: Array
+    points: Array
+    axes: Array | None
+    rotations: Array | None
+    is_closed: bool
+
+    def __post_init__(self) -> None:
+        """Check at the door that time goes on and nothing is missing or not finite."""
+        fewest = 4 if self.is_closed else 2
+        if len(self.times) < fewest or self.points.shape != (len(self.times), 3):
+            raise ValueError(f"trajectory '{self.source}': expected at least {fewest} instants with a point each")
+        if not np.all(np.isfinite(self.points)) or self.times[0] != 0.0 or not np.all(np.diff(self.times) > 0.0):
+            raise ValueError(f"trajectory '{self.source}': expected finite points at instants that increase from 0")
+
+    @property
+    def duration(self) -> float:
+        """Time for one cycle in [s]."""
+        return float(self.times[-1])
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether a curve is laid through the points: always, a trajectory has a speed everywhere."""
+        return True
+
+
+PathSpec = CirclePath | PolygonPath | SpacePolylinePath | SampledPath | TimedPath
 
 
 class Frame(StrEnum):
@@ -115,12 +159,13 @@ class Task:
         plane_offset: Position of an unprojected planar path along the plane's normal axis in [m].
         tool_axis: ``None`` for the inward surface normal (or the axes of the file), else a unit direction in P.
         tool_x: Direction in P that the tool's x axis leans to, shape (3,).
-        turn: Angle in [rad] by which the tool turns about its own z axis, evenly over the path's length.
+        turn: Angle in [rad] by which the tool turns about its own z axis, evenly over the path's length; every
+            further cycle turns it on.
         axes: Constrained components of the tool's motion in P, in the order x, y, z, rx, ry, rz.
         is_spin_free: Whether rotation about the tool's own axis is left open.
         tolerance: Largest allowed error.
         start: Start of the motion on the common clock in [s].
-        duration: Time for the whole path in [s]; None when the feed decides.
+        duration: Time for the whole path in [s], all cycles together; None when the feed or a trajectory decides.
         feed: Largest speed along the path on the surface in [m/s]; None when the duration decides.
         time_law: Law of each stretch between stops.
         blend: Corner rounding distance in [m]; None means that the tool stops at every corner.
@@ -150,3 +195,13 @@ class Task:
     settle: float = 0.0
     repeat: int = 1
     relative_to: Frame = Frame.PART
+
+    @property
+    def judged_from(self) -> float:
+        """Instant in [s] from which on errors are judged: all along, unless the tool needs time to settle."""
+        return self.start + self.settle if self.settle > 0.0 else 0.0
+
+    def first_judged(self, times: Array) -> int:
+        """Index of the first of these instants in [s], shape (N,), at which errors are judged; at most the last."""
+        first = int(np.searchsorted(times, self.judged_from - INSTANT_ROOM))
+        return min(first, len(times) - 1) if self.settle > 0.0 else 0

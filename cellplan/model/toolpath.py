@@ -25,7 +25,8 @@ class Toolpath:
         arc: Length along the tip curve.
         stops: Parameters of the tip curve between which the pieces lie, shape (pieces + 1,).
         turn: Angle in [rad] by which the tool turns about its own z axis, evenly over the whole length.
-        is_closed: Whether the last piece ends where the first starts.
+        is_closed: Whether the last piece ends in the pose in which the first starts, but for the turn.
+        runs_on: Whether the closed path passes its start without a corner and without a stop.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Toolpath:
     stops: Array
     turn: float
     is_closed: bool
+    runs_on: bool = False
 
     @property
     def length(self) -> float:
@@ -84,6 +86,29 @@ class Toolpath:
             R = R @ rotation_about(TOOL_Z, self.turn / self.length * np.clip(s, 0.0, self.length))
             twists[:, 3:] += self.turn / self.length * R[:, :, 2]
         return pose_from(R, p), twists
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trajectory(Toolpath):
+    """Toolpath whose parameter is the time in [s] since its start: it brings its own clock and may stand still."""
+
+    @property
+    def duration(self) -> float:
+        """Time for one cycle in [s]."""
+        return float(self.stops[-1])
+
+    @property
+    def X_PT_start(self) -> Array:
+        """Tool tip pose at the start, shape (4, 4)."""
+        first: Array = self.at(np.zeros(1))[0][0]
+        return first
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """Tool poses X_PT, shape (N, 4, 4), and twists in P, linear first, shape (N, 6), at times of shape (N,)."""
+        interval = (float(self.stops[0]), float(self.stops[-1]))
+        p, v = self.tip.evaluate(t, interval)
+        R, w = self.orientation.frames(t, interval, p=p, dp=v)
+        return pose_from(R, p), np.concatenate([v, w], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,6 +7,7 @@ from typing import cast, get_args
 
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell, Mode
+from cellplan.model.cell_errors import CellErrors
 from cellplan.model.solver import NULL_SPACE_METHODS, MethodName
 
 SHORTEST = 1e-3  # [s] shorter cycles are slips of the pen
@@ -38,6 +39,22 @@ def with_overrides(
     if duration is not None:
         cell = _with_duration(cell, duration)
     return cell
+
+
+def with_draws(errors: CellErrors, *, trials: int | None = None, seed: int | None = None) -> CellErrors:
+    """The errors with another number of trials or another seed; what is None stays as it is.
+
+    Raises:
+        InputError: A number makes no sense.
+    """
+    for option, given, least in (("--trials", trials, 1), ("--seed", seed, 0)):
+        if given is not None and given < least:
+            raise InputError(f"{option}: expected a whole number of at least {least}, got {given}")
+    return replace(
+        errors,
+        trials=errors.trials if trials is None else trials,
+        seed=errors.seed if seed is None else seed,
+    )
 
 
 def require_task(cell: Cell, name: str | None) -> None:

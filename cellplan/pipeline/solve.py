@@ -65,7 +65,7 @@ def _run(scene: Scene, toolpaths: Mapping[str, Toolpath], plan: RunPlan, *, star
         moving=plan.moving,
         schedule=schedule,
         motion=motion,
-        program=_with_verdict(cell, program, report),
+        program=with_verdict(cell, program, report),
         report=report,
     )
 
@@ -81,14 +81,15 @@ def render_program(cell: Cell, motion: Motion) -> Program:
     )
 
 
-def _with_verdict(cell: Cell, program: Program, report: Report) -> Program:
-    """The same rows under headers that carry the verdict and the digests."""
+def with_verdict(cell: Cell, program: Program, report: Report, *, remark: str = "") -> Program:
+    """The same rows under headers that carry the verdict, the digests, and a remark where there is one."""
     failed = [check for check in report.checks if not check.passed]
     header = TableHeader(
         cell=cell.name,
         mode=str(cell.motion.mode),
         verdict=f"REJECTED: {failed[0].message}" if failed else "passed",
         digests=_digests(cell, program),
+        remark=remark,
     )
     return Program(tables={name: replace_header(text, header=header) for name, text in program.tables.items()})
 

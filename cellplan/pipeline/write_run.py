@@ -69,9 +69,10 @@ def _write_one(target: RunFolder, cell: Cell, run: Run) -> None:
     plots = draw_plots(run.report, cell=cell)
     for name, picture in plots.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    page = report_html(run.report, cell=cell, provenance=provenance, plots=plots)
+    page = report_html(run.report, cell=cell, provenance=provenance, plots=plots, motion=run.motion)
     target.write_text(f"{place}report.html", page)
-    target.write_text(f"{place}report.json", report_json(run.report, cell=cell, provenance=provenance))
+    record = report_json(run.report, cell=cell, provenance=provenance, motion=run.motion)
+    target.write_text(f"{place}report.json", record)
     target.write_text(f"{place}cell.yaml", render_cell(cell))
 
 

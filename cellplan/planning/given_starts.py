@@ -79,10 +79,13 @@ def _outside(cell: Cell, robot: Robot) -> list[InputError]:
 
 
 def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
-    """A complaint when a given start does not put the tool on the start of its task, within the task's tolerance."""
+    """A complaint when a given start does not put the tool on the start of its task, within the task's tolerance.
+
+    A task that gives its tool time to settle may start beside its path.
+    """
     robot = cell.robot(task.robot)
     off = _distance(cell, task, toolpath.X_PT_start)
-    if off is None:
+    if off is None or task.settle > 0.0:
         return []
     distance, angle = off
     if distance <= task.tolerance.position and angle <= task.tolerance.orientation:

@@ -16,9 +16,10 @@ from cellplan.geometry.curves import (
     smooth_through,
     straight_sides,
 )
+from cellplan.geometry.splines import spline_through
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Origin
-from cellplan.model.task import CirclePath, PlaneName, PolygonPath, SampledPath, SpacePolylinePath, Task
+from cellplan.model.task import CirclePath, PlaneName, PolygonPath, SampledPath, SpacePolylinePath, Task, TimedPath
 from cellplan.planning.path_words import direction_name, in_mm, length
 
 SAME_POINT: Final = 1e-9  # [m] points nearer than this are one point written twice
@@ -39,12 +40,14 @@ class Drawing:
         stops: Parameters at which the tool rests: the start, corners that are not rounded, the end.
         given: Parameters of the points as they were listed, shape (N,); a closed path ends with its start.
         is_closed: Whether the end is the start.
+        runs_on: Whether a closed curve passes its start without a corner.
     """
 
     curve: Curve
     stops: Array
     given: Array
     is_closed: bool
+    runs_on: bool = False
 
 
 def draw_path(task: Task, origin: Origin) -> Drawing:
@@ -69,6 +72,8 @@ def draw_path(task: Task, origin: Origin) -> Drawing:
             _refuse_poor_points(path.points, path.is_closed, where=where, source=path.source)
             points = _closed(path.points, path.is_closed)
             return _draw_smooth(points, path.is_closed) if path.is_smooth else _draw_sides(points, task, origin)
+        case TimedPath():
+            return _draw_timed(path)
 
 
 def _draw_circle(path: CirclePath, task: Task, where: str) -> Drawing:
@@ -82,7 +87,7 @@ def _draw_circle(path: CirclePath, task: Task, where: str) -> Drawing:
         first=path.radius * first,
         second=turn * path.radius * second,
     )
-    return Drawing(curve=curve, stops=curve.knots, given=curve.knots, is_closed=True)
+    return Drawing(curve=curve, stops=curve.knots, given=curve.knots, is_closed=True, runs_on=True)
 
 
 def _polygon_points(path: PolygonPath, task: Task, where: str) -> Array:
@@ -159,7 +164,19 @@ def _draw_smooth(points: Array, is_closed: bool) -> Drawing:
     breaks = np.zeros(len(points), dtype=bool)
     breaks[[0, -1]] = not is_closed
     curve = smooth_through(given, points, breaks=breaks)
-    return Drawing(curve=curve, stops=given[[0, -1]], given=given, is_closed=is_closed)
+    return Drawing(curve=curve, stops=given[[0, -1]], given=given, is_closed=is_closed, runs_on=is_closed)
+
+
+def _draw_timed(path: TimedPath) -> Drawing:
+    """Smooth curve over time."""
+    curve = spline_through(path.times, path.points, is_closed=path.is_closed)
+    return Drawing(
+        curve=curve,
+        stops=path.times[[0, -1]],
+        given=path.times,
+        is_closed=path.is_closed,
+        runs_on=path.is_closed,
+    )
 
 
 def _draw_sides(points: Array, task: Task, origin: Origin) -> Drawing:

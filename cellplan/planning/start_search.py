@@ -1,4 +1,4 @@
-"""Start postures that are to be found: several inverse-kinematics branches per robot, rehearsed, the best one kept."""
+"""Start postures that are to be found: several inverse-kinematics branches per robot, tried out, the best one kept."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ from cellplan.planning.inverse_kinematics import (
     smallest_singular_values,
     within_limits,
 )
-from cellplan.planning.rehearsal import Rehearsal
+from cellplan.planning.start_trials import StartTrials
 from cellplan.scene.scene import Scene
 
 SEEDS: Final = 48  # random starts of the inverse kinematics per robot and place; finds all 8 branches of a 6-axis arm
@@ -30,8 +30,8 @@ SEEDS_PER_HOLDER: Final = 16  # the same when many postures of the positioner ar
 HOLDER_DRAWS: Final = 1500  # postures of the positioner that are drawn when its start is to be found as well
 HOLDER_POSTURES: Final = 60  # the most promising of these, which are tried
 HOLDER_RANGE: Final = 0.7  # share of each joint range that they are drawn from, so that room is left to move
-CANDIDATES: Final = 10  # whole-cell postures that are rehearsed
-TRIED_ALONE: Final = 8  # branches of each operator that are rehearsed without the other operators
+CANDIDATES: Final = 10  # whole-cell postures that are tried out
+TRIED_ALONE: Final = 8  # branches of each operator that are tried out without the other operators
 BRANCHES: Final = 4  # the best of these, which are combined
 COMBINATIONS_PER_HOLDER: Final = 3  # candidates taken from one posture of the positioner, so that several are compared
 COMFORTABLE: Final = 0.1  # smallest singular value above which more manipulability is worth no more
@@ -43,7 +43,7 @@ class _Search:
 
     scene: Scene
     toolpaths: Mapping[str, Toolpath]
-    rehearsal: Rehearsal
+    trials: StartTrials
     rng: np.random.Generator
     unreached: dict[str, int] = field(default_factory=dict)
     touching: dict[tuple[str, str], int] = field(default_factory=dict)
@@ -62,7 +62,7 @@ def find_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: Pro
     """Stacked start posture of the whole cell; given postures are kept, the others chosen.
 
     Candidates put every tool on the start of its task, within limits and without collision. They are ranked by joint
-    margin and manipulability; the best are rehearsed on a coarse clock and the one whose motion keeps the largest share
+    margin and manipulability; the best are tried out on a coarse clock and the one whose motion keeps the largest share
     of its joint ranges and speeds free is taken. The search is seeded by ``solver.seed``.
 
     Args:
@@ -79,16 +79,16 @@ def find_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: Pro
     search = _Search(
         scene=scene,
         toolpaths=toolpaths,
-        rehearsal=Rehearsal(scene, toolpaths),
+        trials=StartTrials(scene, toolpaths),
         rng=np.random.default_rng(cell.solver.seed),
     )
     candidates = _candidates(search, progress)
-    rehearsed = []
+    judged = []
     for index, candidate in enumerate(candidates):
-        progress("rehearsing start postures", index / len(candidates))
-        rehearsed.append(search.rehearsal.judge(candidate))
-    best = int(np.argmax([quality for quality, _ in rehearsed]))
-    return rehearsed[best][1]
+        progress("trying start postures", index / len(candidates))
+        judged.append(search.trials.judge(candidate))
+    best = int(np.argmax([quality for quality, _ in judged]))
+    return judged[best][1]
 
 
 def _candidates(search: _Search, progress: Progress) -> list[Array]:
@@ -193,7 +193,7 @@ def _combinations(search: _Search, holder_posture: Array | None, room: int) -> l
 
     for picks in best_combinations([[score for score, _ in branches] for branches in choices], collides):
         q = np.concatenate([branches[pick][1] for branches, pick in zip(choices, picks, strict=True)])
-        pair = search.scene.touching(q, among=search.rehearsal.open_pairs)
+        pair = search.scene.touching(q, among=search.trials.open_pairs)
         if pair is None:
             found.append(q)
         else:
@@ -227,9 +227,9 @@ def _branches(search: _Search, robot: Robot, holder_posture: Array | None) -> li
     scored = _scored_branches(search, robot, task, holder_posture)
     if search.is_holder_open or isinstance(task, Grasp):
         return scored[:BRANCHES]
-    rehearsed = [(search.rehearsal.judge_alone(task, q, holder_posture), q) for _, q in scored[:TRIED_ALONE]]
-    rehearsed.sort(key=lambda branch: -branch[0])
-    return rehearsed[:BRANCHES]
+    judged = [(search.trials.judge_alone(task, q, holder_posture), q) for _, q in scored[:TRIED_ALONE]]
+    judged.sort(key=lambda branch: -branch[0])
+    return judged[:BRANCHES]
 
 
 def _scored_branches(

@@ -1,11 +1,14 @@
 """Time laws: how the share of a stretch that is done grows with the share of its time."""
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.task import TimeLaw, TimeLawKind
+
+HALVINGS: Final = 60  # of the interval 0..1: down to the last digit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,6 +49,17 @@ def peak_rate(law: TimeLaw) -> float:
             return 1.875
         case TimeLawKind.TRAPEZOID:
             return 1.0 / (1.0 - law.ramp)
+
+
+def reached_at(law: TimeLaw, share: Array) -> Array:
+    """Shares of the time, 0..1, at which a law has come to shares of the stretch, shape (N,): by halving."""
+    low, high = np.zeros_like(share), np.ones_like(share)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        is_short = advance(law, middle).share < share
+        low, high = np.where(is_short, middle, low), np.where(is_short, high, middle)
+    tau: Array = np.where(share <= 0.0, 0.0, np.where(share >= 1.0, 1.0, 0.5 * (low + high)))
+    return tau
 
 
 def _trapezoid(tau: Array, ramp: float) -> Advance:

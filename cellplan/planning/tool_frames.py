@@ -7,9 +7,10 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.curves import smooth_through
 from cellplan.geometry.orientations import AxisFrame, FixedFrame, NormalFrame, Orientation, rotations_through
+from cellplan.geometry.splines import spline_through
 from cellplan.geometry.transforms import Array, frame_from_axes, is_rigid, pose_from, rotation_vector
 from cellplan.model.cell import Origin
-from cellplan.model.task import SampledPath, Task
+from cellplan.model.task import SampledPath, Task, TimedPath
 from cellplan.planning.path_drawing import Drawing
 from cellplan.planning.path_laying import LaidPath, along
 from cellplan.planning.path_words import direction_name, in_mm
@@ -34,7 +35,7 @@ def orient_tool(task: Task, drawing: Drawing, laid: LaidPath, origin: Origin) ->
     """
     where = origin.at(f"tasks.{task.name}.tool_axis")
     path = task.path
-    if isinstance(path, SampledPath) and (path.axes is not None or path.rotations is not None):
+    if isinstance(path, SampledPath | TimedPath) and (path.axes is not None or path.rotations is not None):
         if task.project is not None or task.tool_axis is not None:
             other = "tool_axis" if task.tool_axis is not None else "path.project"
             raise InputError(
@@ -59,7 +60,7 @@ def orient_tool(task: Task, drawing: Drawing, laid: LaidPath, origin: Origin) ->
     )
 
 
-def _from_file(path: SampledPath, task: Task, drawing: Drawing, *, origin: Origin) -> Orientation:
+def _from_file(path: SampledPath | TimedPath, task: Task, drawing: Drawing, *, origin: Origin) -> Orientation:
     """Interpolate the axes or rotations of a file over the parameters of its points."""
     where = origin.at(f"tasks.{task.name}.path")
     breaks = np.isin(drawing.given, drawing.stops)
@@ -77,7 +78,10 @@ def _from_file(path: SampledPath, task: Task, drawing: Drawing, *, origin: Origi
         raise InputError(f"{where}: expected tool axes of length 1 in {path.source}")
     cross, dot = np.linalg.norm(np.cross(axes[:-1], axes[1:]), axis=1), np.sum(axes[:-1] * axes[1:], axis=1)
     _refuse_wide(np.arctan2(cross, dot), WIDEST_LEAN, path, where=where)
-    curve = smooth_through(drawing.given, axes, breaks=breaks)
+    if isinstance(path, TimedPath):
+        curve = spline_through(path.times, axes, is_closed=path.is_closed)
+    else:
+        curve = smooth_through(drawing.given, axes, breaks=breaks)
     u = along(curve)
     p, _ = drawing.curve.evaluate(u, (u[0], u[-1]))
     _refuse_parallel(_unit(curve.evaluate(u, (u[0], u[-1]))[0]), p, task, origin)
@@ -89,7 +93,7 @@ def _returning(values: Array, drawing: Drawing) -> Array:
     return values if len(values) == len(drawing.given) else np.concatenate([values, values[:1]])
 
 
-def _refuse_wide(angles: Array, widest: float, path: SampledPath, *, where: str) -> None:
+def _refuse_wide(angles: Array, widest: float, path: SampledPath | TimedPath, *, where: str) -> None:
     """Refuse neighbouring orientations between which the way is not clear."""
     k = int(np.argmax(angles))
     if angles[k] > widest:

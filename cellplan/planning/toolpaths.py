@@ -7,16 +7,18 @@ import numpy as np
 from cellplan.errors import CellplanError, InputError
 from cellplan.geometry.arc_length import ArcLength, measure
 from cellplan.geometry.curves import Curve
-from cellplan.geometry.transforms import is_rigid
+from cellplan.geometry.orientations import Orientation
+from cellplan.geometry.transforms import Array, is_rigid, pose_from
 from cellplan.model.cell import Origin, Part
-from cellplan.model.task import Task
-from cellplan.model.toolpath import Toolpath
+from cellplan.model.task import Task, TimedPath
+from cellplan.model.toolpath import Toolpath, Trajectory
 from cellplan.planning.path_drawing import draw_path
 from cellplan.planning.path_laying import lay_path
 from cellplan.planning.path_words import in_mm
 from cellplan.planning.tool_frames import orient_tool
 
 STANDSTILL: Final = 1e-4  # [-] of the largest speed by the parameter: a curve slower than this has a cusp there
+SAME_POSE: Final = 1e-9  # [m], [-] entries of poses that differ by less are those of one pose
 PROBES: Final = 257  # poses looked at before a toolpath is handed on
 
 
@@ -29,25 +31,52 @@ def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
         origin: Where the words of the task stand, for complaints.
 
     Raises:
-        InputError: The path cannot be drawn, misses the part, runs over an edge, or leaves the tool's turn open.
+        InputError: The path cannot be drawn, misses the part, runs over an edge, leaves the tool's turn open, or is to
+            be gone through again and does not come back to its start.
     """
     drawing = draw_path(task, origin)
     laid = lay_path(drawing, task, part, origin)
     orientation = orient_tool(task, drawing, laid, origin)
     arc = measure(laid.tip)
-    _refuse_standstill(laid.tip, arc, origin.at(f"tasks.{task.name}.path"))
-    toolpath = Toolpath(
+    is_timed = isinstance(task.path, TimedPath)
+    if not is_timed:
+        _refuse_standstill(laid.tip, arc, origin.at(f"tasks.{task.name}.path"))
+    is_closed = drawing.is_closed and _comes_back(laid.tip, orientation, drawing.stops)
+    if task.repeat > 1 and not is_closed:
+        raise InputError(
+            f"{origin.at(f'tasks.{task.name}.repeat')}: expected 1 for a path that does not end in the pose of its "
+            f"start, got {task.repeat}; close the path"
+        )
+    toolpath = (Trajectory if is_timed else Toolpath)(
         name=task.name,
         tip=laid.tip,
         orientation=orientation,
         arc=arc,
         stops=drawing.stops,
         turn=task.turn,
-        is_closed=drawing.is_closed,
+        is_closed=is_closed,
+        runs_on=drawing.runs_on,
     )
-    if not is_rigid(toolpath.poses(np.linspace(0.0, toolpath.length, PROBES))):
+    if not is_rigid(_probe(toolpath)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")
     return toolpath
+
+
+def _comes_back(tip: Curve, orientation: Orientation, stops: Array) -> bool:
+    """Whether the last pose is the first one; a file may come back to a point with another orientation."""
+    poses = []
+    for u, interval in ((stops[:1], (stops[0], stops[1])), (stops[-1:], (stops[-2], stops[-1]))):
+        p, dp = tip.evaluate(u, interval)
+        R, _ = orientation.frames(u, interval, p=p, dp=dp)
+        poses.append(pose_from(R, p)[0])
+    return bool(np.abs(poses[1] - poses[0]).max() <= SAME_POSE)
+
+
+def _probe(toolpath: Toolpath) -> Array:
+    """Poses spread over a toolpath, shape (N, 4, 4)."""
+    if isinstance(toolpath, Trajectory):
+        return toolpath.at(np.linspace(0.0, toolpath.duration, PROBES))[0]
+    return toolpath.poses(np.linspace(0.0, toolpath.length, PROBES))
 
 
 def _refuse_standstill(tip: Curve, arc: ArcLength, where: str) -> None:

@@ -7,10 +7,14 @@ from functools import cache
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from cellplan.model.cell import Cell
+from cellplan.model.motion import Motion
+from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Check, Report
-from cellplan.report.json_report import summary_record
+from cellplan.report.json_report import run_record, summary_record
+from cellplan.report.method import method_lines
 from cellplan.report.palette import ROBOTS, robot_colours
-from cellplan.report.record import Provenance, Record, report_record, rounded_down
+from cellplan.report.record import Provenance, Record, rounded_down
+from cellplan.report.rehearsal_record import rehearsal_record
 
 MODES = {
     "simultaneous": "all robots move",
@@ -25,6 +29,7 @@ CHECKS = {
     "orientation_error": "tool orientation on the part within tolerance",
     "closure_position_error": "further holders' tools on their grasps",
     "closure_orientation_error": "further holders' tools turned as they grasp",
+    "joint_drift": "joints back where each cycle began",
     "clearance": "required clearance kept",
     "collision": "no collision",
 }
@@ -35,12 +40,26 @@ CLASSES = {
     "part": "part",
     "environment": "environment",
 }
+EXECUTION_TITLES = {
+    "before": "as solved",
+    "after": "corrected from pass to pass",
+    "in_pass": "corrected within the pass",
+}
+OUTCOMES = {
+    "converged": "converged",
+    "stalled": "does not converge: the error falls no more and is beyond the tolerance",
+    "diverged": "does not converge: the error grew, or the corrected references cannot be followed",
+    "unfinished": "not converged yet: the rounds are used up",
+}
 NARROW = 0.05  # [-] of the half range: a joint whose margin is smaller is marked
 FAST = 0.95  # [-] of the speed limit: likewise
 SMALLEST_SHOWN = 1e-6  # [mm] or [deg]: below it more digits tell nothing
+LEAST_PLAIN = 1e-4  # [-] of a manipulability: smaller ones are shown with a power of ten
 
 
-def report_html(report: Report, *, cell: Cell, provenance: Provenance, plots: Mapping[str, bytes]) -> str:
+def report_html(
+    report: Report, *, cell: Cell, provenance: Provenance, plots: Mapping[str, bytes], motion: Motion | None = None
+) -> str:
     """The page of one run.
 
     Args:
@@ -48,8 +67,9 @@ def report_html(report: Report, *, cell: Cell, provenance: Provenance, plots: Ma
         cell: Its cell.
         provenance: Where the result comes from.
         plots: SVG pictures by file name, as ``draw_plots`` returns them; others are ignored.
+        motion: The motion as it was planned, for what its steps took; None when it is not at hand.
     """
-    record = report_record(report, cell=cell, provenance=provenance)
+    record = run_record(report, cell=cell, provenance=provenance, motion=motion)
     return _render(
         "report.html",
         record,
@@ -59,6 +79,7 @@ def report_html(report: Report, *, cell: Cell, provenance: Provenance, plots: Ma
             "check_groups": _check_groups(report.checks),
             "shares": _shares(record),
             "excluded": _by_reason(record["exclusions"]),
+            "method": list(method_lines(record["solver"])),
             "plots": _inline_plots(plots),
         },
     )
@@ -68,6 +89,13 @@ def overview_html(reports: Mapping[str, Report], *, cell: Cell, provenance: Prov
     """The page of a job done in several runs, with a link to the page of each; see ``summary_record``."""
     record = summary_record(reports, cell=cell, provenance=provenance)
     return _render("overview.html", record, cell, {"figures": _figures(record)})
+
+
+def rehearsal_html(rehearsal: Rehearsal, *, provenance: Provenance, plots: Mapping[str, bytes]) -> str:
+    """The page of a rehearsal; ``plots`` as ``draw_rehearsal`` returns them."""
+    record = rehearsal_record(rehearsal, provenance=provenance)
+    parts = {"plots": _inline_plots(plots), "executions": EXECUTION_TITLES, "outcomes": OUTCOMES}
+    return _render("rehearsal.html", record, rehearsal.cell, parts)
 
 
 def _render(template: str, record: Record, cell: Cell, parts: Mapping[str, object]) -> str:
@@ -88,6 +116,7 @@ def _environment() -> Environment:
     environment.filters |= {
         "fixed": _fixed,
         "small": _small,
+        "power": _power,
         "percent": _percent,
         "floored": _floored,
         "range_bar": _range_bar,
@@ -113,6 +142,14 @@ def _small(value: float | None) -> str:
         return f"< {SMALLEST_SHOWN:.6f}"
     text = f"{float(f'{value:.3g}'):.9f}".rstrip("0").rstrip(".")
     return text.replace("-", "−")
+
+
+def _power(value: float | None) -> str:
+    """The value with three telling digits, small ones as a multiple of a power of ten."""
+    if value is None or value == 0.0 or abs(value) >= LEAST_PLAIN:
+        return _small(value)
+    digits, _, exponent = f"{value:.2e}".partition("e")
+    return f"{digits} · 10^{int(exponent)}".replace("-", "−")
 
 
 def _floored(value: float | None) -> str:

@@ -6,27 +6,46 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from cellplan.model.cell import Cell
+from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, JointUse, Report
+from cellplan.report.closure_record import closures_record, worst_closures_record
+from cellplan.report.method import solver_record
 from cellplan.report.record import (
     SCHEMA,
     Provenance,
     Record,
     check_record,
     clearance_record,
-    closures_record,
     joints_record,
     number,
     origin_record,
+    repeatability_record,
     report_record,
     status,
     tasks_record,
     withdrawals,
 )
+from cellplan.report.series import INDENT, series, series_text
 
 
-def report_json(report: Report, *, cell: Cell, provenance: Provenance) -> str:
-    """The record of one run as text; values without a finite number are null."""
-    return _as_text(report_record(report, cell=cell, provenance=provenance))
+def report_json(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> str:
+    """The record of one run as text, its series last; values without a finite number are null.
+
+    Args:
+        report: The run.
+        cell: Its cell.
+        provenance: Where the result comes from.
+        motion: The motion as it was planned, for what its steps took; None when it is not at hand.
+    """
+    record = run_record(report, cell=cell, provenance=provenance, motion=motion)
+    last = f',\n{INDENT}"series": {series_text(series(report, motion), 1)}\n}}\n'
+    return _as_text(record).removesuffix("\n}\n") + last
+
+
+def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> Record:
+    """The record of one run, of its closures and of how its motion was found, without the series."""
+    record = report_record(report, cell=cell, provenance=provenance)
+    return record | {"closure": closures_record(report, cell), "solver": solver_record(cell.solver, motion)}
 
 
 def summary_json(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> str:
@@ -55,14 +74,16 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "cycle_time_s": number(sum(report.cycle_time for report in runs)),
         "runs": {name: _run_record(name, report, cell) for name, report in reports.items()},
         "tasks": {name: record for report in runs for name, record in tasks_record(report, cell).items()},
-        "closure": _worst_closures(runs, cell),
+        "closure": worst_closures_record(runs, cell),
         "joints": joints_record(merge_joint_uses(use for report in runs for use in report.joints)),
+        "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
         "clearance": clearance_record(minima),
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
         "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
         "before_you_run": [f"{name}: {line}" for name, report in reports.items() for line in withdrawals(report, cell)],
         **origin_record(cell, provenance),
         "caution": CAUTION,
+        "solver": solver_record(cell.solver),
     }
 
 
@@ -79,23 +100,6 @@ def _run_record(name: str, report: Report, cell: Cell) -> Record:
     for task in tasks_record(report, cell).values():
         record |= {key: task[key] for key in errors}
     return record
-
-
-def _worst_closures(runs: Iterable[Report], cell: Cell) -> Record:
-    """Closure errors by robot: the largest distance and the largest angle of all runs, each with its instant."""
-    worst: Record = {}
-    for report in runs:
-        for robot, record in closures_record(report, cell).items():
-            known = worst[robot] = worst.get(robot) or record
-            for name, instant in (
-                ("max_position_error_mm", "at_s"),
-                ("max_orientation_error_deg", "max_orientation_error_at_s"),
-            ):
-                if record[name] > known[name]:
-                    known |= {name: record[name], instant: record[instant]}
-    return {
-        robot: {key: value for key, value in record.items() if "mean" not in key} for robot, record in worst.items()
-    }
 
 
 def merge_joint_uses(uses: Iterable[JointUse]) -> list[JointUse]:

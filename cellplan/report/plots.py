@@ -16,6 +16,8 @@ from cellplan.report.plots_canvas import Sheet, pictures, style
 from cellplan.report.record import rounded_down
 
 JOINT_COLUMNS = 3
+LEAST_PLAIN, SMALLEST_DRAWN = 1e-2, 1e-200  # [-] of a manipulability: below, in powers of ten; below, as zero
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 CLASS_TITLES: Mapping[ClearanceClass, str] = {
     ClearanceClass.ROBOT_ROBOT: "robot to robot",
     ClearanceClass.SELF: "robot to itself",
@@ -77,8 +79,8 @@ def _draw_task(accuracy: TaskAccuracy, times: Array, cell: Cell) -> dict[str, by
     tolerance = cell.task(accuracy.task).tolerance
     place = "on the part" if cell.task(accuracy.task).relative_to is Frame.PART else "in the world"
     sheet = Sheet(f"{accuracy.task} ({accuracy.robot}): tool error {place}", rows=2, columns=2, times=times)
-    _draw_error(sheet, 0, accuracy.position_error, allowed=tolerance.position, kind=POSITION)
-    _draw_error(sheet, 1, accuracy.orientation_error, allowed=tolerance.orientation, kind=ORIENTATION)
+    draw_error(sheet, 0, accuracy.position_error, allowed=tolerance.position, kind=POSITION)
+    draw_error(sheet, 1, accuracy.orientation_error, allowed=tolerance.orientation, kind=ORIENTATION)
     return pictures(sheet, f"task_{accuracy.task}")
 
 
@@ -86,16 +88,16 @@ def _draw_closure(closure: ClosureAccuracy, times: Array, cell: Cell) -> dict[st
     """Total and per-axis error of the tool of a further holder on its grasp."""
     checks = cell.checks
     sheet = Sheet(f"{closure.robot}: tool error on its grasp", rows=2, columns=2, times=times)
-    _draw_error(sheet, 0, closure.position_error, allowed=checks.closure_position, kind=POSITION)
-    _draw_error(sheet, 1, closure.orientation_error, allowed=checks.closure_orientation, kind=ORIENTATION)
+    draw_error(sheet, 0, closure.position_error, allowed=checks.closure_position, kind=POSITION)
+    draw_error(sheet, 1, closure.orientation_error, allowed=checks.closure_orientation, kind=ORIENTATION)
     return pictures(sheet, f"closure_{closure.robot}")
 
 
-def _draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: ErrorKind) -> None:
+def draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: ErrorKind) -> None:
     """One row: the total, with the tolerance where it lies within the picture, and the three axes beside it."""
     total = np.linalg.norm(error, axis=1)
     largest = float(total.max())
-    unit, scale = _readable_unit(largest, kind.units)
+    unit, scale = readable_unit(largest, kind.units)
     main_unit, main_scale = kind.units[0]
     is_in_sight = allowed <= 4.0 * largest
     span = (0.0, scale * (max(largest, allowed) if is_in_sight else largest) or 1.0)
@@ -114,7 +116,7 @@ def _draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: E
         sheet.write(x, y, axis, size=8.5, color=colour, weight="bold", ha="right")
 
 
-def _readable_unit(largest: float, units: tuple[tuple[str, float], ...]) -> tuple[str, float]:
+def readable_unit(largest: float, units: tuple[tuple[str, float], ...]) -> tuple[str, float]:
     """The largest unit in which the value is at least one half; the first of all for zero."""
     if largest == 0.0:
         return units[0]
@@ -221,20 +223,38 @@ def _draw_clearance(report: Report, required: float) -> dict[str, bytes]:
 
 
 def _draw_singularity(report: Report, colours: Mapping[str, str]) -> dict[str, bytes]:
-    """Smallest singular value of the whole stack and of each robot along the motion."""
-    series = {"all robots together": report.conditioning.stack, **report.conditioning.robots}
+    """Singular values, condition and manipulability of the whole stack, then the smallest value of each robot."""
+    conditioning = report.conditioning
+    series = {
+        "all robots together": conditioning.stack,
+        "their condition": conditioning.condition,
+        "their manipulability": conditioning.manipulability,
+        **conditioning.robots,
+    }
     rows = math.ceil(len(series) / JOINT_COLUMNS)
-    sheet = Sheet("smallest singular values along the motion", rows=rows, columns=JOINT_COLUMNS, times=report.times)
+    title = "smallest singular values, condition and manipulability along the motion"
+    sheet = Sheet(title, rows=rows, columns=JOINT_COLUMNS, times=report.times)
     for index, (name, values) in enumerate(series.items()):
         worst = int(np.argmin(values))
-        at_s, smallest = float(report.times[worst]), float(values[worst])
+        unit, scale = _power_of_ten(float(values.max()))
+        at_s, smallest = float(report.times[worst]), scale * float(values[worst])
         panel = sheet.panel(
             index,
-            name,
+            name + unit,
             note=f"smallest {smallest:.2g} at {at_s:.2f} s",
-            span=(0.0, float(values.max()) or 1.0),
+            span=(0.0, scale * float(values.max()) or 1.0),
             is_floored=True,
         )
-        sheet.curve(panel, report.times, values, colour=colours.get(name, INK))
+        sheet.curve(panel, report.times, scale * values, colour=colours.get(name, INK))
         sheet.dot(panel, at_s, smallest)
     return pictures(sheet, "singularity")
+
+
+def _power_of_ten(largest: float) -> tuple[str, float]:
+    """Words and factor that make small values readable; what is too small for that becomes zero."""
+    if largest >= LEAST_PLAIN:
+        return "", 1.0
+    if largest < SMALLEST_DRAWN:
+        return "", 0.0
+    exponent = math.floor(math.log10(largest))
+    return f", in 10{str(exponent).translate(SUPERSCRIPTS)}", 10.0**-exponent

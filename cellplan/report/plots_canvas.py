@@ -86,9 +86,9 @@ class Panel:
 class Sheet:
     """A figure with a grid of panels that share the time axis; lengths are in inches from the lower left corner."""
 
-    def __init__(self, title: str, *, rows: int, columns: int, times: Array) -> None:
-        """Open a sheet for a grid of panels over the instants ``times`` in [s]."""
-        self.rows, self.columns, self.times = rows, columns, times
+    def __init__(self, title: str, *, rows: int, columns: int, times: Array, across: str = "time in s") -> None:
+        """Open a sheet for a grid of panels over ``times``, which are instants in [s] or what ``across`` says."""
+        self.rows, self.columns, self.times, self.across = rows, columns, times, across
         self.height = HEAD + rows * ROW + FOOT
         self.figure = Figure(figsize=(WIDTH, self.height))
         self.write(0.12, self.height - 0.2, title, size=10.5, weight="bold", va="center")
@@ -125,7 +125,7 @@ class Sheet:
         self.write(panel.left, top, title, size=8.5, weight="bold")
         self.write(panel.left + width, top, note, size=7.5, color=GREY, ha="right")
         if is_lowest and column == self.columns - 1:
-            self.write(panel.left + width, 0.1, "time in s", color=GREY, ha="right")
+            self.write(panel.left + width, 0.1, self.across, color=GREY, ha="right")
         return panel
 
     def curve(self, panel: Panel, times: Array, values: Array, *, colour: str, width: float = 1.3) -> None:

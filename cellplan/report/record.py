@@ -16,10 +16,10 @@ from cellplan.model.report import (
     ClearanceClass,
     ClearanceMinimum,
     ClearanceReport,
-    ClosureAccuracy,
     Conditioning,
     Contact,
     JointUse,
+    Repeatability,
     Report,
     RobotSpeed,
     TaskAccuracy,
@@ -57,8 +57,8 @@ def report_record(report: Report, *, cell: Cell, provenance: Provenance) -> Reco
         "samples": len(report.times),
         "step_s": number(report.cycle_time / (len(report.times) - 1)),
         "tasks": tasks_record(report, cell),
-        "closure": closures_record(report, cell),
         "joints": joints_record(report.joints),
+        "repeatability": repeatability_record(report),
         "clearance": clearance_record(report.clearance.minima),
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
         "pair_count": report.clearance.pair_count,
@@ -116,7 +116,7 @@ def check_record(check: Check) -> Record:
 
 
 def tasks_record(report: Report, cell: Cell) -> Record:
-    """Tool errors by task: largest, mean and per axis over all samples."""
+    """Tool errors by task: largest, mean and per axis over all samples that are judged."""
     return {accuracy.task: _task_record(accuracy, report, cell) for accuracy in report.accuracy}
 
 
@@ -126,43 +126,30 @@ def _task_record(accuracy: TaskAccuracy, report: Report, cell: Cell) -> Record:
         "position_mm": number(1e3 * task.tolerance.position),
         "orientation_deg": number(math.degrees(task.tolerance.orientation)),
     }
+    first = task.first_judged(report.times)
+    times, position = report.times[first:], 1e3 * accuracy.position_error
+    orientation = np.rad2deg(accuracy.orientation_error)
     return {
         "robot": accuracy.robot,
         "relative_to": str(task.relative_to),
-        **_error_record("position_error", "mm", 1e3 * accuracy.position_error, times=report.times, axes=AXES[:3]),
-        **_error_record(
-            "orientation_error", "deg", np.rad2deg(accuracy.orientation_error), times=report.times, axes=AXES[3:]
-        ),
+        **_error_record("position_error", "mm", position[first:], times=times, axes=AXES[:3]),
+        "max_position_error_with_settling_mm": number(_longest(position)),
+        **_error_record("orientation_error", "deg", orientation[first:], times=times, axes=AXES[3:]),
+        "max_orientation_error_with_settling_deg": number(_longest(orientation)),
+        "settle_s": number(task.settle),
+        "judged_from_s": number(task.judged_from),
         "tolerance": tolerance,
         "axes": [AXES[index] for index in task.axes],
         "path_length_mm": number(1e3 * accuracy.path_length),
+        "cycles": task.repeat,
         "start_s": number(task.start),
         "end_s": number(accuracy.end_s),
     }
 
 
-def closures_record(report: Report, cell: Cell) -> Record:
-    """Closure errors by robot, of every holder but the first."""
-    return {closure.robot: _closure_record(closure, report, cell) for closure in report.closures}
-
-
-def _closure_record(closure: ClosureAccuracy, report: Report, cell: Cell) -> Record:
-    position = np.linalg.norm(closure.position_error, axis=1)
-    orientation = np.linalg.norm(closure.orientation_error, axis=1)
-    worst, most_turned = int(np.argmax(position)), int(np.argmax(orientation))
-    return {
-        "max_position_error_mm": number(1e3 * position[worst]),
-        "max_orientation_error_deg": number(math.degrees(orientation[most_turned])),
-        "at_s": number(report.times[worst]),
-        "max_orientation_error_at_s": number(report.times[most_turned]),
-        "mean_position_error_mm": number(1e3 * position.mean()),
-        "mean_orientation_error_deg": number(math.degrees(orientation.mean())),
-        "allowed": {
-            "position_mm": number(1e3 * cell.checks.closure_position),
-            "orientation_deg": number(math.degrees(cell.checks.closure_orientation)),
-        },
-        "axes": [AXES[index] for index in closure.axes],
-    }
+def _longest(error: Array) -> float:
+    """Largest length of all vectors, shape (N, 3)."""
+    return float(np.linalg.norm(error, axis=1).max())
 
 
 def _error_record(name: str, unit: str, error: Array, *, times: Array, axes: Sequence[str]) -> Record:
@@ -176,6 +163,53 @@ def _error_record(name: str, unit: str, error: Array, *, times: Array, axes: Seq
         f"mean_{name}_{unit}": number(length.mean()),
         f"max_{name}_by_axis_{unit}": {axis: number(value) for axis, value in zip(axes, by_axis, strict=True)},
     }
+
+
+def repeatability_record(report: Report) -> Record:
+    """How far the joints are after each cycle from where they were, by the task, or ``all`` tasks together."""
+    found = report.repeatability
+    if found is None:
+        return {}
+    name = report.tasks[0] if len(report.tasks) == 1 else "all"
+    return {
+        name: {
+            "cycles": found.cycles,
+            "period_s": number(found.period),
+            "ends_s": [number(float(instant)) for instant in found.instants[1:]],
+            **_worst_drift(found, is_revolute=True),
+            **_worst_drift(found, is_revolute=False),
+            "closes": found.closes,
+            "per_joint": _drifts_by_joint(found),
+        }
+    }
+
+
+def _worst_drift(found: Repeatability, *, is_revolute: bool) -> Record:
+    """The joint that drifts most in a cycle, of those that turn (deg) or slide (mm); nothing when there is none."""
+    drifts = [drift for drift in found.drifts if drift.is_revolute == is_revolute]
+    if not drifts:
+        return {}
+    worst = max(drifts, key=lambda drift: drift.worst)
+    unit, scale, key = ("deg", math.degrees(1.0), "joint") if is_revolute else ("mm", 1e3, "sliding_joint")
+    return {
+        f"worst_drift_{unit}": number(scale * worst.worst),
+        key: f"{worst.robot} {worst.joint}",
+        "at_cycle" if is_revolute else "sliding_at_cycle": worst.at_cycle,
+    }
+
+
+def _drifts_by_joint(found: Repeatability) -> Record:
+    """Position at the end less position at the start of each cycle, in deg or mm, by robot and joint."""
+    record: Record = {}
+    for drift in found.drifts:
+        scale = math.degrees(1.0) if drift.is_revolute else 1e3
+        record.setdefault(drift.robot, {})[drift.joint] = {
+            "unit": "deg" if drift.is_revolute else "mm",
+            "worst": number(scale * drift.worst),
+            "at_cycle": drift.at_cycle,
+            "drift": [number(scale * float(value)) for value in drift.drift],
+        }
+    return record
 
 
 def joints_record(joints: Iterable[JointUse]) -> Record:
@@ -288,9 +322,12 @@ def exclusions_record(clearance: ClearanceReport) -> list[Record]:
 
 
 def _singularity_record(conditioning: Conditioning, times: Array) -> Record:
-    """Smallest singular values; metres and radians as they come."""
+    """Smallest singular values, condition and manipulability; metres and radians as they come."""
     return {
         "stack": _smallest(conditioning.stack, times),
+        "condition": _smallest(conditioning.condition, times),
+        "squared_condition": _smallest(conditioning.squared_condition, times),
+        "manipulability": _smallest(conditioning.manipulability, times),
         "robots": {robot: _smallest(series, times) for robot, series in conditioning.robots.items()},
     }
 

@@ -1,4 +1,4 @@
-"""Singular values of the report against those of the planner's matrix, which shares no code with them."""
+"""Singular values of the report against the planner's matrix, and against the derivative of the tool poses."""
 
 import numpy as np
 import pytest
@@ -32,6 +32,22 @@ def planners_values(cell, schedule, q, moving):
     return np.array(values)
 
 
+def still_scheduled(tasks, chains, by_name, X_WP):
+    """A schedule that wants every tool where it is."""
+    scheduled = tuple(
+        TaskSchedule(
+            task=task,
+            X_PT=np.linalg.inv(X_WP) @ chains[task.robot].tool_poses(by_name[task.robot]),
+            V_PT_P=np.zeros((len(X_WP), 6)),
+            travelled=np.zeros(len(X_WP)),
+            length=1.0,
+            end=1.0,
+        )
+        for task in tasks
+    )
+    return Schedule(times=np.arange(len(X_WP)) * 1e-3, tasks=scheduled)
+
+
 @pytest.mark.parametrize("options", [{}, {"is_spin_free": True}, {"axes": (0, 1, 5)}], ids=["whole", "spin", "planar"])
 @pytest.mark.parametrize("at_rest", [False, True])
 def test_smallest_singular_value_of_the_stack(options, at_rest):
@@ -41,18 +57,7 @@ def test_smallest_singular_value_of_the_stack(options, at_rest):
     chains = {r.name: ScrewChain(r) for r in cell.robots}
     by_name = {r.name: q[:, cell.columns(r.name)] for r in cell.robots}
     X_WP = part_poses(cell, chains, by_name)
-    scheduled = tuple(
-        TaskSchedule(
-            task=task,
-            X_PT=np.linalg.inv(X_WP) @ chains[task.robot].tool_poses(by_name[task.robot]),
-            V_PT_P=np.zeros((N, 6)),
-            travelled=np.zeros(N),
-            length=1.0,
-            end=1.0,
-        )
-        for task in tasks
-    )
-    schedule = Schedule(times=np.arange(N) * 1e-3, tasks=scheduled)
+    schedule = still_scheduled(tasks, chains, by_name, X_WP)
     moving = [t.robot for t in tasks] if at_rest else [r.name for r in cell.robots]
 
     found = conditioning(cell, schedule, chains, q=by_name, X_WP=X_WP, moving=moving)
@@ -91,3 +96,63 @@ def test_the_stack_holds_the_closures_of_further_holders_and_the_path_of_the_par
         assert found.robots["op2"][k] == pytest.approx(np.linalg.svd(own, compute_uv=False)[len(axes) - 1], abs=1e-12)
     assert set(found.robots) == set(names)
     assert all(len(series) == N for series in found.robots.values())
+
+
+NUDGE = 1e-5  # [rad]: central differences are then good to about 1e-10
+
+
+def poses_in_part(cell, chains, tasks, q):
+    """Tool poses seen from the part, shape (tasks, 4, 4), from chains of screws alone."""
+    by_name = {r.name: q[None, cell.columns(r.name)] for r in cell.robots}
+    X_PW = np.linalg.inv(part_poses(cell, chains, by_name))[0]
+    return np.array([X_PW @ chains[task.robot].tool_poses(by_name[task.robot])[0] for task in tasks])
+
+
+def jacobian_by_differences(cell, chains, tasks, q):
+    """Twists of all tools relative to the part, in P, by central differences of their poses, shape (6 tasks, nq)."""
+    X = poses_in_part(cell, chains, tasks, q)
+    columns = []
+    for joint in range(cell.joint_count):
+        step = NUDGE * np.eye(cell.joint_count)[joint]
+        rate = poses_in_part(cell, chains, tasks, q + step) - poses_in_part(cell, chains, tasks, q - step)
+        rate /= 2.0 * NUDGE
+        spin = rate[:, :3, :3] @ np.swapaxes(X[:, :3, :3], 1, 2)
+        turn = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        columns.append(np.concatenate([rate[:, :3, 3], turn], axis=1).ravel())
+    return np.array(columns).T
+
+
+def measured(cell, tasks, q):
+    """What the report says at the postures q, shape (N, nq), with all robots free to move."""
+    chains = {r.name: ScrewChain(r) for r in cell.robots}
+    by_name = {r.name: q[:, cell.columns(r.name)] for r in cell.robots}
+    X_WP = part_poses(cell, chains, by_name)
+    schedule = still_scheduled(tasks, chains, by_name, np.broadcast_to(X_WP, (len(q), 4, 4)))
+    return conditioning(cell, schedule, chains, q=by_name, X_WP=X_WP, moving=[r.name for r in cell.robots])
+
+
+@pytest.mark.parametrize("operators", [1, 2, 3])
+def test_manipulability_and_condition_follow_from_the_derivative_of_the_tool_poses(operators):
+    cell = random_cell(8, operators=operators)
+    tasks = [make_task(task.robot) for task in cell.tasks]
+    q = np.random.default_rng(1).uniform(-1, 1, (3, cell.joint_count))
+    chains = {r.name: ScrewChain(r) for r in cell.robots}
+
+    found = measured(cell, tasks, q)
+
+    for k, posture in enumerate(q):
+        J = jacobian_by_differences(cell, chains, tasks, posture)
+        squares = np.linalg.eigvalsh(J @ J.T)  # in rising order: squared singular values, by another way
+        assert found.manipulability[k] == pytest.approx(np.sqrt(np.linalg.det(J @ J.T)), rel=1e-6)
+        assert found.squared_condition[k] == pytest.approx(squares[0] / squares[-1], rel=1e-6)
+        assert found.condition[k] == pytest.approx(np.sqrt(squares[0] / squares[-1]), rel=1e-6)
+        assert found.stack[k] == pytest.approx(np.sqrt(squares[0]), rel=1e-6)
+
+
+def test_with_more_rows_than_joints_everything_is_singular():
+    cell = random_cell(3, operators=2, joints=3)  # 12 rows, 9 joints
+
+    found = measured(cell, list(cell.tasks), np.random.default_rng(2).uniform(-1, 1, (N, 9)))
+
+    for values in (found.stack, found.condition, found.squared_condition, found.manipulability):
+        np.testing.assert_array_equal(values, np.zeros(N))

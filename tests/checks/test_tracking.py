@@ -1,5 +1,7 @@
 """The reported tool error against errors put in by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from random_cells import make_task
@@ -124,3 +126,20 @@ def test_check_names_instant_and_amount():
     assert not position.passed
     assert position.message == "position error of task 'ring': 0.2 mm at 0.500 s, allowed 0.1 mm"
     assert orientation.passed
+
+
+def test_errors_are_judged_from_the_instant_on_that_the_tool_has_settled():
+    offset = np.zeros((5, 3))
+    offset[:, 0] = [0.7, 0.1, 5e-5, 2e-5, 1e-5]
+    accuracy = accuracy_of(offset, np.zeros((5, 3)))
+    schedule = Schedule(times=np.array([0.0, 0.5, 1.0, 1.5, 2.0]), tasks=())
+    task = scheduled_task(random_poses(1), start=0.5, settle=0.5).task
+
+    settled, _ = check_accuracy(schedule, accuracy, task)
+    early, _ = check_accuracy(schedule, accuracy, replace(task, settle=0.49))
+
+    assert settled.passed
+    assert settled.message == "position error of task 'ring': 0.05 mm at 1.000 s, allowed 0.1 mm, judged from 1 s"
+    assert early.passed
+    assert not check_accuracy(schedule, accuracy, replace(task, start=0.0))[0].passed
+    assert check_accuracy(schedule, accuracy, replace(task, settle=99.0))[0].at_s == 2.0  # the last instant at least

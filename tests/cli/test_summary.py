@@ -29,6 +29,7 @@ def record() -> dict[str, Any]:
         "joints": {"holder": {"A1": use(), "A2": use(margin=37.25)}, "pen": {"B1": use(ratio=0.351)}},
         "clearance": {"whole": {"minimum_mm": 12.345, "pair": ["pen/tool", "holder/A2"], "at_s": 0.25}},
         "checks": [{"passed": True, "message": "fine"}],
+        "solver": {"method": "weighted_pseudo_inverse", "slack": {"max": 0.0, "max_at_s": 0.0, "unit": "m/s"}},
     }
 
 
@@ -45,6 +46,15 @@ def test_a_passed_run_is_told_in_a_few_lines(record: dict[str, Any], tmp_path: P
         f"report: {tmp_path / 'report.html'}",
         f"tables: {tmp_path / 'tables'}",
     ]
+
+
+def test_a_method_of_ones_own_choice_and_what_it_gave_up_are_told(record: dict[str, Any], tmp_path: Path) -> None:
+    record["solver"] = {"method": "quadratic_program", "slack": {"max": 0.01234, "max_at_s": 1.5, "unit": "m/s"}}
+
+    lines = summary_lines(record, tmp_path)
+
+    assert lines[1] == "  mode simultaneous, 4 s, method quadratic_program"
+    assert "  tasks left on purpose by at most 0.012 (m/s) at 1.500 s" in lines
 
 
 def test_every_failed_check_has_a_line_and_no_tables_are_offered(record: dict[str, Any], tmp_path: Path) -> None:
@@ -90,3 +100,25 @@ def test_what_is_not_known_is_left_out(record: dict[str, Any], tmp_path: Path) -
     lines = summary_lines(record, tmp_path)
 
     assert not any("margin" in line or "speed" in line or "clearance" in line for line in lines)
+
+
+def test_a_joint_that_does_not_come_back_is_named(record: dict[str, Any], tmp_path: Path) -> None:
+    drifts = {
+        "cycles": 25,
+        "worst_drift_deg": 0.5312,
+        "joint": "pen B2",
+        "at_cycle": 7,
+        "worst_drift_mm": 1.25,
+        "sliding_joint": "rail X",
+        "sliding_at_cycle": 1,
+        "closes": False,
+    }
+
+    record["repeatability"] = {"ring": drifts}
+    drifting = summary_lines(record, tmp_path)
+    record["repeatability"] = {"all": drifts | {"closes": True}}
+    closing = summary_lines(record, tmp_path)
+
+    assert "  joint drift 0.5312 deg in cycle 7 of 25 of task ring: pen B2" in drifting
+    assert "  joint drift 1.25 mm in cycle 1 of 25 of task ring: rail X" in drifting
+    assert not any("drift" in line for line in closing)

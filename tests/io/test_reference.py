@@ -1,4 +1,4 @@
-"""The reference of the cell file is made from the format and says what the format says."""
+"""The reference of the files is made from their formats and says what the formats say."""
 
 import importlib.util
 from pathlib import Path
@@ -14,3 +14,5 @@ def test_the_reference_page_is_up_to_date(repository: Path) -> None:
     page = (repository / "docs" / "reference" / "cell-file.md").read_text(encoding="utf-8")
 
     assert page == script.reference(), "run: python docs/make_reference.py"
+    errors_page = (repository / "docs" / "reference" / "errors-file.md").read_text(encoding="utf-8")
+    assert errors_page == script.errors_reference(), "run: python docs/make_reference.py"

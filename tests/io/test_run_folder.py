@@ -227,3 +227,39 @@ def test_an_interruption_between_the_renames_leaves_one_whole_run(
 
     assert names_in(tmp_path) == ["bench"]
     assert (tmp_path / "bench/tables/arm.csv").read_text() == ("old" if number == 1 else "new")
+
+
+def write_rehearsal(path: Path) -> None:
+    with RunFolder(path) as folder:
+        folder.write_text("rehearsal.json", REPORT.replace("report/1", "rehearsal/1"))
+
+
+def test_a_run_takes_the_place_of_a_folder_that_holds_its_rehearsal_alone(tmp_path: Path) -> None:
+    write_rehearsal(tmp_path / "cell" / "rehearsal")
+
+    write_run(tmp_path / "cell")
+
+    assert names_in(tmp_path / "cell") == ["report.json", "tables"]
+
+
+def test_a_rehearsal_beside_other_things_keeps_its_place(tmp_path: Path) -> None:
+    write_rehearsal(tmp_path / "cell" / "rehearsal")
+    (tmp_path / "cell" / "notes.txt").write_text("mine", encoding="utf-8")
+
+    with pytest.raises(InputError, match=r"holds 'notes\.txt', which cellplan did not write"):
+        write_run(tmp_path / "cell")
+
+
+def test_a_folder_of_that_name_with_other_things_in_it_is_never_replaced(tmp_path: Path) -> None:
+    (tmp_path / "cell" / "rehearsal").mkdir(parents=True)
+    (tmp_path / "cell" / "rehearsal" / "score.pdf").write_text("mine", encoding="utf-8")
+
+    with pytest.raises(InputError, match="holds 'rehearsal', which cellplan did not write"):
+        write_run(tmp_path / "cell")
+
+
+def test_a_rehearsal_replaces_an_older_one(tmp_path: Path) -> None:
+    write_rehearsal(tmp_path / "rehearsal")
+    write_rehearsal(tmp_path / "rehearsal")
+
+    assert names_in(tmp_path / "rehearsal") == ["rehearsal.json"]

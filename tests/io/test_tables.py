@@ -125,6 +125,16 @@ def test_header_reads_back() -> None:
     assert parse_header(TEXT, "arm.csv") == HEADER
 
 
+def test_a_remark_stands_before_the_verdict_and_reads_back() -> None:
+    header = TableHeader(cell="bench", mode="pairwise", verdict="passed", digests={}, remark="corrected by hand")
+
+    text = replace_header(TEXT, header=header)
+
+    assert "# remark: corrected by hand\n# verdict: passed\n" in text
+    assert parse_header(text, "t.csv") == header
+    assert table_body(text) == table_body(TEXT)
+
+
 def test_program_digest_depends_on_the_rows_and_not_on_the_header() -> None:
     other_header = replace_header(TEXT, header=TableHeader(cell="x", mode="y", verdict="z", digests={}))
     assert program_digest({"arm": TEXT}) == program_digest({"arm": other_header})

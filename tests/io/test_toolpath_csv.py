@@ -8,14 +8,14 @@ import pytest
 
 from cellplan.errors import InputError, InvalidFileError
 from cellplan.io.toolpath_csv import read_toolpath_csv
-from cellplan.model.task import SampledPath
+from cellplan.model.task import SampledPath, TimedPath
 
 HEADER = "x_mm,y_mm,z_mm\n"
 
 
 @pytest.fixture
 def read(tmp_path: Path):
-    def read_text(text: str | bytes, **words: bool) -> SampledPath:
+    def read_text(text: str | bytes, **words: bool) -> SampledPath | TimedPath:
         file = tmp_path / "weld.csv"
         file.write_bytes(text.encode() if isinstance(text, str) else text)
         return read_toolpath_csv(file, **({"is_smooth": False, "is_closed": False} | words))
@@ -114,7 +114,7 @@ HEADERS = {
     "a slip": ("x_mm,y_mn,z_mm", ["weld.csv:1: unknown column 'y_mn', did you mean 'y_mm'?"]),
     "a stranger": (
         "x_mm,y_mm,z_mm,speed",
-        ["weld.csv:1: unknown column 'speed', allowed are x_mm, y_mm, z_mm, i, j, k, qw, qx, qy, qz"],
+        ["weld.csv:1: unknown column 'speed', allowed are t_s, x_mm, y_mm, z_mm, i, j, k, qw, qx, qy, qz"],
     ),
     "a column twice": ("x_mm,y_mm,z_mm,x_mm", ["weld.csv:1: expected column 'x_mm' once, got it 2 times"]),
     "no z": ("x_mm,y_mm", ["weld.csv:1: expected columns x_mm, y_mm, z_mm, but z_mm is missing"]),
@@ -200,3 +200,60 @@ def test_too_large_a_file_is_refused_unread(tmp_path: Path) -> None:
 
     with pytest.raises(InputError, match="expected at most 50000000 bytes, got 50000001"):
         read_toolpath_csv(file, is_smooth=False, is_closed=False)
+
+
+TIMED = "t_s,x_mm,y_mm,z_mm\n"
+
+
+def test_a_column_of_instants_makes_a_trajectory(read) -> None:
+    path = read(TIMED + "0,0,0,0\n0.5,10,0,0\n1.5,10,0,0\n")
+
+    assert isinstance(path, TimedPath)
+    assert path.times.tolist() == [0.0, 0.5, 1.5]
+    assert path.points[:, 0].tolist() == [0.0, 0.01, 0.01]  # standing still is no slip here
+    assert path.duration == 1.5
+
+
+def test_instants_must_start_at_zero_and_increase(read) -> None:
+    assert complaints_of(read, TIMED + "0.1,0,0,0\n0.2,1,0,0\n0.2,2,0,0\n0.1,3,0,0\n") == [
+        "weld.csv:2: column 't_s': expected 0 in the first row, got 0.1; a task is shifted by its start_s",
+        "weld.csv:4: column 't_s': expected an instant after 0.2 of the row before, got 0.2",
+        "weld.csv:5: column 't_s': expected an instant after 0.2 of the row before, got 0.1",
+    ]
+    assert complaints_of(read, TIMED + "0,0,0,0\n1e7,1,0,0\n") == [
+        "weld.csv:3: column 't_s': expected at most 1000000 s either way, got 1e7"
+    ]
+    assert complaints_of(read, TIMED + "0,0,0,0\n1e-9,1,0,0\n") == [
+        "weld.csv:3: column 't_s': expected an instant after 0 of the row before, got 1e-09"
+    ]
+
+
+@pytest.mark.parametrize("word", ["t", "time", "Time_s", "t_ms"])
+def test_other_words_for_time_are_corrected(read, word: str) -> None:
+    (line,) = complaints_of(read, f"{word},x_mm,y_mm,z_mm\n0,0,0,0\n1,1,0,0\n")
+
+    assert line == f"weld.csv:1: unknown column '{word}', times are in s: write t_s"
+
+
+def test_a_closed_trajectory_ends_exactly_where_it_starts(read) -> None:
+    rows = "t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,9,0,0,1,0,0,0\n2,9,9,0,1,0,0,0\n"
+
+    path = read(rows + "3,0.0004,0,0,-1,0,0,0\n", is_closed=True)
+
+    assert np.array_equal(path.points[-1], path.points[0])
+    assert np.array_equal(path.rotations[-1], path.rotations[0])
+
+
+def test_a_closed_trajectory_that_does_not_come_back_is_refused(read) -> None:
+    rows = "t_s,x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,0,0,1\n1,9,0,0,0,0,1\n2,9,9,0,0,0,1\n"
+    with pytest.raises(InvalidFileError) as caught:
+        read(rows + "3,0.5,0,0,0,1,0\n", is_closed=True)
+    with pytest.raises(InvalidFileError) as too_short:
+        read(TIMED + "0,0,0,0\n1,1,0,0\n2,0,0,0\n", is_closed=True)
+
+    assert str(caught.value).split("\n") == [
+        "weld.csv:5: expected a closed trajectory to end at the point of its first row, but it ends 0.5 mm from it; "
+        "repeat the first row at the end of the cycle",
+        "weld.csv:5: expected a closed trajectory to end with the orientation of its first row",
+    ]
+    assert str(too_short.value) == "weld.csv:4: expected at least 4 rows for a closed trajectory, got 3"

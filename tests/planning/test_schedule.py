@@ -4,20 +4,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from roller_paths import clocked
 
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import pose, rotation_exp
-from cellplan.model.cell import (
-    Cell,
-    CheckSettings,
-    Mode,
-    MotionSettings,
-    Origin,
-    Part,
-)
+from cellplan.model.cell import Origin, Part
 from cellplan.model.motion import Schedule
-from cellplan.model.solver import SolverSettings
 from cellplan.model.task import (
     CirclePath,
     PathSpec,
@@ -64,23 +57,8 @@ def task(name: str, path: PathSpec, **words: Any) -> Task:
     return Task(name=name, path=path, **(plain | words))
 
 
-def clocked(*tasks: Task, duration: float = 4.0, step: float = 0.001) -> Cell:
-    return Cell(
-        name="cell",
-        robots=(),
-        part=ROLLER,
-        tasks=tasks,
-        obstacles=(),
-        motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=duration, step=step),
-        solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
-        checks=CheckSettings(clearance=0.005, contact_zone=0.02),
-        origin=ORIGIN,
-        inputs={},
-    )
-
-
 def scheduled(*tasks: Task, duration: float = 4.0, step: float = 0.001) -> Schedule:
-    cell = clocked(*tasks, duration=duration, step=step)
+    cell = clocked(*tasks, duration=duration, step=step, origin=ORIGIN)
     return schedule_tasks(cell, [build_toolpath(one, ROLLER, ORIGIN) for one in tasks])
 
 
@@ -229,7 +207,7 @@ def test_a_task_too_short_to_be_judged_by_its_samples_is_refused(words: Any, got
     one = on_roller(**words)
 
     with pytest.raises(InputError) as caught:
-        examine_times(clocked(one), [build_toolpath(one, ROLLER, ORIGIN)])
+        examine_times(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])
 
     told = str(caught.value)
     wanted = "expected a task of at least 0.01 s (10 times motion.step_s), got "
@@ -240,4 +218,4 @@ def test_a_task_too_short_to_be_judged_by_its_samples_is_refused(words: Any, got
 def test_ten_steps_are_enough() -> None:
     one = on_roller(duration=0.01)
 
-    examine_times(clocked(one), [build_toolpath(one, ROLLER, ORIGIN)])
+    examine_times(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])

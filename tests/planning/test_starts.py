@@ -219,3 +219,11 @@ def test_margin_share_is_one_in_the_middle_and_nil_on_a_limit(cell):
     middle = 0.5 * (model.lower + model.upper)
     assert margin_shares(model, middle) == pytest.approx(1.0)
     assert margin_shares(model, model.upper) == pytest.approx(0.0)
+
+
+def test_a_task_that_settles_may_start_beside_its_path(cell):
+    start = cell.robot("abb").start.copy()
+    start[0] += np.radians(20.0)
+    tasks = tuple(replace(task, settle=1.0) if task.robot == "abb" else task for task in cell.tasks)
+
+    examine_given_starts(replace(with_start(cell, "abb", start), tasks=tasks), toolpaths_of(cell))

@@ -268,7 +268,10 @@ def _run(name: str = "four-robots", amplitude: float = 1.0, kinds: str = "rrrrrr
     accuracy = tuple(_accuracy(i, task, robot) for i, (task, robot) in enumerate(TASKS.items()))
     share = {"reis": (0.46, "D4"), "kuka": (0.17, "B6"), "abb": (0.15, "A4"), "staubli": (0.22, "C4")}
     conditioning = Conditioning(
-        stack=0.2 + 0.05 * np.cos(TIMES), robots={robot: 0.3 + 0.1 * np.sin(TIMES + i) for i, robot in enumerate(q)}
+        stack=0.2 + 0.05 * np.cos(TIMES),
+        condition=0.1 + 0.02 * np.cos(TIMES),
+        manipulability=3e-7 + 1e-7 * np.sin(TIMES),
+        robots={robot: 0.3 + 0.1 * np.sin(TIMES + i) for i, robot in enumerate(q)},
     )
     report = Report(
         cell=name,

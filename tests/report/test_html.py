@@ -5,9 +5,10 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from typing import Any
 
+import numpy as np
 import pytest
 
-from cellplan.model.report import Check
+from cellplan.model.report import Check, JointDrift, Repeatability
 from cellplan.report.html import overview_html, report_html
 from cellplan.report.plots import draw_plots
 
@@ -213,3 +214,18 @@ def test_overview_leads_to_the_report_of_every_run(pairwise_runs: Any) -> None:
 def test_same_run_gives_the_same_page(failed_run: Any, failed_page: str, pairwise_runs: Any) -> None:
     assert page_of(failed_run) == failed_page
     assert overview_of(pairwise_runs) == overview_of(pairwise_runs)
+
+
+def test_joints_that_do_not_come_back_have_a_table(passed_run: Any) -> None:
+    drift = JointDrift(
+        robot="kuka", joint="B2", is_revolute=True, drift=np.array([0.01, -0.02]), worst=0.02, at_cycle=2
+    )
+    found = Repeatability(instants=np.array([0.0, 1.0, 2.0]), drifts=(drift,), closes=False)
+    run = replace(passed_run, report=replace(passed_run.report, repeatability=found))
+
+    text = page_of(run)
+
+    assert "The joints do not come back" in text
+    assert "after each of the 2 cycles of 1 s" in text
+    assert "1.15 deg" in text
+    assert "Repeatability" not in page_of(passed_run)

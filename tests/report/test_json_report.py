@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.io.run_folder import RunFolder
-from cellplan.model.report import ClearanceClass, ClosureAccuracy
+from cellplan.model.report import ClearanceClass, ClosureAccuracy, JointDrift, Repeatability
 from cellplan.report.json_report import merge_joint_uses, report_json, summary_json
 from cellplan.report.record import number
 
@@ -239,3 +239,59 @@ def test_the_summary_tells_the_worst_closure_of_all_runs(pairwise_runs: Any) -> 
 
     assert record["max_position_error_mm"] == pytest.approx(2e-3)
     assert record["max_orientation_error_deg"] == pytest.approx(math.degrees(3e-5))
+
+
+def drifting(run: Any) -> Any:
+    """The run with three cycles in which one joint drifts."""
+    drifts = tuple(
+        JointDrift(
+            robot=use.robot,
+            joint=use.joint,
+            is_revolute=use.is_revolute,
+            drift=np.array([0.0, 0.01, -0.02]) if use.joint == "B2" else np.zeros(3),
+            worst=0.02 if use.joint == "B2" else 0.0,
+            at_cycle=3 if use.joint == "B2" else 1,
+        )
+        for use in run.report.joints
+    )
+    found = Repeatability(instants=np.array([0.0, 1.0, 2.0, 3.0]), drifts=drifts, closes=False)
+    return replace(run, report=replace(run.report, repeatability=found))
+
+
+def test_the_drift_of_every_joint_is_told_by_task_or_for_all(passed_run: Any, pairwise_runs: Any) -> None:
+    assert record_of(passed_run)["repeatability"] == {}
+    found = record_of(drifting(passed_run))["repeatability"]["all"]
+    runs = {name: drifting(run) for name, run in pairwise_runs.items()}
+
+    assert (found["cycles"], found["period_s"], found["ends_s"], found["closes"]) == (3, 1.0, [1.0, 2.0, 3.0], False)
+    assert (found["worst_drift_deg"], found["joint"], found["at_cycle"]) == (
+        pytest.approx(math.degrees(0.02)),
+        "kuka B2",
+        3,
+    )
+    assert found["per_joint"]["kuka"]["B2"]["drift"] == pytest.approx([0.0, math.degrees(0.01), -math.degrees(0.02)])
+    assert set(summary_of(runs)["repeatability"]) == set(runs)
+
+
+def test_what_is_judged_of_a_settling_task_stands_beside_all_of_it(passed_run: Any) -> None:
+    tasks = tuple(
+        replace(task, settle=1.0, repeat=2) if task.name == "circle" else task for task in passed_run.cell.tasks
+    )
+    error = passed_run.report.accuracy[0].position_error.copy()
+    error[0] = [0.3, 0.4, 0.0]
+    accuracy = (replace(passed_run.report.accuracy[0], position_error=error), *passed_run.report.accuracy[1:])
+    run = replace(
+        passed_run,
+        cell=replace(passed_run.cell, tasks=tasks),
+        report=replace(passed_run.report, accuracy=accuracy),
+    )
+
+    task = record_of(run)["tasks"]["circle"]
+
+    assert accuracy[0].task == "circle"
+    assert (task["settle_s"], task["judged_from_s"], task["cycles"]) == (1.0, 1.0, 2)
+    assert task["max_position_error_with_settling_mm"] == pytest.approx(500.0)
+    assert task["max_position_error_mm"] < 1.0
+    assert task["max_position_error_at_s"] >= 1.0
+    other = record_of(run)["tasks"]["rhombus"]
+    assert other["max_position_error_with_settling_mm"] == other["max_position_error_mm"]

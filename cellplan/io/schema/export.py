@@ -1,8 +1,9 @@
-"""The formats of the cell file and of the robot table as JSON Schemas, for editors and the reference."""
+"""The formats of the cell file, the robot table and the errors file as JSON Schemas, for editors and the reference."""
 
 from typing import Any
 
 from cellplan.io.schema.cell import CellDocument
+from cellplan.io.schema.errors import ErrorsDocument
 from cellplan.io.schema.robot_table import RobotTableDocument
 
 
@@ -14,6 +15,11 @@ def json_schema() -> dict[str, Any]:
 def robot_table_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a joint-axis table."""
     return _finished(RobotTableDocument.model_json_schema(), "cellplan robot table")
+
+
+def errors_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of an errors file."""
+    return _finished(ErrorsDocument.model_json_schema(), "cellplan errors file, version 1")
 
 
 def _finished(schema: dict[str, Any], title: str) -> dict[str, Any]:

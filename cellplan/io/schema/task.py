@@ -105,11 +105,17 @@ class PolylineEntry(Entry):
 class CsvEntry(Entry):
     """Tool targets from a CSV file."""
 
-    file: Text = Field(description="File with the header x_mm,y_mm,z_mm and optionally i,j,k or qw,qx,qy,qz.")
+    file: Text = Field(
+        description="File with the header x_mm,y_mm,z_mm and optionally i,j,k or qw,qx,qy,qz, and t_s for a trajectory "
+        "that brings its own clock."
+    )
     smooth: bool = Field(
         default=True, description="Whether a curve is laid through the points instead of straight sides."
     )
-    closed: bool = Field(default=False, description="Whether the last point is joined to the first.")
+    closed: bool = Field(
+        default=False,
+        description="Whether the last point is joined to the first; a closed trajectory ends with its first row again.",
+    )
 
 
 CsvChoice = Annotated[
@@ -232,7 +238,8 @@ class TaskEntry(Entry):
     tool_x: Direction = Field(default="+x", description="Direction in the part frame that the tool's x axis leans to.")
     tool_turn_deg: Angle = Field(
         default=0.0,
-        description="Angle by which the tool turns about its own z axis, evenly over the length of the path.",
+        description="Angle by which the tool turns about its own z axis, evenly over the length of the path, "
+        "and on by as much in every further cycle.",
     )
     axes: tuple[TaskAxis, ...] = Field(
         default=("x", "y", "z", "rx", "ry", "rz"),
@@ -248,13 +255,14 @@ class TaskEntry(Entry):
     )
     duration_s: Seconds | None = Field(
         default=None,
-        description="Time for the whole path; the rest of the motion's duration when absent. Excludes feed_mm_s.",
+        description="Time for the whole path, all cycles together; the rest of the motion's duration when absent. "
+        "Excludes feed_mm_s.",
     )
     feed_mm_s: SlidingSpeed | None = Field(
         default=None, description="Largest speed along the path on the surface; excludes duration_s."
     )
     repeat: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
-        default=1, description="How often a closed path is gone through; the duration is that of all cycles together."
+        default=1, description="How often a closed path is gone through; more than once only a closed one."
     )
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
         default=0.0,

@@ -1,4 +1,4 @@
-"""Rehearsal: what a start posture is worth, seen from the motion that follows from it on a coarse clock."""
+"""Start trials: what a start posture is worth, seen from the motion that follows from it on a coarse clock."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -24,7 +24,7 @@ TOUCH_INSTANTS: Final = 12  # instants of the coarse motion that are looked at f
 TOUCHING: Final = 2.0  # taken off the quality of a posture that collides on the way
 
 
-class Rehearsal:
+class StartTrials:
     """The coarse clock of one cell, on which start postures are tried.
 
     Attributes:
@@ -33,8 +33,8 @@ class Rehearsal:
     """
 
     def __init__(self, scene: Scene, toolpaths: Mapping[str, Toolpath]) -> None:
-        """Choose a step that makes few samples of the whole motion."""
-        cell = scene.cell
+        """Choose a step that makes few samples of the whole motion, of which every path is gone through once."""
+        cell = replace(scene.cell, tasks=tuple(_first_cycle(task) for task in scene.cell.tasks))
         schedule = schedule_tasks(cell, [toolpaths[task.name] for task in cell.tasks])
         step = float(max(cell.motion.step, schedule.times[-1] / SAMPLES))
         self._scene, self._toolpaths, self._step = scene, toolpaths, step
@@ -76,7 +76,9 @@ class Rehearsal:
             start[cell.columns(name)] = holder_posture
         movers = () if cell.motion.mode is Mode.PART_AT_REST else cell.positioners
         is_together = cell.motion.mode is Mode.SIMULTANEOUS
-        tasks = tuple(each.name for each in cell.tasks if each is task or (is_together and each.robot in movers))
+        tasks = tuple(
+            each.name for each in cell.tasks if each.name == task.name or (is_together and each.robot in movers)
+        )
         try:
             motions = self._motions(cell, start, [RunPlan(name=None, tasks=tasks, moving=(*movers, task.robot))])
         except NoSolutionError:
@@ -91,6 +93,12 @@ class Rehearsal:
             schedule = schedule_tasks(cell, [self._toolpaths[name] for name in run.tasks])
             motions.append(follow(cell, schedule, start=start, moving=run.moving).q)
         return motions
+
+
+def _first_cycle(task: Task) -> Task:
+    """A task that goes through its path once, as fast as it does on the whole."""
+    duration = None if task.duration is None else task.duration / task.repeat
+    return replace(task, repeat=1, duration=duration)
 
 
 def _open_pairs(scene: Scene) -> NDArray[np.bool_]:

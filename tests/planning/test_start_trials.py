@@ -1,4 +1,4 @@
-"""Rehearsals on a coarse clock against the full motion of the reference cell."""
+"""Start postures tried on a coarse clock against the full motion of the reference cell."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell import Obstacle
 from cellplan.pipeline.overrides import with_overrides
-from cellplan.planning.rehearsal import TOUCHING, Rehearsal
+from cellplan.planning.start_trials import TOUCHING, StartTrials
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.scene import Scene
 
@@ -20,9 +20,9 @@ def cell(cells):
     return load_cell(cells / "four_robots.yaml")
 
 
-def rehearsal_of(cell):
+def trials_of(cell):
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
-    return Rehearsal(Scene.from_cell(cell), toolpaths)
+    return StartTrials(Scene.from_cell(cell), toolpaths)
 
 
 def start_of(cell):
@@ -36,8 +36,8 @@ def share_left_free(report, robots):
     return min(ranges, *(1 - use.peak_velocity / use.velocity_limit for use in used))
 
 
-def test_rehearsal_foretells_what_the_full_motion_leaves_free(cell):
-    quality, start = rehearsal_of(cell).judge(start_of(cell))
+def test_the_coarse_clock_foretells_what_the_full_motion_leaves_free(cell):
+    quality, start = trials_of(cell).judge(start_of(cell))
 
     np.testing.assert_array_equal(start, start_of(cell))  # given postures stay on their turn
     expected = share_left_free(solve(cell).runs[0].report, {robot.name for robot in cell.robots})
@@ -48,7 +48,7 @@ def test_an_operator_judged_alone_is_judged_as_in_a_run_of_its_own(cell):
     task = cell.task("rectangle")
     holder = cell.robot("reis").start
 
-    quality = rehearsal_of(cell).judge_alone(task, cell.robot("staubli").start, holder)
+    quality = trials_of(cell).judge_alone(task, cell.robot("staubli").start, holder)
 
     run = solve(with_overrides(cell, mode="pairwise"), task="rectangle").runs[0]
     assert quality == pytest.approx(share_left_free(run.report, {"reis", "staubli"}), abs=0.02)
@@ -68,8 +68,8 @@ def test_a_collision_on_the_way_costs_more_than_any_limit(cell):
     )
     assert Scene.from_cell(blocked).touching(start_of(cell)) is None
 
-    free, _ = rehearsal_of(cell).judge(start_of(cell))
-    colliding, _ = rehearsal_of(blocked).judge(start_of(cell))
+    free, _ = trials_of(cell).judge(start_of(cell))
+    colliding, _ = trials_of(blocked).judge(start_of(cell))
 
     assert colliding == pytest.approx(free - TOUCHING)
 
@@ -77,4 +77,4 @@ def test_a_collision_on_the_way_costs_more_than_any_limit(cell):
 def test_a_lost_path_is_worth_nothing(cell):
     start = start_of(cell)
     start[cell.columns("kuka")] += 2.0
-    assert rehearsal_of(cell).judge(start)[0] == -np.inf
+    assert trials_of(cell).judge(start)[0] == -np.inf

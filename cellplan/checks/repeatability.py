@@ -1,0 +1,112 @@
+"""Joint drift: how far the joints are after each cycle from where they were at its start."""
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Schedule
+from cellplan.model.report import Check, JointDrift, Repeatability
+from cellplan.model.task import INSTANT_ROOM
+
+TURN_LIMIT: Final = float(np.deg2rad(0.001))  # [rad] below the repeatability of any arm's joints
+SLIDE_LIMIT: Final = 1e-6  # [m] likewise
+UNITS: Final = {True: ("deg", float(np.rad2deg(1.0))), False: ("mm", 1e3)}  # of joints that turn, of joints that slide
+
+
+def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Repeatability | None:
+    """How far every joint is at the end of each cycle from where it was at its start.
+
+    A cycle lies between two instants at which all tools are at the pose of their start together. Tasks that begin and
+    end their cycles together are taken cycle by cycle; otherwise the whole run is one cycle. Cycles that begin while a
+    tool still settles are left out. Between two samples a joint moves evenly.
+
+    Args:
+        cell: The cell.
+        schedule: The tasks that were worked on.
+        q: Positions read back in [rad] or [m], shape (N, n), by robot.
+
+    Returns:
+        The drift of every joint; None when a tool does not come back, or no cycle is left.
+    """
+    instants = _instants(schedule)
+    if len(instants) < 2:
+        return None
+    drifts = []
+    for robot in cell.robots:
+        for joint, positions in zip(robot.model.joints, q[robot.name].T, strict=True):
+            drift = np.diff(np.interp(instants, schedule.times, positions))
+            k = int(np.argmax(np.abs(drift)))
+            drifts.append(
+                JointDrift(
+                    robot=robot.name,
+                    joint=joint.name,
+                    is_revolute=joint.is_revolute,
+                    drift=drift,
+                    worst=float(abs(drift[k])),
+                    at_cycle=k + 1,
+                )
+            )
+    closes = all(drift.worst <= _limit(drift) for drift in drifts)
+    return Repeatability(instants=instants, drifts=tuple(drifts), closes=closes)
+
+
+def check_joint_drift(found: Repeatability | None, *, is_demanded: bool) -> tuple[Check, ...]:
+    """Whether every joint comes back in every cycle; nothing is checked when the cell does not ask for it.
+
+    Args:
+        found: What is known of the run; a run without a cycle cannot keep the demand.
+        is_demanded: Whether the cell asks for a joint motion that closes.
+    """
+    if not is_demanded:
+        return ()
+    if found is None:
+        message = "joint drift: there is no cycle to judge, as not all tools come back to the pose of their start"
+        return (
+            Check(
+                name="joint_drift",
+                subject="cell",
+                passed=False,
+                value=0.0,
+                limit=1.0,
+                unit="cycles",
+                at_s=None,
+                message=message,
+            ),
+        )
+    return tuple(_check(found, drift) for drift in found.drifts)
+
+
+def _instants(schedule: Schedule) -> Array:
+    """Instants at which all tools are at their start together, shape (cycles + 1,); fewer than two: no cycle."""
+    if not schedule.tasks or not all(scheduled.cycle_ends for scheduled in schedule.tasks):
+        return np.zeros(0)
+    bounds = [np.array([scheduled.task.start, *scheduled.cycle_ends]) for scheduled in schedule.tasks]
+    is_common = all(len(b) == len(bounds[0]) and np.abs(b - bounds[0]).max() <= INSTANT_ROOM for b in bounds)
+    instants = bounds[0] if is_common else np.array([min(b[0] for b in bounds), max(b[-1] for b in bounds)])
+    settled = max(scheduled.task.judged_from for scheduled in schedule.tasks)
+    return instants[instants >= settled - INSTANT_ROOM]
+
+
+def _limit(drift: JointDrift) -> float:
+    """Largest drift of a joint that comes back, in [rad] or [m]."""
+    return TURN_LIMIT if drift.is_revolute else SLIDE_LIMIT
+
+
+def _check(found: Repeatability, drift: JointDrift) -> Check:
+    """One joint against its limit."""
+    unit, scale = UNITS[drift.is_revolute]
+    value, limit = scale * drift.worst, scale * _limit(drift)
+    return Check(
+        name="joint_drift",
+        subject=f"{drift.robot} {drift.joint}",
+        passed=drift.worst <= _limit(drift),
+        value=value,
+        limit=limit,
+        unit=unit,
+        at_s=float(found.instants[drift.at_cycle]),
+        message=f"{drift.robot} {drift.joint} is {value:.3g} {unit} from where it was a cycle before, "
+        f"at {found.instants[drift.at_cycle]:.3f} s, the end of cycle {drift.at_cycle}; allowed {limit:g} {unit}",
+    )

@@ -1,0 +1,65 @@
+"""True errors: how far the tools of real cells are from their tasks, judged by the tasks' tolerances."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.rehearsal import RunRehearsal
+from cellplan.model.report import Check, TaskAccuracy
+
+KINDS: Final = (("position", "mm", 1e3), ("orientation", "deg", float(np.rad2deg(1.0))))
+
+
+def largest(errors: Array, first: int) -> float:
+    """Largest length of error vectors, shape (N, 3), from a sample on."""
+    return float(np.linalg.norm(errors[first:], axis=1).max())
+
+
+def worst_share(cell: Cell, accuracy: Sequence[TaskAccuracy], judged_from: Mapping[str, int]) -> float:
+    """Largest error of all tasks as a share of its tolerance; an error where none is allowed is infinite."""
+    shares = [0.0]
+    for errors in accuracy:
+        tolerance, first = cell.task(errors.task).tolerance, judged_from[errors.task]
+        for found, allowed in (
+            (largest(errors.position_error, first), tolerance.position),
+            (largest(errors.orientation_error, first), tolerance.orientation),
+        ):
+            shares.append(found / allowed if allowed > 0.0 else np.inf if found > 0.0 else 0.0)
+    return max(shares)
+
+
+def check_true_errors(cell: Cell, run: RunRehearsal) -> tuple[Check, ...]:
+    """Position and orientation error of each task of a run, at its worst over all trials, against its tolerance."""
+    return tuple(
+        _check(cell, run, place, kind) for place in range(len(run.trials[0].final)) for kind in range(len(KINDS))
+    )
+
+
+def _check(cell: Cell, run: RunRehearsal, place: int, kind: int) -> Check:
+    """One error of one task."""
+    name, unit, scale = KINDS[kind]
+    found = [trial.final[place] for trial in run.trials]
+    task = cell.task(found[0].task)
+    first = run.judged_from[task.name]
+    series = np.stack(
+        [np.linalg.norm((each.position_error, each.orientation_error)[kind][first:], axis=1) for each in found]
+    )
+    trial, sample = np.unravel_index(int(np.argmax(series)), series.shape)
+    value, at_s = scale * float(series[trial, sample]), float(run.times[first + sample])
+    limit = scale * (task.tolerance.position, task.tolerance.orientation)[kind]
+    after = " after correcting" if run.trials[0].correction is not None else ""
+    which = f" in trial {trial + 1} of {len(found)}" if len(found) > 1 else ""
+    return Check(
+        name=f"true_{name}_error",
+        subject=task.name,
+        passed=value <= limit,
+        value=value,
+        limit=limit,
+        unit=unit,
+        at_s=at_s,
+        message=f"true {name} error of task '{task.name}'{after}: {value:.3g} {unit} at {at_s:.3f} s{which}, "
+        f"allowed {limit:g} {unit}",
+    )

@@ -1,0 +1,75 @@
+"""What a rehearsal shows on the screen: verdict, true errors before and after, convergence, and where the report is."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+Record = dict[str, Any]
+
+TITLES = {"before": "as solved", "after": "corrected", "in_pass": "corrected within the pass"}
+OUTCOMES = {
+    "converged": "converged",
+    "stalled": "does not converge: the error falls no more",
+    "diverged": "does not converge: the error grew, or the corrected references cannot be followed",
+    "unfinished": "not converged yet: allow more --rounds",
+}
+
+
+def read_record(folder: Path) -> Record:
+    """The rehearsal as it stands on disk."""
+    record: Record = json.loads((folder / "rehearsal.json").read_text(encoding="utf-8"))
+    return record
+
+
+def summary_lines(record: Record, folder: Path) -> list[str]:
+    """Lines for people about one rehearsal."""
+    cells = "one real cell" if record["trials"] == 1 else f"{record['trials']} real cells"
+    return [
+        f"{record['cell']}: {record['status']}",
+        f"  mode {record['mode']}, {record['cycle_time_s']:g} s, rehearsed on {cells}, seed {record['seed']}",
+        *_task_lines(record),
+        *_repeatability_lines(record["tasks"]),
+        *_round_lines(record["runs"]),
+        *(f"  FAILED {check['message']}" for check in record["checks"] if not check["passed"]),
+        f"report: {folder / 'rehearsal.html'}",
+        *([f"tables: {folder / 'tables'}"] if record["tables_released"] else []),
+    ]
+
+
+def _task_lines(record: Record) -> Iterator[str]:
+    for name, task in record["tasks"].items():
+        for key, title in TITLES.items():
+            place, found = f"  task {name} ({task['robot']}), {title}", task[key]
+            if found is not None:
+                position, orientation = found["max_position_error_mm"], found["max_orientation_error_deg"]
+                lost = record["trials"] - found["trials"]
+                yield f"{place}: true error {position:.2g} mm, {orientation:.2g} deg" + (
+                    f", path lost in {lost} trials" if lost else ""
+                )
+            elif key == "in_pass" and record["in_pass"]:
+                yield f"{place}: the path was lost"
+
+
+def _repeatability_lines(tasks: Record) -> Iterator[str]:
+    """Path accuracy and repeatability where there is more than one trial."""
+    for name, task in tasks.items():
+        for key, figures in task["iso_9283"].items():
+            if figures is not None and figures["RT_p_mm"] is not None:
+                accuracy, spread = figures["AT_p_mm"], figures["RT_p_mm"]
+                yield f"  task {name}, {TITLES[key]}: AT_p {accuracy:.2g} mm, RT_p {spread:.2g} mm"
+
+
+def _round_lines(runs: list[Record]) -> Iterator[str]:
+    """How correcting ended: the convergence table of a single cell, the count of each outcome of several."""
+    for run in runs:
+        where = f"{run['name']}: " if run["name"] else ""
+        corrections = [trial["correction"] for trial in run["trials"] if trial["correction"] is not None]
+        for outcome, words in OUTCOMES.items():
+            count = sum(correction["outcome"] == outcome for correction in corrections)
+            if count:
+                share = f" in {count} of {len(corrections)} trials" if len(corrections) > 1 else ""
+                yield f"  {where}feedback {words}{share}"
+        if len(corrections) == 1:
+            for made in corrections[0]["rounds"]:
+                yield f"    round {made['round']}: largest true error {made['share_of_tolerance']:.3g} of its tolerance"

@@ -1,0 +1,75 @@
+"""``cellplan rehearse``: execute a solved program on cells with errors, and correct it from measurements."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet
+from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.progress import progress_listener
+from cellplan.errors import ExitStatus
+
+SCHEMA = "cellplan.rehearse/1"
+
+ErrorsFile = Annotated[
+    Path, typer.Option("--errors", metavar="FILE", help="How the real cell differs (YAML).", show_default=False)
+]
+Feedback = Annotated[
+    bool, typer.Option("--feedback", help="Correct the references from pass to pass until the true error converges.")
+]
+InPass = Annotated[
+    bool, typer.Option("--in-pass", help="Also execute with the measured error fed back from instant to instant.")
+]
+Rounds = Annotated[int, typer.Option("--rounds", metavar="N", help="Most corrections from pass to pass.")]
+Trials = Annotated[
+    int | None, typer.Option("--trials", metavar="N", help="Real cells that are drawn (default: as in the file).")
+]
+Seed = Annotated[int | None, typer.Option("--seed", metavar="N", help="Seed of the draws (default: as in the file).")]
+Output = Annotated[
+    Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder (default: outputs/<cell name>/rehearsal).")
+]
+
+
+def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
+    cell: CellFile,
+    errors: ErrorsFile,
+    feedback: Feedback = False,
+    in_pass: InPass = False,
+    rounds: Rounds = 20,
+    trials: Trials = None,
+    seed: Seed = None,
+    output: Output = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    allow_dir: AllowDirs = None,
+) -> None:
+    """Execute the solved program on perturbed cells and report the true errors of the tools on the part.
+
+    Exit status: 0 the true errors are within tolerance (after feedback when asked), 1 they are not, 2 bad input,
+    3 no solution, 4 internal error.
+    """
+    with json_failure(SCHEMA, wanted=as_json):
+        from cellplan.cli.rehearsal_summary import read_record, summary_lines
+        from cellplan.io.cell_file import load_cell
+        from cellplan.io.errors_file import load_errors
+        from cellplan.io.run_folder import REHEARSAL, refuse_unless_replaceable
+        from cellplan.pipeline.overrides import with_draws
+        from cellplan.pipeline.rehearse import rehearse as rehearse_cell
+        from cellplan.pipeline.write_rehearsal import write_rehearsal
+
+        asked = load_cell(cell, allow_dirs=allow_dir or ())
+        stated = with_draws(load_errors(errors, asked), trials=trials, seed=seed)
+        folder = output or Path("outputs") / asked.name / REHEARSAL
+        refuse_unless_replaceable(folder)
+        with progress_listener(quiet=quiet) as progress:
+            made = rehearse_cell(asked, stated, feedback=feedback, in_pass=in_pass, rounds=rounds, progress=progress)
+            write_rehearsal(made, folder, progress=progress)
+        record = read_record(folder)
+    status = ExitStatus.PASSED if made.passed else ExitStatus.CHECK_FAILED
+    if as_json:
+        place = {"folder": str(folder), "report_path": str(folder / "rehearsal.html")}
+        say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "rehearsal": record})
+    else:
+        say("\n".join(summary_lines(record, folder)))
+    raise typer.Exit(status)
