@@ -47,6 +47,10 @@ class StartOffTaskError(InputError):
     """A start posture given in the cell does not put the tool on the start of its task."""
 
 
+class StartOffGraspError(InputError):
+    """A start posture given in the cell does not put the tool of a further holder where it holds the part."""
+
+
 class NotPlanarError(InputError):
     """A cell was to be treated as planar, but one of its joints moves something out of the plane."""
 

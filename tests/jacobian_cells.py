@@ -8,16 +8,17 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.combined import CombinedModel
 from cellplan.model.cell import Cell
 from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
-from cellplan.planning.cooperation import column_signs, cooperation_jacobian
+from cellplan.planning.cooperation import column_signs, cooperation_jacobian, reference_frames
 
 
 def planners_jacobian(cell: Cell, q: Array) -> Array:
-    """The planner's matrix, from another engine, with every robot moving; shape (tasks, 6, nq)."""
+    """The planner's matrix, from another engine, with every robot moving; shape (tasks + further holders, 6, nq)."""
     model = CombinedModel(cell)
     state = model.state(q)
     names = [robot.name for robot in cell.robots]
-    p_WT = state.X_WT[[names.index(task.robot) for task in cell.tasks], :3, 3]
-    return cooperation_jacobian(state, p_WT, column_signs(cell, model, cell.tasks, names))
+    p_WT = state.X_WT[[names.index(relation.robot) for relation in cell.relations], :3, 3]
+    signs = column_signs(cell, model, cell.relations, names)
+    return cooperation_jacobian(state, p_WT, signs, X_WR=reference_frames(state, cell.relations))
 
 
 def model_of(axes: list[tuple[str, tuple[float, float, float], tuple[float, float, float]]], X_BF: Array) -> RobotModel:

@@ -19,7 +19,7 @@ from cellplan.model.cell import (
 )
 from cellplan.model.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
 from cellplan.model.solver import SolverSettings
-from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
+from cellplan.model.task import CirclePath, Frame, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
 
 
 def random_pose(rng: np.random.Generator) -> Array:
@@ -139,6 +139,20 @@ def random_cell(
         origin=Origin(),
         inputs={},
     )
+
+
+def sharing(cell: Cell, holders: int, *, axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)) -> Cell:
+    """The cell with its last operators as further holders of the part, at grasps drawn at random."""
+    rng = np.random.default_rng(holders)
+    names = [task.robot for task in cell.tasks[-holders:]]
+    grasps = tuple(Grasp(robot=name, X_PT=random_pose(rng), axes=axes) for name in names)
+    part = replace(cell.part, held_by=(*cell.part.held_by, *grasps))
+    return replace(cell, part=part, tasks=cell.tasks[:-holders])
+
+
+def carried(cell: Cell) -> Cell:
+    """The cell with one more task, which says where the holder carries the part in the world."""
+    return replace(cell, tasks=(*cell.tasks, make_task("holder", relative_to=Frame.WORLD)))
 
 
 def moved(cell: Cell, X: Array) -> Cell:

@@ -15,6 +15,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check, ClearanceClass, ClearanceMinimum, ClearanceReport, Contact
+from cellplan.model.task import Frame
 from cellplan.scene.bodies import Kind
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -95,7 +96,7 @@ def check_clearance(
 def _idle_exclusions(scene: Scene, schedule: Schedule) -> dict[int, str]:
     """Pairs of the part with robots whose task is not worked on now, and what is said of them."""
     at_work = {scheduled.task.robot for scheduled in schedule.tasks}
-    idle = {task.robot for task in scene.cell.tasks} - at_work
+    idle = {task.robot for task in scene.cell.tasks if task.relative_to is Frame.PART} - at_work
     left_out = {}
     for row, pair in enumerate(scene.pairs):
         ends = [scene.bodies[pair.first], scene.bodies[pair.second]]

@@ -6,9 +6,10 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, skew
 from cellplan.kinematics.screws import ScrewChain
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.cell import Cell, Relation
+from cellplan.model.motion import Schedule
 from cellplan.model.report import Conditioning
+from cellplan.model.task import Frame
 
 SAMPLES_AT_ONCE = 2000  # keeps the stacked matrices of 16 robots below 100 MB
 
@@ -27,8 +28,9 @@ def conditioning(
     The manipulability of the stack J is ``w = sqrt(det(J J^T))`` ([Ribeiro2010]_ Eq. D.45), here the product of its
     singular values: it also holds where ``det`` would lose its digits. A stack with more rows than columns has 0.
 
-    An operator's Jacobian has the rows its task constrains; a positioner's gives the twist of the part frame. Joints
-    that stand still are left out. Metres and radians stand side by side as they come.
+    An operator's Jacobian has the rows its task constrains, a further holder's those of its grasp; that of the robot
+    that carries the part gives the twist of the part frame, or has the rows of the path it carries the part along.
+    Joints that stand still are left out. Metres and radians stand side by side as they come.
 
     Args:
         cell: The cell.
@@ -42,15 +44,19 @@ def conditioning(
     at_each: Array = np.broadcast_to(X_WP, (count, 4, 4))
     stack: list[Array] = []
     robots: dict[str, list[Array]] = {}
+    relations = _relations(cell, schedule, moving)
     for first in range(0, count, SAMPLES_AT_ONCE):
         piece = slice(first, first + SAMPLES_AT_ONCE)
         positions = {name: values[piece] for name, values in q.items()}
-        blocks = _blocks(cell, schedule, chains, positions, piece=piece, X_WP=at_each[piece])
-        stack.append(_singular_values(_stacked(cell, schedule, blocks, moving)))
-        for task in (scheduled.task for scheduled in schedule.tasks):
-            robots.setdefault(task.robot, []).append(_smallest(blocks[task.name][0]))
+        rows = [
+            _blocks(cell, each, chains, positions, X_WP=at_each[piece], R_PT=R_PT[piece]) for each, R_PT in relations
+        ]
+        names = [*cell.positioners[:1], *(each.robot for each, _ in relations)]
+        stack.append(_singular_values(_stacked(rows, names, moving)))
+        for (relation, _), row in zip(relations, rows, strict=True):
+            robots.setdefault(relation.robot, []).append(_smallest(row[relation.robot]))
         for name in cell.positioners[:1]:
-            if name in moving:
+            if name in moving and all(relation.robot != name for relation, _ in relations):
                 J_WP = _at_point(chains[name].flange_screws(positions[name]), at_each[piece])
                 robots.setdefault(name, []).append(_smallest(J_WP))
     spectrum = np.concatenate(stack)
@@ -63,36 +69,42 @@ def conditioning(
     )
 
 
+def _relations(cell: Cell, schedule: Schedule, moving: Sequence[str]) -> list[tuple[Relation, Array]]:
+    """Tasks worked on, then grasps of further holders that move, each with wanted rotations of its tool in P."""
+    tasks: list[tuple[Relation, Array]] = [(each.task, each.X_PT[:, :3, :3]) for each in schedule.tasks]
+    count = len(schedule.times)
+    grasps = [grasp for grasp in cell.closures if grasp.robot in moving]
+    return tasks + [(grasp, np.broadcast_to(grasp.X_PT[:3, :3], (count, 3, 3))) for grasp in grasps]
+
+
 def _blocks(
     cell: Cell,
-    schedule: Schedule,
+    relation: Relation,
     chains: Mapping[str, ScrewChain],
     q: Mapping[str, Array],
     *,
-    piece: slice,
     X_WP: Array,
-) -> dict[str, tuple[Array, Array | None]]:
-    """Constrained rows of each task: the operator's columns and the positioner's, by task name."""
-    holder = cell.positioners[0] if cell.positioners else None
-    blocks = {}
-    for scheduled in schedule.tasks:
-        X_WT = chains[scheduled.task.robot].tool_poses(q[scheduled.task.robot])
-        at_tip = X_WP.copy()
-        at_tip[:, :3, 3] = X_WT[:, :3, 3]
-        pick = _pick(scheduled, piece)
-        own = pick @ _at_point(chains[scheduled.task.robot].flange_screws(q[scheduled.task.robot]), at_tip)
-        others = None if holder is None else -pick @ _at_point(chains[holder].flange_screws(q[holder]), at_tip)
-        blocks[scheduled.task.name] = (own, others)
+    R_PT: Array,
+) -> dict[str, Array]:
+    """Constrained rows of one task or grasp over the joints of each robot that has a part in it, by robot name."""
+    robot = relation.robot
+    is_on_part = relation.relative_to is Frame.PART
+    at_tip: Array = X_WP.copy() if is_on_part else np.tile(np.eye(4), (len(X_WP), 1, 1))
+    at_tip[:, :3, 3] = chains[robot].tool_poses(q[robot])[:, :3, 3]
+    pick = _pick(relation, R_PT)
+    blocks = {robot: pick @ _at_point(chains[robot].flange_screws(q[robot]), at_tip)}
+    if is_on_part and cell.positioners:
+        holder = cell.positioners[0]
+        blocks[holder] = -pick @ _at_point(chains[holder].flange_screws(q[holder]), at_tip)
     return blocks
 
 
-def _pick(scheduled: TaskSchedule, piece: slice) -> Array:
-    """Rows that a task constrains, from a twist in P, shape (N, m, 6)."""
-    task, R_PT = scheduled.task, scheduled.X_PT[piece, :3, :3]
-    axes = [axis for axis in task.axes if axis < 3 or not task.is_spin_free]
-    rows = np.zeros((len(R_PT), len(axes) + 2 * task.is_spin_free, 6))
+def _pick(relation: Relation, R_PT: Array) -> Array:
+    """Rows that a task or grasp constrains, from a twist in P, shape (N, m, 6)."""
+    axes = [axis for axis in relation.axes if axis < 3 or not relation.is_spin_free]
+    rows = np.zeros((len(R_PT), len(axes) + 2 * relation.is_spin_free, 6))
     rows[:, range(len(axes)), axes] = 1.0
-    if task.is_spin_free:
+    if relation.is_spin_free:
         rows[:, -2, 3:], rows[:, -1, 3:] = R_PT[:, :, 0], R_PT[:, :, 1]
     return rows
 
@@ -104,20 +116,16 @@ def _at_point(screws_W: Array, X_W: Array) -> Array:
     return np.concatenate([R_T @ linear, R_T @ screws_W[:, 3:]], axis=1)
 
 
-def _stacked(
-    cell: Cell, schedule: Schedule, blocks: Mapping[str, tuple[Array, Array | None]], moving: Sequence[str]
-) -> Array:
-    """Arrow matrix of all tasks over the joints that may move, shape (N, rows, columns)."""
-    holder_moves = bool(cell.positioners) and cell.positioners[0] in moving
-    rows = []
-    for scheduled in schedule.tasks:
-        own, holder = blocks[scheduled.task.name]
-        row: list[Array] = [holder] if holder_moves and holder is not None else []
-        for other in schedule.tasks:
-            width = blocks[other.task.name][0].shape[2]
-            row.append(own if other is scheduled else np.zeros((*own.shape[:2], width)))
-        rows.append(np.concatenate(row, axis=2))
-    return np.concatenate(rows, axis=1)
+def _stacked(rows: Sequence[Mapping[str, Array]], robots: Sequence[str], moving: Sequence[str]) -> Array:
+    """Arrow matrix of all tasks and closures over the joints that may move, shape (N, rows, columns)."""
+    movers = [name for name in dict.fromkeys(robots) if name in moving]
+    widths = {name: block.shape[2] for row in rows for name, block in row.items()}
+    stacked = []
+    for row in rows:
+        shape = next(iter(row.values())).shape[:2]
+        blocks = [row[name] if name in row else np.zeros((*shape, widths[name])) for name in movers if name in widths]
+        stacked.append(np.concatenate([*blocks, np.zeros((*shape, 0))], axis=2))
+    return np.concatenate(stacked, axis=1)
 
 
 def _singular_values(J: Array) -> Array:

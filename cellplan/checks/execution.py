@@ -11,6 +11,7 @@ from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.report import TaskAccuracy
+from cellplan.model.task import Frame
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +34,7 @@ class RealCell:
         self._chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
 
     def tool_poses(self, robots: Sequence[str], q: Array) -> tuple[Array, ...]:
-        """Tool tips of some robots on the part.
+        """Tool tips of some robots on the part, or in the world where a robot's task is given there.
 
         Args:
             robots: Their names.
@@ -43,8 +44,10 @@ class RealCell:
             Poses X_PT, shape (N, 4, 4) each.
         """
         own = {robot.name: q[:, self._cell.columns(robot.name)] for robot in self._cell.robots}
-        X_PW = inverse(part_poses(self._cell, self._chains, own))
-        return tuple(X_PW @ self._chains[name].tool_poses(own[name]) for name in robots)
+        X_WP = part_poses(self._cell, self._chains, own)
+        in_world = {task.robot for task in self._cell.tasks if task.relative_to is Frame.WORLD}
+        X_WT = {name: self._chains[name].tool_poses(own[name]) for name in robots}
+        return tuple(X_WT[name] if name in in_world else inverse(X_WP) @ X_WT[name] for name in robots)
 
     def accuracy(self, schedule: Schedule, q: Array) -> tuple[TaskAccuracy, ...]:
         """True errors of all tasks of a schedule, for stacked joint positions of shape (N, nq)."""

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from cellplan.checks.clearance import check_clearance
+from cellplan.checks.closure import check_closure, closure_accuracy
 from cellplan.checks.conditioning import conditioning
 from cellplan.checks.limits import check_joints, joint_uses
 from cellplan.checks.locked import check_locked, told_with_failures
@@ -28,7 +29,7 @@ def verify(
     moving: Sequence[str],
     progress: Progress = silent,
 ) -> Report:
-    """Check tool errors, joint limits and clearance of a run.
+    """Check tool errors, closed grasps, joint limits and clearance of a run.
 
     The kinematics is that of successive screw displacements; nothing of the planner is used.
 
@@ -53,6 +54,7 @@ def verify(
     for scheduled, errors in zip(schedule.tasks, accuracy, strict=True):
         own_checks, tolerance = check_accuracy(schedule, errors, scheduled.task), scheduled.task.tolerance
         checks += told_with_failures(own_checks, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
+    checks += check_closure(cell, schedule.times, closures := closure_accuracy(cell, scene.chains, q, X_WP))
     uses: list[JointUse] = []
     for robot in cell.robots:
         own = joint_uses(robot, schedule.times, q[robot.name])
@@ -81,6 +83,7 @@ def verify(
         q=q,
         repeatability=drift,
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
+        closures=closures,
     )
 
 

@@ -22,7 +22,8 @@ def structure_lines(record: Record) -> list[str]:
         f"the part is held by {holders}" if holders else "the part is fixed in the world",
         *_robot_lines(record["robots"]),
         *_task_lines(record["tasks"]),
-        *_graph_lines(record["graph"]),
+        *_closure_lines(record["part"]),
+        *_graph_lines(record["graph"], [closure["name"] for closure in record["part"]["closures"]]),
         *_circuit_lines(record),
         *(line for matrix in record["matrices"] for line in _matrix_lines(matrix)),
     ]
@@ -53,10 +54,21 @@ def _task_lines(tasks: list[Record]) -> Iterator[str]:
     for task in tasks:
         wanted = [name for name in task["constrained"] if not name.startswith("across")]
         wanted += ["tool axis (spin is free)"] if len(wanted) < len(task["constrained"]) else []
-        yield f"  {task['name']:<{task_width}}  {task['robot']:<{robot_width}}  {' '.join(wanted)}"
+        place = "" if task["relative_to"] == "part" else "  in the world"
+        yield f"  {task['name']:<{task_width}}  {task['robot']:<{robot_width}}  {' '.join(wanted)}{place}"
 
 
-def _graph_lines(graph: Record) -> Iterator[str]:
+def _closure_lines(part: Record) -> Iterator[str]:
+    closures = part["closures"]
+    if closures:
+        width = _width(closure["name"] for closure in closures)
+        yield ""
+        yield f"grasps that close a loop over the part and the world; {part['held_by'][0]} carries the part frame"
+        for closure in closures:
+            yield f"  {closure['name']:<{width}}  keeps {' '.join(closure['kept'])}"
+
+
+def _graph_lines(graph: Record, closures: list[str]) -> Iterator[str]:
     """Counts, then every chain as the links it joins."""
     e, v, circuits = graph["edges"], graph["vertices"], graph["independent_circuits"]
     where = "PPPS, in space" if graph["plane"] is None else f"PPR, in the plane {graph['plane']}"
@@ -66,11 +78,18 @@ def _graph_lines(graph: Record) -> Iterator[str]:
     yield f"  l = e - v + 1 = {e} - {v} + 1 = {_count(circuits, 'independent circuit')}"
     chains: dict[str, list[Record]] = {}
     for joint in graph["joints"]:
-        chains.setdefault(("task " if joint["virtual"] else "") + joint["owner"], []).append(joint)
+        chains.setdefault(_owner(joint, closures), []).append(joint)
     width = _width(chains)
     for owner, joints in chains.items():
         steps = [f"-{_short(joint)}- {_link(joint['to'])}" for joint in joints]
         yield from _wrapped(f"  {owner:<{width}}  ", " ".join([joints[0]["from"], *steps]))
+
+
+def _owner(joint: Record, closures: list[str]) -> str:
+    """Whose chain a joint belongs to: a robot's, a task's, or what the grasp of a further holder leaves open."""
+    if not joint["virtual"]:
+        return str(joint["owner"])
+    return f"{'grasp' if joint['owner'] in closures else 'task'} {joint['owner']}"
 
 
 def _circuit_lines(record: Record) -> Iterator[str]:
@@ -89,9 +108,14 @@ def _circuit_lines(record: Record) -> Iterator[str]:
 
 
 def _from_first_virtual(passed: list[Record], joints: dict[str, Record]) -> list[Record]:
-    """A circuit as told from the first virtual joint on: along the virtual chain, then back over the robots."""
+    """A circuit as told from the first virtual joint on: along the virtual chain, then back over the robots.
+
+    A circuit without a virtual chain is told from the world on, up one robot that holds the part and down another.
+    """
     virtual = [joints[step["joint"]]["virtual"] for step in passed]
-    first = next((place for place, is_in in enumerate(virtual) if is_in and not virtual[place - 1]), 0)
+    upward = [step["sign"] > 0 and joints[step["joint"]]["from"] == "world" for step in passed]
+    marks = virtual if any(virtual) else upward
+    first = next((place for place, is_in in enumerate(marks) if is_in and not marks[place - 1]), 0)
     return passed[first:] + passed[:first]
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from cellplan.cli.joints import joint_record
 
 if TYPE_CHECKING:
-    from cellplan.model.cell import Cell, Robot
+    from cellplan.model.cell import Cell, Grasp, Robot
     from cellplan.model.task import Task
     from cellplan.pipeline.explain import MatrixShape, Structure
 
@@ -21,7 +21,7 @@ def structure_record(structure: Structure) -> dict[str, Any]:
     return {
         "cell": cell.name,
         "mode": str(cell.motion.mode),
-        "part": {"held_by": list(cell.positioners)},
+        "part": {"held_by": list(cell.positioners), "closures": [_closure_record(grasp) for grasp in cell.closures]},
         "robots": [_robot_record(cell, robot) for robot in cell.robots],
         "tasks": [_task_record(task) for task in cell.tasks],
         "graph": {
@@ -68,8 +68,14 @@ def _task_record(task: Task) -> dict[str, Any]:
     return {
         "name": task.name,
         "robot": task.robot,
+        "relative_to": str(task.relative_to),
         "constrained": [*wanted, *(TOOL_AXIS if task.is_spin_free else ())],
     }
+
+
+def _closure_record(grasp: Grasp) -> dict[str, Any]:
+    """What the grasp of a further holder keeps."""
+    return {"name": grasp.name, "robot": grasp.robot, "kept": [COMPONENTS[axis] for axis in grasp.axes]}
 
 
 def _matrix_record(cell: Cell, matrix: MatrixShape) -> dict[str, Any]:
@@ -82,11 +88,11 @@ def _matrix_record(cell: Cell, matrix: MatrixShape) -> dict[str, Any]:
         "run": matrix.plan.name,
         "rows": sum(matrix.rows),
         "columns": sum(matrix.columns),
-        "row_blocks": dict(zip(matrix.plan.tasks, matrix.rows, strict=True)),
+        "row_blocks": dict(zip(matrix.blocks, matrix.rows, strict=True)),
         "column_blocks": dict(zip(robots, matrix.columns, strict=True)),
         "signs": {
             task: {robot: int(sign) for robot, sign in zip(robots, row, strict=True)}
-            for task, row in zip(matrix.plan.tasks, matrix.signs.tolist(), strict=True)
+            for task, row in zip(matrix.blocks, matrix.signs.tolist(), strict=True)
         },
         "starts_to_find": list(matrix.missing),
         "rank": matrix.rank,

@@ -22,6 +22,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
         f"{record['cell']}: {record['status']}",
         f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_method_word(record['solver'])}",
         *_task_lines(record["tasks"]),
+        *_closure_lines(record.get("closure", {})),
         *_margin_lines(record["joints"]),
         *_speed_lines(record["joints"]),
         *_drift_lines(record.get("repeatability", {})),
@@ -42,6 +43,12 @@ def _task_lines(tasks: Record) -> Iterator[str]:
     for name, task in tasks.items():
         position, orientation = task["max_position_error_mm"], task["max_orientation_error_deg"]
         yield f"  task {name} ({task['robot']}): largest error {_short(position)} mm, {_short(orientation)} deg"
+
+
+def _closure_lines(closures: Record) -> Iterator[str]:
+    for robot, closure in closures.items():
+        position, orientation = closure["max_position_error_mm"], closure["max_orientation_error_deg"]
+        yield f"  grasp of {robot}: largest closure error {_short(position)} mm, {_short(orientation)} deg"
 
 
 def _margin_lines(joints: Record) -> Iterator[str]:

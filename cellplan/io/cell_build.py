@@ -1,6 +1,6 @@
 """Entries of a cell file, in millimetres and degrees, become the cell's frozen data in metres and radians."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -37,6 +37,7 @@ from cellplan.model.cell import (
 from cellplan.model.robot import BASE, Body, RobotModel
 from cellplan.model.task import (
     CirclePath,
+    Frame,
     PathSpec,
     PlaneName,
     PolygonPath,
@@ -88,7 +89,10 @@ def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
     return Part(
         shape=shape,
         X_PS=X_PS,
-        held_by=tuple(Grasp(robot=grasp.robot, X_PT=pose_from_entry(grasp.at)) for grasp in entry.held_by),
+        held_by=tuple(
+            Grasp(robot=grasp.robot, X_PT=pose_from_entry(grasp.at), axes=_axis_numbers(grasp.axes))
+            for grasp in entry.held_by
+        ),
         X_WP=None if entry.at is None else pose_from_entry(entry.at),
         mass=entry.mass_kg,
     )
@@ -117,7 +121,7 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
         tool_axis=None if tool_axis is None else direction(tool_axis),
         tool_x=direction(tool_x),
         turn=float(np.deg2rad(entry.tool_turn_deg)),
-        axes=tuple(sorted(COMPONENTS.index(axis) for axis in entry.axes)),
+        axes=_axis_numbers(entry.axes),
         is_spin_free="spin" in entry.free,
         tolerance=Tolerance(
             position=entry.tolerance.position_mm / MM, orientation=float(np.deg2rad(entry.tolerance.orientation_deg))
@@ -129,7 +133,13 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
         blend=corners.blend_mm / MM if isinstance(corners, BlendEntry) else None,
         settle=entry.settle_s,
         repeat=entry.repeat,
+        relative_to=Frame(entry.relative_to),
     )
+
+
+def _axis_numbers(words: Sequence[str]) -> tuple[int, ...]:
+    """Components of a twist by number, in its order."""
+    return tuple(sorted(COMPONENTS.index(axis) for axis in words))
 
 
 Direction = str | tuple[float, float, float]
@@ -183,6 +193,8 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         if task.path.is_planar and task.path.project is None:
             entry["path"].setdefault("offset_mm", 0.0)
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}
+    for grasp in values["part"]["held_by"][:1]:
+        del grasp["axes"]  # the first holder has no choice
     return values
 
 
@@ -244,4 +256,6 @@ def build_checks(entry: ChecksEntry) -> CheckSettings:
         clearance=entry.clearance_mm / MM,
         contact_zone=entry.contact_zone_mm / MM,
         exclusions=tuple(Exclusion(bodies=pair.bodies, reason=pair.reason) for pair in entry.exclude),
+        closure_position=entry.closure_mm / MM,
+        closure_orientation=float(np.deg2rad(entry.closure_deg)),
     )

@@ -1,6 +1,6 @@
 """Rules between the entries of a cell file: names that must exist, times that must fit, what goes with what."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, listed
@@ -40,24 +40,41 @@ def _clashing_names(pieces: Pieces, document: YamlDocument) -> Iterator[Complain
 
 
 def _holders(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
-    """The part is held by a robot of the cell."""
+    """The part is held by robots of the cell, each once."""
+    seen: set[str] = set()
     for path, robot in _holders_as_written(document):
         yield from _known_robot(robot, pieces, document, path)
+        if robot in seen:
+            yield document.complaint(path, f"expected a robot that does not hold the part already, got '{robot}' twice")
+        seen.add(robot)
 
 
 def _operators(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
-    """Each task has a robot of its own that does not hold the part."""
-    holders = [robot for _, robot in _holders_as_written(document)][:1]  # a second one is refused as such
+    """Each task has a robot of its own: one that does not hold the part, or the one that carries it."""
+    holders = [robot for _, robot in _holders_as_written(document)]
     busy: dict[str, str] = {}
     for name, path, robot in _operators_as_written(document):
         yield from _known_robot(robot, pieces, document, path)
         if robot in holders:
-            text = f"expected a robot that does not hold the part, got the positioner '{robot}'"
-            yield document.complaint(path, text)
+            is_in_world = document.root["tasks"][name].get("relative_to") == "world"
+            text = _wrong_holder(robot, holders, pieces, is_in_world=is_in_world)
+            if text:
+                yield document.complaint(path, text)
         other = busy.setdefault(robot, name)
         if other != name:
             text = f"expected a robot without another task, got '{robot}', which does '{other}'"
             yield document.complaint(path, text)
+
+
+def _wrong_holder(robot: str, holders: Sequence[str], pieces: Pieces, *, is_in_world: bool) -> str | None:
+    """What is wrong with a task of a robot that holds the part; None for one that may carry it along a path."""
+    if not is_in_world:
+        return f"expected a robot that does not hold the part, got the positioner '{robot}'"
+    if robot != holders[0]:
+        return f"expected the first holder '{holders[0]}', which carries the part frame, got '{robot}'"
+    if pieces.motion is not None and pieces.motion.mode == "part_at_rest":
+        return f"expected a robot that does not hold the part in the mode part_at_rest, got the positioner '{robot}'"
+    return None
 
 
 def _holders_as_written(document: YamlDocument) -> Iterator[tuple[KeyPath, str]]:
@@ -112,10 +129,10 @@ def needs_surface(task: TaskEntry) -> bool:
 def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Complaint]:
     """A normal needs a surface; of a file it is known only later whether it brings orientations."""
     if needs_surface(task) and task.path.project is None and task.path.csv is None:
-        text = (
-            "tool_axis: normal needs a path that is laid on the part: "
-            "add project: +z (or another side), or give tool_axis a direction"
-        )
+        cure = "give tool_axis a direction"
+        if task.relative_to == "part":
+            cure = f"add project: +z (or another side), or {cure}"
+        text = f"tool_axis: normal needs a path that is laid on the part: {cure}"
         key = "path" if task.tool_axis is None else "tool_axis"
         yield document.complaint(("tasks", name, key), text)
 

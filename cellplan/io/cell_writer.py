@@ -81,8 +81,7 @@ def _part(entry: Mapping[str, Any], part: Part) -> dict[str, Any]:
     """The part with its place written out."""
     written = dict(entry)
     written["held_by"] = [
-        {"robot": grasp.robot, "at": _pose(old["at"], grasp.X_PT)}
-        for grasp, old in zip(part.held_by, entry["held_by"], strict=True)
+        {**old, "at": _pose(old["at"], grasp.X_PT)} for grasp, old in zip(part.held_by, entry["held_by"], strict=True)
     ]
     if part.X_WP is not None:
         written["at"] = _pose(entry["at"], part.X_WP)

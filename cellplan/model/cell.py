@@ -1,5 +1,6 @@
 """Cell: what the user wrote, as immutable data."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -8,7 +9,7 @@ from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
-from cellplan.model.task import Task
+from cellplan.model.task import Frame, Task
 
 
 class Mode(StrEnum):
@@ -80,10 +81,39 @@ class Robot:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Grasp:
-    """A robot holding the part; ``X_PT`` is the holder's tool tip in the part frame."""
+    """A robot holding the part.
+
+    The first holder carries the part frame. The tool of each further one is tied to it: it has a pose on the part that
+    never changes ([Ribeiro2010]_ 4.5).
+
+    Attributes:
+        robot: Name of the holder.
+        X_PT: The holder's tool tip in the part frame.
+        axes: Components of the tool's motion on the part that a further holder keeps at zero, in the order x, y, z,
+            rx, ry, rz.
+    """
 
     robot: str
     X_PT: Array
+    axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+
+    @property
+    def name(self) -> str:
+        """What the grasp is called among the tasks; no task can have such a name."""
+        return f"{self.robot}@part"
+
+    @property
+    def is_spin_free(self) -> bool:
+        """A grasp never leaves the rotation about the tool's own axis to chance."""
+        return False
+
+    @property
+    def relative_to(self) -> Frame:
+        """The tool is tied to the part."""
+        return Frame.PART
+
+
+Relation = Task | Grasp  # what asks for a tool's motion: a task, or the grasp of a further holder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -158,11 +188,15 @@ class CheckSettings:
         clearance: Smallest allowed distance in [m] between things that must not touch.
         contact_zone: Radius in [m] round the tool tip within which tool and part may touch.
         exclusions: Pairs left out at the user's word.
+        closure_position: Largest distance in [m] of a further holder's tool from its grasp.
+        closure_orientation: Largest angle in [rad] between the two.
     """
 
     clearance: float
     contact_zone: float
     exclusions: tuple[Exclusion, ...] = ()
+    closure_position: float = 3e-6
+    closure_orientation: float = 1e-3 * math.pi / 180.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -203,8 +237,18 @@ class Cell:
 
     @property
     def positioners(self) -> tuple[str, ...]:
-        """Names of the robots that hold the part."""
+        """Names of the robots that hold the part, the one that carries the part frame first."""
         return tuple(grasp.robot for grasp in self.part.held_by)
+
+    @property
+    def closures(self) -> tuple[Grasp, ...]:
+        """Grasps of all holders but the first: each closes a loop over the part and the world."""
+        return self.part.held_by[1:]
+
+    @property
+    def relations(self) -> tuple[Relation, ...]:
+        """All tasks, then the closures: the block rows of the whole cooperation Jacobian."""
+        return (*self.tasks, *self.closures)
 
     def columns(self, robot: str) -> slice:
         """Place of a robot's joints in the stacked joint vector."""

@@ -72,6 +72,23 @@ class TaskAccuracy:
     end_s: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ClosureAccuracy:
+    """How far the tool of a further holder strays from its grasp, recomputed from the written tables.
+
+    Attributes:
+        robot: Name of the holder.
+        axes: Components that the grasp keeps, in the order x, y, z, rx, ry, rz.
+        position_error: Position error in P in [m], shape (N, 3); components that the grasp leaves open are zero.
+        orientation_error: Rotation vector of ``R_PT,wanted R_PT^T`` in P in [rad], shape (N, 3); likewise.
+    """
+
+    robot: str
+    axes: tuple[int, ...]
+    position_error: Array
+    orientation_error: Array
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointUse:
     """How one joint is used, in [rad] or [m], and where it is worst."""
@@ -172,7 +189,7 @@ class Conditioning:
         condition: Smallest by largest singular value of J, shape (N,): 1 when all directions are alike, 0 when it is
             singular.
         manipulability: ``sqrt(det(J J^T))``, the product of the singular values of J, shape (N,).
-        robots: Smallest singular value of each operator's own block and of each positioner's, shape (N,) each.
+        robots: Smallest singular value of each operator's own block and of each holder's, shape (N,) each.
     """
 
     stack: Array
@@ -251,6 +268,7 @@ class Report:
         times: The common clock in [s], shape (N,).
         q: Positions read back from the tables in [rad] or [m], shape (N, n), by robot.
         qd: Speeds between the samples, shape (N - 1, n), by robot.
+        closures: Closure errors, one entry per holder but the first.
         repeatability: Whether the joints come back with the tools; None when not all tools come back.
     """
 
@@ -267,6 +285,7 @@ class Report:
     times: Array
     q: Mapping[str, Array]
     qd: Mapping[str, Array]
+    closures: tuple[ClosureAccuracy, ...] = ()
     repeatability: Repeatability | None = None
 
     @property

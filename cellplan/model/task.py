@@ -115,6 +115,13 @@ class TimedPath:
 PathSpec = CirclePath | PolygonPath | SpacePolylinePath | SampledPath | TimedPath
 
 
+class Frame(StrEnum):
+    """What a tool's path is given in, and what the tool's motion is measured against."""
+
+    PART = "part"
+    WORLD = "world"
+
+
 class TimeLawKind(StrEnum):
     """How the position on a path grows with time."""
 
@@ -165,6 +172,8 @@ class Task:
         settle: Time in [s] after the start during which the tool may come from beside its path: errors are reported
             and not judged.
         repeat: How often a closed path is gone through.
+        relative_to: Frame that path and axes are given in. In the world, the first holder's task says where the part
+            is carried; P then reads W in everything that is said of the task.
     """
 
     name: str
@@ -185,6 +194,7 @@ class Task:
     blend: float | None
     settle: float = 0.0
     repeat: int = 1
+    relative_to: Frame = Frame.PART
 
     @property
     def judged_from(self) -> float:

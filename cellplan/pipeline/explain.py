@@ -10,9 +10,10 @@ from cellplan.kinematics.combined import CombinedModel
 from cellplan.kinematics.derivations.coupling import PLANE, coupling_graph
 from cellplan.kinematics.derivations.davies import network
 from cellplan.kinematics.derivations.graph import Circuit, CouplingGraph, circuits, spanning_tree
-from cellplan.model.cell import Cell
-from cellplan.model.task import PlaneName, Task
-from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian
+from cellplan.model.cell import Cell, Relation
+from cellplan.model.task import Frame, PlaneName
+from cellplan.planning.closures import closures
+from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian, reference_frames
 from cellplan.planning.modes import RunPlan, plan_runs
 
 RANK_TOL = 1e-10  # [-] singular values below this share of the largest one are zero: rounding of the matrix
@@ -24,14 +25,17 @@ class MatrixShape:
 
     Attributes:
         plan: Which tasks are worked on and who moves.
-        rows: Constrained components of each task, in the order of the plan.
+        blocks: Names of the block rows: the tasks of the plan, then the grasps of further holders that move.
+        rows: Constrained components of each block row.
         columns: Joints of each robot, in the order of the cell, that move and carry a tool or the part.
-        signs: Sign of each task's block for each robot, shape (tasks, robots): -1 positioner, +1 operator, 0 empty.
+        signs: Sign of each block for each robot, shape (blocks, robots): -1 the robot that carries the part, +1 the one
+            that has the tool, 0 empty.
         missing: Robots whose start posture is to be found before there is a rank.
         singular_values: Largest first, one for each row or column, whichever are fewer; None where a start is missing.
     """
 
     plan: RunPlan
+    blocks: tuple[str, ...]
     rows: tuple[int, ...]
     columns: tuple[int, ...]
     signs: Array
@@ -87,7 +91,7 @@ def explain(cell: Cell) -> Structure:
 def _plane(cell: Cell) -> PlaneName | None:
     """The plane of P in which all tasks are given and all joints move, if there is one."""
     for plane, components in PLANE.items():
-        if all(task.axes == components and not task.is_spin_free for task in cell.tasks):
+        if all(task.axes == components and not task.is_spin_free for task in cell.relations):
             try:
                 network(cell, np.zeros(cell.joint_count), plane=plane)
             except NotPlanarError:
@@ -98,15 +102,17 @@ def _plane(cell: Cell) -> PlaneName | None:
 
 def _matrix(cell: Cell, model: CombinedModel, plan: RunPlan) -> MatrixShape:
     """Blocks of one run, and its singular values where all postures that matter are known."""
-    tasks = [cell.task(name) for name in plan.tasks]
+    tasks: list[Relation] = [*(cell.task(name) for name in plan.tasks), *closures(cell, plan.moving)]
     signs = column_signs(cell, model, tasks, plan.moving)
     moves = np.any(signs != 0.0, axis=0)
-    at_work = {*cell.positioners[:1], *(task.robot for task in tasks)}
+    carriers = cell.positioners[:1] if any(task.relative_to is Frame.PART for task in tasks) else ()
+    at_work = {*carriers, *(task.robot for task in tasks)}
     missing = tuple(robot.name for robot in cell.robots if robot.name in at_work and robot.start is None)
     places = [cell.columns(robot.name) for robot in cell.robots]
     blocks = [np.sign(signs[:, place].sum(axis=1)) for place in places]  # one robot's signs in one task are all alike
     return MatrixShape(
         plan=plan,
+        blocks=tuple(task.name for task in tasks),
         rows=tuple(len(constraint_rows(task, np.eye(4)[None])[0]) for task in tasks),
         columns=tuple(int(moves[place].sum()) for place in places),
         signs=np.stack(blocks, axis=1),
@@ -115,14 +121,15 @@ def _matrix(cell: Cell, model: CombinedModel, plan: RunPlan) -> MatrixShape:
     )
 
 
-def _singular_values(cell: Cell, model: CombinedModel, tasks: list[Task], signs: Array) -> Array:
+def _singular_values(cell: Cell, model: CombinedModel, tasks: list[Relation], signs: Array) -> Array:
     """Singular values of the constrained rows over the moving joints at the start; bystanders do not matter."""
     q = np.concatenate([np.zeros(len(r.model.joints)) if r.start is None else r.start for r in cell.robots])
     state = model.state(q)
     names = [robot.name for robot in cell.robots]
     X_WT = state.X_WT[[names.index(task.robot) for task in tasks]]
-    X_PT = inverse(state.X_WP) @ X_WT
-    J = cooperation_jacobian(state, X_WT[:, :3, 3], signs)
+    X_WR = reference_frames(state, tasks)
+    X_PT = inverse(X_WR) @ X_WT
+    J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
     picked = [constraint_rows(task, X[None])[0] @ block for task, X, block in zip(tasks, X_PT, J, strict=True)]
     rows = np.concatenate(picked)
     values: Array = np.linalg.svd(rows[:, np.any(signs != 0.0, axis=0)], compute_uv=False)

@@ -6,20 +6,21 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, rotation_vector, skew
 from cellplan.kinematics.combined import CellState, CombinedModel
-from cellplan.model.cell import Cell
-from cellplan.model.task import Task
+from cellplan.model.cell import Cell, Relation
+from cellplan.model.task import Frame
 
 
-def column_signs(cell: Cell, model: CombinedModel, tasks: Sequence[Task], moving: Sequence[str]) -> Array:
+def column_signs(cell: Cell, model: CombinedModel, tasks: Sequence[Relation], moving: Sequence[str]) -> Array:
     """Sign with which each joint enters each task: +1 in the operator, -1 in the positioner, 0 elsewhere.
 
     These are the arrow blocks of the cooperation Jacobian ([Ribeiro2010]_ Eq. 4.33). A robot that does not move has
-    zeros: the part at rest, an operator that stands still and the single pair are not special cases.
+    zeros: the part at rest, an operator that stands still and the single pair are not special cases. The grasp of a
+    further holder has a row like a task's (4.5); a task in the world has no positioner.
 
     Args:
         cell: The cell.
         model: The combined model of its robots.
-        tasks: The tasks, one block row each.
+        tasks: The tasks and closures, one block row each.
         moving: Names of the robots that may move.
 
     Returns:
@@ -32,11 +33,16 @@ def column_signs(cell: Cell, model: CombinedModel, tasks: Sequence[Task], moving
         may_move[cell.columns(name)] = 1.0
     signs = np.stack([carries[names.index(task.robot)] for task in tasks])
     for name in cell.positioners[:1]:
-        signs -= carries[names.index(name)]
+        signs -= np.outer([task.relative_to is Frame.PART for task in tasks], carries[names.index(name)])
     return signs * may_move
 
 
-def cooperation_jacobian(state: CellState, p_WT: Array, signs: Array) -> Array:
+def reference_frames(state: CellState, tasks: Sequence[Relation]) -> Array:
+    """Frame that each task's motion is relative to and expressed in: the part or the world, shape (tasks, 4, 4)."""
+    return np.stack([state.X_WP if task.relative_to is Frame.PART else np.eye(4) for task in tasks])
+
+
+def cooperation_jacobian(state: CellState, p_WT: Array, signs: Array, *, X_WR: Array | None = None) -> Array:
     r"""Stack the relative Jacobians of all operators ([Ribeiro2010]_ Eqs. 3.56, 4.33).
 
     .. math:: {}_P V_{PT_i} = \begin{bmatrix} R & -R S(p_i) \\ 0 & R \end{bmatrix}
@@ -50,11 +56,12 @@ def cooperation_jacobian(state: CellState, p_WT: Array, signs: Array) -> Array:
         state: Kinematics of the cell.
         p_WT: Tool tips in the world, shape (tasks, 3), in [m].
         signs: Sign of each joint in each task, shape (tasks, nq).
+        X_WR: Frame that stands for P in each task, shape (tasks, 4, 4), see `reference_frames`; P itself when None.
 
     Returns:
         Linear part in [m] before angular part in [rad], expressed in P, shape (tasks, 6, nq).
     """
-    R = state.X_WP[:3, :3].T
+    R = state.X_WP[:3, :3].T if X_WR is None else np.swapaxes(X_WR[:, :3, :3], 1, 2)
     to_tip = np.zeros((len(p_WT), 6, 6))
     to_tip[:, :3, :3] = to_tip[:, 3:, 3:] = R
     to_tip[:, :3, 3:] = -R @ skew(p_WT)
@@ -62,7 +69,7 @@ def cooperation_jacobian(state: CellState, p_WT: Array, signs: Array) -> Array:
     return jacobian
 
 
-def constraint_rows(task: Task, X_PT: Array) -> Array:
+def constraint_rows(task: Relation, X_PT: Array) -> Array:
     """Rows that pick what a task constrains from a relative twist, shape (N, m, 6) for N wanted poses.
 
     Components named by ``axes`` are taken in P. With free spin the two rotations across the wanted tool axis are

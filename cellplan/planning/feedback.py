@@ -15,7 +15,7 @@ from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_exp
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.task import Task
-from cellplan.planning.cooperation import pose_errors
+from cellplan.planning.cooperation import pose_errors, reference_frames
 from cellplan.planning.follow import LARGEST_STEP, follow
 from cellplan.planning.methods import method_named
 from cellplan.planning.tracking_problem import TrackingProblem
@@ -118,7 +118,7 @@ def follow_measured(cell: Cell, wanted: Schedule, *, start: Array, moving: Seque
     q[0] = start
     for k in range(len(q) - 1):
         state = problem.state(q[k])
-        nominal = inverse(state.X_WP) @ state.X_WT[problem.operators]
+        nominal = inverse(reference_frames(state, problem.tasks)) @ state.X_WT[problem.operators]
         for place, (scheduled, X_seen) in enumerate(zip(wanted.tasks, measure(q[k : k + 1]), strict=True)):
             seen, told = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
             problem.wanted[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=told)

@@ -4,12 +4,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cellplan.errors import InputError, InvalidFileError, StartOffTaskError, StartOutsideLimitsError
+from cellplan.errors import (
+    InputError,
+    InvalidFileError,
+    StartOffGraspError,
+    StartOffTaskError,
+    StartOutsideLimitsError,
+)
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screws import ScrewChain
-from cellplan.model.cell import Cell, Robot
+from cellplan.model.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.robot import Joint
-from cellplan.model.task import Task
+from cellplan.model.task import Frame, Task
 from cellplan.model.toolpath import Toolpath
 from cellplan.planning.cooperation import constraint_rows, pose_errors
 
@@ -29,6 +35,7 @@ def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
 
     Raises:
         StartOutsideLimitsError: A joint starts outside its limits.
+        StartOffGraspError: A further holder's tool is not where it holds the part.
         StartOffTaskError: A tool does not start on its task.
         InvalidFileError: More than one of these.
     """
@@ -36,7 +43,8 @@ def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
         complaint for robot in cell.robots if robot.start is not None for complaint in _outside(cell, robot)
     ]
     if not complaints:
-        complaints = [complaint for task in cell.tasks for complaint in _off_task(cell, task, toolpaths[task.name])]
+        complaints += [complaint for grasp in cell.closures for complaint in _off_grasp(cell, grasp)]
+        complaints += [complaint for task in cell.tasks for complaint in _off_task(cell, task, toolpaths[task.name])]
     if len(complaints) == 1:
         raise complaints[0]
     if complaints:
@@ -76,15 +84,10 @@ def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
     A task that gives its tool time to settle may start beside its path.
     """
     robot = cell.robot(task.robot)
-    holder = cell.robot(cell.positioners[0]).start if cell.positioners else None
-    X_WP = part_pose(cell, holder)
-    if robot.start is None or X_WP is None or task.settle > 0.0:
+    off = _distance(cell, task, toolpath.X_PT_start)
+    if off is None or task.settle > 0.0:
         return []
-    X_PT = inverse(X_WP) @ ScrewChain(robot).tool_poses(robot.start[None])
-    wanted = toolpath.X_PT_start[None]
-    rows = constraint_rows(task, wanted)[0]
-    error = rows.T @ (rows @ pose_errors(wanted, X_PT, [task.is_spin_free])[0])
-    distance, angle = np.linalg.norm(error[:3]), np.linalg.norm(error[3:])
+    distance, angle = off
     if distance <= task.tolerance.position and angle <= task.tolerance.orientation:
         return []
     return [
@@ -94,6 +97,39 @@ def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
             f"{np.degrees(task.tolerance.orientation):g} deg; `auto` finds a posture"
         )
     ]
+
+
+def _off_grasp(cell: Cell, grasp: Grasp) -> list[InputError]:
+    """A complaint when a given start does not put a further holder's tool on its grasp, within the allowed closure."""
+    off = _distance(cell, grasp, grasp.X_PT)
+    if off is None or (off[0] <= cell.checks.closure_position and off[1] <= cell.checks.closure_orientation):
+        return []
+    return [
+        StartOffGraspError(
+            f"{start_place(cell, cell.robot(grasp.robot))}: the tool is {1e3 * off[0]:.3f} mm and "
+            f"{np.degrees(off[1]):.4f} deg from its grasp on the part that '{cell.positioners[0]}' carries, allowed "
+            f"are {1e3 * cell.checks.closure_position:g} mm and {np.degrees(cell.checks.closure_orientation):g} deg; "
+            "`auto` finds a posture"
+        )
+    ]
+
+
+def _distance(cell: Cell, task: Relation, X_PT_wanted: Array) -> tuple[float, float] | None:
+    """How far a given start puts a tool from where it is wanted, in [m] and [rad]; None while a start is missing."""
+    robot = cell.robot(task.robot)
+    X_WR = np.eye(4)
+    if task.relative_to is Frame.PART:
+        holder = cell.robot(cell.positioners[0]).start if cell.positioners else None
+        at_start = part_pose(cell, holder)
+        if at_start is None:
+            return None
+        X_WR = at_start
+    if robot.start is None:
+        return None
+    X_PT, wanted = inverse(X_WR) @ ScrewChain(robot).tool_poses(robot.start[None]), X_PT_wanted[None]
+    rows = constraint_rows(task, wanted)[0]
+    error = rows.T @ (rows @ pose_errors(wanted, X_PT, [task.is_spin_free])[0])
+    return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
 
 
 def _shown(joint: Joint, position: float) -> str:

@@ -6,8 +6,8 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, inverse, skew
 from cellplan.kinematics.screws import ScrewChain
+from cellplan.model.cell import Relation
 from cellplan.model.robot import RobotModel
-from cellplan.model.task import Task
 from cellplan.planning.cooperation import constraint_rows, pose_errors
 
 CLOSED: Final = 1e-12  # [m, rad] a posture counts as found when the tool is this near its goal: rounding is 1e-15
@@ -31,14 +31,14 @@ def finite_limits(model: RobotModel) -> tuple[Array, Array]:
     return np.where(endless, -np.pi, model.lower), np.where(endless, np.pi, model.upper)
 
 
-def reaching_postures(chain: ScrewChain, task: Task, X_PT: Array, *, X_WP: Array, seeds: Array) -> Array:
+def reaching_postures(chain: ScrewChain, task: Relation, X_PT: Array, *, X_WP: Array, seeds: Array) -> Array:
     """Run damped Newton iterations from all seeds at once and keep what arrives.
 
     Joint limits are not looked at here: a posture out of limits may have an equal one a turn away.
 
     Args:
         chain: The operator.
-        task: Says which components of the pose count.
+        task: The task or grasp, which says which components of the pose count.
         X_PT: Wanted tool tip in P, shape (4, 4).
         X_WP: The part, shape (4, 4).
         seeds: Postures to start from, shape (B, n).
@@ -95,7 +95,7 @@ def margin_shares(model: RobotModel, q: Array) -> Array:
     return shares
 
 
-def smallest_singular_values(chain: ScrewChain, task: Task, X_PT: Array, q: Array) -> Array:
+def smallest_singular_values(chain: ScrewChain, task: Relation, X_PT: Array, q: Array) -> Array:
     """Smallest singular value of the operator's constrained Jacobian at each posture, shape (K,)."""
     X_WT = chain.tool_poses(q)
     R_PW = X_PT[:3, :3] @ np.swapaxes(X_WT[:, :3, :3], 1, 2)

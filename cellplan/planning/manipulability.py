@@ -12,17 +12,22 @@ from cellplan.planning.weighted_inverse import ROUNDING
 class ManipulabilityGradient:
     """Gradient of the logarithm of the manipulability over the joints of one cell."""
 
-    def __init__(self, model: CombinedModel, operators: Sequence[int], holder: int | None) -> None:
+    def __init__(
+        self, model: CombinedModel, operators: Sequence[int], holder: int | None, *, on_part: Array | None = None
+    ) -> None:
         """Note who carries what.
 
         Args:
             model: The combined model of the cell's robots.
             operators: Index of each task's robot.
             holder: Index of the robot that carries the part; None when it is fixed.
+            on_part: 1 where a task's rows stand in the frame of the part, 0 where in the world, shape (tasks,); all 1
+                when None.
         """
         self._model, self._operators = model, list(operators)
         carries = model.carries_flange.astype(float)
         self._moves_tool = carries[self._operators]
+        self._on_part = np.ones(len(self._operators)) if on_part is None else on_part
         self._moves_part = np.zeros(carries.shape[1]) if holder is None else carries[holder]
 
     def at(self, q: Array, state: CellState, *, J: Array, picks: Sequence[Array], signs: Array) -> Array:
@@ -47,12 +52,13 @@ class ManipulabilityGradient:
         G = U @ ((U.T @ J) / s_squared[:, None])  # derivative of log w by the entries of J
         edges = np.cumsum([len(pick) for pick in picks])[:-1]
         blocks = np.stack([pick.T @ rows for pick, rows in zip(picks, np.split(G, edges), strict=True)])
-        R, p = state.X_WP[:3, :3], state.X_WT[self._operators, :3, 3]
+        R = np.where(self._on_part[:, None, None] > 0.0, state.X_WP[:3, :3], np.eye(3))
+        p = state.X_WT[self._operators, :3, 3]
         force, torque = R @ blocks[:, :3], R @ blocks[:, 3:]  # in W, at the tool tips, shape (tasks, 3, nq)
         linear, angular = state.screws_W[:3], state.screws_W[3:]
         omega = angular * signs[:, None]
         at_tip = linear * signs[:, None] + np.cross(omega, p[:, :, None], axis=1)
-        turning = (np.cross(at_tip, force, axis=1) + np.cross(omega, torque, axis=1)).sum(axis=(0, 2))
+        turning = self._on_part @ (np.cross(at_tip, force, axis=1) + np.cross(omega, torque, axis=1)).sum(axis=2)
         shifting = np.cross(force, omega, axis=1).sum(axis=2)  # by the motion of each tool tip
         tips = linear + np.cross(angular[None], p[:, :, None], axis=1)
         on_screws = np.concatenate([force, torque + np.cross(p[:, :, None], force, axis=1)], axis=1) * signs[:, None]

@@ -1,9 +1,11 @@
 """Modes: which tasks are worked on together, and which robots move meanwhile (MODO 1, 2, 3 of [Ribeiro2010]_ ch. 5)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell, Mode
+from cellplan.model.task import Task
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,14 +36,31 @@ def plan_runs(cell: Cell, *, only: str | None = None) -> tuple[RunPlan, ...]:
     chosen = [task for task in cell.tasks if only in (None, task.name)]
     if not chosen:
         raise InputError(f"task: expected one of {', '.join(task.name for task in cell.tasks)}, got '{only}'")
+    _refuse_carrying_at_rest(cell, chosen)
     operators = tuple(task.robot for task in chosen)
     tasks = tuple(task.name for task in chosen)
     match cell.motion.mode:
         case Mode.SIMULTANEOUS:
-            return (RunPlan(name=None, tasks=tasks, moving=cell.positioners + operators),)
+            return (RunPlan(name=None, tasks=tasks, moving=_each_once(cell.positioners + operators)),)
         case Mode.PART_AT_REST:
             return (RunPlan(name=None, tasks=tasks, moving=operators),)
         case Mode.PAIRWISE:
             return tuple(
-                RunPlan(name=task.name, tasks=(task.name,), moving=(*cell.positioners, task.robot)) for task in chosen
+                RunPlan(name=task.name, tasks=(task.name,), moving=_each_once((*cell.positioners, task.robot)))
+                for task in chosen
             )
+
+
+def _refuse_carrying_at_rest(cell: Cell, tasks: Sequence[Task]) -> None:
+    """Refuse a task that carries the part where the part is to stand still."""
+    for task in tasks:
+        if cell.motion.mode is Mode.PART_AT_REST and task.robot in cell.positioners:
+            raise InputError(
+                f"{cell.origin.at(f'tasks.{task.name}.robot')}: expected a robot that does not hold the part in the "
+                f"mode part_at_rest, got the positioner '{task.robot}'; choose another mode or leave the task out"
+            )
+
+
+def _each_once(names: Sequence[str]) -> tuple[str, ...]:
+    """Names in their order; a holder that carries the part along a path of its own is named once."""
+    return tuple(dict.fromkeys(names))

@@ -19,8 +19,9 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.combined import CellState, CombinedModel
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, Relation
 from cellplan.model.solver import GoalKind, SecondaryGoal
+from cellplan.model.task import Frame
 from cellplan.planning.manipulability import ManipulabilityGradient
 from cellplan.scene.closest import ClosestPairs
 from cellplan.scene.scene import Scene
@@ -72,20 +73,18 @@ class SecondaryGoals:
     """All secondary goals of a cell along one motion."""
 
     def __init__(
-        self, cell: Cell, model: CombinedModel, *, operators: Sequence[int], times: Array, start: Array
+        self, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], times: Array, start: Array
     ) -> None:
         """Make ready what each goal needs.
 
         Args:
             cell: The cell.
             model: The combined model of its robots.
-            operators: Index of each task's robot.
+            tasks: The tasks and closures, one block row each.
             times: Instants of the motion in [s], shape (N,).
             start: Stacked posture at the first instant, shape (nq,).
         """
-        self._pulls = [
-            (goal.gain, _pull(goal, cell, model, operators=operators, start=start)) for goal in cell.solver.goals
-        ]
+        self._pulls = [(goal.gain, _pull(goal, cell, model, tasks=tasks, start=start)) for goal in cell.solver.goals]
         self._lower = np.concatenate([robot.model.lower for robot in cell.robots])
         self._upper = np.concatenate([robot.model.upper for robot in cell.robots])
         self._limits = SPEED_SHARE * np.concatenate([robot.model.velocity for robot in cell.robots])
@@ -144,11 +143,11 @@ def _fade(times: Array) -> Array:
     return share
 
 
-def _pull(goal: SecondaryGoal, cell: Cell, model: CombinedModel, *, operators: Sequence[int], start: Array) -> Pull:
+def _pull(goal: SecondaryGoal, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], start: Array) -> Pull:
     """The function that gives the slope of one goal."""
     match goal.kind:
         case GoalKind.MANIPULABILITY:
-            return _manipulability(cell, model, operators)
+            return _manipulability(cell, model, tasks)
         case GoalKind.JOINT_LIMITS:
             return _joint_limits(cell)
         case GoalKind.OBSTACLES:
@@ -157,7 +156,7 @@ def _pull(goal: SecondaryGoal, cell: Cell, model: CombinedModel, *, operators: S
             return _posture(cell, goal.postures, start=start)
 
 
-def _manipulability(cell: Cell, model: CombinedModel, operators: Sequence[int]) -> Pull:
+def _manipulability(cell: Cell, model: CombinedModel, tasks: Sequence[Relation]) -> Pull:
     """``w = log sqrt(det(J J^T))`` of all task rows together ([Ribeiro2010]_ Eq. D.45).
 
     The logarithm makes a sum over the robots of the product: the pull on a robot depends neither on how many others
@@ -166,7 +165,9 @@ def _manipulability(cell: Cell, model: CombinedModel, operators: Sequence[int]) 
     """
     names = [robot.name for robot in cell.robots]
     holder = names.index(cell.positioners[0]) if cell.positioners else None
-    gradients = ManipulabilityGradient(model, operators, holder)
+    operators = [names.index(task.robot) for task in tasks]
+    on_part = np.array([float(task.relative_to is Frame.PART) for task in tasks])
+    gradients = ManipulabilityGradient(model, operators, holder, on_part=on_part)
 
     def pull(stance: Stance) -> Slope:
         gradient = gradients.at(stance.q, stance.state, J=stance.J, picks=stance.picks, signs=stance.signs)

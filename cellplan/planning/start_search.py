@@ -1,16 +1,16 @@
 """Start postures that are to be found: several inverse-kinematics branches per robot, tried out, the best one kept."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
 from cellplan.errors import StartNotFoundError
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.model.cell import Cell, Robot
+from cellplan.model.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.progress import Progress, silent
-from cellplan.model.task import Task
+from cellplan.model.task import Frame
 from cellplan.model.toolpath import Toolpath
 from cellplan.planning.combinations import Picks, best_combinations
 from cellplan.planning.given_starts import part_pose, start_place
@@ -50,8 +50,12 @@ class _Search:
 
     @property
     def is_holder_open(self) -> bool:
-        """Whether the positioner's start posture is to be found as well."""
-        return any(self.scene.cell.robot(name).start is None for name in self.scene.cell.positioners)
+        """Whether the start posture of the robot that carries the part is to be found as well."""
+        return any(self.scene.cell.robot(name).start is None for name in self.scene.cell.positioners[:1])
+
+    def X_PT_start(self, relation: Relation) -> Array:
+        """Where a tool is to be at the start: on its task, or on its grasp."""
+        return relation.X_PT if isinstance(relation, Grasp) else self.toolpaths[relation.name].X_PT_start
 
 
 def find_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: Progress = silent) -> Array:
@@ -110,10 +114,13 @@ def _holder_postures(search: _Search) -> list[Array | None]:
     holder = cell.robot(cell.positioners[0])
     if holder.start is not None:
         return [holder.start]
-    for task in cell.tasks:
-        operator = cell.robot(task.robot)
-        if operator.start is not None:
-            return list(_postures_meeting(search, task, operator.start))
+    for relation in cell.relations:
+        if relation.robot == holder.name:
+            return list(_postures_at(search, holder, relation, search.X_PT_start(relation)))
+    for relation in cell.relations:
+        operator = cell.robot(relation.robot)
+        if operator.start is not None and relation.relative_to is Frame.PART:
+            return list(_postures_meeting(search, relation, operator.start))
     return list(_promising_postures(search, holder))
 
 
@@ -125,10 +132,10 @@ def _promising_postures(search: _Search, holder: Robot) -> Array:
     q = middle + HOLDER_RANGE * (random_postures(holder.model, HOLDER_DRAWS, rng) - middle)
     X_WP = scene.chains[holder.name].tool_poses(q) @ inverse(scene.cell.part.held_by[0].X_PT)
     awkwardness = np.zeros(len(q))
-    for task in scene.cell.tasks:
-        operator = scene.cell.robot(task.robot)
-        usual = scene.chains[task.robot].tool_poses(random_postures(operator.model, HOLDER_DRAWS, rng))
-        goal = X_WP @ search.toolpaths[task.name].X_PT_start
+    for relation in scene.cell.relations:
+        operator = scene.cell.robot(relation.robot)
+        usual = scene.chains[relation.robot].tool_poses(random_postures(operator.model, HOLDER_DRAWS, rng))
+        goal = (X_WP if relation.relative_to is Frame.PART else np.eye(4)) @ search.X_PT_start(relation)
         base = operator.X_WB[:3, 3]
         awkwardness = np.maximum(awkwardness, _awkwardness(goal, usual, base))
     order: Array = q[np.argsort(awkwardness, kind="stable")[:HOLDER_POSTURES]]
@@ -149,15 +156,20 @@ def _awkwardness(goal: Array, usual: Array, base: Array) -> Array:
     return measure
 
 
-def _postures_meeting(search: _Search, task: Task, operator_start: Array) -> Array:
-    """Postures of the positioner that bring the start of a task to the tool of an operator that already stands."""
+def _postures_meeting(search: _Search, relation: Relation, operator_start: Array) -> Array:
+    """Postures of the positioner that bring the start of a task, or a grasp, to the tool of a robot that stands."""
     cell, chains = search.scene.cell, search.scene.chains
     holder = cell.robot(cell.positioners[0])
-    X_WT = chains[task.robot].tool_poses(operator_start[None])[0]
-    X_W_holder = X_WT @ inverse(search.toolpaths[task.name].X_PT_start) @ cell.part.held_by[0].X_PT
-    whole = replace(task, axes=(0, 1, 2, 3, 4, 5), is_spin_free=False)
+    X_WT = chains[relation.robot].tool_poses(operator_start[None])[0]
+    X_W_holder = X_WT @ inverse(search.X_PT_start(relation)) @ cell.part.held_by[0].X_PT
+    return _postures_at(search, holder, cell.part.held_by[0], X_W_holder)
+
+
+def _postures_at(search: _Search, holder: Robot, relation: Relation, X_W_holder: Array) -> Array:
+    """Postures of the positioner that bring its tool to a place in the world, those with most joint margin first."""
     seeds = random_postures(holder.model, SEEDS, search.rng)
-    q = reaching_postures(chains[holder.name], whole, X_W_holder, X_WP=np.eye(4), seeds=seeds)
+    chain = search.scene.chains[holder.name]
+    q = reaching_postures(chain, relation, X_W_holder, X_WP=np.eye(4), seeds=seeds)
     inside = within_limits(holder.model, q)
     best_first: Array = inside[np.argsort(-margin_shares(holder.model, inside), kind="stable")]
     return best_first
@@ -198,22 +210,22 @@ def _culprits(cell: Cell, pair: tuple[str, str], picks: tuple[int, ...]) -> tupl
     return tuple(
         (index, picks[index])
         for index, robot in enumerate(cell.robots)
-        if robot.name in owners or (robot.name in cell.positioners and "part" in owners)
+        if robot.name in owners or (robot.name in cell.positioners[:1] and "part" in owners)
     )
 
 
 def _branches(search: _Search, robot: Robot, holder_posture: Array | None) -> list[tuple[float, Array]]:
     """Postures of one robot with their scores, best first; one entry when there is no choice."""
     cell = search.scene.cell
-    if holder_posture is not None and robot.name in cell.positioners:
+    if holder_posture is not None and robot.name == cell.positioners[0]:
         return [(np.inf, holder_posture)]
     if robot.start is not None:
         return [(np.inf, robot.start)]
-    task = next((task for task in cell.tasks if task.robot == robot.name), None)
+    task = next((relation for relation in cell.relations if relation.robot == robot.name), None)
     if task is None:
         return [(np.inf, np.clip(np.zeros(len(robot.model.joints)), *finite_limits(robot.model)))]
     scored = _scored_branches(search, robot, task, holder_posture)
-    if search.is_holder_open:
+    if search.is_holder_open or isinstance(task, Grasp):
         return scored[:BRANCHES]
     judged = [(search.trials.judge_alone(task, q, holder_posture), q) for _, q in scored[:TRIED_ALONE]]
     judged.sort(key=lambda branch: -branch[0])
@@ -221,13 +233,13 @@ def _branches(search: _Search, robot: Robot, holder_posture: Array | None) -> li
 
 
 def _scored_branches(
-    search: _Search, robot: Robot, task: Task, holder_posture: Array | None
+    search: _Search, robot: Robot, task: Relation, holder_posture: Array | None
 ) -> list[tuple[float, Array]]:
-    """Postures that bring one operator's tool to the start of its task, by joint margin times manipulability."""
-    X_WP = part_pose(search.scene.cell, holder_posture)
+    """Postures that bring a tool to the start of its task or to its grasp, by joint margin times manipulability."""
+    X_WP = part_pose(search.scene.cell, holder_posture) if task.relative_to is Frame.PART else np.eye(4)
     if X_WP is None:
         return []
-    X_PT = search.toolpaths[task.name].X_PT_start
+    X_PT = search.X_PT_start(task)
     chain = search.scene.chains[robot.name]
     seeds = random_postures(robot.model, SEEDS_PER_HOLDER if search.is_holder_open else SEEDS, search.rng)
     q = within_limits(robot.model, reaching_postures(chain, task, X_PT, X_WP=X_WP, seeds=seeds))
@@ -250,9 +262,16 @@ def _why_nothing(search: _Search, holder_count: int) -> str:
             f"{cell.origin.at('robots')}: every start posture that reaches the tasks collides, most often "
             f"'{first}' with '{second}' ({tried} tried): move the bases apart or change a tool"
         )
-    name = max(search.unreached, key=lambda robot: search.unreached[robot], default=cell.robots[0].name)
-    task = next((task.name for task in cell.tasks if task.robot == name), "")
+    name = max(
+        search.unreached, key=lambda robot: search.unreached[robot], default=(*cell.positioners, cell.robots[0].name)[0]
+    )
+    task = next((relation for relation in cell.relations if relation.robot == name), None)
+    goal = (
+        "the part to where the other robots stand" if task is None else f"the tool to the start of task '{task.name}'"
+    )
+    if isinstance(task, Grasp):
+        goal = "the tool to its grasp on the part"
     return (
-        f"{start_place(cell, cell.robot(name))}: no posture within the joint limits brings the tool to the "
-        f"start of task '{task}' ({tried} tried): move the base, change the tool or free an axis"
+        f"{start_place(cell, cell.robot(name))}: no posture within the joint limits brings {goal} "
+        f"({tried} tried): move the base, change the tool or free an axis"
     )

@@ -43,6 +43,7 @@ class StartTrials:
             motion=replace(cell.motion, step=step, locked=()),  # nobody knows beforehand which joint will fail
             solver=replace(cell.solver, gain=GAIN / step),
         )
+        self._alone = replace(self._cell, part=replace(cell.part, held_by=cell.part.held_by[:1]))
         self.open_pairs = _open_pairs(scene)
 
     def judge(self, start: Array) -> tuple[float, Array]:
@@ -52,7 +53,7 @@ class StartTrials:
         when a tool loses its path.
         """
         try:
-            motions = self._motions(start, plan_runs(self._cell))
+            motions = self._motions(self._cell, start, plan_runs(self._cell))
         except NoSolutionError:
             return -np.inf, start
         turns = _whole_turns(self._cell, np.concatenate(motions))
@@ -64,26 +65,33 @@ class StartTrials:
         return quality, start + turns
 
     def judge_alone(self, task: Task, posture: Array, holder_posture: Array | None) -> float:
-        """Quality of one operator's posture, as if its task were the only one; collisions are not looked at."""
-        cell = self._cell
+        """Quality of one operator's posture, as if its task were the only one beside what the first holder does.
+
+        Collisions and the other holders are not looked at.
+        """
+        cell = self._alone
         start = np.concatenate([np.clip(0.0, *finite_limits(robot.model)) for robot in cell.robots])
         start[cell.columns(task.robot)] = posture
         for name in cell.positioners[:1]:
             start[cell.columns(name)] = holder_posture
         movers = () if cell.motion.mode is Mode.PART_AT_REST else cell.positioners
+        is_together = cell.motion.mode is Mode.SIMULTANEOUS
+        tasks = tuple(
+            each.name for each in cell.tasks if each.name == task.name or (is_together and each.robot in movers)
+        )
         try:
-            motions = self._motions(start, [RunPlan(name=None, tasks=(task.name,), moving=(*movers, task.robot))])
+            motions = self._motions(cell, start, [RunPlan(name=None, tasks=tasks, moving=(*movers, task.robot))])
         except NoSolutionError:
             return -np.inf
         turns = _whole_turns(cell, motions[0])
         return _share_left_free(cell, motions[0] + turns, self._step, only=(*movers, task.robot))
 
-    def _motions(self, start: Array, plans: Sequence[RunPlan]) -> list[Array]:
+    def _motions(self, cell: Cell, start: Array, plans: Sequence[RunPlan]) -> list[Array]:
         """Joint positions of each run on the coarse clock, shape (N, nq) each."""
         motions = []
         for run in plans:
-            schedule = schedule_tasks(self._cell, [self._toolpaths[name] for name in run.tasks])
-            motions.append(follow(self._cell, schedule, start=start, moving=run.moving).q)
+            schedule = schedule_tasks(cell, [self._toolpaths[name] for name in run.tasks])
+            motions.append(follow(cell, schedule, start=start, moving=run.moving).q)
         return motions
 
 

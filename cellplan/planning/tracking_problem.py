@@ -9,9 +9,17 @@ import numpy as np
 from cellplan.errors import DivergedError
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.combined import CellState, CombinedModel
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, Grasp, Relation
 from cellplan.model.motion import Schedule
-from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian, pose_errors
+from cellplan.model.task import Frame
+from cellplan.planning.closures import targets
+from cellplan.planning.cooperation import (
+    column_signs,
+    constraint_rows,
+    cooperation_jacobian,
+    pose_errors,
+    reference_frames,
+)
 from cellplan.planning.secondary_goals import SecondaryGoals, Stance, share_within
 from cellplan.planning.weighting import JointWeights
 
@@ -76,8 +84,8 @@ class TrackingProblem:
     Attributes:
         cell: The cell.
         times: Instants in [s], shape (N,).
-        tasks: The tasks, one block row each.
-        operators: Index of each task's robot in the cell.
+        tasks: The tasks, then the grasps of further holders, one block row each.
+        operators: Index of each one's robot in the cell.
         wanted: Wanted tool poses X_PT, shape (N, tasks, 4, 4).
         twists: Wanted tool twists in P, linear first, shape (N, tasks, 6).
         signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
@@ -96,20 +104,22 @@ class TrackingProblem:
             moving: Names of the robots that may move.
             start: Stacked start posture, shape (nq,), which goals may lead back to; needed with goals only.
         """
-        tasks = tuple(scheduled.task for scheduled in schedule.tasks)
+        asked = targets(cell, schedule, moving)
+        tasks = tuple(target.relation for target in asked)
         names = [robot.name for robot in cell.robots]
         self._model = CombinedModel(cell)
-        self._rows = [constraint_rows(scheduled.task, scheduled.X_PT) for scheduled in schedule.tasks]
+        self._rows = [constraint_rows(target.relation, target.X_PT) for target in asked]
         self._is_whole = all(len(task.axes) == 6 and not task.is_spin_free for task in tasks)
         self._is_spin_free = [task.is_spin_free for task in tasks]
+        self._is_on_part = all(task.relative_to is Frame.PART for task in tasks)
         self._is_linear = np.array([[float(axis in task.axes) for axis in range(3)] for task in tasks])
-        self._lost = np.array([max(LOST_DISTANCE, 2.0 * task.tolerance.position) for task in tasks])
-        self._settled = np.array([task.start + task.settle if task.settle else -np.inf for task in tasks])
+        self._lost = np.array([max(LOST_DISTANCE, 2.0 * target.tolerance) for target in asked])
+        self._settled = np.array([target.settled for target in asked])
         self._weights = JointWeights(cell, self._model)
         self.cell, self.times, self.tasks = cell, schedule.times, tasks
         self.operators = [names.index(task.robot) for task in tasks]
-        self.wanted = np.stack([scheduled.X_PT for scheduled in schedule.tasks], axis=1)
-        self.twists = np.stack([scheduled.V_PT_P for scheduled in schedule.tasks], axis=1)
+        self.wanted = np.stack([target.X_PT for target in asked], axis=1)
+        self.twists = np.stack([target.V_PT_P for target in asked], axis=1)
         self.signs = column_signs(cell, self._model, tasks, moving)
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
         self.drift: Drift | None = None
@@ -139,8 +149,10 @@ class TrackingProblem:
         state = self.state(q)
         signs = self.signs * self.mobile(k)
         X_WT = state.X_WT[self.operators]
-        J = cooperation_jacobian(state, X_WT[:, :3, 3], signs)
-        error = pose_errors(self.wanted[k], inverse(state.X_WP) @ X_WT, self._is_spin_free)
+        X_WR = None if self._is_on_part else reference_frames(state, self.tasks)
+        J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
+        X_RT = inverse(state.X_WP if X_WR is None else X_WR) @ X_WT
+        error = pose_errors(self.wanted[k], X_RT, self._is_spin_free)
         self._refuse_lost_path(k, error)
         rows, twist, errors = self._constrained(k, J, error)
         drift = self._drift(k, q)
@@ -148,7 +160,7 @@ class TrackingProblem:
         return self._with_goals(k, q, state, FirstOrder(rows, twist, errors, weights, drift), signs=signs)
 
     def _constrained(self, k: int, J: Array, error: Array) -> tuple[Array, Array, Array]:
-        """Rows, wanted twists and errors of the components that the tasks constrain."""
+        """Rows, wanted twists and errors of the components that the tasks and grasps constrain."""
         if self._is_whole:
             return J.reshape(-1, J.shape[2]), self.twists[k].reshape(-1), error.reshape(-1)
         picks = [rows[k] for rows in self._rows]
@@ -162,7 +174,7 @@ class TrackingProblem:
         """The goals of the cell, which may lead back to the start posture."""
         if start is None:
             raise ValueError("secondary goals need the start posture of the motion")
-        return SecondaryGoals(self.cell, self._model, operators=self.operators, times=self.times, start=start)
+        return SecondaryGoals(self.cell, self._model, tasks=self.tasks, times=self.times, start=start)
 
     def _drift(self, k: int, q: Array) -> Array | None:
         """Joint speeds that are asked for to close a cycle, of those joints that may move."""
@@ -201,9 +213,14 @@ class TrackingProblem:
         worst = int(np.argmax(distances))
         task = self.tasks[worst]
         raise DivergedError(
-            f"the tool of '{task.robot}' is {1e3 * distances[worst]:.0f} mm from task '{task.name}': "
+            f"the tool of '{task.robot}' is {1e3 * distances[worst]:.0f} mm from {_place(task)}: "
             "the path cannot be followed from this start posture"
         )
+
+
+def _place(task: Relation) -> str:
+    """Where a tool should be, in words."""
+    return "its grasp on the part" if isinstance(task, Grasp) else f"task '{task.name}'"
 
 
 def _owners(cell: Cell) -> list[str]:

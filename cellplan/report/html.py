@@ -28,6 +28,8 @@ CHECKS = {
     "locked_joint": "joints that failed stand still",
     "position_error": "tool position on the part within tolerance",
     "orientation_error": "tool orientation on the part within tolerance",
+    "closure_position_error": "further holders' tools on their grasps",
+    "closure_orientation_error": "further holders' tools turned as they grasp",
     "joint_drift": "joints back where each cycle began",
     "clearance": "required clearance kept",
     "collision": "no collision",
@@ -183,7 +185,13 @@ def _figures(record: Record) -> list[Record]:
         if "samples" in record
         else f"{len(record['runs'])} runs, one after another",
     }
-    return [cycle, *_error_figures(record["tasks"]), *_joint_figures(record["joints"]), _clearance_figure(record)]
+    return [
+        cycle,
+        *_error_figures(record["tasks"]),
+        *_closure_figures(record["closure"]),
+        *_joint_figures(record["joints"]),
+        _clearance_figure(record),
+    ]
 
 
 def _error_figures(tasks: Record) -> list[Record]:
@@ -203,6 +211,24 @@ def _error_figure(tasks: Record, name: str, unit: str) -> Record:
         f"allowed {_small(allowed)} {unit}",
         "is_bad": worst[key] > allowed,
     }
+
+
+def _closure_figures(closures: Record) -> list[Record]:
+    """Largest distance of a further holder's tool from its grasp."""
+    if not closures:
+        return []
+    robot = max(closures, key=lambda name: closures[name]["max_position_error_mm"])
+    worst = closures[robot]
+    allowed = worst["allowed"]["position_mm"]
+    return [
+        {
+            "label": "Largest closure error",
+            "value": _small(worst["max_position_error_mm"]),
+            "unit": "mm",
+            "detail": f"{robot} at {_fixed(worst['at_s'], 3)} s; allowed {_small(allowed)} mm",
+            "is_bad": worst["max_position_error_mm"] > allowed,
+        }
+    ]
 
 
 def _joint_figures(joints: Record) -> list[Record]:
@@ -264,11 +290,16 @@ def _check_groups(checks: Iterable[Check]) -> list[Record]:
 
 
 def _shares(record: Record) -> list[Record]:
-    """Share of all motion of the positioner and of the operators together."""
+    """Share of all motion of the positioners and of the operators together."""
+    holders = [entry for entry in record["motion_share"].values() if entry["role"] == "positioner"]
     totals = {"positioner": 0.0, "operator": 0.0, "idle": 0.0}
     for entry in record["motion_share"].values():
         totals[entry["role"]] += entry["share"] or 0.0
-    names = {"positioner": "positioner", "operator": "operators", "idle": "robots without a task"}
+    names = {
+        "positioner": "positioner" if len(holders) < 2 else "positioners",
+        "operator": "operators",
+        "idle": "robots without a task",
+    }
     return [{"name": names[role], "share": share} for role, share in totals.items() if share > 0.0]
 
 

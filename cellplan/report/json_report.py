@@ -8,6 +8,7 @@ from dataclasses import replace
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, JointUse, Report
+from cellplan.report.closure_record import closures_record, worst_closures_record
 from cellplan.report.method import solver_record
 from cellplan.report.record import (
     SCHEMA,
@@ -42,9 +43,9 @@ def report_json(report: Report, *, cell: Cell, provenance: Provenance, motion: M
 
 
 def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> Record:
-    """The record of one run and of how its motion was found, without the series."""
+    """The record of one run, of its closures and of how its motion was found, without the series."""
     record = report_record(report, cell=cell, provenance=provenance)
-    return record | {"solver": solver_record(cell.solver, motion)}
+    return record | {"closure": closures_record(report, cell), "solver": solver_record(cell.solver, motion)}
 
 
 def summary_json(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> str:
@@ -73,6 +74,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "cycle_time_s": number(sum(report.cycle_time for report in runs)),
         "runs": {name: _run_record(name, report, cell) for name, report in reports.items()},
         "tasks": {name: record for report in runs for name, record in tasks_record(report, cell).items()},
+        "closure": worst_closures_record(runs, cell),
         "joints": joints_record(merge_joint_uses(use for report in runs for use in report.joints)),
         "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
         "clearance": clearance_record(minima),

@@ -8,7 +8,8 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
-from cellplan.model.report import ClearanceClass, JointUse, Report, TaskAccuracy
+from cellplan.model.report import ClearanceClass, ClosureAccuracy, JointUse, Report, TaskAccuracy
+from cellplan.model.task import Frame
 from cellplan.report import palette
 from cellplan.report.palette import INK, LIMIT
 from cellplan.report.plots_canvas import Sheet, pictures, style
@@ -62,6 +63,8 @@ def draw_plots(report: Report, *, cell: Cell) -> dict[str, bytes]:
     with style():
         for accuracy in report.accuracy:
             files |= _draw_task(accuracy, report.times, cell)
+        for closure in report.closures:
+            files |= _draw_closure(closure, report.times, cell)
         for robot in report.q:
             uses = [use for use in report.joints if use.robot == robot]
             files |= _draw_positions(robot, uses, report, colours[robot])
@@ -74,10 +77,20 @@ def draw_plots(report: Report, *, cell: Cell) -> dict[str, bytes]:
 def _draw_task(accuracy: TaskAccuracy, times: Array, cell: Cell) -> dict[str, bytes]:
     """Total and per-axis error of position and orientation."""
     tolerance = cell.task(accuracy.task).tolerance
-    sheet = Sheet(f"{accuracy.task} ({accuracy.robot}): tool error on the part", rows=2, columns=2, times=times)
+    place = "on the part" if cell.task(accuracy.task).relative_to is Frame.PART else "in the world"
+    sheet = Sheet(f"{accuracy.task} ({accuracy.robot}): tool error {place}", rows=2, columns=2, times=times)
     draw_error(sheet, 0, accuracy.position_error, allowed=tolerance.position, kind=POSITION)
     draw_error(sheet, 1, accuracy.orientation_error, allowed=tolerance.orientation, kind=ORIENTATION)
     return pictures(sheet, f"task_{accuracy.task}")
+
+
+def _draw_closure(closure: ClosureAccuracy, times: Array, cell: Cell) -> dict[str, bytes]:
+    """Total and per-axis error of the tool of a further holder on its grasp."""
+    checks = cell.checks
+    sheet = Sheet(f"{closure.robot}: tool error on its grasp", rows=2, columns=2, times=times)
+    draw_error(sheet, 0, closure.position_error, allowed=checks.closure_position, kind=POSITION)
+    draw_error(sheet, 1, closure.orientation_error, allowed=checks.closure_orientation, kind=ORIENTATION)
+    return pictures(sheet, f"closure_{closure.robot}")
 
 
 def draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: ErrorKind) -> None:

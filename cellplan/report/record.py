@@ -132,6 +132,7 @@ def _task_record(accuracy: TaskAccuracy, report: Report, cell: Cell) -> Record:
     orientation = np.rad2deg(accuracy.orientation_error)
     return {
         "robot": accuracy.robot,
+        "relative_to": str(task.relative_to),
         **_error_record("position_error", "mm", position[first:], times=times, axes=AXES[:3]),
         "max_position_error_with_settling_mm": number(_longest(position)),
         **_error_record("orientation_error", "deg", orientation[first:], times=times, axes=AXES[3:]),

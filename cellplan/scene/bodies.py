@@ -10,7 +10,7 @@ from cellplan.errors import InputError
 from cellplan.geometry.shapes import HalfSpace, Shape
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screws import ScrewChain
-from cellplan.model.cell import Cell, Part, Robot
+from cellplan.model.cell import Cell, Grasp, Part, Robot
 from cellplan.model.robot import BASE
 
 
@@ -56,7 +56,7 @@ def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
         InputError: Two bodies have the same name.
     """
     bodies = [body for robot in cell.robots for body in _robot_bodies(robot)]
-    bodies.append(_part_body(cell, cell.part))
+    bodies.append(part_body(cell, cell.part, *cell.part.held_by[:1]))
     bodies += [_fixed(thing.name, Kind.OBSTACLE, shape=thing.shape, X_WS=thing.X_WS) for thing in cell.obstacles]
     seen: set[str] = set()
     for body in bodies:
@@ -118,13 +118,12 @@ def _robot_bodies(robot: Robot) -> list[SceneBody]:
     return bodies
 
 
-def _part_body(cell: Cell, part: Part) -> SceneBody:
-    """The part, carried by the first of its holders or fixed in the world."""
-    if not part.held_by:
+def part_body(cell: Cell, part: Part, grasp: Grasp | None = None) -> SceneBody:
+    """The part, carried by one of its holders or fixed in the world."""
+    if grasp is None:
         if part.X_WP is None:
             raise InputError(f"{cell.origin.at('part')}: nobody holds the part and it has no place in the world")
         return _fixed("part", Kind.PART, shape=part.shape, X_WS=part.X_WP @ part.X_PS)
-    grasp = part.held_by[0]
     holder = cell.robot(grasp.robot)
     return SceneBody(
         name="part",

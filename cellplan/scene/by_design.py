@@ -15,7 +15,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.robot import RobotModel
-from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground
+from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, part_body
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, near_in_chain, stands_on
 
 POSTURES: Final = 48  # random postures beside the reference; a pair that is free in one of ten escapes 0.6 % of trials
@@ -43,24 +43,48 @@ def apply_design(
     - a tool or a held part against a link, at a distance that hardly changes between them: likewise.
 
     A robot whose foot has no body may stand with its first link in the surroundings, if it does so in every posture.
+    The links of each robot that holds the part are looked at as if it were the one that carries it.
     """
-    sampled = None
+    views = _views(cell, bodies)
+    postures = _postures(cell)
+    sampled: dict[str | None, BodyPoses] = {}
     kept, excluded = [], []
     for pair in pairs:
-        is_near = near_in_chain(pair, bodies, cell=cell)
+        holder = _further_holder(pair, bodies, views)
+        seen = views[holder]
+        is_near = near_in_chain(pair, seen, cell=cell)
         if not is_near and not stands_on(pair, bodies, cell=cell):
             kept.append(pair)
             continue
-        if sampled is None:
-            sampled = checked_poses(body_poses(bodies, chains, _postures(cell)))
-        if _always_touch(engine, bodies, pair, poses=sampled):
+        if holder not in sampled:
+            sampled[holder] = checked_poses(body_poses(seen, chains, postures))
+        if _always_touch(engine, bodies, pair, poses=sampled[holder]):
             reason = f"touch at the reference posture and at {POSTURES} random ones: it is their shape, not the motion"
             excluded.append(Excluded(pair.first, pair.second, reason))
         elif is_near:
-            kept.append(_relaxed(pair, bodies, engine=engine, poses=sampled, clearance=cell.checks.clearance))
+            kept.append(_relaxed(pair, bodies, engine=engine, poses=sampled[holder], clearance=cell.checks.clearance))
         else:
             kept.append(pair)
     return kept, excluded
+
+
+def _views(cell: Cell, bodies: Sequence[SceneBody]) -> dict[str | None, Sequence[SceneBody]]:
+    """The bodies as they are, and with the part on each further holder whose grasp leaves nothing open."""
+    views: dict[str | None, Sequence[SceneBody]] = {None: bodies}
+    for grasp in cell.closures:
+        if len(grasp.axes) == 6:
+            held = part_body(cell, cell.part, grasp)
+            views[grasp.robot] = [held if body.kind is Kind.PART else body for body in bodies]
+    return views
+
+
+def _further_holder(
+    pair: ScenePair, bodies: Sequence[SceneBody], views: Mapping[str | None, Sequence[SceneBody]]
+) -> str | None:
+    """The further holder that a pair belongs to, when the pair is one of its bodies and the part."""
+    ends = (bodies[pair.first], bodies[pair.second])
+    owner = next((body.robot for body in ends if body.kind is not Kind.PART), None)
+    return owner if any(body.kind is Kind.PART for body in ends) and owner in views else None
 
 
 def _postures(cell: Cell) -> dict[str, Array]:

@@ -15,6 +15,7 @@ from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import Cell, Robot
+from cellplan.model.task import Frame
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, scene_bodies
 from cellplan.scene.by_design import apply_design
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
@@ -145,9 +146,10 @@ def _at_work(cell: Cell, bodies: tuple[SceneBody, ...], pairs: list[ScenePair], 
 
 
 def _is_tool_at_work(cell: Cell, bodies: tuple[SceneBody, ...], pair: ScenePair) -> bool:
-    """Whether a pair is the tool of a robot that has a task, and the part."""
+    """Whether a pair is the tool of a robot that has a task on the part, and the part."""
+    at_work = {task.robot for task in cell.tasks if task.relative_to is Frame.PART}
     kinds = {bodies[index].kind: bodies[index] for index in (pair.first, pair.second)}
-    return set(kinds) == {Kind.TOOL, Kind.PART} and kinds[Kind.TOOL].robot in {task.robot for task in cell.tasks}
+    return set(kinds) == {Kind.TOOL, Kind.PART} and kinds[Kind.TOOL].robot in at_work
 
 
 def _watch_tool(watch: _Watch, cell: Cell, bodies: tuple[SceneBody, ...], *, pair: ScenePair, next_index: int) -> None:

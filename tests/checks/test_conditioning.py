@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from random_cells import make_task, random_cell
+from jacobian_cells import planners_jacobian
+from random_cells import carried, make_task, random_cell, sharing
 
 from cellplan.checks.conditioning import conditioning
 from cellplan.checks.tracking import part_poses
@@ -63,6 +64,38 @@ def test_smallest_singular_value_of_the_stack(options, at_rest):
 
     np.testing.assert_allclose(found.stack, planners_values(cell, schedule, q, moving), atol=1e-12)
     assert ("holder" in found.robots) is not at_rest
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2, 3, 4, 5), (0, 1, 5)], ids=["whole", "planar"])
+def test_the_stack_holds_the_closures_of_further_holders_and_the_path_of_the_part(axes):
+    cell = carried(sharing(random_cell(22, operators=3), 1, axes=axes))
+    q = np.random.default_rng(1).uniform(-1, 1, (N, cell.joint_count))
+    chains = {r.name: ScrewChain(r) for r in cell.robots}
+    by_name = {r.name: q[:, cell.columns(r.name)] for r in cell.robots}
+    scheduled = tuple(
+        TaskSchedule(
+            task=task,
+            X_PT=np.broadcast_to(np.eye(4), (N, 4, 4)),
+            V_PT_P=np.zeros((N, 6)),
+            travelled=np.zeros(N),
+            length=1.0,
+            end=1.0,
+        )
+        for task in cell.tasks
+    )
+    schedule = Schedule(times=np.arange(N) * 1e-3, tasks=scheduled)
+    names = [r.name for r in cell.robots]
+
+    found = conditioning(cell, schedule, chains, q=by_name, X_WP=part_poses(cell, chains, by_name), moving=names)
+
+    for k in range(N):
+        J = planners_jacobian(cell, q[k])
+        stack = np.concatenate([J[:-1].reshape(-1, cell.joint_count), J[-1][list(axes)]])
+        assert found.stack[k] == pytest.approx(np.linalg.svd(stack, compute_uv=False)[-1], abs=1e-12)
+        own = J[-1][list(axes)][:, cell.columns("op2")]
+        assert found.robots["op2"][k] == pytest.approx(np.linalg.svd(own, compute_uv=False)[len(axes) - 1], abs=1e-12)
+    assert set(found.robots) == set(names)
+    assert all(len(series) == N for series in found.robots.values())
 
 
 NUDGE = 1e-5  # [rad]: central differences are then good to about 1e-10

@@ -147,12 +147,12 @@ def test_many_robots_with_long_names_stay_within_the_screen() -> None:
     record = {
         "cell": "many",
         "mode": "simultaneous",
-        "part": {"held_by": []},
+        "part": {"held_by": [], "closures": []},
         "robots": [
             {"name": r, "model": "m", "holds_part": False, "works_on": [], "joints": [], "followers": []}
             for r in robots
         ],
-        "tasks": [{"name": "t", "robot": robots[0], "constrained": ["x"]}],
+        "tasks": [{"name": "t", "robot": robots[0], "relative_to": "part", "constrained": ["x"]}],
         "graph": {"chains": "PPPS", "plane": None, "vertices": 1, "edges": 0, "independent_circuits": 0, "joints": []},
         "circuits": [],
         "matrices": [

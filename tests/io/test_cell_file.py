@@ -13,7 +13,7 @@ from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Sp
 from cellplan.geometry.transforms import pose
 from cellplan.io.cell_file import load_cell
 from cellplan.model.cell import Cell, Mode
-from cellplan.model.task import CirclePath, PlaneName, PolygonPath, SampledPath, TimeLawKind
+from cellplan.model.task import CirclePath, Frame, PlaneName, PolygonPath, SampledPath, TimeLawKind
 
 Load = Callable[..., Cell]
 Refuse = Callable[..., list[str]]
@@ -302,3 +302,32 @@ def test_real_arms_load_from_their_urdf(
     assert str(urdf) in cell.inputs
     assert sum(name.endswith((".stl", ".STL", ".obj", ".dae")) for name in cell.inputs) > 0
     assert told[0].startswith("c:8: robots.worker.model: expected a path below the folder of the cell file, got ")
+
+
+def test_further_holders_may_leave_components_open(load: Callable[..., Cell]) -> None:
+    cell = load(
+        (
+            "    - {robot: holder, at: {xyz_mm: [-250, 0, 0]}}",
+            "    - {robot: holder, at: {xyz_mm: [-250, 0, 0]}}\n"
+            "    - {robot: helper, at: {xyz_mm: [250, 0, 0]}, axes: [rz, x, y]}",
+        ),
+        ("part:\n", "  helper: {model: kuka_kr6}\npart:\n"),
+        ("environment:", "checks: {closure_mm: 0.02, closure_deg: 0.5}\nenvironment:"),
+    )
+    assert cell.positioners == ("holder", "helper")
+    assert [grasp.name for grasp in cell.closures] == ["helper@part"]
+    assert cell.closures[0].axes == (0, 1, 5)
+    assert cell.part.held_by[0].axes == (0, 1, 2, 3, 4, 5)
+    assert [relation.name for relation in cell.relations] == ["ring", "helper@part"]
+    assert cell.checks.closure_position == pytest.approx(2e-5)
+    assert cell.checks.closure_orientation == pytest.approx(np.radians(0.5))
+
+
+def test_the_first_holder_may_carry_the_part_along_a_path_in_the_world(load: Callable[..., Cell]) -> None:
+    cell = load(
+        ("    robot: worker", "    robot: holder\n    relative_to: world"),
+        ("plane: xy}, project: +z}", "plane: xy}}"),
+        ("    tool_axis: normal", "    tool_axis: -z"),
+    )
+    assert cell.task("ring").relative_to is Frame.WORLD
+    assert cell.checks.closure_position == 3e-6

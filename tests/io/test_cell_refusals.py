@@ -61,8 +61,36 @@ Refuse = Callable[..., list[str]]
         ),
         (
             "    - {robot: holder, at: {xyz_mm: [-250, 0, 0]}}",
+            "    - {robot: holder}\n    - {robot: holder}",
+            "c:16: part.held_by[1].robot: expected a robot that does not hold the part already, got 'holder' twice",
+        ),
+        (
+            "    - {robot: holder, at: {xyz_mm: [-250, 0, 0]}}",
+            "    - {robot: holder, axes: [x, y, rz]}",
+            "c:15: part.held_by[0].axes: unexpected key, the first holder carries the part frame; further holders may "
+            "leave axes open",
+        ),
+        (
+            "    - {robot: holder, at: {xyz_mm: [-250, 0, 0]}}",
+            "    - {robot: holder}\n    - {robot: worker, axes: [x, x]}",
+            "c:16: part.held_by[1].axes[1]: expected each word once, got 'x' twice\n"
+            "c:19: tasks.ring.robot: expected a robot that does not hold the part, got the positioner 'worker'",
+        ),
+        (
+            "    - {robot: holder, at: {xyz_mm: [-250, 0, 0]}}",
             "    - {robot: holder}\n    - {robot: worker}",
-            "c:14: part.held_by: expected at most one holder, got 2; load sharing is not available in this version",
+            "c:19: tasks.ring.robot: expected a robot that does not hold the part, got the positioner 'worker'",
+        ),
+        (
+            "    tool_axis: normal",
+            "    relative_to: world\n    tool_axis: -z",
+            "c:19: tasks.ring.path.project: unexpected key, a path in the world is not laid on the part",
+        ),
+        (
+            "plane: xy}, project: +z}",
+            "plane: xy}}\n    relative_to: world",
+            "c:21: tasks.ring.tool_axis: tool_axis: normal needs a path that is laid on the part: give tool_axis a "
+            "direction",
         ),
         (
             "  held_by:\n    - {robot: holder, at: {xyz_mm: [-250, 0, 0]}}\n",

@@ -39,7 +39,9 @@ def reload(cell: Cell, folder: Path, starts: dict[str, np.ndarray] | None = None
     return load_cell(path)
 
 
-@pytest.mark.parametrize("file", ["four_robots.yaml", "four_robots_initial.yaml"])
+@pytest.mark.parametrize(
+    "file", ["four_robots.yaml", "four_robots_initial.yaml", "load_sharing.yaml", "load_sharing_planar.yaml"]
+)
 def test_a_written_cell_loads_to_the_same_cell_and_writes_the_same_text(cells: Path, tmp_path: Path, file: str) -> None:
     cell = load_cell(cells / file)
 

@@ -27,6 +27,13 @@ Refuse = Callable[..., list[str]]
             "c:18: tasks.ring.robot: expected a robot that does not hold the part, got the positioner 'holder'",
         ),
         (
+            "motion: {",
+            "  carry: {robot: holder, relative_to: world, path: {circle: {radius_mm: 50, plane: xy}}, tool_axis: -z}\n"
+            "motion: {mode: part_at_rest, ",
+            "c:21: tasks.carry.robot: expected a robot that does not hold the part in the mode part_at_rest, got the "
+            "positioner 'holder'",
+        ),
+        (
             "robot: worker",
             "robot: wroker",
             "c:18: tasks.ring.robot: expected a robot of this cell (holder, worker), got 'wroker', did you mean "

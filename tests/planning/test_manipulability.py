@@ -8,7 +8,8 @@ from random_cells import random_cell
 
 from cellplan.geometry.transforms import pose_from, rotation_exp
 from cellplan.kinematics.combined import CombinedModel
-from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian
+from cellplan.model.task import Frame
+from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian, reference_frames
 from cellplan.planning.manipulability import ManipulabilityGradient
 
 H = 1e-5  # [rad] or [m]: central differences leave H^2 and eps / H times the condition, both below 1e-7
@@ -18,16 +19,19 @@ class Tasks:
     """The task rows of a random cell as a function of the posture."""
 
     def __init__(self, cell, *, held: bool, moving=None) -> None:
+        self.tasks = cell.tasks
         self.model, names = CombinedModel(cell), [robot.name for robot in cell.robots]
         self.operators = [names.index(task.robot) for task in cell.tasks]
         self.signs = column_signs(cell, self.model, cell.tasks, moving or names)
         X_PT = pose_from(rotation_exp(np.array([[0.3, -0.5, 0.9]])), np.zeros((1, 3)))  # where free spin looks along
         self.picks = [constraint_rows(task, X_PT)[0] for task in cell.tasks]
-        self._gradient = ManipulabilityGradient(self.model, self.operators, 0 if held else None)
+        on_part = np.array([float(task.relative_to is Frame.PART) for task in cell.tasks])
+        self._gradient = ManipulabilityGradient(self.model, self.operators, 0 if held else None, on_part=on_part)
 
     def rows(self, q):
         state = self.model.state(q)
-        blocks = cooperation_jacobian(state, state.X_WT[self.operators, :3, 3], self.signs)
+        X_WR = reference_frames(state, self.tasks)
+        blocks = cooperation_jacobian(state, state.X_WT[self.operators, :3, 3], self.signs, X_WR=X_WR)
         return np.concatenate([pick @ block for pick, block in zip(self.picks, blocks, strict=True)])
 
     def log_manipulability(self, q) -> float:
@@ -37,6 +41,18 @@ class Tasks:
     def gradient(self, q):
         state = self.model.state(q)
         return self._gradient.at(q, state, J=self.rows(q), picks=self.picks, signs=self.signs)
+
+
+def test_a_task_in_the_world_keeps_its_frame_while_the_part_turns() -> None:
+    cell = random_cell(5, operators=3, joints=7)
+    moved, *others = (replace(t, axes=(0, 1, 3, 5)) for t in cell.tasks)
+    tasks = Tasks(replace(cell, tasks=(replace(moved, relative_to=Frame.WORLD), *others)), held=True)
+    q = np.random.default_rng(5).uniform(-1.0, 1.0, cell.joint_count)
+
+    expected = [
+        (tasks.log_manipulability(q + H * e) - tasks.log_manipulability(q - H * e)) / (2 * H) for e in np.eye(len(q))
+    ]
+    np.testing.assert_allclose(tasks.gradient(q), expected, atol=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("operators", [1, 2, 4])

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from cellplan.io.run_folder import RunFolder
 from cellplan.model.cell import LockedJoint
-from cellplan.model.report import ClearanceClass, JointDrift, Repeatability
+from cellplan.model.report import ClearanceClass, ClosureAccuracy, JointDrift, Repeatability
 from cellplan.report.json_report import merge_joint_uses, report_json, summary_json
 from cellplan.report.record import number
 
@@ -218,6 +218,42 @@ def test_speeds_in_the_world_are_told_in_millimetres_per_second(passed_run: Any)
         "axis": "C3",
         "axis_peak_at_s": 2.5,
     }
+
+
+def closure(size: float, turn: float, times: Any) -> ClosureAccuracy:
+    wave = np.sin(np.pi * times / times[-1])[:, None]
+    axis = np.array([0.6, 0.0, 0.8])
+    return ClosureAccuracy(
+        robot="abb", axes=(0, 1, 5), position_error=size * wave * axis, orientation_error=turn * wave * axis
+    )
+
+
+def test_closures_are_told_by_robot_with_what_is_allowed(passed_run: Any) -> None:
+    report = replace(passed_run.report, closures=(closure(2e-6, 1e-5, passed_run.report.times),))
+
+    record = read(report_json(report, cell=passed_run.cell, provenance=passed_run.provenance))["closure"]
+
+    assert list(record) == ["abb"]
+    assert record["abb"]["max_position_error_mm"] == pytest.approx(2e-3)
+    assert record["abb"]["max_orientation_error_deg"] == pytest.approx(math.degrees(1e-5))
+    assert record["abb"]["at_s"] == pytest.approx(0.5 * report.times[-1], abs=1e-3)
+    assert record["abb"]["allowed"] == {"position_mm": 0.003, "orientation_deg": 0.001}
+    assert record["abb"]["axes"] == ["x", "y", "rz"]
+    assert record_of(passed_run)["closure"] == {}
+
+
+def test_the_summary_tells_the_worst_closure_of_all_runs(pairwise_runs: Any) -> None:
+    first = pairwise_runs["circle"]
+    sizes = {"circle": (1e-6, 3e-5), "rhombus": (2e-6, 1e-5)}
+    reports = {
+        name: replace(pairwise_runs[name].report, closures=(closure(*size, pairwise_runs[name].report.times),))
+        for name, size in sizes.items()
+    }
+
+    record = read(summary_json(reports, cell=first.cell, provenance=first.provenance))["closure"]["abb"]
+
+    assert record["max_position_error_mm"] == pytest.approx(2e-3)
+    assert record["max_orientation_error_deg"] == pytest.approx(math.degrees(3e-5))
 
 
 def drifting(run: Any) -> Any:

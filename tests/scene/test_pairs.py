@@ -23,9 +23,10 @@ from scene_builders import (
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Sphere
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell import Cell, CheckSettings, Exclusion
+from cellplan.model.cell import Cell, CheckSettings, Exclusion, Grasp, Part
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import FollowerJoint, JointKind, RobotModel
+from cellplan.model.task import Frame
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 
@@ -255,3 +256,41 @@ def test_a_bent_tool_whose_distance_changes_keeps_its_clearance() -> None:
     pair = watched(Scene.from_cell(make_cell(placed("a", arm_model(), tool=bent))))[frozenset(("a/tube", "a/tool"))]
 
     assert pair.rule is Rule.CLEARANCE
+
+
+def shared_part(shape: Sphere | Box) -> Part:
+    """A part that two arms hold from opposite sides, each with its tool axis into the part."""
+    grasps = (
+        Grasp(robot="a", X_PT=pose((0.0, 0.0, -0.1))),
+        Grasp(robot="b", X_PT=pose((0.0, 0.0, 0.1), (2 * QUARTER, 0.0, 0.0))),
+    )
+    return Part(shape=shape, X_PS=np.eye(4), held_by=grasps, X_WP=None)
+
+
+def test_every_holder_may_touch_the_part_with_its_tool_and_hand() -> None:
+    scene = Scene.from_cell(two_arms(part=shared_part(Sphere(0.05)), tasks=()))
+    for robot in "ab":
+        assert reasons(scene)[frozenset((f"{robot}/hand", "part"))] == "holds the part"
+        assert reasons(scene)[frozenset((f"{robot}/tool", "part"))] == "holds the part"
+        assert watched(scene)[frozenset((f"{robot}/foot", "part"))].rule is Rule.CLEARANCE
+    assert watched(scene)[frozenset(("a/tool", "b/tool"))].rule is Rule.CLEARANCE
+
+
+def test_links_near_a_part_by_their_mounting_are_the_same_for_every_holder() -> None:
+    """A broad plate at 0.1 m from either tool tip reaches back over the wrists of both arms."""
+    scene = Scene.from_cell(two_arms(part=shared_part(Box((0.3, 0.3, 0.42))), tasks=()))
+    said, kept = reasons(scene), watched(scene)
+    rules = [
+        kept[frozenset((f"{robot}/wrist", "part"))].rule
+        if frozenset((f"{robot}/wrist", "part")) in kept
+        else said[frozenset((f"{robot}/wrist", "part"))]
+        for robot in "ab"
+    ]
+    assert rules[0] == rules[1]
+    assert rules[0] is not Rule.CLEARANCE
+
+
+def test_a_task_in_the_world_is_no_leave_to_touch_the_part() -> None:
+    in_world = replace(work("b"), relative_to=Frame.WORLD)
+    scene = Scene.from_cell(two_arms(part=held_part(Sphere(0.05), "a", np.eye(4)), tasks=(in_world,)))
+    assert watched(scene)[frozenset(("b/tool", "part"))].rule is Rule.CLEARANCE

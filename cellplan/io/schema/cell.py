@@ -8,37 +8,53 @@ from cellplan.io.schema.common import Angle, Coordinate, Entry, Name, PoseEntry,
 from cellplan.io.schema.robot import Mass, RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
 from cellplan.io.schema.solver import SolverEntry
-from cellplan.io.schema.task import LONGEST_S, CornerChoice, Seconds, TaskEntry, TimeLawChoice
+from cellplan.io.schema.task import (
+    LONGEST_S,
+    CornerChoice,
+    Seconds,
+    TaskAxis,
+    TaskEntry,
+    TimeLawChoice,
+    require_each_once,
+)
 
 SCHEMA_VERSION: Final = 1
 ROBOT_LIMIT: Final = 16
 TASK_LIMIT: Final = 200
 OBSTACLE_LIMIT: Final = 500
 SAMPLE_LIMIT: Final = 2_000_000  # tables longer than this fill disks, not controllers
+ALL_AXES: Final[tuple[TaskAxis, ...]] = ("x", "y", "z", "rx", "ry", "rz")
 
 
 class GraspEntry(Entry):
     """A robot that holds the part."""
 
-    robot: Name = Field(description="Robot that holds the part (the positioner).")
+    robot: Name = Field(description="Robot that holds the part (a positioner).")
     at: PoseEntry = Field(default=PoseEntry(), description="Pose of the holder's tool tip in the part frame.")
+    axes: tuple[TaskAxis, ...] = Field(
+        default=ALL_AXES,
+        min_length=1,
+        description="Components of its motion on the part that a further holder keeps at zero, in the part frame; the "
+        "first holder carries the part frame and has all six.",
+    )
 
-
-def _one_holder(holders: tuple[GraspEntry, ...]) -> tuple[GraspEntry, ...]:
-    """Refuse load sharing."""
-    if len(holders) > 1:
-        raise rule(f"expected at most one holder, got {len(holders)}; load sharing is not available in this version")
-    return holders
-
-
-Holders = Annotated[tuple[GraspEntry, ...], AfterValidator(_one_holder)]
+    @model_validator(mode="after")
+    def _names_each_axis_once(self) -> Self:
+        """Each axis once."""
+        require_each_once(self.axes, "axes")
+        return self
 
 
 class PartEntry(Entry):
     """The workpiece; somebody holds it, or it is fixed in the world."""
 
     geometry: PartShapeEntry = Field(description="Shape of the part.")
-    held_by: Holders = Field(default=(), description="The robot that holds the part; none: fixed in the world.")
+    held_by: tuple[GraspEntry, ...] = Field(
+        default=(),
+        max_length=ROBOT_LIMIT,
+        description="The robots that hold the part, the one that carries the part frame first; none: fixed in the "
+        "world.",
+    )
     at: PoseEntry | None = Field(
         default=None, description="Pose of the part frame in the world; required exactly when nobody holds the part."
     )
@@ -46,11 +62,14 @@ class PartEntry(Entry):
 
     @model_validator(mode="after")
     def _stands_somewhere(self) -> Self:
-        """Held by one robot, or placed in the world."""
+        """Held by robots, the first of them in all components, or placed in the world."""
         if self.held_by and self.at is not None:
             raise rule("unexpected key, the part is placed by the robot that holds it", "at")
         if not self.held_by and self.at is None:
             raise rule("missing, expected the pose of the part in the world, or a robot under held_by", "at")
+        if self.held_by and set(self.held_by[0].axes) != set(ALL_AXES):
+            words = "unexpected key, the first holder carries the part frame; further holders may leave axes open"
+            raise rule(words, "held_by[0].axes")
         return self
 
 
@@ -115,6 +134,12 @@ class ChecksEntry(Entry):
     )
     contact_zone_mm: Annotated[float, Field(ge=0.0, le=10_000.0)] = Field(
         default=20.0, description="Radius round the tool tip within which tool and part may touch."
+    )
+    closure_mm: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(
+        default=0.003, description="Largest distance of a further holder's tool from its grasp on the part."
+    )
+    closure_deg: Annotated[float, Field(gt=0.0, le=180.0)] = Field(
+        default=0.001, description="Largest angle between a further holder's tool and its grasp on the part."
     )
     exclude: tuple[ExclusionEntry, ...] = Field(default=(), description="Pairs left out of the collision check.")
 

@@ -213,10 +213,22 @@ class ToleranceEntry(Entry):
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
 
 
+def require_each_once(words: tuple[str, ...], key: str) -> None:
+    """Refuse a list that names something twice."""
+    for index, word in enumerate(words):
+        if word in words[:index]:
+            raise rule(f"expected each word once, got '{word}' twice", f"{key}[{index}]")
+
+
 class TaskEntry(Entry):
     """One operator's work on the part."""
 
     robot: Name = Field(description="Robot that does the task; a robot has at most one.")
+    relative_to: Literal["part", "world"] = Field(
+        default="part",
+        description="Frame that path, tool axis and axes are given in. With world, a robot that holds the part (the "
+        "first under held_by) carries it along the path; any other moves its tool through the cell.",
+    )
     path: PathEntry = Field(description="Path of the tool tip on the part.")
     tool_axis: ToolAxis | None = Field(
         default=None,
@@ -266,11 +278,11 @@ class TaskEntry(Entry):
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
-        """Duration or feed; each axis once; a free spin leaves an axis to point."""
+        """Duration or feed; each word once; only a path on the part has a surface to lie on."""
         if self.duration_s is not None and self.feed_mm_s is not None:
             raise rule("expected either duration_s or feed_mm_s, got both", "feed_mm_s")
+        if self.relative_to == "world" and self.path.project is not None:
+            raise rule("unexpected key, a path in the world is not laid on the part", "path.project")
         for name, words in (("axes", self.axes), ("free", self.free)):
-            for index, word in enumerate(words):
-                if word in words[:index]:
-                    raise rule(f"expected each word once, got '{word}' twice", f"{name}[{index}]")
+            require_each_once(words, name)
         return self

@@ -2,9 +2,9 @@
 
 from cellplan.kinematics.derivations.graph import Coupling, CouplingGraph
 from cellplan.kinematics.derivations.serial_chain import chain_to_flange, part_holder
-from cellplan.model.cell import Cell, Robot
+from cellplan.model.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.robot import JointKind
-from cellplan.model.task import PlaneName, Task
+from cellplan.model.task import Frame, PlaneName
 
 WORLD, PART = "world", "part"
 SPACE = (0, 1, 2, 3, 4, 5)  # PPPS: three slides along the axes of P, then a ball joint as three turns about them
@@ -17,12 +17,12 @@ def components(plane: PlaneName | None) -> tuple[int, ...]:
     return SPACE if plane is None else PLANE[plane]
 
 
-def virtual_joint(task: Task, component: int) -> str:
+def virtual_joint(task: Relation, component: int) -> str:
     """Name of the virtual joint that measures one component of a tool's twist on the part."""
     return f"{task.name}:{VIRTUAL_JOINTS[component]}"
 
 
-def coupling_graph(cell: Cell, plane: PlaneName | None = None) -> CouplingGraph:
+def coupling_graph(cell: Cell, plane: PlaneName | None = None, *, measure_grasps: bool = False) -> CouplingGraph:
     """Links and joints of all robots, each from base to flange, and one virtual chain per task from part to tool.
 
     Things fixed to each other are one link: the world with all bases (and with a part on a fixture), the last link of
@@ -30,12 +30,28 @@ def coupling_graph(cell: Cell, plane: PlaneName | None = None) -> CouplingGraph:
     a plane ([Ribeiro2010]_ C.1); they add no constraint, they only measure. Followers are joints of their own, driven
     by their leaders; axes beside the way to a flange carry no tool and are left out.
 
+    Where several robots hold the part (4.5), the last links of all of them are one link with it: each further holder
+    closes a real circuit over the part and the world, without a virtual chain. What its grasp leaves open is a virtual
+    joint that nobody measures. A task in the world has its chain from the world to the tool.
+
     Args:
         cell: The cell.
         plane: Plane of P in which everything moves; None for space.
+        measure_grasps: Whether each further holder is let go and given a whole virtual chain to the part instead, so
+            that it is measured how it would stray from its grasp.
     """
-    joints = [coupling for robot in cell.robots for coupling in _robot_joints(cell, robot)]
-    joints += [coupling for task in cell.tasks for coupling in _virtual_chain(cell, task, components(plane))]
+    joints = [
+        coupling
+        for robot in cell.robots
+        for coupling in _robot_joints(robot, tool_link(cell, robot, plane, measure_grasps=measure_grasps))
+    ]
+    for relation in cell.relations:
+        wanted = components(plane)
+        if isinstance(relation, Grasp) and not measure_grasps:
+            wanted = tuple(component for component in wanted if component not in relation.axes)
+        if wanted:
+            tool = tool_link(cell, cell.robot(relation.robot), plane, measure_grasps=measure_grasps)
+            joints += _virtual_chain(relation, wanted, tail=_reference_link(cell, relation), head=tool)
     links = dict.fromkeys([WORLD, part_link(cell)] + [end for joint in joints for end in (joint.tail, joint.head)])
     return CouplingGraph(links=tuple(links), joints=tuple(joints))
 
@@ -46,18 +62,26 @@ def part_link(cell: Cell) -> str:
     return PART if holder is not None and chain_to_flange(holder[0].model) else WORLD
 
 
-def tool_link(cell: Cell, robot: Robot) -> str:
-    """The link that a robot's tool belongs to."""
+def tool_link(cell: Cell, robot: Robot, plane: PlaneName | None = None, *, measure_grasps: bool = False) -> str:
+    """The link that a robot's tool belongs to; that of a holder whose grasp leaves nothing open is the part's."""
     if not chain_to_flange(robot.model):
         return WORLD
     holder = part_holder(cell)
-    return PART if holder is not None and holder[0].name == robot.name else f"{robot.name}/tool"
+    if holder is not None and holder[0].name == robot.name:
+        return PART
+    rigid = [grasp.robot for grasp in cell.closures if set(components(plane)) <= set(grasp.axes)]
+    return part_link(cell) if robot.name in rigid and not measure_grasps else f"{robot.name}/tool"
 
 
-def _robot_joints(cell: Cell, robot: Robot) -> list[Coupling]:
+def _reference_link(cell: Cell, relation: Relation) -> str:
+    """The link that a tool's motion is relative to."""
+    return part_link(cell) if relation.relative_to is Frame.PART else WORLD
+
+
+def _robot_joints(robot: Robot, tool: str) -> list[Coupling]:
     """The joints of one robot from base to flange, each pointing away from the base."""
     chain = chain_to_flange(robot.model)
-    links = [WORLD, *(f"{robot.name}/{number}" for number in range(1, len(chain))), tool_link(cell, robot)]
+    links = [WORLD, *(f"{robot.name}/{number}" for number in range(1, len(chain))), tool]
     return [
         Coupling(
             name=f"{robot.name}/{axis.name}",
@@ -72,10 +96,10 @@ def _robot_joints(cell: Cell, robot: Robot) -> list[Coupling]:
     ]
 
 
-def _virtual_chain(cell: Cell, task: Task, wanted: tuple[int, ...]) -> list[Coupling]:
-    """The virtual joints of one task, pointing from the part to the tool."""
+def _virtual_chain(task: Relation, wanted: tuple[int, ...], *, tail: str, head: str) -> list[Coupling]:
+    """The virtual joints of one task or grasp, pointing from the part, or the world, to the tool."""
     inner = [f"{task.name}:{number}" for number in range(1, len(wanted))]
-    links = [part_link(cell), *inner, tool_link(cell, cell.robot(task.robot))]
+    links = [tail, *inner, head]
     names = [virtual_joint(task, component) for component in wanted]
     return [
         Coupling(

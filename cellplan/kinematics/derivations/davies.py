@@ -18,7 +18,7 @@ from cellplan.kinematics.derivations.serial_chain import (
     part_holder,
 )
 from cellplan.model.cell import Cell, Robot
-from cellplan.model.task import PlaneName
+from cellplan.model.task import Frame, PlaneName
 
 IN_PLANE_TOL = 1e-9  # [-] share of a unit screw that may point out of the plane: rounding of poses in files
 RANK_TOL = 1e-10  # [-] singular values below this share of the largest one are zero: rounding of unit screws
@@ -68,29 +68,36 @@ class NetworkSpeeds:
 
 
 def network(
-    cell: Cell, q: Array, *, plane: PlaneName | None = None, tree_order: Sequence[int] | None = None
+    cell: Cell,
+    q: Array,
+    *,
+    plane: PlaneName | None = None,
+    tree_order: Sequence[int] | None = None,
+    measure_grasps: bool = False,
 ) -> Network:
     r"""Network matrix of a cell, ``N = sum_e B_e $_e`` ([Ribeiro2010]_ Eqs. 3.59, 4.27; App. E in the plane).
 
     The signed sum of joint twists round each circuit is zero, ``N qdot = 0``. A follower adds its ratio to the column
-    of its leader.
+    of its leader. The circuits of further holders are among them, so speeds that fulfil it keep their grasps.
 
     Args:
         cell: The cell.
         q: Stacked joint vector in [rad] or [m], shape (nq,).
         plane: Plane of P in which everything moves (PPR chains, three rows); None for space (PPPS, six rows).
         tree_order: Order in which joints are offered to the spanning tree; any order gives the same speeds.
+        measure_grasps: Whether further holders are let go and measured, see `coupling_graph`.
 
     Raises:
         InputError: The posture does not fit the cell, or a fixed part has no pose.
-        NotPlanarError: A joint in a circuit moves out of the plane.
+        NotPlanarError: A joint in a circuit moves out of the plane, or a task is given in the world.
     """
     q = checked_posture(cell, q)
-    graph = coupling_graph(cell, plane)
+    _refuse_world_in_plane(cell, plane)
+    graph = coupling_graph(cell, plane, measure_grasps=measure_grasps)
     found = circuits(graph, spanning_tree(graph, tree_order))
     B = circuit_matrix(graph, found)
     rows = list(components(plane))
-    screws = _unit_screws(cell, q, components(plane))
+    screws = _unit_screws(cell, q, graph)
     _check_planar(graph, screws, B=B, rows=rows)
     driven = [f"{robot.name}/{joint.name}" for robot in cell.robots for joint in robot.model.joints]
     joints = (*driven, *(joint.name for joint in graph.joints if joint.is_virtual))
@@ -121,6 +128,9 @@ def davies_cooperation_jacobian(
 ) -> Array:
     r"""Cooperation Jacobian ``N_p^{-1} N_s`` with the virtual joints primary ([Ribeiro2010]_ Eqs. 3.72, 4.33, App. E).
 
+    Further holders are let go and measured like tools at work; their blocks follow those of the tasks. With their
+    virtual joints locked, that is with the speeds of these blocks at zero, the loops are closed (4.5).
+
     Args:
         cell: The cell.
         q: Stacked joint vector in [rad] or [m], shape (nq,).
@@ -128,18 +138,19 @@ def davies_cooperation_jacobian(
         tree_order: Order in which joints are offered to the spanning tree; the result does not depend on it.
 
     Returns:
-        Twists of the tools relative to the part, linear part first, expressed in P, shape (tasks, 6, nq), or
-        (tasks, 3, nq) in a plane: the two speeds in it and the turn about its normal.
+        Twists of the tools relative to the part, linear part first, expressed in P, shape (tasks + further holders, 6,
+        nq), or (..., 3, nq) in a plane: the two speeds in it and the turn about its normal. Of a task in the world,
+        relative to and in W.
 
     Raises:
         InputError: The posture does not fit the cell, or a fixed part has no pose.
-        NotPlanarError: A joint in a circuit moves out of the plane.
+        NotPlanarError: A joint in a circuit moves out of the plane, or a task is given in the world.
     """
-    net = network(cell, q, plane=plane, tree_order=tree_order)
+    net = network(cell, q, plane=plane, tree_order=tree_order, measure_grasps=True)
     wanted = components(plane)
-    virtual = [virtual_joint(task, component) for task in cell.tasks for component in wanted]
+    virtual = [virtual_joint(relation, component) for relation in cell.relations for component in wanted]
     N_s, N_p = partition(net, virtual)
-    J = np.linalg.solve(N_p, N_s).reshape(len(cell.tasks), len(wanted), cell.joint_count)
+    J = np.linalg.solve(N_p, N_s).reshape(len(cell.relations), len(wanted), cell.joint_count)
     return np.asarray(J, dtype=np.float64)
 
 
@@ -177,7 +188,17 @@ def solve_network(net: Network, imposed: Mapping[str, float], *, weights: Array 
     return NetworkSpeeds(speeds={name: values[name] for name in net.joints}, freedom=len(sought) - int(rank))
 
 
-def _unit_screws(cell: Cell, q: Array, wanted: tuple[int, ...]) -> Array:
+def _refuse_world_in_plane(cell: Cell, plane: PlaneName | None) -> None:
+    """Refuse chains in a plane of the part for a task whose components are those of the world."""
+    for task in cell.tasks:
+        if plane is not None and task.relative_to is Frame.WORLD:
+            raise NotPlanarError(
+                f"task '{task.name}': expected a path on the part in a plane of the part, got one in the world; "
+                "leave the plane out and use the spatial chains"
+            )
+
+
+def _unit_screws(cell: Cell, q: Array, graph: CouplingGraph) -> Array:
     """Unit screws of all joints of the graph in its order, linear part first, in P about its origin, shape (6, e)."""
     placed = {robot.name: _robot_screws(robot, q[cell.columns(robot.name)]) for robot in cell.robots}
     holder = part_holder(cell)
@@ -188,11 +209,14 @@ def _unit_screws(cell: Cell, q: Array, wanted: tuple[int, ...]) -> Array:
     to_P[:3, 3:] = skew(X_PW[:3, 3]) @ X_PW[:3, :3]
     real = [to_P @ screws for screws, _ in placed.values()]
     virtual = []
-    for task in cell.tasks:
+    names = {joint.name for joint in graph.joints}
+    for task in cell.relations:
         r = (X_PW @ placed[task.robot][1] @ cell.robot(task.robot).tool.X_FT)[:3, 3]
         chain = np.eye(6)  # [e; 0] for a slide, [r x e; e] for a turn at the tool tip (Eq. 3.64)
-        chain[:3, 3:] = skew(r)
-        virtual.append(chain[:, list(wanted)])
+        if task.relative_to is Frame.WORLD:
+            chain[:3, :3] = chain[3:, 3:] = X_PW[:3, :3]  # along the axes of W
+        chain[:3, 3:] = skew(r) @ chain[3:, 3:]
+        virtual.append(chain[:, [axis for axis in range(6) if virtual_joint(task, axis) in names]])
     screws: Array = np.concatenate([*real, *virtual], axis=1)
     return screws
 

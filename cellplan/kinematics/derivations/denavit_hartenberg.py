@@ -16,6 +16,7 @@ from cellplan.kinematics.derivations.serial_chain import (
 )
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.robot import RobotModel
+from cellplan.model.task import Frame
 
 NEARLY_PARALLEL = 1e-3  # [rad] below this the common normal lies so far out that its foot costs digits
 ROUNDING = 1e-12  # [m] a distance below this says nothing about a direction
@@ -140,7 +141,8 @@ def dh_cooperation_jacobian(cell: Cell, q: Array) -> Array:
         q: Stacked joint vector in [rad] or [m], shape (nq,).
 
     Returns:
-        Twists of the tools relative to the part, linear part first, expressed in P, shape (tasks, 6, nq).
+        Twists of the tools relative to the part, linear part first, expressed in P, shape (tasks + further holders, 6,
+        nq): the grasps of further holders follow the tasks (4.5). Of a task in the world, relative to and in W.
 
     Raises:
         InputError: The posture does not fit the cell, or a fixed part has no pose.
@@ -149,11 +151,13 @@ def dh_cooperation_jacobian(cell: Cell, q: Array) -> Array:
     holder = part_holder(cell)
     arms = {robot.name: _arm(robot, q[cell.columns(robot.name)]) for robot in cell.robots}
     X_WP = fixed_part_pose(cell) if holder is None else arms[holder[0].name].X_WF @ holder[1]
-    J = np.zeros((len(cell.tasks), 6, cell.joint_count))
-    for block, task in zip(J, cell.tasks, strict=True):
+    J = np.zeros((len(cell.relations), 6, cell.joint_count))
+    for block, task in zip(J, cell.relations, strict=True):
         arm, X_FT = arms[task.robot], cell.robot(task.robot).tool.X_FT
-        block[:, cell.columns(task.robot)] += _operator_block(arm, X_WP, r_FT=X_FT[:3, 3])
-        if holder is not None:
+        is_on_part = task.relative_to is Frame.PART
+        X_WR = X_WP if is_on_part else np.eye(4)
+        block[:, cell.columns(task.robot)] += _operator_block(arm, X_WR, r_FT=X_FT[:3, 3])
+        if holder is not None and is_on_part:
             r_PT = (inverse(X_WP) @ arm.X_WF @ X_FT)[:3, 3]
             held = _positioner_block(arms[holder[0].name], X_WP, r_PT=r_PT, r_FP=holder[1][:3, 3])
             block[:, cell.columns(holder[0].name)] += held

@@ -14,6 +14,7 @@ from cellplan.kinematics.derivations.serial_chain import (
     part_holder,
 )
 from cellplan.model.cell import Cell, Robot
+from cellplan.model.task import Frame
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,6 +59,12 @@ def walk_from_part(cell: Cell, q: Array, operator: str) -> tuple[list[Step], Arr
     return steps, X_PB @ robot.model.X_BF @ robot.tool.X_FT
 
 
+def _walk_from_world(cell: Cell, q: Array, name: str) -> tuple[list[Step], Array]:
+    """Axes met on the way from the world to a robot's tool, and that tool at the reference posture, in W."""
+    robot = cell.robot(name)
+    return _steps(cell, robot, q, X_PB=robot.X_WB), robot.X_WB @ robot.model.X_BF @ robot.tool.X_FT
+
+
 def screw_cooperation_jacobian(cell: Cell, q: Array) -> Array:
     r"""Cooperation Jacobian from screws moved one after another ([Ribeiro2010]_ Eqs. 3.56, 4.25, 4.33).
 
@@ -71,15 +78,17 @@ def screw_cooperation_jacobian(cell: Cell, q: Array) -> Array:
         q: Stacked joint vector in [rad] or [m], shape (nq,).
 
     Returns:
-        Twists of the tools relative to the part, linear part first, expressed in P, shape (tasks, 6, nq).
+        Twists of the tools relative to the part, linear part first, expressed in P, shape (tasks + further holders, 6,
+        nq): the grasps of further holders follow the tasks (4.5). Of a task in the world, relative to and in W.
 
     Raises:
         InputError: The posture does not fit the cell, or a fixed part has no pose.
     """
     q = checked_posture(cell, q)
-    J = np.zeros((len(cell.tasks), 6, cell.joint_count))
-    for block, task in zip(J, cell.tasks, strict=True):
-        steps, X_PT = walk_from_part(cell, q, task.robot)
+    J = np.zeros((len(cell.relations), 6, cell.joint_count))
+    for block, task in zip(J, cell.relations, strict=True):
+        is_on_part = task.relative_to is Frame.PART
+        steps, X_PT = walk_from_part(cell, q, task.robot) if is_on_part else _walk_from_world(cell, q, task.robot)
         screws, D = displaced_screws(steps)
         r = (D @ X_PT)[:3, 3]
         to_twist = np.zeros((6, 6))

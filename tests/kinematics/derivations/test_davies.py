@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from jacobian_cells import model_of, planners_jacobian
-from random_cells import random_cell
+from random_cells import random_cell, sharing
 
 from cellplan import load_cell
 from cellplan.errors import InputError, NotPlanarError, PrimaryChoiceError
@@ -16,7 +16,7 @@ from cellplan.kinematics.derivations.davies import (
     partition,
     solve_network,
 )
-from cellplan.model.task import PlaneName
+from cellplan.model.task import Frame, PlaneName
 
 AGREEMENT = 1e-11  # [-] of the largest entry
 SOLVE_TOL = 1e-9  # [-] of the largest speed: rounding times the condition of a random network
@@ -226,3 +226,57 @@ def test_the_worked_example_of_the_concept_page_is_what_the_library_gives():
 
     np.testing.assert_allclose(J, [[0.5, -0.5, 0.5, 0.5], [-2, -1, -1, 0], [-1, 1, 1, 1]], atol=1e-14)
     np.testing.assert_allclose([following[f"op0/j{i}"] for i in range(3)], [1, -3, 3], atol=1e-12)
+
+
+def test_a_further_holder_closes_a_real_circuit_without_a_virtual_chain():
+    """Two arms of six joints hold the part: one real circuit; with a tool held still on the part six freedoms stay."""
+    cell = sharing(random_cell(51, operators=2, joints=6), 1)
+    q = np.random.default_rng(51).uniform(-1.5, 1.5, cell.joint_count)
+    net = network(cell, q)
+    chords = [net.graph.joints[circuit.chord] for circuit in net.circuits]
+    is_real = [not any(net.graph.joints[i].is_virtual for i, _ in circuit.passed) for circuit in net.circuits]
+    assert sorted(is_real) == [False, True]
+    assert len(chords) == 2
+    assert not any(name.startswith("op1@part") for name in net.joints)
+
+    found = solve_network(net, {**wanted_twist(cell, np.zeros(6)), "holder/j0": 0.3})
+
+    J = planners_jacobian(cell, q)
+    speeds = np.array([found.speeds[name] for name in net.joints[: cell.joint_count]])
+    assert found.freedom == 5
+    assert np.abs(J @ speeds).max() <= SOLVE_TOL * np.abs(speeds).max()  # neither tool strays on the part
+
+
+def test_what_a_grasp_leaves_open_is_a_joint_that_nobody_measures():
+    cell = sharing(random_cell(52, operators=2, joints=6), 1, axes=(0, 1, 2))
+    q = np.random.default_rng(52).uniform(-1.5, 1.5, cell.joint_count)
+    net = network(cell, q)
+    twist = planners_jacobian(cell, q)[1]
+
+    found = solve_network(net, wanted_twist(cell, np.zeros(6)) | {"holder/j0": 0.3})
+
+    speeds = np.array([found.speeds[name] for name in net.joints[: cell.joint_count]])
+    turn = [found.speeds[f"op1@part:{name}"] for name in ("rx", "ry", "rz")]
+    np.testing.assert_allclose(twist @ speeds, [0.0, 0.0, 0.0, *turn], atol=SOLVE_TOL * np.abs(speeds).max())
+
+
+def test_planar_holders_have_three_rows_each(cells):
+    cell = load_cell(cells / "load_sharing_planar.yaml")
+    cell = replace(cell, tasks=tuple(replace(task, relative_to=Frame.PART, robot="right") for task in cell.tasks))
+    q = np.random.default_rng(3).uniform(-1, 1, 6)
+
+    net = network(cell, q, plane=PlaneName.XY)
+    J = davies_cooperation_jacobian(cell, q, plane=PlaneName.XY)
+
+    assert net.matrix.shape == (6, 9)  # two circuits; six driven joints and the three that measure the task
+    np.testing.assert_allclose(J, planners_jacobian(cell, q)[:, [0, 1, 5]], atol=1e-12)
+
+
+def test_a_task_in_the_world_has_no_chain_in_a_plane_of_the_part(cells):
+    cell = load_cell(cells / "load_sharing_planar.yaml")
+    with pytest.raises(NotPlanarError) as caught:
+        network(cell, np.zeros(6), plane=PlaneName.XY)
+    assert str(caught.value) == (
+        "task 'carry': expected a path on the part in a plane of the part, got one in the world; leave the plane out "
+        "and use the spatial chains"
+    )

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from jacobian_cells import model_of, planners_jacobian, with_operator
-from random_cells import make_task, random_cell
+from random_cells import carried, make_task, random_cell, sharing
 
 from cellplan import load_cell
 from cellplan.errors import InputError
@@ -33,6 +33,23 @@ def test_all_ways_agree_on_random_cells(operators, with_follower, held):
     cell = random_cell(100 + operators, operators=operators, held=held, with_follower=with_follower)
     for seed in range(3):
         assert_one_matrix(cell, np.random.default_rng(seed).uniform(-3.0, 3.0, cell.joint_count))
+
+
+@pytest.mark.parametrize("holders", [1, 2, 3])
+@pytest.mark.parametrize("with_follower", [False, True], ids=["plain", "follower"])
+def test_all_ways_agree_where_several_robots_hold_the_part(holders, with_follower):
+    cell = carried(sharing(random_cell(130 + holders, operators=holders + 1, with_follower=with_follower), holders))
+    for seed in range(3):
+        q = np.random.default_rng(seed).uniform(-3.0, 3.0, cell.joint_count)
+        assert dh_cooperation_jacobian(cell, q).shape == (2 + holders, 6, cell.joint_count)
+        assert_one_matrix(cell, q)
+
+
+@pytest.mark.parametrize("name", ["load_sharing", "load_sharing_planar"])
+def test_all_ways_agree_on_shipped_cells_of_several_holders(cells, name):
+    cell = load_cell(cells / f"{name}.yaml")
+    for seed in range(4):
+        assert_one_matrix(cell, np.random.default_rng(seed).uniform(-0.5, 0.5, cell.joint_count))
 
 
 @pytest.mark.parametrize("name", ["four_robots", "four_robots_initial", "planar_pair", "turntable", "rail", "dual_arm"])
