@@ -47,6 +47,8 @@ def solver_complaints(pieces: Pieces, models: Mapping[str, RobotModel], document
     for index, step in enumerate(solver.search.sequence or ()):
         path = ("solver", "search", "sequence", index)
         yield from _joint(path, step.robot, step.joint, pieces=pieces, models=models, document=document)
+        if step in (solver.search.sequence or ())[:index]:
+            yield document.complaint(path, f"expected every joint once, got '{step.robot}/{step.joint}' again")
     yield from _postures(solver, pieces, models, document=document)
     if solver.method not in NULL_SPACE_METHODS:
         yield from _without_null_space(solver, pieces, document)

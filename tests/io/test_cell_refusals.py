@@ -143,6 +143,16 @@ Refuse = Callable[..., list[str]]
         ),
         (
             "environment:",
+            "solver: {search: {sequence: [{robot: worker, joint: A3}, {robot: worker, joint: A3}]}}\nenvironment:",
+            "c:22: solver.search.sequence[1]: expected every joint once, got 'worker/A3' again",
+        ),
+        (
+            "environment:",
+            "solver: {search: {sequence: []}}\nenvironment:",
+            "c:22: solver.search.sequence: expected at least 1 entry, got 0",
+        ),
+        (
+            "environment:",
             "solver: {seed: 1.5}\nenvironment:",
             "c:22: solver.seed: expected a whole number, got 1.5",
         ),

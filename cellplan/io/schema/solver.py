@@ -65,6 +65,7 @@ class SearchEntry(Entry):
     brakes: bool = Field(default=False, description="Whether joints slow down on their way to a limit.")
     sequence: tuple[SearchJointEntry, ...] | None = Field(
         default=None,
+        min_length=1,
         description="Joints in the order in which `recursive_search` moves them; all in the order of the file when "
         "absent. Joints left out stand still.",
     )

@@ -1,0 +1,75 @@
+"""Heuristic search: always the one joint that brings all tools nearest to where they are to be."""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.planning.joint_lines import joint_lines
+from cellplan.planning.posture_search import Bounds, Pass, PostureSearch, position_bounds
+from cellplan.planning.search_cost import Look, SearchCost
+from cellplan.planning.tracking_problem import Advance, TrackingProblem
+
+NEGLIGIBLE: Final = 1e-12  # share of the cost that a move must gain: below it a joint would turn for rounding errors
+HALVINGS: Final = 20  # of a move whose gain is only known to second order, before it is left out
+
+
+def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
+    """Best-first search among the joints of all robots ([Nicolato2007]_ Algorithm 1); all tasks add to the cost.
+
+    A round goes: of all open joints the one whose best move leaves the least cost makes that move and is closed; when
+    all are closed, all are opened again. The search ends as soon as the root of the cost is within the tolerance.
+
+    Besides the paper: joints stop at their position limits (speeds are not limited); a search begins where the last
+    step leads to, scaled so that it fits the goal best, if that costs less than the present posture; and rounds that
+    gain little are carried on (see `PostureSearch`).
+    """
+    tolerance = problem.cell.solver.search.tolerance
+    search = PostureSearch(problem, lambda cost: _best_first(cost, tolerance**2))
+    before: dict[int, Array] = {}  # posture at the instant before the last one, by that one's number
+
+    def advance(k: int, q: Array) -> Advance:
+        problem.first_order(k, q)  # refuses a lost path
+        last = before.pop(k, None)
+        before.clear()
+        before[k + 1] = q
+        return search.advance(k, q, position_bounds(problem, q), momentum=None if last is None else q - last)
+
+    return advance
+
+
+def _best_first(cost: SearchCost, target: float) -> Pass:
+    """One round of Algorithm 1 as a pass."""
+
+    def improve(look: Look, bounds: Bounds, _rounds: int) -> tuple[Look, int]:
+        return _round(cost, look, bounds, target), 1
+
+    return improve
+
+
+def _round(cost: SearchCost, look: Look, bounds: Bounds, target: float) -> Look:
+    """Every joint moves once, the best one first (steps 6 to 12)."""
+    is_open = np.ones(len(look.q), dtype=bool)
+    while is_open.any() and look.cost > target:
+        lines = joint_lines(look)
+        moves = lines.best(bounds.lowest - look.q, bounds.highest - look.q)
+        gains = np.where(is_open, lines.gain(moves), -np.inf)
+        best = int(np.argmax(gains))
+        if not gains[best] > NEGLIGIBLE * look.cost:
+            break
+        look = _moved(cost, look, best, float(moves[best]))
+        is_open[best] = False
+    return look
+
+
+def _moved(cost: SearchCost, look: Look, joint: int, move: float) -> Look:
+    """The look after one joint's move; a move that costs more, as a linkage may make it, is halved."""
+    for _ in range(HALVINGS):
+        q = look.q.copy()
+        q[joint] += move
+        moved = cost.look(q)
+        if moved.cost < look.cost:
+            return moved
+        move *= 0.5
+    return look
