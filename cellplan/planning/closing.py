@@ -89,7 +89,8 @@ def _closing_drift(
         u, drift = u + change, found
     raise NoSolutionError(
         f"{problem.cell.origin.at('motion.cyclic')}: the joint motion does not close, a joint is still "
-        f"{np.degrees(np.max(np.abs(drift))):.3g} deg away after {ROUNDS} tries; another start posture may help"
+        f"{np.degrees(np.max(np.abs(drift))):.3g} deg away after {ROUNDS} tries; another start posture may help, or "
+        "no goal that keeps off obstacles"
     )
 
 
