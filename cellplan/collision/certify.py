@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from cellplan.collision.engine import Engine
 from cellplan.collision.inside import is_inside
-from cellplan.collision.measure import SURELY_APART, Reading, look, sharpen
+from cellplan.collision.measure import SURELY_APART, TIGHT, Reading, look, sharpen
+from cellplan.collision.pieces import PieceMotion, can_be_split, read_piece, split
 from cellplan.collision.travel import Motion, Pair, PairMotion
 from cellplan.geometry.transforms import Array
 
@@ -24,6 +25,7 @@ Flags = NDArray[np.bool_]
 SEARCH_ROOM: Final = 5e-5  # [m] a search stops when nothing can be nearer than the nearest found by more than this
 RESOLUTION: Final = 1e-6  # [m] steps in which nothing travels farther than this are not cut any more
 PARTS: Final = 8  # [-] finer steps that an open step is cut into
+MOST_LOOSE: Final = 16  # [-] distances beyond those of the hulls that are measured before a body is taken apart
 MOST_CUTS: Final = 1000  # [-] steps of one pair that are cut, finer ones included; beyond that nothing is certified
 
 
@@ -80,6 +82,8 @@ class Search(ABC):
             if self._is_closed[step] or self.low[step] >= goal:
                 break
             unread = [sample for sample in (step, step + 1) if not self._is_read[sample]]
+            if self._takes_apart(cutoff):
+                continue
             if unread:
                 self._read(unread[len(unread) // 2], goal)
             else:
@@ -100,7 +104,7 @@ class Search(ABC):
         elif is_exact and distance < self.found.distance:
             self.found.distance, self.found.at = distance, self._instant(sample)
 
-    def _close(self, steps: slice) -> None:
+    def _close(self, steps: slice | Flags) -> None:
         """Give up steps: nothing but zero can be said of them."""
         self._is_closed[steps] = True
         self.low[steps] = 0.0
@@ -119,6 +123,10 @@ class Search(ABC):
             self._close(slice(step, step + 1))
         else:
             self.low[step] = max(self.low[step], float(fine.low.min()))
+
+    def _takes_apart(self, cutoff: float) -> bool:  # noqa: ARG002 - for those that have pieces
+        """Search piece by piece where that is quicker; say whether it was done."""
+        return False
 
     @abstractmethod
     def _travel(self, step: int) -> float:
@@ -139,6 +147,8 @@ class Search(ABC):
 
 class SolidSearch(Search):
     """The search for two solids."""
+
+    _finds_enclosures = True
 
     def __init__(
         self,
@@ -165,6 +175,8 @@ class SolidSearch(Search):
         self._are_spheres_apart = self.low > SURELY_APART
         self._relative: PairMotion | None = None
         self._readings: dict[int, Reading] = {}
+        self._loose = 0
+        self._was_split = not any(can_be_split(engine.bodies[index]) for index in pair)
 
     @property
     def relative(self) -> PairMotion:
@@ -177,12 +189,19 @@ class SolidSearch(Search):
         """Measure at a sample, finely when the distance seems less than a goal, and raise bounds below the goal."""
         reading = self._readings.get(sample)
         if reading is None:
-            poses = self._motion.poses
-            reading = look(self._engine, self._pair, poses, sample=sample)
-            if reading.bound < goal and not reading.touches:
-                reading = sharpen(self._engine, self._pair, poses, sample=sample, reading=reading)
+            reading = self._measured(sample, goal)
             self.take(sample, reading, goal)
         return reading
+
+    def _measured(self, sample: int, goal: float) -> Reading:
+        """What the engine says of a sample."""
+        poses = self._motion.poses
+        reading = look(self._engine, self._pair, poses, sample=sample)
+        if reading.is_exact or reading.bound >= goal:
+            return reading
+        sharp = sharpen(self._engine, self._pair, poses, sample=sample, reading=reading)
+        self._loose += sharp.bound > reading.bound + TIGHT
+        return sharp
 
     def take(self, sample: int, reading: Reading, goal: float) -> None:
         """Make use of a reading."""
@@ -197,7 +216,7 @@ class SolidSearch(Search):
         for step in (sample - 1, sample):
             ends = self._readings.get(step), self._readings.get(step + 1)
             if ends[0] is not None and ends[1] is not None:
-                proved = 0.5 * (ends[0].bound + ends[1].bound - self.relative.step_travel[step])
+                proved = 0.5 * (ends[0].bound + ends[1].bound - self.relative.step_travel(step))
                 self.low[step] = max(self.low[step], proved)
         self.low[self._is_closed] = 0.0
 
@@ -205,10 +224,36 @@ class SolidSearch(Search):
         self.read(sample, goal)
 
     def _travel(self, step: int) -> float:
-        return float(self.relative.step_travel[step])
+        return self.relative.step_travel(step)
+
+    def _takes_apart(self, cutoff: float) -> bool:
+        if self._loose < MOST_LOOSE or self._was_split:
+            return False
+        self._was_split = True
+        engine, is_first_split = split(self._engine, self._pair)
+        motion = PieceMotion.of(self._motion, self._pair, engine, is_first_split=is_first_split)
+        lowest = np.full(len(self.low), np.inf)
+        for piece in range(len(engine.bodies) - 1):
+            search = PieceSearch(
+                engine, motion.piece_pair(piece), motion, found=self.found, begin=self._begin, width=self._width
+            )
+            search.go_on_from(self)
+            search.run(cutoff)
+            lowest = np.minimum(lowest, search.low)
+            self._touches |= search._touches
+            self._close(self._is_closed | search._is_closed)
+        self.low = np.where(self._is_closed, 0.0, np.maximum(self.low, lowest))
+        self._engine.distance_queries += engine.distance_queries
+        self._engine.contact_queries += engine.contact_queries
+        return True
+
+    def go_on_from(self, whole: "SolidSearch") -> None:
+        """Take over what is known of the bodies of which these are pieces."""
+        self._is_closed |= whole._is_closed
+        self.low = np.where(self._is_closed, 0.0, np.maximum(self.low, whole.low))
 
     def _finer(self, step: int) -> "Search":
-        fine = SolidSearch(
+        fine = type(self)(
             self._engine,
             self._pair,
             self._motion.finer(self._pair, step, parts=PARTS),
@@ -225,17 +270,11 @@ class SolidSearch(Search):
         is_left = np.append(True, self._is_closed) & np.append(self._is_closed, True) & ~self._is_read
         for sample in np.flatnonzero(is_left):
             self.read(int(sample), SURELY_APART)
-        if self._width == 1.0:
-            for stretch in self._free_stretches():
+        if self._finds_enclosures and self._width == 1.0:
+            for stretch in _free_stretches(self._touches, self._is_closed):
                 if self._is_enclosed(stretch):
                     self.found.touches += [self._instant(int(sample)) for sample in stretch]
                     self._close(slice(max(0, stretch[0] - 1), stretch[-1] + 1))
-
-    def _free_stretches(self) -> list[NDArray[np.intp]]:
-        """Runs of samples between which nothing touches."""
-        free = np.flatnonzero(~self._touches)
-        ends = np.flatnonzero((np.diff(free) > 1) | self._is_closed[free[:-1]]) + 1
-        return [stretch for stretch in np.split(free, ends) if stretch.size]
 
     def _is_enclosed(self, stretch: NDArray[np.intp]) -> bool:
         """Whether one body lies inside the other throughout a stretch: one proof that it does not is enough."""
@@ -246,3 +285,21 @@ class SolidSearch(Search):
         if any(self._readings[sample].direction is not None for sample in known):
             return False
         return is_inside(self._engine, self._pair, self._motion.poses, sample=known[0] if known else first)
+
+
+class PieceSearch(SolidSearch):
+    """The search for a piece of a body that is not convex, and another body."""
+
+    _finds_enclosures = False
+
+    def _measured(self, sample: int, goal: float) -> Reading:  # noqa: ARG002 - always exact
+        reading, is_proved = read_piece(self._engine, self._pair, self._motion.poses, sample=sample)
+        self._loose += not is_proved
+        return reading
+
+
+def _free_stretches(touches: Flags, is_closed: Flags) -> list[NDArray[np.intp]]:
+    """Runs of samples, shape (n,), that do not touch, with no step, shape (n - 1,), between them that was given up."""
+    free = np.flatnonzero(~touches)
+    ends = np.flatnonzero((np.diff(free) > 1) | is_closed[free[:-1]]) + 1
+    return [stretch for stretch in np.split(free, ends) if stretch.size]

@@ -64,6 +64,9 @@ class Motion(Protocol):
     def bends(self, pair: Pair) -> Bends:
         """How much the paths of two bodies bend in each step."""
 
+    def relative(self, pair: Pair) -> tuple[Array, Array]:
+        """Rotations, shape (n, 3, 3), and positions in [m], shape (n, 3), of the second body seen from the first."""
+
     def sphere_bounds(self, pair: Pair) -> Array:
         """Lower bound of the distance of two bounding spheres in each step in [m], shape (n - 1,)."""
 
@@ -77,21 +80,23 @@ class PairMotion:
     def __init__(self, engine: Engine, pair: Pair, motion: Motion) -> None:
         """Work out the pose of the second body seen from the first at each sample."""
         first, second = pair
-        poses = motion.poses
         self._a, self._b = engine.bodies[first], engine.bodies[second]
-        self._R_WA = poses.R[first]
-        R_AW = np.swapaxes(poses.R[first], 1, 2)
-        self._R_AB = R_AW @ poses.R[second]
-        self._p_AB = (R_AW @ (poses.p[second] - poses.p[first])[..., None])[..., 0]
+        self._R_WA = motion.poses.R[first]
+        self._R_AB, self._p_AB = motion.relative(pair)
         self._b_in_A = self._p_AB + self._R_AB @ self._b.centre
         self._a_in_B = ((self._a.centre - self._p_AB)[:, None, :] @ self._R_AB)[:, 0]
         self._work = sum(len(body.hull.vertices) for body in (self._a, self._b) if isinstance(body.hull, Mesh))
-        bends = motion.bends(pair)
-        self._strays_b, self._strays_a = bends.second / 8.0, bends.first / 8.0
-        turn = _turns(np.diff(self._R_AB, axis=0))
-        along_b = np.linalg.norm(np.diff(self._b_in_A, axis=0), axis=1) + self._b.radius * turn + bends.second / 3.0
-        along_a = np.linalg.norm(np.diff(self._a_in_B, axis=0), axis=1) + self._a.radius * turn + bends.first / 3.0
-        self.step_travel: Array = np.minimum(np.minimum(along_a, along_b), bends.reach) + ROUNDING
+        self._bends = motion.bends(pair)
+        self._strays_b, self._strays_a = self._bends.second / 8.0, self._bends.first / 8.0
+
+    def step_travel(self, step: int) -> float:
+        """How far no point of the one body travels farther in a step, seen from the other, in [m]."""
+        turn = float(_turns(self._R_AB[step + 1] - self._R_AB[step])[0])
+        along_b = float(np.linalg.norm(self._b_in_A[step + 1] - self._b_in_A[step])) + self._b.radius * turn
+        along_a = float(np.linalg.norm(self._a_in_B[step + 1] - self._a_in_B[step])) + self._a.radius * turn
+        along_b += float(self._bends.second[step]) / 3.0
+        along_a += float(self._bends.first[step]) / 3.0
+        return min(along_a, along_b, float(self._bends.reach[step])) + ROUNDING
 
     def displacement(self, sample: int, others: slice | Samples) -> tuple[Array, Array]:
         """Farthest that a point of the second body seen from the first, and of the first seen from the second, moved.

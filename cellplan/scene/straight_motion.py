@@ -61,6 +61,13 @@ class StraightMotion:
         reach = np.minimum(np.minimum(there.reach(steps), back.reach(steps)), apart)
         return Bends(second=there.bend(steps), first=back.bend(steps), reach=reach)
 
+    def relative(self, pair: Pair) -> tuple[Array, Array]:
+        """Rotations, shape (n, 3, 3), and positions in [m], shape (n, 3), of the second body seen from the first."""
+        first, second = pair
+        R_AW = np.swapaxes(self.poses.R[first], 1, 2)
+        apart = self.poses.p[second] - self.poses.p[first]
+        return R_AW @ self.poses.R[second], (R_AW @ apart[..., None])[..., 0]
+
     def sphere_bounds(self, pair: Pair) -> Array:
         """Lower bound of the distance of two bounding spheres in each step in [m], shape (n - 1,).
 
