@@ -21,7 +21,7 @@ help:
 	@echo "make test      formatter, linter, types, import rules, sizes and all quick tests"
 	@echo "make test-all  the same with the slow tests"
 	@echo "make lint      everything but the tests"
-	@echo "make bench     time whole commands, beside a baseline of the same run"
+	@echo "make bench     time whole commands, beside a baseline of the same run, and the check of clearance"
 	@echo "make format    put the code into shape"
 	@echo "make clean     remove .venv, caches and results"
 
@@ -73,6 +73,7 @@ demo: $(STAMP)
 
 bench: $(STAMP)
 	$(BIN)/python benchmarks/commands.py --rounds $(ROUNDS)
+	$(BIN)/python benchmarks/clearance.py
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist outputs/*/

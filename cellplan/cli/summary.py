@@ -94,7 +94,8 @@ def _drift_lines(repeatability: Record) -> Iterator[str]:
 def _clearance_lines(whole: Record) -> Iterator[str]:
     if whole["minimum_mm"] is not None and whole["pair"]:
         first, second = whole["pair"]
-        yield f"  smallest clearance {whole['minimum_mm']:.4g} mm: {first} - {second}{_instant(whole['at_s'])}"
+        proof = "certified" if whole["certified"] else "not certified"
+        yield f"  smallest clearance {whole['minimum_mm']:.4g} mm, {proof}: {first} - {second}{_instant(whole['at_s'])}"
 
 
 def _slack_lines(slack: Record | None) -> Iterator[str]:

@@ -20,13 +20,22 @@ NO_ANSWER: Final = "collision: the engine gave a distance that is not a number b
 
 
 class Engine:
-    """A set of bodies that can be asked about in pairs; built once, safe to send to another process."""
+    """A set of bodies that can be asked about in pairs; built once, safe to send to another process.
+
+    Attributes:
+        bodies: The bodies.
+        centres: Centres of their bounding spheres, each in the body's own frame in [m], shape (B, 3).
+        radii: Radii of these spheres in [m], shape (B,).
+        contact_queries: How often a contact was asked for so far.
+        distance_queries: How often a distance was asked for so far.
+    """
 
     def __init__(self, bodies: Sequence[CollisionBody]) -> None:
         """Take the bodies; what FCL needs of each is built when it is first asked for."""
         self.bodies = tuple(bodies)
         self.centres = np.array([body.centre for body in self.bodies]).reshape(-1, 3)
         self.radii = np.array([body.radius for body in self.bodies])
+        self.contact_queries = self.distance_queries = 0
         self._objects: dict[tuple[str, int], Any] = {}
 
     def __reduce__(self) -> tuple[type["Engine"], tuple[tuple[CollisionBody, ...]]]:
@@ -40,11 +49,13 @@ class Engine:
 
     def touch(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> bool:
         """Say whether two bodies touch at a sample. A mesh is its surface here; what lies inside is asked elsewhere."""
+        self.contact_queries += 1
         a, b = self._placed("solid", first, poses, sample), self._placed("solid", second, poses, sample)
         return bool(fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0)
 
     def proposed_direction(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[float, Array]:
         """FCL's distance in [m] between the hulls of two bodies and the direction from first to second: unproven."""
+        self.distance_queries += 1
         a, b = self._placed("hull", first, poses, sample), self._placed("hull", second, poses, sample)
         result = fcl.DistanceResult()
         distance = fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
@@ -53,6 +64,7 @@ class Engine:
 
     def proposed_points(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[Array, Array]:
         """FCL's nearest points of the hulls of two bodies in the world, shape (3,) each: unproven."""
+        self.distance_queries += 1
         a, b = self._placed("hull", first, poses, sample), self._placed("hull", second, poses, sample)
         result = fcl.DistanceResult()
         fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
@@ -64,6 +76,7 @@ class Engine:
 
         Exact but slow.
         """
+        self.distance_queries += 1
         a, b = self._placed("core", first, poses, sample), self._placed("core", second, poses, sample)
         result = fcl.DistanceResult()
         distance = fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
@@ -80,6 +93,7 @@ class Engine:
         Raises:
             CellplanError: The engine's answer is not a number.
         """
+        self.distance_queries += 1
         a, b = self._placed("core", first, poses, sample), self._placed("core", second, poses, sample)
         distance = float(fcl.distance(a, b, fcl.DistanceRequest(), fcl.DistanceResult()))
         if not np.isfinite(distance):

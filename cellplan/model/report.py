@@ -17,6 +17,12 @@ EVEN = 1e-9  # [-] of the whole time: cycles that differ by less are equally lon
 REDUCED_SPEED = 0.25  # [m/s] of the tool tip: what ISO 10218-1 allows while people are near
 
 
+ASSUMPTION = "every joint moves evenly from each sample to the next"  # between the samples
+MARGIN = "deviation of the controllers, calibration and elasticity belong in the required clearance"
+
+Point = tuple[float, float, float]
+
+
 class ClearanceClass(StrEnum):
     """What keeps its distance from what."""
 
@@ -138,12 +144,24 @@ class ClearanceMinimum:
         pair: Names of the two bodies, None when there is no such pair.
         at_s: Instant in [s].
         certified: Whether the figure also holds between the samples.
+        points: Where the two bodies are nearest, in the world in [m]; None when they touch or are not known.
     """
 
     minimum: float | None
     pair: tuple[str, str] | None
     at_s: float | None
     certified: bool
+    points: tuple[Point, Point] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClosePair:
+    """One of the closest pairs of the whole motion: distance in [m], never above the truth, and its instant in [s]."""
+
+    pair: tuple[str, str]
+    clearance_class: ClearanceClass
+    distance: float
+    at_s: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,7 +186,14 @@ class ClearanceReport:
         exclusions: Pairs that were not checked, as (first, second, reason).
         pair_count: Pairs that were checked.
         curve_times: Instants of the plotted curve in [s], shape (K,).
-        curves: Smallest distance per class in [m] at those instants, shape (K,) each.
+        curves: Per class a distance in [m] that is kept all through the stretch of the program (one of 200) that holds
+            the instant, shape (K,) each; exact to 0.1 mm at the minimum, elsewhere below what is reached in the
+            middle of the stretch by no more than about a twentieth and a millimetre.
+        closest: The closest pairs that are to keep the demanded distance, nearest first.
+        not_certified: Pairs that could neither be proved to be free nor found to touch.
+        distance_queries: How often the collision engine was asked for a distance.
+        contact_queries: How often it was asked for a contact.
+        cut_steps: How many steps between samples had to be looked at in finer steps.
     """
 
     minima: Mapping[ClearanceClass, ClearanceMinimum]
@@ -177,6 +202,11 @@ class ClearanceReport:
     pair_count: int
     curve_times: Array
     curves: Mapping[ClearanceClass, Array]
+    closest: tuple[ClosePair, ...] = ()
+    not_certified: tuple[tuple[str, str], ...] = ()
+    distance_queries: int = 0
+    contact_queries: int = 0
+    cut_steps: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

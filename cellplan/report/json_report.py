@@ -8,6 +8,7 @@ from dataclasses import replace
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, JointUse, Report
+from cellplan.report.clearance_record import clearance_proof_record, closest_pairs_record
 from cellplan.report.closure_record import closures_record, worst_closures_record
 from cellplan.report.method import solver_record
 from cellplan.report.record import (
@@ -45,7 +46,12 @@ def report_json(report: Report, *, cell: Cell, provenance: Provenance, motion: M
 def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> Record:
     """The record of one run, of its closures and of how its motion was found, without the series."""
     record = report_record(report, cell=cell, provenance=provenance)
-    return record | {"closure": closures_record(report, cell), "solver": solver_record(cell.solver, motion)}
+    return record | {
+        "closest_pairs": closest_pairs_record(report.clearance),
+        "clearance_proof": clearance_proof_record(report.clearance),
+        "closure": closures_record(report, cell),
+        "solver": solver_record(cell.solver, motion),
+    }
 
 
 def summary_json(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> str:

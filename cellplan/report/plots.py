@@ -199,7 +199,7 @@ def _draw_joint(sheet: Sheet, index: int, curve: _JointCurve, *, colour: str, wo
 
 
 def _draw_clearance(report: Report, required: float) -> dict[str, bytes]:
-    """Smallest distance of each class over time, with the required clearance."""
+    """Distance that each class keeps over time, certified between the samples, with the required clearance."""
     sheet = Sheet("clearance over time", rows=2, columns=2, times=report.times)
     for index, (kind, title) in enumerate(CLASS_TITLES.items()):
         curve = 1e3 * report.clearance.curves.get(kind, np.empty(0))

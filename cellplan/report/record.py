@@ -301,6 +301,7 @@ def _minimum_record(minimum: ClearanceMinimum) -> Record:
         "pair": list(minimum.pair) if minimum.pair else None,
         "at_s": number(minimum.at_s),
         "certified": minimum.certified,
+        "points_mm": [[number(1e3 * x) for x in point] for point in minimum.points] if minimum.points else None,
     }
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.collision.bodies import BodyPoses, checked_poses
 from cellplan.collision.points import NearestPoints, nearest_points, point_above
-from cellplan.collision.sweep import Flags, PairIndices
+from cellplan.collision.posture import Flags, PairIndices
 from cellplan.geometry.shapes import bounding_box
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.combined import CombinedModel, LinkState

@@ -8,8 +8,9 @@ import numpy as np
 from cellplan.collision.bodies import BodyPoses, CollisionBody, checked_poses, prepare
 from cellplan.collision.certificate import heights
 from cellplan.collision.engine import Engine
+from cellplan.collision.posture import Flags, PairIndices, first_touching
 from cellplan.collision.self_test import prove_engine
-from cellplan.collision.sweep import Flags, Pair, PairIndices, first_touching
+from cellplan.collision.travel import Pair
 from cellplan.collision.zone import outside_zone
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import Array, inverse
@@ -85,6 +86,21 @@ class Scene:
         own = {robot.name: q[:, self.cell.columns(robot.name)] for robot in self.cell.robots}
         poses = body_poses([body for body in self.bodies if not is_ground(body)], self.chains, own)
         return checked_poses([*poses, *(poses[tool] for tool in self.cut_from)])
+
+    def pair_poses(self, pair: Pair, q: Array) -> BodyPoses:
+        """Poses of two of the engine's bodies only; those of the others are not numbers, so that nothing uses them."""
+        carriers = [self.carrier(index) for index in pair]
+        names = {body.robot or self.cell.robots[0].name for body in carriers}  # one robot at least: it counts the rows
+        own = {name: q[:, self.cell.columns(name)] for name in sorted(names)}
+        found = checked_poses(body_poses(carriers, self.chains, own))
+        R, p = (np.full((len(self.engine.bodies), *part.shape[1:]), np.nan) for part in (found.R, found.p))
+        R[list(pair)], p[list(pair)] = found.R, found.p
+        return BodyPoses(R, p)
+
+    def carrier(self, index: int) -> SceneBody:
+        """The body of the scene that one of the engine's bodies is, or is cut from."""
+        solids = len(self.engine.bodies) - len(self.cut_from)
+        return self.bodies[index if index < solids else self.cut_from[index - solids]]
 
     def ground_heights(self, pair: ScenePair, poses: BodyPoses) -> Array:
         """Distance of a solid above a half-space at each sample in [m], shape (N,); zero or less where they touch."""

@@ -1,101 +1,123 @@
-"""Survey: all watched pairs over a stretch of samples, half-spaces by arithmetic and solids by the engine."""
+"""Survey: what is known of all watched pairs over a program, and which of them are worth looking at more closely.
+
+The program is cut into blocks of steps. Each pair has one certified lower bound per block, at first from its bounding
+spheres. Pairs are then searched (``survey_search``), the nearest first, as far as they may be the nearest of their
+class or among the nearest of the cell; the others keep the bounds they have.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.collision.bodies import BodyPoses
-from cellplan.collision.curve import nearest_at_each
-from cellplan.collision.nearest import Nearest, find_nearest
-from cellplan.collision.sweep import Pair, sphere_bounds, sweep
+from cellplan.collision.certify import SEARCH_ROOM, Found, Search
+from cellplan.collision.measure import SURELY_APART
+from cellplan.collision.points import nearest_points, point_above
+from cellplan.collision.travel import Pair
 from cellplan.geometry.transforms import Array
+from cellplan.model.report import ClearanceClass
+from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 
+BLOCKS: Final = 200  # [-] stretches of the program that have a bound of their own
+CLOSEST: Final = 10  # [-] pairs that are reported as the closest ones
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+
 class Survey:
-    """What is known of some of the scene's pairs at n samples.
+    """All watched pairs over a program.
 
     Attributes:
         scene: The scene.
-        rows: Indices into ``Scene.pairs``, ascending, in the order of the arrays below.
-        poses: Where the bodies are.
-        lower: Proved lower bounds of the distances in [m], shape (P, n); exact for half-spaces; inf where nothing of a
-            tool sticks out of its contact zone.
-        touching: Whether the bodies touch, shape (P, n).
+        q: Stacked joint positions in [rad] or [m], shape (N, nq).
+        edges: Samples at which blocks begin and end, ascending from 0 to N - 1, shape (K + 1,).
+        low: No distance of a pair is below this in a block, in [m], shape (pairs, K); zero where the pair touches or
+            nothing is proved; inf where nothing of a tool sticks out of its contact zone. May be negative where nobody
+            looked: for pairs left out.
+        found: What is known of each pair; instants are counted in samples.
+        at_surface: First and last sample at which a tool at work is at the surface of the part, by pair.
+        left_out: Pairs of which contacts are looked for at the samples only.
     """
 
-    scene: Scene
-    rows: tuple[int, ...]
-    poses: BodyPoses
-    lower: Array
-    touching: NDArray[np.bool_]
+    def __init__(self, scene: Scene, q: Array, *, left_out: Sequence[int] = ()) -> None:
+        """Lay out the blocks.
 
-    def solids(self, rows: Sequence[int]) -> tuple[list[int], list[Pair]]:
-        """Places in the arrays and engine bodies of those of the given pairs, ascending, that the engine watches."""
-        chosen = np.isin(self.scene.solid_rows, rows)
-        places = np.searchsorted(self.rows, self.scene.solid_rows[chosen])
-        return places.tolist(), [(int(a), int(b)) for a, b in self.scene.solid_pairs[chosen]]
+        Args:
+            scene: The scene.
+            q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2.
+            left_out: Indices of pairs of which contacts are looked for at the samples only.
+        """
+        count = len(scene.pairs)
+        self.scene, self.q, self.left_out = scene, q, frozenset(left_out)
+        self.edges = np.unique(np.linspace(0, len(q) - 1, min(BLOCKS, len(q) - 1) + 1).round().astype(np.intp))
+        self.low = np.full((count, len(self.edges) - 1), np.inf)
+        self.found = [Found(most_cuts=0) if row in self.left_out else Found() for row in range(count)]
+        self.at_surface: dict[int, tuple[int, int]] = {}
+        self._nearest = np.full(count, np.inf)  # smallest distance found in [m], zero where a pair touches
+        counts = ~np.isin(np.arange(count), left_out)
+        kinds = np.array([pair.clearance_class for pair in scene.pairs])
+        self._keeps_any = counts & np.array([pair.rule is Rule.CLEARANCE for pair in scene.pairs], dtype=bool)
+        self._watched = {kind: counts & (kinds == kind) for kind in ClearanceClass}
+        self._keeps = {kind: self._keeps_any & (kinds == kind) for kind in ClearanceClass}
 
+    def rows(self, kind: ClearanceClass) -> list[int]:
+        """Pairs of a class that are to keep the distance that the cell demands."""
+        return np.flatnonzero(self._keeps[kind]).tolist()
 
-def survey(scene: Scene, rows: Sequence[int], poses: BodyPoses) -> Survey:
-    """Settle for some pairs of the scene at which samples they touch."""
-    found = _measured_grounds(scene, rows, poses)
-    places, pairs = found.solids(rows)
-    swept = sweep(scene.engine, pairs, poses)
-    found.lower[places], found.touching[places] = swept.lower, swept.touching
-    return found
+    def watched(self, kind: ClearanceClass) -> list[int]:
+        """Pairs of a class that must not touch, whatever else is asked of them."""
+        return np.flatnonzero(self._watched[kind]).tolist()
 
+    def distance(self, row: int) -> float:
+        """Smallest distance of a pair that was found in [m]: zero when it touches, inf when it was not measured."""
+        return 0.0 if self.found[row].touches else self.found[row].distance
 
-def nearest(found: Survey, rows: Sequence[int], *, best: float) -> Nearest:
-    """Smallest distance of the given pairs, none of which touches; ``row`` is an index into ``Scene.pairs``.
+    def best(self, kind: ClearanceClass) -> float:
+        """Smallest distance of a class found so far in [m]; zero when any pair of it touches."""
+        return float(self._nearest[self._watched[kind]].min(initial=np.inf))
 
-    Args:
-        found: The survey.
-        rows: Indices into ``Scene.pairs``.
-        best: A distance in [m] known from elsewhere; farther pairs are of no interest.
-    """
-    places, pairs = found.solids(rows)
-    grounds = np.setdiff1d(np.searchsorted(found.rows, rows), places)
-    lowest = Nearest(np.inf, best, -1, -1)
-    if grounds.size:
-        place, sample = np.unravel_index(np.argmin(found.lower[grounds]), (len(grounds), found.lower.shape[1]))
-        height = float(found.lower[grounds[place], sample])
-        if height < best:
-            lowest = Nearest(height, height, found.rows[grounds[place]], int(sample))
-    lower = found.lower[places]
-    solid = find_nearest(found.scene.engine, pairs, found.poses, lower=lower, best=lowest.measured)
-    found.lower[places] = lower
-    proved = min(solid.proved, float(found.lower[grounds].min(initial=np.inf)))
-    if solid.row < 0:
-        return Nearest(proved, lowest.measured, lowest.row, lowest.sample)
-    return Nearest(proved, solid.measured, found.rows[places[solid.row]], solid.sample)
+    def cutoff(self, row: int) -> float:
+        """Distance in [m] from which on a pair is neither the nearest of its class nor among the closest of all."""
+        kind = self.scene.pairs[row].clearance_class
+        if not self._keeps[kind][row]:
+            return SURELY_APART
+        others = np.delete(self._nearest[self._keeps_any], np.count_nonzero(self._keeps_any[:row]))
+        last = np.partition(others, CLOSEST - 1)[CLOSEST - 1] if len(others) >= CLOSEST else np.inf
+        return float(max(SURELY_APART, max(self.best(kind), last) - SEARCH_ROOM))
 
+    def remember(self, row: int) -> None:
+        """Keep the smallest distance of a pair at hand; of pairs that only must not touch only the touch counts."""
+        found = self.found[row]
+        if found.touches:
+            self._nearest[row] = 0.0
+        elif self._keeps_any[row]:
+            self._nearest[row] = found.distance
 
-def distance_curve(scene: Scene, rows: Sequence[int], poses: BodyPoses, *, touching: NDArray[np.bool_]) -> Array:
-    """Smallest distance of the given pairs at each sample in [m], shape (n,); zero where any of them touches.
+    def lift(self, row: int, search: Search, first: int) -> None:
+        """Raise the bounds of a pair by those of a search that begins where a block does."""
+        begin = int(self.edges[first])
+        last = int(np.searchsorted(self.edges, begin + len(search.low)))
+        low = np.minimum.reduceat(search.low, self.edges[first:last] - begin)
+        known = self.low[row, first:last]
+        self.low[row, first:last] = np.where(np.isinf(known) | (low == 0.0), low, np.maximum(known, low))
+        self.remember(row)
 
-    Args:
-        scene: The scene.
-        rows: Indices into ``Scene.pairs``, at least one.
-        poses: Where the bodies are.
-        touching: Whether each pair touches, shape (P, n).
-    """
-    found = _measured_grounds(scene, rows, poses)
-    places, pairs = found.solids(rows)
-    values: Array = np.where(touching.any(axis=0), 0.0, found.lower.min(axis=0))
-    if pairs:
-        lower = np.where(touching[places], 0.0, np.maximum(sphere_bounds(scene.engine, pairs, poses), 0.0))
-        solid = nearest_at_each(scene.engine, pairs, poses, lower=lower, touching=touching[places])
-        values = np.minimum(values, solid)
-    return np.maximum(values, 0.0)
+    def nearest_points(self, row: int, ends: Pair | None) -> tuple[Array, Array] | None:
+        """Points of a pair where it is nearest, in the world in [m]; None when it touches or was not measured.
 
-
-def _measured_grounds(scene: Scene, rows: Sequence[int], poses: BodyPoses) -> Survey:
-    """A survey in which only the half-spaces are settled."""
-    lower = np.full((len(rows), poses.p.shape[1]), np.inf)
-    for place in np.flatnonzero(np.isin(rows, scene.ground_rows)).tolist():
-        lower[place] = scene.ground_heights(scene.pairs[rows[place]], poses)
-    return Survey(scene=scene, rows=tuple(rows), poses=poses, lower=lower, touching=lower <= 0.0)
+        Args:
+            row: The pair.
+            ends: The engine's bodies; None for a pair with a half-space.
+        """
+        found, scene = self.found[row], self.scene
+        if found.touches or not np.isfinite(found.distance):
+            return None
+        before = min(int(found.at), len(self.q) - 2)
+        share = found.at - before
+        q = (1.0 - share) * self.q[before] + share * self.q[before + 1]
+        if ends is None:
+            pair = scene.pairs[row]
+            poses = scene.pair_poses((pair.first, pair.first), q[None])
+            points = point_above(scene.engine, pair.first, poses, X_WS=scene.bodies[pair.second].X_BS, sample=0)
+        else:
+            points = nearest_points(scene.engine, ends, scene.pair_poses(ends, q[None]), sample=0)
+        return points.first, points.second

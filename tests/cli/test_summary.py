@@ -27,7 +27,9 @@ def record() -> dict[str, Any]:
         "cycle_time_s": 4.0,
         "tasks": {"ring": {"robot": "pen", "max_position_error_mm": 0.00163, "max_orientation_error_deg": 0.00002}},
         "joints": {"holder": {"A1": use(), "A2": use(margin=37.25)}, "pen": {"B1": use(ratio=0.351)}},
-        "clearance": {"whole": {"minimum_mm": 12.345, "pair": ["pen/tool", "holder/A2"], "at_s": 0.25}},
+        "clearance": {
+            "whole": {"minimum_mm": 12.345, "pair": ["pen/tool", "holder/A2"], "at_s": 0.25, "certified": True}
+        },
         "checks": [{"passed": True, "message": "fine"}],
         "solver": {"method": "weighted_pseudo_inverse", "slack": {"max": 0.0, "max_at_s": 0.0, "unit": "m/s"}},
     }
@@ -42,7 +44,7 @@ def test_a_passed_run_is_told_in_a_few_lines(record: dict[str, Any], tmp_path: P
         "  task ring (pen): largest error 0.0016 mm, 2e-05 deg",
         "  smallest joint margin 37.25 deg: holder A2 at 1.500 s",
         "  largest joint speed 35.1 % of its limit: pen B1 at 2.500 s",
-        "  smallest clearance 12.35 mm: pen/tool - holder/A2 at 0.250 s",
+        "  smallest clearance 12.35 mm, certified: pen/tool - holder/A2 at 0.250 s",
         f"report: {tmp_path / 'report.html'}",
         f"tables: {tmp_path / 'tables'}",
     ]

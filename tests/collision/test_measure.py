@@ -196,6 +196,24 @@ def test_meshes_agree_with_a_second_engine(mesh: str, second: str) -> None:
     _compare(engine, poses, truth)
 
 
+@pytest.mark.slow
+def test_the_certificate_is_never_above_a_second_engine_in_many_states() -> None:
+    """At least 100,000 pair states: the proved distance is never above the true one, and tight in nearly all."""
+    shapes = [*SHAPES.values(), rock(3), rock(4)]
+    pairs = [(a, b) for i, a in enumerate(shapes) for b in shapes[i:]]
+    states, tight = 0, 0
+    for number, (a, b) in enumerate(pairs):
+        engine, poses = Engine((prepare("a", a), prepare("b", b))), random_states(1000 + number, 6000, reach=0.8)
+        truth = coal_distances(a, b, poses)
+        for k in np.flatnonzero(truth > 1e-7):  # on the border both answers are right
+            bound = look(engine, (0, 1), poses, sample=int(k)).bound
+            assert bound <= truth[k] + ROUNDING
+            tight += bound >= truth[k] - EXACT
+            states += 1
+    assert states >= 100_000
+    assert tight >= 0.98 * states
+
+
 def _compare(engine: Engine, poses: BodyPoses, truth: np.ndarray) -> None:
     """Touching where the truth is below zero; elsewhere never above it and near it; the cheap look never above it."""
     for k, distance in enumerate(truth):

@@ -17,6 +17,10 @@ MEANT_TO_FAIL = {"four_robots_initial"}  # the start of a layout search
 def test_cell_passes(path):
     solution = solve(load_cell(path))
     assert solution.passed, [c.message for run in solution.runs for c in run.report.checks if not c.passed]
+    for run in solution.runs:
+        clearance = run.report.clearance
+        assert clearance.not_certified == ()
+        assert all(found.certified for found in clearance.minima.values() if found.minimum is not None)
 
 
 @pytest.mark.parametrize("path", CELLS, ids=lambda p: p.stem)

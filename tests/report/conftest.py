@@ -26,6 +26,7 @@ from cellplan.model.report import (
     ClearanceClass,
     ClearanceMinimum,
     ClearanceReport,
+    ClosePair,
     Conditioning,
     Contact,
     JointUse,
@@ -188,7 +189,13 @@ def _clearance() -> ClearanceReport:
         ClearanceClass.ENVIRONMENT: ("reis/D6", "floor", 0.48, 2.0),
     }
     minima = {
-        kind: ClearanceMinimum(minimum=value, pair=(first, second), at_s=at, certified=False)
+        kind: ClearanceMinimum(
+            minimum=value,
+            pair=(first, second),
+            at_s=at,
+            certified=True,
+            points=((1.2, 0.0, 0.9), (1.2 + value, 0.0, 0.9)),
+        )
         for kind, (first, second, value, at) in names.items()
     }
     curves = {kind: value + 0.06 * (1 - np.cos(1.3 * (curve_times - at))) for kind, (_, _, value, at) in names.items()}
@@ -216,6 +223,13 @@ def _clearance() -> ClearanceReport:
         pair_count=612,
         curve_times=curve_times,
         curves=curves,
+        closest=tuple(
+            ClosePair(pair=(first, second), clearance_class=kind, distance=value, at_s=at)
+            for kind, (first, second, value, at) in sorted(names.items(), key=lambda item: item[1][2])
+        ),
+        distance_queries=349,
+        contact_queries=348,
+        cut_steps=2,
     )
 
 
@@ -313,7 +327,7 @@ def failed_run() -> Run:
         is_allowed=False,
         reason="collision",
     )
-    touching = ClearanceMinimum(minimum=0.0, pair=hit.pair, at_s=1.204, certified=False)
+    touching = ClearanceMinimum(minimum=0.0, pair=hit.pair, at_s=1.204, certified=True)
     check = Check(
         name="clearance",
         subject="kuka/B5 and abb/A5",

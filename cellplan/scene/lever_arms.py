@@ -1,0 +1,180 @@
+r"""How far the points of a body can be from the joint axes that move it, whatever the posture.
+
+Seen from one body, another is moved by the joints on the way between the two links: down from the one to the link they
+share, or to the ground, and up to the other. Take a point :math:`P_j` on each of these axes. Two axes that follow each
+other sit on one link, so the distance of their points never changes, but for what a sliding joint adds between them.
+The triangle inequality gives, for every point x of the body at the far end and every turning joint j,
+
+.. math:: |x - P_j| \le L_j = \sum_{i \ge j} \bigl( |P_{i+1} - P_i| + \hat q_i \bigr) + \rho
+
+with the largest position :math:`\hat q_i` of each sliding joint in the program, zero for those that turn, the centre c
+of a sphere round the body as the last point, and its radius :math:`\rho`. A sliding joint moves a point as far as it
+slides: :math:`L_j = 1`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.robot import BASE, FollowerJoint, Joint
+from cellplan.scene.bodies import SceneBody
+from cellplan.scene.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chain:
+    """The joints between two bodies, the nearest to the first one first.
+
+    Attributes:
+        axes: Their places among all axes of the scene, shape (m,).
+        levers: Lever arm of each to the points of the second body, in [m] for joints that turn, 1 for those that
+            slide, shape (m,).
+        turns: 1 for joints that turn, 0 for those that slide, shape (m,).
+    """
+
+    axes: np.ndarray
+    levers: Array
+    turns: Array
+
+    def bend(self, steps: Array) -> Array:
+        r"""Largest second derivative of a point of the second body seen from the first in each step, shape (n - 1,).
+
+        With even joints :math:`\ddot x = \sum_i \sum_j \partial^2 x / \partial q_i \partial q_j \, \dot q_i \dot q_j`.
+        For a joint i that is nearer to the first body than j, or j itself, that derivative is
+        :math:`s_i \times (s_j \times (x - P_j))` when both turn, no longer than :math:`L_j`; :math:`s_i \times s_j`
+        when only i turns; and zero when i slides.
+
+        Args:
+            steps: By how much each axis of the scene moves in each step in [rad] or [m], shape (n - 1, axes).
+        """
+        moved = steps[:, self.axes]
+        turned = moved * self.turns
+        bend: Array = (moved * self.levers * (2.0 * np.cumsum(turned, axis=1) - turned)).sum(axis=1)
+        return bend
+
+    def reach(self, steps: Array) -> Array:
+        """How far a point of the second body travels at most in each step, seen from the first, in [m]."""
+        reach: Array = steps[:, self.axes] @ self.levers
+        return reach
+
+
+class LeverArms:
+    """All axes of a cell at their reference posture, and how far each slides in a program."""
+
+    def __init__(self, scene: Scene, q: Array) -> None:
+        """Place the axes in the world.
+
+        Args:
+            scene: The scene.
+            q: Stacked joint positions of the program in [rad] or [m], shape (N, nq); between its rows joints move
+                evenly.
+        """
+        cell = scene.cell
+        self._scene = scene
+        self._known: dict[tuple[int | None, int], Chain] = {}
+        self._placed = [axis for robot in cell.robots for axis in _placed(robot, cell.columns(robot.name).start)]
+        self._first = dict(zip((robot.name for robot in cell.robots), _starts(cell), strict=True))
+        self._columns = np.array([axis.column for axis in self._placed], dtype=np.intp)
+        self._ratios = np.array([axis.ratio for axis in self._placed])
+        self._turns = np.array([float(axis.is_revolute) for axis in self._placed])
+        positions = q[:, self._columns] * self._ratios + np.array([axis.offset for axis in self._placed])
+        self._slides = np.abs(positions).max(axis=0, initial=0.0) * (1.0 - self._turns)
+
+    def steps(self, q: Array) -> Array:
+        """By how much each axis moves from row to row, without its sign, in [rad] or [m], shape (n - 1, axes)."""
+        moved: Array = np.abs(np.diff(q[:, self._columns], axis=0) * self._ratios)
+        return moved
+
+    def chain(self, first: int | None, second: int) -> Chain:
+        """The joints between two of the engine's bodies; ``first`` is None for the ground."""
+        found = self._known.get((first, second))
+        if found is None:
+            down = [] if first is None else self._way(self._scene.carrier(first))
+            found = self._known[first, second] = self._chain(down, second)
+        return found
+
+    def _chain(self, down: list[int], index: int) -> Chain:
+        """The joints on the way down from one link and up to another body."""
+        body, seen = self._scene.carrier(index), self._scene.engine.bodies[index]
+        up = self._way(body)
+        shared = set(down) & set(up)
+        axes = [axis for axis in down if axis not in shared] + [axis for axis in reversed(up) if axis not in shared]
+        levers = np.ones(len(axes))
+        point, length = self._at_reference(body, seen.centre), seen.radius
+        for place in range(len(axes) - 1, -1, -1):
+            axis = self._placed[axes[place]]
+            foot = axis.point_W + axis.axis_W * ((point - axis.point_W) @ axis.axis_W)
+            length += float(np.linalg.norm(point - foot)) + float(self._slides[axes[place]])
+            if axis.is_revolute:
+                levers[place] = length
+            point = foot
+        return Chain(np.array(axes, dtype=np.intp), levers, self._turns[axes])
+
+    def _way(self, body: SceneBody) -> list[int]:
+        """Axes from the link that carries a body to the ground."""
+        way: list[int] = []
+        link = BASE if body.robot is None else body.link
+        while link != BASE:
+            way.append(self._first[str(body.robot)] + link)
+            link = self._placed[way[-1]].parent
+        return way
+
+    def _at_reference(self, body: SceneBody, point: Array) -> Array:
+        """A point of a body in the world when all joints are at zero, shape (3,)."""
+        X_WS = body.X_BS if body.robot is None else self._scene.cell.robot(body.robot).X_WB @ body.X_BS
+        placed: Array = X_WS[:3, :3] @ point + X_WS[:3, 3]
+        return placed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _PlacedAxis:
+    """One axis at the reference posture in the world, and the stacked joint that moves it.
+
+    Attributes:
+        column: The stacked joint.
+        ratio: Its motion per motion of that joint.
+        offset: Its position when that joint reads zero.
+        is_revolute: Whether it turns.
+        parent: Index in its robot of the axis that carries it.
+        point_W: A point on it in [m].
+        axis_W: Its unit direction.
+    """
+
+    column: int
+    ratio: float
+    offset: float
+    is_revolute: bool
+    parent: int
+    point_W: Array
+    axis_W: Array
+
+
+def _placed(robot: Robot, start: int) -> list[_PlacedAxis]:
+    """The axes of a robot, followers after joints; ``start`` is the column of its first joint."""
+    R, p = robot.X_WB[:3, :3], robot.X_WB[:3, 3]
+    placed = []
+    axes: tuple[Joint | FollowerJoint, ...] = (*robot.model.joints, *robot.model.followers)
+    for place, axis in enumerate(axes):
+        column, ratio, offset = place, 1.0, 0.0
+        if isinstance(axis, FollowerJoint):
+            column, ratio, offset = axis.leader, axis.ratio, axis.offset
+        placed.append(
+            _PlacedAxis(
+                column=start + column,
+                ratio=ratio,
+                offset=offset,
+                is_revolute=axis.is_revolute,
+                parent=axis.parent,
+                point_W=R @ axis.point_B + p,
+                axis_W=R @ axis.axis_B,
+            )
+        )
+    return placed
+
+
+def _starts(cell: Cell) -> list[int]:
+    """Place of each robot's first axis among all."""
+    counts = [len(robot.model.joints) + len(robot.model.followers) for robot in cell.robots]
+    return [0, *np.cumsum(counts)[:-1].tolist()]

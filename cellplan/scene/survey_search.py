@@ -1,0 +1,168 @@
+"""The work of a survey: stretch by stretch through the program, pair by pair, the nearest first."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from cellplan.collision.at_surface import surface_span
+from cellplan.collision.certify import SolidSearch
+from cellplan.collision.measure import Reading, measure
+from cellplan.collision.travel import Pair
+from cellplan.geometry.transforms import Array
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report import ClearanceClass
+from cellplan.scene.curves import CurveRefiner
+from cellplan.scene.ground_search import GroundSearch
+from cellplan.scene.lever_arms import LeverArms
+from cellplan.scene.pairs import Rule
+from cellplan.scene.scene import Scene
+from cellplan.scene.straight_motion import StraightMotion
+from cellplan.scene.survey import Survey
+
+CHUNK_WORK: Final = 400_000  # [-] bodies times samples worked on at once: 40 MB of poses
+MOST_SAMPLES: Final = 16_384  # [-] samples worked on at once, however few bodies there are
+FIRST_LOOKS: Final = 12  # [-] pairs of each class measured once before any search: a small distance saves much later
+
+
+def survey(
+    scene: Scene, q: Array, *, left_out: Sequence[int] = (), progress: Progress = silent, stage: str = ""
+) -> Survey:
+    """Search a program for contacts and for the smallest distances, at the samples and between them.
+
+    Args:
+        scene: The scene.
+        q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2.
+        left_out: Indices of pairs of which contacts are looked for at the samples only.
+        progress: Who wants to know how far it is.
+        stage: What it is told.
+    """
+    found = Survey(scene, q, left_out=left_out)
+    arms = LeverArms(scene, q)
+    for first, last in _stretches(found):
+        motion = StraightMotion.of_cell(scene, arms, q[found.edges[first] : found.edges[last] + 1])
+        stretch = _Stretch(found, motion, first, last)
+        stretch.search_all()
+        for kind in ClearanceClass:
+            stretch.raise_curve(kind)
+        stretch.note_work()
+        progress(stage, 0.9 * last / (len(found.edges) - 1))
+    return found
+
+
+def solid_ends(scene: Scene) -> dict[int, Pair]:
+    """The engine's bodies of each pair of solids that is watched, by the pair."""
+    pairs = zip(scene.solid_rows.tolist(), scene.solid_pairs.tolist(), strict=True)
+    return {row: (first, second) for row, (first, second) in pairs}
+
+
+def _stretches(found: Survey) -> Iterator[tuple[int, int]]:
+    """Runs of blocks small enough to be worked on at once: the first block, and the first one after the last."""
+    most = min(MOST_SAMPLES, max(512, CHUNK_WORK // max(1, len(found.scene.engine.bodies))))
+    first = 0
+    while first < len(found.edges) - 1:
+        last = int(np.searchsorted(found.edges, found.edges[first] + most, side="right")) - 1
+        last = max(last, first + 1)
+        yield first, last
+        first = last
+
+
+class _Stretch:
+    """Some blocks of the program."""
+
+    def __init__(self, found: Survey, motion: StraightMotion, first: int, last: int) -> None:
+        """Bound all pairs over the stretch by the cheapest means."""
+        self._found, self._motion, self._first, self._last = found, motion, first, last
+        self._scene, self._solid = found.scene, solid_ends(found.scene)
+        self._edges = found.edges[first : last + 1] - found.edges[first]
+        self._bound_solids()
+        self._grounds: dict[int, GroundSearch] = {}
+        for row in self._scene.ground_rows.tolist():
+            begin = float(found.edges[first])
+            search = GroundSearch(self._scene.pairs[row], motion, found=found.found[row], begin=begin)
+            self._grounds[row] = search
+            found.lift(row, search, first)
+
+    def search_all(self) -> None:
+        """Search every pair as far as it matters."""
+        looks = {row: look for kind in ClearanceClass for row, look in self._first_looks(kind)}
+        for row in np.argsort(self._low().min(axis=1, initial=np.inf), kind="stable").tolist():
+            self._search(row, looks.get(row))
+
+    def raise_curve(self, kind: ClearanceClass) -> None:
+        """Raise the bounds of a class in every block so far that the smallest of them says something."""
+        rows = self._found.rows(kind)
+        if not rows:
+            return
+        low = self._low()[rows]
+        refiner = CurveRefiner(self._scene.engine, self._motion, self._edges)
+        refiner.raise_bounds(low, [self._solid.get(row) for row in rows])
+        self._low()[rows] = low
+
+    def note_work(self) -> None:
+        """Write down from when to when tools at work are at the part, whatever breaks there are."""
+        begin, spans = int(self._found.edges[self._first]), self._found.at_surface
+        for row, pair in enumerate(self._scene.pairs):
+            if pair.rule is not Rule.PROCESS or row in self._found.left_out:
+                continue
+            span = surface_span(self._scene.engine, (pair.first, pair.second), self._motion)
+            if span is not None:
+                spans[row] = spans.get(row, (begin + span[0], 0))[0], begin + span[1]
+
+    def _low(self) -> Array:
+        """The bounds of all pairs in the stretch, to be changed in place."""
+        return self._found.low[:, self._first : self._last]
+
+    def _bound_solids(self) -> None:
+        """Bounds of pairs of solids by their spheres: half of the gaps at both edges less the way of both centres."""
+        engine, pairs, motion = self._scene.engine, self._scene.solid_pairs, self._motion
+        if not len(pairs):
+            return
+        centres = np.array([motion.centres[index][self._edges] for index in range(len(engine.bodies))])
+        ways = np.empty((len(engine.bodies), self._last - self._first))
+        for index in range(len(engine.bodies)):
+            way = np.linalg.norm(np.diff(motion.centres[index], axis=0), axis=1) + motion.bend[index] / 3.0
+            ways[index] = np.add.reduceat(way, self._edges[:-1])
+        a, b = pairs.T
+        gaps = np.linalg.norm(centres[b] - centres[a], axis=2) - (engine.radii[a] + engine.radii[b])[:, None]
+        self._low()[self._scene.solid_rows] = 0.5 * (gaps[:, 1:] + gaps[:, :-1] - ways[a] - ways[b])
+
+    def _first_looks(self, kind: ClearanceClass) -> Iterator[tuple[int, tuple[int, Reading]]]:
+        """Measure the pairs of a class that seem nearest once, at an edge of the block where they do."""
+        found, lowest = self._found, self._low().min(axis=1, initial=np.inf)
+        rows = sorted((row for row in found.rows(kind) if row in self._solid), key=lambda row: float(lowest[row]))
+        for row in rows[:FIRST_LOOKS]:
+            if lowest[row] >= found.best(kind):
+                break
+            block = int(np.argmin(self._low()[row]))
+            sample = int(self._edges[block])
+            reading = measure(self._scene.engine, self._solid[row], self._motion.poses, sample=sample)
+            if not reading.touches and reading.bound < found.found[row].distance:
+                found.found[row].distance = reading.bound
+                found.found[row].at = float(found.edges[self._first + block])
+                found.remember(row)
+            yield row, (sample, reading)
+
+    def _search(self, row: int, look: tuple[int, Reading] | None) -> None:
+        """Search one pair where it may matter."""
+        found, cutoff = self._found, self._found.cutoff(row)
+        open_ = np.flatnonzero(self._low()[row] < cutoff)
+        if not open_.size:
+            return
+        ground = self._grounds.get(row)
+        if ground is not None:
+            ground.run(cutoff)
+            found.lift(row, ground, self._first)
+            return
+        block, begin, end = self._first + int(open_[0]), int(self._edges[open_[0]]), int(self._edges[open_[-1] + 1])
+        search = SolidSearch(
+            self._scene.engine,
+            self._solid[row],
+            self._motion.part(begin, end),
+            found=found.found[row],
+            begin=float(found.edges[block]),
+        )
+        if look is not None and begin <= look[0] <= end:
+            search.take(look[0] - begin, look[1], cutoff)
+        search.run(cutoff)
+        found.lift(row, search, block)
