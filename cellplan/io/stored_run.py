@@ -5,18 +5,22 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
+import numpy as np
+
 from cellplan.errors import InputError, InvalidFileError
 from cellplan.io.complaints import shown
 from cellplan.io.input_files import digest, read_regular_file
 from cellplan.io.json_reader import parse_json, required
 from cellplan.io.manifest import SIZE_LIMIT, Manifest, file_complaints, parse_manifest
 from cellplan.io.run_folder import MANIFEST
-from cellplan.io.tables import parse_header, parse_table
+from cellplan.io.tables import MM_PER_M, parse_header, parse_table, table_body
+from cellplan.model.motion import JointTable
 
 REPORT_SCHEMA: Final = "cellplan.report/1"
 OF_EVERY_RUN: Final = ("cell.yaml", "report.html", "report.json")
 CELL: Final = "cell.yaml"
 TABLE_LIMIT: Final = 500_000_000  # [bytes] of a table that is read only to say where it is spoilt
+SERIES_ROOM: Final = 1e-6  # [-] series have seven digits
 
 Record = dict[str, Any]
 
@@ -178,9 +182,33 @@ def _spoilt_tables(folder: Path, changed: Iterable[str]) -> Iterator[InputError]
             data = read_regular_file(path, file=str(path), limit=TABLE_LIMIT)
             text = data.decode("utf-8", "replace")
             parse_header(text, str(path))
-            parse_table(text, str(path))
+            yield from _first_other_row(parse_table(text, str(path)), text, path)
         except InputError as error:
             yield error
+        except (AttributeError, KeyError, TypeError, ValueError):  # the report is spoilt too: nothing to compare with
+            continue
+
+
+def _first_other_row(table: JointTable, text: str, path: Path) -> Iterator[InputError]:
+    """The first number that is not the one in the series of the report beside the table, as far as that can tell."""
+    report = path.parent.parent / "report.json"
+    curves = parse_json(read_regular_file(report, file=str(report), limit=TABLE_LIMIT), str(report)).get("series", {})
+    own = curves.get("joints", {}).get(table.robot, {})
+    if curves.get("every") != 1 or list(own) != list(table.joints):
+        return
+    found = []
+    for joint, q in zip(table.joints, table.q.T, strict=True):
+        is_turn = "position_deg" in own[joint]
+        said = np.array(own[joint]["position_deg" if is_turn else "position_mm"], dtype=np.float64)
+        written = np.rad2deg(q) if is_turn else MM_PER_M * q
+        if said.shape != written.shape:
+            return
+        other = np.flatnonzero(~np.isclose(written, said, rtol=SERIES_ROOM, atol=SERIES_ROOM))
+        found += [(int(other[0]), joint, float(said[other[0]]), float(written[other[0]]))] if len(other) else []
+    if found:
+        row, joint, said_there, got = min(found)
+        line = text.count("\n", 0, len(text) - len(table_body(text))) + 2 + row
+        yield InputError(f"{path}:{line}: {joint}: expected {said_there:.7g} as in report.json, got {got:.10g}")
 
 
 def _at(place: str, name: str) -> str:

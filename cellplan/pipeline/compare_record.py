@@ -42,8 +42,7 @@ def _compare(said: Any, found: Any, path: tuple[str, ...], *, same_program: bool
             else:
                 yield from _compare(said[key], found[key], (*path, key), same_program=same_program)
     elif isinstance(found, np.ndarray):
-        if not _is_same_series(said, found):
-            yield ".".join(path), "another series", "this one"
+        yield from _compare_series(said, found, ".".join(path))
     elif isinstance(found, list) and isinstance(said, list) and len(found) == len(said):
         for index, (left, right) in enumerate(zip(said, found, strict=True)):
             yield from _compare(left, right, (*path[:-1], f"{path[-1]}[{index}]"), same_program=same_program)
@@ -66,14 +65,13 @@ def _is_same(said: Any, found: Any) -> bool:
     return type(said) is type(found) and bool(said == found)
 
 
-def _is_same_series(said: Any, found: np.ndarray[Any, Any]) -> bool:
-    """Whether a list of numbers is an array up to its seven digits; null stands for what is not finite."""
+def _compare_series(said: Any, found: np.ndarray[Any, Any], key: str) -> Iterator[tuple[str, Any, Any]]:
+    """The first value at which a list of numbers is not an array up to its digits; null is what is not finite."""
     if not isinstance(said, list) or len(said) != len(found):
-        return False
-    if not all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in said):
-        return False
-    numbers = np.array([math.nan if value is None else float(value) for value in said])
-    missing = ~np.isfinite(found)
-    if not np.array_equal(np.isnan(numbers), missing):
-        return False
-    return bool(np.allclose(numbers[~missing], found[~missing], rtol=RELATIVE, atol=ABSOLUTE))
+        yield key, said, f"a list of {len(found)}"
+        return
+    expected = [value if math.isfinite(value) else None for value in found.tolist()]
+    other = (i for i, pair in enumerate(zip(said, expected, strict=True)) if not _is_same(*pair))
+    first = next(other, None)
+    if first is not None:
+        yield f"{key}[{first}]", said[first], expected[first]

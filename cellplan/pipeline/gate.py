@@ -117,18 +117,18 @@ def _tables(cell: Cell, stored: StoredRun, place: str) -> dict[str, JointTable]:
         verdict="passed",
         digests={"cell": manifest.inputs[manifest.cell_file], "program": program},
     )
-    if stored.records[place].get("digests") != {"program": program}:
-        raise InputError(f"{stored.file(place, 'report.json')}: digests.program: is not that of the tables beside it")
     found = {}
     for name, text in texts.items():
         file = stored.file(place, f"tables/{name}.csv")
-        _refuse_other_header(parse_header(text, file), expected, file)
         found[name] = parse_table(text, file)
+        _refuse_other_header(parse_header(text, file), expected, file)
         if found[name].robot != name:
             raise InputError(f"{file}: robot: expected '{name}', got '{found[name].robot}'")
         if found[name].joints != cell.robot(name).model.joint_names:
             joints = listed(cell.robot(name).model.joint_names)
             raise InputError(f"{file}: expected the joints {joints} in this order, got {listed(found[name].joints)}")
+    if stored.records[place].get("digests") != {"program": program}:
+        raise InputError(f"{stored.file(place, 'report.json')}: digests.program: is not that of the tables beside it")
     return found
 
 

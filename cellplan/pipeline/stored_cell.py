@@ -3,18 +3,16 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from cellplan.errors import InputError, InvalidFileError
 from cellplan.io.bundled_robots import load_bundled_table
 from cellplan.io.cell_file import load_cell
 from cellplan.io.cell_writer import written_document
-from cellplan.io.complaints import listed, shown
+from cellplan.io.complaints import KeyPath, key_text, listed, shown
 from cellplan.io.manifest import BUNDLED
 from cellplan.io.stored_run import CELL, StoredRun
 from cellplan.model.cell import Cell
-
-KeyPath = tuple[str, ...]
 
 ANY: Final = "*"
 FOUND: Final = frozenset({"start", "start_deg"})  # written ``auto`` in a cell whose start was to be found
@@ -66,7 +64,7 @@ def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequen
     if foreign:
         raise InvalidFileError([_foreign(stored, cell, each) for each in foreign])
     remarks = [
-        f"{'.'.join(path)}: {shown(new)} was chosen on the command line; the cell file has {shown(old)}"
+        f"{key_text(path)}: {shown(new)} was chosen on the command line; the cell file has {shown(old)}"
         for path, old, new in chosen
         if path[-1] not in FOUND
     ]
@@ -134,17 +132,11 @@ def _differences(old: object, new: object, path: KeyPath = ()) -> Iterator[tuple
     if isinstance(old, Mapping) and isinstance(new, Mapping):
         for key in dict.fromkeys([*old, *new]):
             yield from _differences(old.get(key), new.get(key), (*path, str(key)))
-    elif _plain(old) != _plain(new):
+    elif isinstance(old, list | tuple) and isinstance(new, list | tuple) and len(old) == len(new):
+        for index, (one, other) in enumerate(zip(old, new, strict=True)):
+            yield from _differences(one, other, (*path, index))
+    elif old != new:
         yield path, old, new
-
-
-def _plain(value: object) -> Any:
-    """A value in which lists and tuples, and whole numbers of either kind, are the same."""
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    return value
 
 
 def _may_differ(path: KeyPath, old: object) -> bool:
@@ -160,5 +152,5 @@ def _may_differ(path: KeyPath, old: object) -> bool:
 def _foreign(stored: StoredRun, cell: Path, difference: tuple[KeyPath, object, object]) -> InputError:
     path, old, new = difference
     return InputError(
-        f"{stored.folder / CELL}: {'.'.join(path)}: expected {shown(old)} as in '{cell}', got {shown(new)}"
+        f"{stored.folder / CELL}: {key_text(path)}: expected {shown(old)} as in '{cell}', got {shown(new)}"
     )
