@@ -160,7 +160,7 @@ def report_edit(rng, copy):
             ('"status": "passed"', '"status": "failed"'),
             ('"seed": 0', '"seed": 1'),
             ("cellplan.report/1", "cellplan.report/2"),
-            ('"max_position_error_mm": ', '"max_position_error_mm": 0'),
+            ('"max_position_error_mm": 0.', '"max_position_error_mm": 0.0'),
             ('"pair_count": ', '"pair_count": 1'),
         ),
     )
@@ -168,9 +168,10 @@ def report_edit(rng, copy):
 
 
 def resolved_cell_edit(rng, copy):
-    old, new = pick(rng, (("z_mm: 0", "z_mm: 1"), ("1900", "1901"), ("velocity", "velocitiy"), ("left", "lift")))
-    text = (copy.run / "cell.yaml").read_text()
-    (copy.run / "cell.yaml").write_text(text.replace(old, new, 1) if old in text else text + "\n")
+    old, new = pick(
+        rng, (("z_mm: 0", "z_mm: 1"), ("1900", "1901"), ("[x, y, rz]", "[x, y]"), ("position_mm: 1", "position_mm: 2"))
+    )
+    replace_in(copy.run / "cell.yaml", old, new)
 
 
 def cell_edit(rng, copy):
@@ -313,6 +314,18 @@ def idle_robot_in_the_way(rng, copy):
     seal(copy)
 
 
+def idle_robot_elsewhere(rng, copy):
+    """The idle robot stands still, but not where the cell says."""
+    angle = str(pick(rng, (0.001, 7.0, -20.0)))
+    edit_rows(copy.table("idle"), lambda _, f: [f[0], angle, *f[2:]])
+
+
+def found_start_edited(rng, copy):
+    """The start that was found is another one in the resolved cell."""
+    replace_in(copy.run / "cell.yaml", "start_deg: [45.", "start_deg: [4" + str(int(rng.integers(6, 9))) + ".")
+    seal(copy)
+
+
 def block_moved_in_the_copy(rng, copy):
     text = (copy.run / "cell.yaml").read_text()
     (copy.run / "cell.yaml").write_text(text.replace("-900", str(-900 - int(rng.integers(1, 400)))))
@@ -387,6 +400,8 @@ DEFECTS: dict[str, Defect] = {
     "just over a limit, signed": signed(just_over_its_limit),
     "a jump, signed": signed(a_jump),
     "a contact, signed": idle_robot_in_the_way,
+    "an idle robot elsewhere, signed": signed(idle_robot_elsewhere),
+    "another start in the copy, sealed": found_start_edited,
     "a block moved in the copy, sealed": block_moved_in_the_copy,
     "a robot missing, sealed": robot_missing,
     "a pretty report, sealed": pretty_report,

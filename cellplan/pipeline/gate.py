@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from cellplan.checks.verify import verify
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.io.complaints import listed, shown
 from cellplan.io.stored_run import StoredRun, read_stored_run
-from cellplan.io.tables import TableHeader, parse_header, parse_table, program_digest
+from cellplan.io.tables import TableHeader, parse_header, parse_table, program_digest, table_body
 from cellplan.model.cell import Cell
 from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
@@ -27,7 +28,8 @@ from cellplan.report.record import Provenance, Record
 from cellplan.report.series import series
 from cellplan.scene.scene import Scene
 
-MOST_DIFFERENCES = 10  # of a report that are told; the rest is counted
+MOST_DIFFERENCES: Final = 10  # of a report that are told; the rest is counted
+START_ROOM: Final = 1e-9  # [rad] or [m] tables and cells have twelve decimals of a degree, millimetre or metre
 
 
 def open_gate(
@@ -97,6 +99,7 @@ def _verified(scene: Scene, stored: StoredRun, plan: RunPlan, *, progress: Progr
     schedule = schedule_tasks(cell, [build_toolpath(cell.task(name), cell.part, cell.origin) for name in plan.tasks])
     tables = _tables(cell, stored, place)
     _refuse_other_clock(stored, place, schedule, tables=tables)
+    _refuse_other_start(stored, place, cell, tables=tables)
     report = verify(scene, schedule, list(tables.values()), moving=plan.moving, progress=progress)
     return VerifiedMotion(name=plan.name, moving=plan.moving, schedule=schedule, tables=tables, report=report)
 
@@ -154,10 +157,25 @@ def _refuse_other_clock(stored: StoredRun, place: str, schedule: Schedule, *, ta
         late = np.flatnonzero(table.times != schedule.times)
         if len(late):
             row = int(late[0])
-            text = stored.tables[place][name]
-            line = text.count("\n", 0, text.index("\ntime_s") + 1) + 2 + row
+            line = _line(stored.tables[place][name], row)
             wanted, got = float(schedule.times[row]), float(table.times[row])
             raise InputError(f"{file}:{line}: time_s: expected {wanted!r} as the cell's clock has, got {got!r}")
+
+
+def _refuse_other_start(stored: StoredRun, place: str, cell: Cell, *, tables: Mapping[str, JointTable]) -> None:
+    """Refuse a table that does not begin at the start posture of the cell."""
+    for robot in cell.robots:
+        off = np.abs(tables[robot.name].q[0] - robot.start)
+        if not np.all(off <= START_ROOM):
+            joint = robot.model.joint_names[int(np.argmax(off))]
+            file = stored.file(place, f"tables/{robot.name}.csv")
+            line = _line(stored.tables[place][robot.name], 0)
+            raise InputError(f"{file}:{line}: {joint}: expected the start posture of the cell, got another one")
+
+
+def _line(text: str, row: int) -> int:
+    """Line of a row of numbers in the text of a table."""
+    return text.count("\n", 0, len(text) - len(table_body(text))) + 2 + row
 
 
 def _refuse_failing(stored: StoredRun, motions: Sequence[VerifiedMotion]) -> None:

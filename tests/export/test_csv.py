@@ -1,5 +1,7 @@
 """Plain CSV: what is written is read back to the same rounded numbers, and nothing else is taken for it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
