@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from cellplan.model.report import Check, Report
     from cellplan.model.task import Task
     from cellplan.model.toolpath import Toolpath
+    from cellplan.pipeline.export import export_program
+    from cellplan.pipeline.gate import open_gate
     from cellplan.pipeline.rehearse import rehearse
     from cellplan.pipeline.solution import Solution
     from cellplan.pipeline.solve import solve
@@ -41,8 +43,10 @@ _HOME: Final = {
     "Solution": "pipeline.solution",
     "Task": "model.task",
     "Toolpath": "model.toolpath",
+    "export_program": "pipeline.export",
     "load_cell": "io.cell_file",
     "load_errors": "io.errors_file",
+    "open_gate": "pipeline.gate",
     "rehearse": "pipeline.rehearse",
     "solve": "pipeline.solve",
     "verify": "pipeline.verify",
@@ -63,8 +67,10 @@ __all__ = [
     "Task",
     "Toolpath",
     "__version__",
+    "export_program",
     "load_cell",
     "load_errors",
+    "open_gate",
     "rehearse",
     "solve",
     "verify",

@@ -39,6 +39,21 @@ class InvalidFileError(InputError):
         self.complaints = complaints
 
 
+class NotVerifiedError(CellplanError):
+    """A run on disk is whole, but a check fails on what it holds.
+
+    Attributes:
+        complaints: What fails, one line each.
+    """
+
+    status = ExitStatus.CHECK_FAILED
+
+    def __init__(self, complaints: list[str]) -> None:
+        """Join the complaints, one per line."""
+        super().__init__("\n".join(complaints))
+        self.complaints = complaints
+
+
 class StartOutsideLimitsError(InputError):
     """A start posture given in the cell lies outside the joint limits."""
 

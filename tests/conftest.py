@@ -26,3 +26,13 @@ def shared_robots() -> Path:
     if not folder.is_dir():
         pytest.skip("the real robot descriptions (../shared/robots) are not on this machine")
     return folder
+
+
+@pytest.fixture(scope="session")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with a small cell below ``cell`` and its run in ``run``; not to be changed."""
+    from stored_cells import solve_into, write_cell
+
+    folder = tmp_path_factory.mktemp("sound")
+    solve_into(write_cell(folder / "cell"), folder / "run")
+    return folder

@@ -6,7 +6,7 @@ import re
 import sys
 import traceback
 
-from cellplan.errors import CellplanError, ExitStatus, InvalidFileError
+from cellplan.errors import CellplanError, ExitStatus, InvalidFileError, NotVerifiedError
 
 DEBUG_VARIABLE = "CELLPLAN_DEBUG"  # set to 1 to see the traceback of an internal error
 LOCATED = re.compile(r".+?:\d+: ")  # a message that begins with file and line needs no other opening
@@ -27,7 +27,7 @@ def error_lines(error: BaseException) -> list[str]:
     """What went wrong, one complaint per line; a complaint about a line of a file begins with ``FILE:LINE:``."""
     if isinstance(error, KeyboardInterrupt):
         return ["interrupted: no half-written run is left behind"]
-    if isinstance(error, InvalidFileError):
+    if isinstance(error, InvalidFileError | NotVerifiedError):
         return [_one_line(str(complaint)) for complaint in error.complaints]
     if isinstance(error, CellplanError):
         line = _one_line(str(error))

@@ -11,11 +11,13 @@ import cellplan
 from cellplan.cli.check import check
 from cellplan.cli.errors import OutputError, report_failure
 from cellplan.cli.explain import explain
+from cellplan.cli.export import export
 from cellplan.cli.output import say
 from cellplan.cli.rehearse import rehearse
 from cellplan.cli.robots import robots
 from cellplan.cli.schema import schema
 from cellplan.cli.solve import solve
+from cellplan.cli.verify import verify
 from cellplan.errors import ExitStatus
 
 app = typer.Typer(
@@ -45,6 +47,8 @@ def program(
 app.command()(check)
 app.command()(explain)
 app.command()(solve)
+app.command()(verify)
+app.command()(export)
 app.command()(rehearse)
 app.command()(robots)
 app.command()(schema)

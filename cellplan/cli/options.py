@@ -6,6 +6,13 @@ from typing import Annotated
 import typer
 
 CellFile = Annotated[Path, typer.Argument(metavar="CELL", help="Cell file (YAML).", show_default=False)]
+RunDir = Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)]
+OriginalCell = Annotated[
+    Path | None,
+    typer.Option(
+        "--cell", metavar="CELL", help="The cell file that was solved: it and its files are compared with the run."
+    ),
+]
 AllowDirs = Annotated[
     list[Path] | None,
     typer.Option(

@@ -20,6 +20,16 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
     """Lines for people about one run folder."""
     return [
         f"{record['cell']}: {record['status']}",
+        *figure_lines(record),
+        *_failure_lines(record["checks"]),
+        *(f"  before you run it: {line}" for line in record.get("before_you_run", [])),
+        *_place_lines(record, folder),
+    ]
+
+
+def figure_lines(record: Record) -> list[str]:
+    """The worst figures of a run."""
+    return [
         f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_method_word(record['solver'])}",
         *_task_lines(record["tasks"]),
         *_closure_lines(record.get("closure", {})),
@@ -28,9 +38,6 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
         *_drift_lines(record.get("repeatability", {})),
         *_clearance_lines(record["clearance"]["whole"]),
         *_slack_lines(record["solver"]["slack"]),
-        *_failure_lines(record["checks"]),
-        *(f"  before you run it: {line}" for line in record.get("before_you_run", [])),
-        *_place_lines(record, folder),
     ]
 
 

@@ -34,12 +34,13 @@ from cellplan.model.task import TimedPath
 PART_EXTENT_MM: Final = (1.0, 20_000.0)  # smaller or larger parts are slips of the unit
 
 
-def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> Cell:
+def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path | None = None) -> Cell:
     """Read a cell file and everything it names.
 
     Args:
         path: The cell file.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+        folder: The folder that its names start from; None for the one it lies in.
 
     Raises:
         InvalidFileError: Everything that is wrong with the cell and the files it names, one located line each.
@@ -54,7 +55,7 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> Cell:
         raise_complaints(file, complaints)
     complaints += rule_complaints(pieces, document)
     sources = Sources(
-        document, AllowedFolders(folder=path.parent, allowed=tuple(Path(folder) for folder in allow_dirs))
+        document, AllowedFolders(folder=folder or path.parent, allowed=tuple(Path(allowed) for allowed in allow_dirs))
     )
     sources.inputs[path.name] = document.digest
     models = _models(pieces, document, sources)

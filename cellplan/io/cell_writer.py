@@ -31,6 +31,11 @@ def render_cell(cell: Cell, starts: Mapping[str, Array] | None = None) -> str:
     Raises:
         ValueError: The cell was not read from a file.
     """
+    return yaml_text(written_document(cell, starts))
+
+
+def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> dict[str, Any]:
+    """The cell as plain values in the units of a cell file, every default filled in; see ``render_cell``."""
     if not cell.origin.document:
         raise ValueError("a cell that was not read from a file has no words to write")
     document: dict[str, Any] = dict(cell.origin.document)
@@ -42,7 +47,7 @@ def render_cell(cell: Cell, starts: Mapping[str, Array] | None = None) -> str:
     document["motion"] = _motion(document["motion"], cell)
     document["solver"] = _solver(document["solver"], cell.solver)
     document["checks"] = _checks(document["checks"], cell.checks)
-    return yaml_text(document)
+    return document
 
 
 def as_written(model: RobotModel, q: Array) -> Array:

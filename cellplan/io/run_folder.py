@@ -5,6 +5,7 @@ place at the end. A folder that cellplan did not write is never replaced.
 """
 
 import contextlib
+import json
 import os
 import shutil
 from pathlib import Path, PurePosixPath
@@ -13,16 +14,21 @@ from typing import Self
 from uuid import uuid4
 
 from cellplan.errors import InputError
+from cellplan.io.input_files import digest
 
 MARK = '"schema": "cellplan.'  # stands in the first lines of every report.json and rehearsal.json
 MARK_WITHIN = 200  # [bytes]
-REPORTS = ("report.json", "rehearsal.json")
+REPORTS = ("report.json", "rehearsal.json", "export.json")
 REHEARSAL = "rehearsal"  # folder of a rehearsal, inside the run folder of its cell
+PROGRAMS = "programs"  # folder of exported programs, inside the run folder that they were made from
+EXPORT = "export.json"  # what was exported, in the folder that holds it
+MANIFEST = "manifest.json"
 OWN_NAMES = frozenset(
     {
         "cell.yaml",
+        MANIFEST,
         "plots",
-        "programs",
+        PROGRAMS,
         "rehearsal.html",
         "rejected",
         "report.html",
@@ -39,11 +45,16 @@ class RunFolder:
 
     On a normal end the folder takes the place of an older run at the same path. On an exception or an interruption
     everything is removed and an older run stays as it was.
+
+    Attributes:
+        path: Where the run will stand.
+        written: Size in bytes and SHA-256 of every file written so far, by its name in the folder.
     """
 
     def __init__(self, path: Path) -> None:
         """Name the folder; nothing is touched before the ``with`` statement begins."""
         self.path = path
+        self.written: dict[str, tuple[int, str]] = {}
         self._draft = path.parent / f".{path.name}.{uuid4().hex[:12]}.partial"
         self._aside = self._draft.with_suffix(".replaced")  # where the older run waits for its end
         self._made_parents: list[Path] = []
@@ -88,6 +99,7 @@ class RunFolder:
                 os.fsync(file.fileno())
         except OSError as error:
             raise _cannot_write(self.path / relative, error) from error
+        self.written[str(relative)] = (len(content), digest(content))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -174,10 +186,22 @@ def _foreign_entry(path: Path) -> str | None:
         if [entry.name for entry in entries] == [REHEARSAL] and _is_run_entry(entries[0]):
             return None
         return entries[0].name
+    own = OWN_NAMES | _exported_names(path / EXPORT)
     for entry in entries:
-        if entry.is_symlink() or (entry.name not in OWN_NAMES and not _is_run_entry(entry)):
+        if entry.is_symlink() or (entry.name not in own and not _is_run_entry(entry)):
             return entry.name
     return None
+
+
+def _exported_names(record: Path) -> set[str]:
+    """What stands beside a record of exported programs by the record's own word; nothing when there is none."""
+    if not _is_own_report(record):
+        return set()
+    try:
+        files = json.loads(record.read_bytes())["files"]
+        return {PurePosixPath(name).parts[0] for name in files}
+    except (ValueError, KeyError, TypeError, IndexError, RecursionError):
+        return set()
 
 
 def _is_run_entry(entry: Path) -> bool:

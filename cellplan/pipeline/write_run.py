@@ -7,7 +7,8 @@ from typing import Final
 
 import cellplan
 from cellplan.io.cell_writer import render_cell
-from cellplan.io.run_folder import RunFolder
+from cellplan.io.manifest import render_manifest
+from cellplan.io.run_folder import MANIFEST, RunFolder
 from cellplan.io.tables import parse_header, program_digest, replace_header
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
@@ -17,14 +18,22 @@ from cellplan.report.json_report import report_json, summary_json
 from cellplan.report.plots import draw_plots
 from cellplan.report.record import Provenance
 
-ENGINES: Final = ("numpy", "pin", "python-fcl", "trimesh")  # packages whose arithmetic the result rests on
+ENGINES: Final = (
+    "numpy",
+    "pin",
+    "python-fcl",
+    "coal",
+    "daqp",
+    "trimesh",
+)  # packages whose arithmetic the result rests on
 
 
 def write_run(solution: Solution, folder: Path, *, keep_rejected: bool = False, progress: Progress = silent) -> None:
     """Write a run folder; it appears whole or not at all.
 
     Every run has ``report.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only when the whole
-    solution passed. A cell with one run per task gets a subfolder for each and an overview above them.
+    solution passed. A cell with one run per task gets a subfolder for each and an overview above them. Last comes
+    ``manifest.json``, which names every file.
 
     Args:
         solution: What was solved.
@@ -49,6 +58,8 @@ def write_run(solution: Solution, folder: Path, *, keep_rejected: bool = False, 
             target.write_text("report.json", summary_json(reports, cell=solution.cell, provenance=provenance))
             target.write_text("report.html", overview_html(reports, cell=solution.cell, provenance=provenance))
             target.write_text("cell.yaml", render_cell(solution.cell))
+        manifest = render_manifest(solution.cell, passed=solution.passed, versions=versions(), files=target.written)
+        target.write_text(MANIFEST, manifest)
 
 
 def versions() -> dict[str, str]:

@@ -27,7 +27,7 @@ def test_help_names_every_command_and_nothing_unfinished(capsys: pytest.CaptureF
     told = capsys.readouterr().out
     assert status == 0
     commands = [line.split()[0] for line in told.partition("Commands:")[2].splitlines() if line.strip()]
-    assert commands == ["check", "explain", "solve", "rehearse", "robots", "schema"]
+    assert commands == ["check", "explain", "solve", "verify", "export", "rehearse", "robots", "schema"]
 
 
 @pytest.mark.parametrize(

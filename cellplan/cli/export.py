@@ -1,0 +1,51 @@
+"""``cellplan export``: controller programs from a run that is verified once more."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
+from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.progress import progress_listener
+from cellplan.errors import ExitStatus
+
+SCHEMA = "cellplan.exported/1"
+
+Format = Annotated[str, typer.Option("--format", metavar="NAME", help="What to write: csv.", show_default=False)]
+Output = Annotated[
+    Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder (default: RUN/programs/<format>).")
+]
+
+
+def export(  # noqa: PLR0913, PLR0917 - the options of the command
+    run: RunDir,
+    form: Format,
+    output: Output = None,
+    cell: OriginalCell = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    allow_dir: AllowDirs = None,
+) -> None:
+    """Write controller programs, from a verified run only.
+
+    The run is verified first, and the rounded numbers of the programs after that. Exit status: 0 written, 1 a check
+    fails, 2 bad input, or a run that is changed or stale, 4 internal error. Nothing is written unless it is 0.
+    """
+    with json_failure(SCHEMA, wanted=as_json):
+        from cellplan.pipeline.export import default_folder, export_program, refuse_unless_exportable, require_format
+        from cellplan.pipeline.gate import open_gate
+
+        require_format(form)
+        folder = output or default_folder(run, form)
+        refuse_unless_exportable(folder, run)
+        with progress_listener(quiet=quiet) as progress:
+            verified = open_gate(run, cell=cell, allow_dirs=allow_dir or (), progress=progress)
+            files = export_program(verified, folder, form=form, progress=progress)
+    if as_json:
+        status = {"status": "exported", "exit": int(ExitStatus.PASSED)}
+        about = {"folder": str(folder), "format": form, "run": verified.digest, "files": list(files)}
+        say_json({"schema": SCHEMA, **status, **about, "remarks": list(verified.remarks)})
+        return
+    lines = [f"{verified.cell.name}: exported", *(f"  note: {remark}" for remark in verified.remarks)]
+    say("\n".join([*lines, f"programs: {folder}"]))

@@ -1,0 +1,51 @@
+"""``cellplan verify``: re-check a run on disk, file by file and figure by figure."""
+
+import typer
+
+from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
+from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.progress import progress_listener
+from cellplan.errors import ExitStatus, NotVerifiedError
+
+SCHEMA = "cellplan.verify/1"
+
+
+def verify(
+    run: RunDir,
+    cell: OriginalCell = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    allow_dir: AllowDirs = None,
+) -> None:
+    """Re-check what is on disk: files, inputs, tables and report, without planning anything.
+
+    Exit status: 0 verified, 1 a check fails, 2 not a run, changed or stale, 4 internal error.
+    """
+    with json_failure(SCHEMA, wanted=as_json):
+        from cellplan.cli.summary import figure_lines, read_record
+        from cellplan.pipeline.gate import open_gate
+
+        try:
+            with progress_listener(quiet=quiet) as progress:
+                verified = open_gate(run, cell=cell, allow_dirs=allow_dir or (), progress=progress)
+        except NotVerifiedError as error:
+            if not as_json:
+                raise
+            told = {"schema": SCHEMA, "status": "failed", "exit": int(error.status), "folder": str(run)}
+            say_json({**told, "errors": error.complaints})
+            raise typer.Exit(error.status) from None
+        record = read_record(run)
+    if as_json:
+        about = {"folder": str(run), "cell": verified.cell.name, "run": verified.digest, "files": verified.file_count}
+        compared = {"inputs": list(verified.inputs_compared), "remarks": list(verified.remarks)}
+        status = {"status": "verified", "exit": int(ExitStatus.PASSED)}
+        say_json({"schema": SCHEMA, **status, **about, **compared, "report": record})
+        return
+    lines = [
+        f"{verified.cell.name}: verified",
+        f"  files as they were written: {verified.file_count}",
+        f"  inputs as they were read: {', '.join(verified.inputs_compared) or 'none compared'}",
+        *(f"  note: {remark}" for remark in verified.remarks),
+        *figure_lines(record),
+    ]
+    say("\n".join(lines))

@@ -1,0 +1,103 @@
+"""Plain CSV for any controller: one line of names with units, one row per instant, nine decimals, no comments."""
+
+import re
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.export.rounding import from_file_unit, rounded_inside, rounded_quanta
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Robot
+from cellplan.model.motion import JointTable
+from cellplan.model.verified_run import VerifiedRun
+
+DECIMALS: Final = 9  # of a degree, millimetre or second: a joint's speed over 1 ms is kept to a millionth of a degree/s
+CLOCK: Final = "time_s"
+_NUMBER: Final = rf"-?[0-9]{{1,7}}\.[0-9]{{{DECIMALS}}}"
+
+
+def render_csv(run: VerifiedRun) -> dict[str, str]:
+    """Text of every file, by its path in the folder of the export: ``<robot>.csv``, or ``<task>/<robot>.csv``.
+
+    Args:
+        run: What the gate let through.
+
+    Raises:
+        InputError: A joint cannot be written with the decimals of the format.
+    """
+    return {
+        file_name(motion.name, robot): _render(run.cell.robot(robot), table)
+        for motion in run.motions
+        for robot, table in motion.tables.items()
+    }
+
+
+def read_csv(run: VerifiedRun, files: Mapping[str, str]) -> tuple[dict[str, JointTable], ...]:
+    """Read the files of an export back, strictly: the tables of each motion, by robot name.
+
+    Args:
+        run: The run that they were made from.
+        files: Text by path, as ``render_csv`` gives it.
+
+    Raises:
+        InputError: With file and line, when a text is not such a file.
+    """
+    return tuple(
+        {
+            robot: _read(run.cell.robot(robot), files[name], name)
+            for robot in motion.tables
+            for name in [file_name(motion.name, robot)]
+        }
+        for motion in run.motions
+    )
+
+
+def file_name(motion: str | None, robot: str) -> str:
+    """Path of the file of one robot in the folder of the export."""
+    return f"{robot}.csv" if motion is None else f"{motion}/{robot}.csv"
+
+
+def _render(robot: Robot, table: JointTable) -> str:
+    """The file of one robot."""
+    times = rounded_quanta(table.times, DECIMALS, what=CLOCK) / 10.0**DECIMALS
+    columns = [times] + [
+        rounded_inside(joint, table.q[:, index], DECIMALS) for index, joint in enumerate(robot.model.joints)
+    ]
+    rows = (",".join(f"{number:.{DECIMALS}f}" for number in row) for row in zip(*map(_floats, columns), strict=True))
+    return "\n".join([_names(robot), *rows]) + "\n"
+
+
+def _floats(column: Array) -> list[float]:
+    numbers: list[float] = column.tolist()
+    return numbers
+
+
+def _names(robot: Robot) -> str:
+    return ",".join([CLOCK, *(f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in robot.model.joints)])
+
+
+def _read(robot: Robot, text: str, file: str) -> JointTable:
+    """The table of one robot."""
+    names, _, rest = text.partition("\n")
+    if names != _names(robot):
+        raise InputError(f"{file}:1: expected the names '{_names(robot)}', got {names[:80]!r}")
+    if not rest.endswith("\n"):
+        raise InputError(f"{file}: expected the last row to end with a line break; the file is cut off")
+    row = re.compile(_NUMBER + rf"(?:,{_NUMBER}){{{len(robot.model.joints)}}}")
+    lines = rest.split("\n")[:-1]
+    bad = next((number for number, line in enumerate(lines, start=2) if not row.fullmatch(line)), None)
+    if bad is not None:
+        count = len(robot.model.joints) + 1
+        raise InputError(
+            f"{file}:{bad}: expected {count} numbers with {DECIMALS} decimals, got {lines[bad - 2][:60]!r}"
+        )
+    numbers = np.array([[float(field) for field in line.split(",")] for line in lines])
+    positions = [from_file_unit(joint, numbers[:, 1 + index]) for index, joint in enumerate(robot.model.joints)]
+    return JointTable(
+        robot=robot.name,
+        joints=robot.model.joint_names,
+        times=numbers[:, 0].copy(),
+        q=np.stack(positions, axis=1),
+    )

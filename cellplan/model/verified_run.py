@@ -1,0 +1,64 @@
+"""Verified run: the only thing a controller program may be made from."""
+
+from collections.abc import Mapping
+from dataclasses import InitVar, dataclass
+from pathlib import Path
+from typing import Final
+
+from cellplan.model.cell import Cell
+from cellplan.model.motion import JointTable, Schedule
+from cellplan.model.report import Report
+
+SEAL: Final = object()  # held by the gate alone: whoever shows it has verified the run
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class VerifiedMotion:
+    """One motion of a verified run.
+
+    Attributes:
+        name: Name of the only task in a run of its own; None when all tasks are worked on together.
+        moving: Names of the robots that may move.
+        schedule: Where every tool must be.
+        tables: What each robot is told to do, read back from its table, by robot name.
+        report: What the checks found when the run was verified.
+    """
+
+    name: str | None
+    moving: tuple[str, ...]
+    schedule: Schedule
+    tables: Mapping[str, JointTable]
+    report: Report
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class VerifiedRun:
+    """A run folder that was read back, recomputed and found to be what its report says.
+
+    Only ``cellplan.pipeline.gate.open_gate`` makes one.
+
+    Attributes:
+        folder: The run folder.
+        digest: SHA-256 of its manifest, which stands for the whole run.
+        cell: The cell that was solved.
+        motions: One, or one per task in the pairwise mode.
+        file_count: Files that were compared with the manifest.
+        inputs_compared: Names of the files the run rests on that were found unchanged.
+        remarks: What somebody who relies on the run should know.
+    """
+
+    folder: Path
+    digest: str
+    cell: Cell
+    motions: tuple[VerifiedMotion, ...]
+    file_count: int
+    inputs_compared: tuple[str, ...]
+    remarks: tuple[str, ...]
+    seal: InitVar[object]
+
+    def __post_init__(self, seal: object) -> None:
+        """Refuse to be made by anybody but the gate, or of a run with a failed check."""
+        if seal is not SEAL:
+            raise TypeError("a verified run is made by cellplan.pipeline.gate.open_gate only")
+        if not self.motions or not all(motion.report.passed for motion in self.motions):
+            raise ValueError("a verified run has motions, and all their checks passed")

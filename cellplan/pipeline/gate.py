@@ -1,0 +1,235 @@
+"""The gate before export: a run on disk passes only when everything in it is found to be true once more."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.verify import verify
+from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
+from cellplan.io.complaints import listed, shown
+from cellplan.io.stored_run import StoredRun, read_stored_run
+from cellplan.io.tables import TableHeader, parse_header, parse_table, program_digest, table_body
+from cellplan.model.cell import Cell
+from cellplan.model.motion import JointTable, Schedule
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report import Report
+from cellplan.model.verified_run import SEAL, VerifiedMotion, VerifiedRun
+from cellplan.pipeline.compare_record import differences
+from cellplan.pipeline.stored_cell import load_stored_cell
+from cellplan.pipeline.write_run import versions
+from cellplan.planning.modes import RunPlan, plan_runs
+from cellplan.planning.schedule import schedule_tasks
+from cellplan.planning.toolpaths import build_toolpath
+from cellplan.report.json_report import run_record, summary_record
+from cellplan.report.record import Provenance, Record
+from cellplan.report.series import series
+from cellplan.scene.scene import Scene
+
+MOST_DIFFERENCES: Final = 10  # of a report that are told; the rest is counted
+START_ROOM: Final = 1e-9  # [rad] or [m] tables and cells have twelve decimals of a degree, millimetre or metre
+
+
+def open_gate(
+    folder: Path, *, cell: Path | None = None, allow_dirs: Sequence[Path] = (), progress: Progress = silent
+) -> VerifiedRun:
+    """Verify a run on disk, by this version of the program, and hand it out for export.
+
+    Every file must be as it was written and every input as it was read. The tables are read back, all checks are made
+    again by a kinematics that shares nothing with the planner, and the report must say what was found.
+
+    Args:
+        folder: The run folder.
+        cell: The cell file that was solved; None when it is not at hand.
+        allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+        progress: Who wants to know how far it is.
+
+    Raises:
+        InputError: The folder is not a whole, unchanged run, or an input has changed.
+        NotVerifiedError: The run failed, or a check fails now.
+    """
+    stored = read_stored_run(folder)
+    _refuse_failed(stored)
+    source = load_stored_cell(stored, cell=cell, allow_dirs=allow_dirs)
+    scene = Scene.from_cell(source.cell)
+    motions = tuple(_verified(scene, stored, plan, progress=progress) for plan in _plans(source.cell, stored))
+    _refuse_failing(stored, motions)
+    _refuse_other_report(stored, source.cell, motions)
+    return VerifiedRun(
+        folder=folder,
+        digest=stored.digest,
+        cell=source.cell,
+        motions=motions,
+        file_count=len(stored.manifest.files),
+        inputs_compared=source.compared,
+        remarks=(*source.remarks, *_other_versions(stored)),
+        seal=SEAL,
+    )
+
+
+def _refuse_failed(stored: StoredRun) -> None:
+    """Refuse a run that failed when it was solved."""
+    if stored.manifest.status != "passed":
+        failed = [
+            check for check in stored.record.get("checks", []) if isinstance(check, dict) and not check.get("passed")
+        ]
+        first = f": {failed[0].get('message')}" if failed else ""
+        raise NotVerifiedError([f"{stored.folder}: the run failed{first}; it has no tables to verify"])
+
+
+def _plans(cell: Cell, stored: StoredRun) -> tuple[RunPlan, ...]:
+    """The runs that the stored ones must be: all tasks of the cell, or the one that was chosen."""
+    tasks = list(stored.record["runs"] if "runs" in stored.record else stored.record["tasks"])
+    every = [task.name for task in cell.tasks]
+    file = stored.file("", "report.json")
+    if tasks != every and (len(tasks) != 1 or tasks[0] not in every):
+        raise InputError(f"{file}: tasks: expected {listed(every)} or one of them, got {listed(map(str, tasks))}")
+    plans = plan_runs(cell, only=None if tasks == every else tasks[0])
+    places = [plan.name or "" for plan in plans]
+    if places != list(stored.records):
+        raise InputError(f"{file}: expected the runs of the mode {cell.motion.mode}, got {listed(stored.records)}")
+    return plans
+
+
+def _verified(scene: Scene, stored: StoredRun, plan: RunPlan, *, progress: Progress) -> VerifiedMotion:
+    """Read the tables of one run back and make all checks again."""
+    cell, place = scene.cell, plan.name or ""
+    schedule = schedule_tasks(cell, [build_toolpath(cell.task(name), cell.part, cell.origin) for name in plan.tasks])
+    tables = _tables(cell, stored, place)
+    _refuse_other_clock(stored, place, schedule, tables=tables)
+    _refuse_other_start(stored, place, cell, tables=tables)
+    report = verify(scene, schedule, list(tables.values()), moving=plan.moving, progress=progress)
+    return VerifiedMotion(name=plan.name, moving=plan.moving, schedule=schedule, tables=tables, report=report)
+
+
+def _tables(cell: Cell, stored: StoredRun, place: str) -> dict[str, JointTable]:
+    """The joint tables of one run, each under the header it must have."""
+    texts = stored.tables[place]
+    names = [robot.name for robot in cell.robots]
+    if sorted(texts) != sorted(names):
+        got = listed(sorted(texts))
+        raise InputError(f"{stored.file(place, 'tables')}: expected one table for each of {listed(names)}, got {got}")
+    texts = {name: texts[name] for name in names}
+    manifest = stored.manifest
+    program = program_digest(texts)
+    expected = TableHeader(
+        cell=cell.name,
+        mode=str(cell.motion.mode),
+        verdict="passed",
+        digests={"cell": manifest.inputs[manifest.cell_file], "program": program},
+    )
+    found = {}
+    for name, text in texts.items():
+        file = stored.file(place, f"tables/{name}.csv")
+        found[name] = parse_table(text, file)
+        _refuse_other_header(parse_header(text, file), expected, file)
+        if found[name].robot != name:
+            raise InputError(f"{file}: robot: expected '{name}', got '{found[name].robot}'")
+        if found[name].joints != cell.robot(name).model.joint_names:
+            joints = listed(cell.robot(name).model.joint_names)
+            raise InputError(f"{file}: expected the joints {joints} in this order, got {listed(found[name].joints)}")
+    if stored.records[place].get("digests") != {"program": program}:
+        raise InputError(f"{stored.file(place, 'report.json')}: digests.program: is not that of the tables beside it")
+    return found
+
+
+def _refuse_other_header(header: TableHeader, expected: TableHeader, file: str) -> None:
+    """Refuse a table of another run, of another cell, or with another verdict than passed."""
+    for key in ("cell", "mode", "verdict", "remark"):
+        got, wanted = getattr(header, key), getattr(expected, key)
+        if got != wanted:
+            raise InputError(f"{file}: {key}: expected {shown(wanted)}, got {shown(got)}")
+    for name in dict.fromkeys([*expected.digests, *header.digests]):
+        if header.digests.get(name) != expected.digests.get(name):
+            raise InputError(f"{file}: {name} digest: is not that of this run; tables of different runs do not mix")
+
+
+def _refuse_other_clock(stored: StoredRun, place: str, schedule: Schedule, *, tables: Mapping[str, JointTable]) -> None:
+    """Refuse a table whose instants are not those of the cell, and name the first line that is not."""
+    for name, table in tables.items():
+        file = stored.file(place, f"tables/{name}.csv")
+        if len(table.times) != len(schedule.times):
+            raise InputError(
+                f"{file}: expected {len(schedule.times)} rows as the cell's clock has, got {len(table.times)}"
+            )
+        late = np.flatnonzero(table.times != schedule.times)
+        if len(late):
+            row = int(late[0])
+            line = _line(stored.tables[place][name], row)
+            wanted, got = float(schedule.times[row]), float(table.times[row])
+            raise InputError(f"{file}:{line}: time_s: expected {wanted!r} as the cell's clock has, got {got!r}")
+
+
+def _refuse_other_start(stored: StoredRun, place: str, cell: Cell, *, tables: Mapping[str, JointTable]) -> None:
+    """Refuse a table that does not begin at the start posture of the cell."""
+    for robot in cell.robots:
+        off = np.abs(tables[robot.name].q[0] - robot.start)
+        if not np.all(off <= START_ROOM):
+            joint = robot.model.joint_names[int(np.argmax(off))]
+            file = stored.file(place, f"tables/{robot.name}.csv")
+            line = _line(stored.tables[place][robot.name], 0)
+            raise InputError(f"{file}:{line}: {joint}: expected the start posture of the cell, got another one")
+
+
+def _line(text: str, row: int) -> int:
+    """Line of a row of numbers in the text of a table."""
+    return text.count("\n", 0, len(text) - len(table_body(text))) + 2 + row
+
+
+def _refuse_failing(stored: StoredRun, motions: Sequence[VerifiedMotion]) -> None:
+    """Refuse a run of which a check fails now, whatever its report says."""
+    complaints = []
+    for motion in motions:
+        where = stored.file(motion.name or "", "tables")
+        complaints += [f"{where}: {check.message}" for check in motion.report.checks if not check.passed]
+        complaints += [f"{where}: {what}: not a number" for what in _unproved(motion.report)]
+    if complaints:
+        raise NotVerifiedError(complaints)
+
+
+def _unproved(report: Report) -> Iterator[str]:
+    """Figures that are no figures: what cannot be compared with its limit is not proved."""
+    for check in report.checks:
+        if not math.isfinite(check.value) or math.isnan(check.limit):
+            yield f"{check.name} of {check.subject}"
+    for kind, minimum in report.clearance.minima.items():
+        if minimum.minimum is not None and not math.isfinite(minimum.minimum):
+            yield f"clearance {kind}"
+
+
+def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> None:
+    """Refuse reports that say something else than was found."""
+    provenance = Provenance(versions=stored.manifest.versions, digests={})
+    found: dict[str, Record] = {
+        motion.name or "": {
+            **run_record(motion.report, cell=cell, provenance=provenance),
+            "series": series(motion.report),
+        }
+        for motion in motions
+    }
+    said: dict[str, Record] = dict(stored.records)
+    if "runs" in stored.record:
+        said[""] = stored.record
+        reports = {str(motion.name): motion.report for motion in motions}
+        found[""] = summary_record(reports, cell=cell, provenance=provenance)
+    is_same = stored.manifest.versions.get("cellplan") == versions()["cellplan"]
+    complaints = []
+    for place, record in said.items():
+        complaints += [
+            f"{stored.file(place, 'report.json')}: {key}: {shown(old)} stands there, {shown(new)} was found"
+            for key, old, new in differences(record, found[place], same_program=is_same)
+        ]
+    if complaints:
+        more = len(complaints) - MOST_DIFFERENCES
+        told = complaints[:MOST_DIFFERENCES] + ([f"{stored.folder}: and {more} more differences"] if more > 0 else [])
+        raise InvalidFileError([InputError(complaint) for complaint in told])
+
+
+def _other_versions(stored: StoredRun) -> Iterator[str]:
+    """Programs that have another version now than when the run was made; what counts is the verification of now."""
+    now = versions()
+    for name, version in stored.manifest.versions.items():
+        if now.get(name, "none") != version:
+            yield f"made with {name} {version}, verified with {name} {now.get(name, 'none')}"
