@@ -38,6 +38,14 @@ class InvalidFileError(InputError):
         super().__init__("\n".join(str(complaint) for complaint in complaints))
         self.complaints = complaints
 
+    def __reduce__(self) -> tuple[type["InvalidFileError"], tuple[list[InputError]]]:
+        """Cross to another process with every complaint."""
+        return InvalidFileError, (self.complaints,)
+
+
+class OverrunError(InputError):
+    """A file took its reader down, or more time or memory than any sound file needs."""
+
 
 class NotVerifiedError(CellplanError):
     """A run on disk is whole, but a check fails on what it holds.

@@ -35,6 +35,7 @@ NUMBER: Final = rb"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf|infinity)"
 STL_VERTEX: Final = re.compile(rb"vertex" + 3 * (rb"\s+" + NUMBER))
 MIN_TRIANGLES: Final = 4  # a tetrahedron
 MAX_TRIANGLES: Final = 500_000
+MAX_LINE: Final = 100_000  # [characters] of an OBJ file: a longer line is no face
 OBJ_SILENT: Final = frozenset({"vt", "vn", "g", "o", "s", "l", "p", "usemtl", "mtllib"})
 FORMATS: Final = ("stl", "obj", "ply")
 
@@ -69,6 +70,16 @@ def require_likely_count(triangles: int, name: str) -> None:
     """
     if not MIN_TRIANGLES <= triangles <= MAX_TRIANGLES:
         raise InputError(f"{name}: expected {MIN_TRIANGLES} to {MAX_TRIANGLES} triangles, got {triangles}")
+
+
+def require_no_more(count: int, most: int, what: str, *, place: str) -> None:
+    """Refuse a file as soon as it holds more than any sound one, before it fills the memory.
+
+    Raises:
+        InputError: The count is above the limit.
+    """
+    if count > most:
+        raise InputError(f"{place}: expected at most {most} {what}, got more")
 
 
 def _parse_stl(data: bytes, name: str) -> Triangles:
@@ -117,7 +128,8 @@ def _checked_text_stl(data: bytes, name: str) -> tuple[bytes, int]:
     """
     tally = dict.fromkeys(STL_LETTERS, 0)
     order, kept = [], []
-    for line, text in enumerate(data.lower().splitlines(), start=1):
+    lines = BytesIO(data.lower().replace(b"\r\n", b"\n").replace(b"\r", b"\n"))
+    for line, text in enumerate(lines, start=1):
         words = text.split()
         if not words:
             continue
@@ -126,6 +138,7 @@ def _checked_text_stl(data: bytes, name: str) -> tuple[bytes, int]:
         if words[0] == b"vertex" and not STL_VERTEX.fullmatch(text.strip()):
             raise InputError(f"{name}:{line}: expected 3 numbers, got '{_shown(b' '.join(words[1:]), 60)}'")
         tally[words[0]] += 1
+        require_no_more(tally[words[0]], 3 * MAX_TRIANGLES, f"'{_shown(words[0])}' lines", place=f"{name}:{line}")
         order.append(STL_LETTERS[words[0]])
         if words[0] not in (b"solid", b"endsolid"):  # their names could hold words of the format
             kept.append(text.strip() if words[0] == b"vertex" else words[0])
@@ -142,28 +155,31 @@ def _parse_obj(data: bytes, name: str) -> Triangles:
     """Wavefront OBJ: vertices and polygons; material files are not opened, curved surfaces and includes refused."""
     vertices: list[Sequence[float]] = []
     polygons: Polygons = []
-    text = data.decode("utf-8", errors="replace")
-    if "\0" in text:
+    if b"\0" in data:
         raise InputError(f"{name}: expected an OBJ text file, got binary data")
-    for line, words in _obj_lines(text):
+    for line, words in _obj_lines(data, name):
         place = f"{name}:{line}"
         if words[0] == "v":
             vertices.append(_obj_vertex(words[1:], place))
+            require_no_more(len(vertices), 3 * MAX_TRIANGLES, "vertices", place=place)
         elif words[0] == "f":
             polygons.append([_obj_index(word, known=len(vertices), place=place) for word in words[1:]])
             if len(words) < 4:
                 raise InputError(f"{place}: expected a face with at least three corners, got {len(words) - 1}")
+            require_no_more(len(polygons), MAX_TRIANGLES, "faces", place=place)
         elif words[0] not in OBJ_SILENT:
             raise InputError(f"{place}: expected vertices and flat faces, got '{words[0]}', which is not supported")
     return fan(np.array(vertices, dtype=float).reshape(-1, 3), polygons, name)
 
 
-def _obj_lines(text: str) -> Iterable[tuple[int, list[str]]]:
+def _obj_lines(data: bytes, name: str) -> Iterable[tuple[int, list[str]]]:
     """Words of each line that is not empty, comments cut off and continued lines joined."""
     waiting: list[str] = []
-    for line, content in enumerate(text.split("\n"), start=1):
-        plain = content.partition("#")[0].rstrip()
+    for line, content in enumerate(BytesIO(data), start=1):
+        require_no_more(len(content), MAX_LINE, "characters in a line", place=f"{name}:{line}")
+        plain = content.decode("utf-8", errors="replace").removesuffix("\n").partition("#")[0].rstrip()
         waiting.extend(plain.removesuffix("\\").split())
+        require_no_more(len(waiting), MAX_LINE, "words in a line", place=f"{name}:{line}")
         if not plain.endswith("\\") and waiting:
             yield line, waiting
             waiting = []

@@ -26,7 +26,10 @@ TYPES: Final = {
 }
 ORDERS: Final = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
 INDEX_NAMES: Final = ("vertex_indices", "vertex_index")
-MAX_ROWS: Final = 3_000_000  # more than the largest allowed mesh can need
+MAX_ROWS: Final = 1_500_000  # the largest allowed mesh with three vertices of its own for each triangle
+MAX_LISTS: Final = 500_000  # rows with lists: one for each triangle of the largest allowed mesh
+MAX_WORDS: Final = 15_000_000  # of a text file: ten columns for each vertex of the largest allowed mesh
+CHUNK: Final = 1_000_000  # [bytes] of text made into numbers at once
 MAX_INDEX: Final = 2**31  # beyond any index that such a file can hold
 MAX_CORNERS: Final = 1000  # more in one face is a damaged file
 
@@ -61,7 +64,7 @@ class _Values:
         self._order = order
         self._body = body
         self.place = 0
-        self._words: NDArray[np.float64] = np.array(body.split() if not order else [], dtype=np.float64)
+        self._words = _numbers(body) if not order else np.zeros(0)
 
     def take(self, kind: str, count: int) -> NDArray[np.float64]:
         """The next ``count`` numbers of one type."""
@@ -124,6 +127,20 @@ def parse_ply(data: bytes, name: str) -> Triangles:
     return fan(vertices, polygons, name)
 
 
+def _numbers(body: bytes) -> NDArray[np.float64]:
+    """All numbers of a text, piece by piece, for a list of all words would take ten times its memory."""
+    pieces, start, count = [np.zeros(0)], 0, 0
+    while start < len(body):
+        end = start + CHUNK
+        while end < len(body) and not body[end : end + 1].isspace():
+            end += 1
+        pieces.append(np.array(body[start:end].split(), dtype=np.float64))
+        start, count = end, count + len(pieces[-1])
+        if count > MAX_WORDS:
+            raise ValueError(f"it has more than {MAX_WORDS} numbers")
+    return np.concatenate(pieces)
+
+
 def _header(data: bytes, name: str) -> tuple[str, list[_Element], bytes]:
     """Byte order, elements and the bytes after the header."""
     head, mark, body = data.partition(b"end_header")
@@ -140,6 +157,10 @@ def _header(data: bytes, name: str) -> tuple[str, list[_Element], bytes]:
             raise InputError(f"{name}:{line}: expected a PLY header line, got '{shown}'") from None
     if order is None:
         raise InputError(f"{name}: expected a PLY header with a 'format' line")
+    for element in elements:
+        most = MAX_LISTS if _has_lists(element) else MAX_ROWS
+        if element.rows > most:
+            raise InputError(f"{name}: expected at most {most} rows of '{element.name}', got {element.rows}")
     return ORDERS[order], elements, body[2:] if body.startswith(b"\r\n") else body[1:]
 
 
@@ -150,7 +171,7 @@ def _header_line(words: list[str], elements: list[_Element]) -> str | None:
             pass
         case ["format", order, "1.0"] if order in ORDERS:
             return order
-        case ["element", name, rows] if 0 <= int(rows) <= MAX_ROWS:
+        case ["element", name, rows] if int(rows) >= 0:
             elements.append(_Element(name, int(rows), []))
         case ["property", "list", count, kind, name] if TYPES[count][0] != "f" and kind in TYPES:
             elements[-1].properties.append(_Property(name, kind, count))

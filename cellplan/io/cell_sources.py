@@ -3,6 +3,7 @@
 import os
 import posixpath
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.meshes import read_mesh, require_solid
 from cellplan.geometry.shapes import Mesh
+from cellplan.guard import Guard, in_child
 from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.bundled_robots import load_bundled_table
 from cellplan.io.complaints import Complaint, KeyPath, shown
@@ -109,7 +111,8 @@ class Sources:
         if place is None:
             return None
         try:
-            mesh = read_mesh(place, scale=MESH_UNITS[unit])
+            guard = Guard(file=written, worker="the mesh reader")
+            mesh = in_child(partial(read_mesh, scale=MESH_UNITS[unit]), place, guard=guard)
             self.inputs[written] = digest_of_file(place, file=written)
         except InputError as error:
             self.complaints.append(self._document.complaint(path, str(error)))
@@ -170,7 +173,7 @@ class Sources:
             locked=dict(_locked_in_si(entry)),
         )
         try:
-            robot = load_urdf(place, options)
+            robot = in_child(load_urdf, place, options, guard=Guard(file=entry.model, worker="the URDF reader"))
             self.inputs[entry.model] = digest_of_file(place, file=entry.model)
             for mesh in robot.mesh_files:
                 if not self._folders.holds(mesh):

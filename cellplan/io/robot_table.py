@@ -12,6 +12,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.meshes import read_mesh
 from cellplan.geometry.shapes import Mesh
+from cellplan.guard import Guard, in_child
 from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.complaints import Complaint, did_you_mean, listed, raise_complaints, shown
 from cellplan.io.schema import RobotTableDocument
@@ -112,7 +113,8 @@ class _Meshes:
             self.complaints.append(self._document.complaint(("bodies", index, "mesh", "file"), str(error)))
             return None
         try:
-            mesh = read_mesh(path, scale=MESH_UNITS[unit])
+            guard = Guard(file=written, worker="the mesh reader")
+            mesh = in_child(partial(read_mesh, scale=MESH_UNITS[unit]), path, guard=guard)
         except InputError as error:
             self.complaints.append(self._document.complaint(("bodies", index, "mesh", "file"), str(error)))
             return None

@@ -1,0 +1,78 @@
+"""The child's side of the guard: takes one job after the other from its standard input and answers each."""
+
+import contextlib
+import os
+import pickle
+import signal
+import sys
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+from cellplan.errors import CellplanError
+
+MEGABYTE: Final = 1 << 20  # [bytes]
+
+
+class Job(NamedTuple):
+    """What the parent wants: a function of a module, its arguments, where and within which limits."""
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    folder: str | None
+    seconds: float
+    megabytes: int
+
+
+class Answer(NamedTuple):
+    """What became of a job: its value, our own error, no memory left, or another exception in words."""
+
+    value: Any = None
+    error: CellplanError | None = None
+    is_out_of_memory: bool = False
+    surprise: str | None = None
+
+
+def serve() -> None:
+    """Do jobs until the parent closes the pipe.
+
+    What libraries print is led nowhere: the answers have the pipe for themselves. Ctrl-C is the parent's business.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _set_limit("RLIMIT_CORE", 0)  # a crash leaves no file behind
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    while True:
+        try:
+            job = pickle.load(sys.stdin.buffer)  # noqa: S301 - the parent's own words
+        except EOFError:
+            return
+        answers.write(pickle.dumps(_done(job)))
+        answers.flush()
+
+
+def _done(job: Job) -> Answer:
+    """Answer to a job."""
+    try:
+        if job.folder is not None:
+            os.chdir(job.folder)
+        _set_limit("RLIMIT_AS", job.megabytes * MEGABYTE)
+        _set_limit("RLIMIT_CPU", int(sum(os.times()[:2]) + job.seconds) + 1)
+        return Answer(value=job.function(*job.arguments))
+    except CellplanError as error:
+        return Answer(error=error)
+    except MemoryError:
+        return Answer(is_out_of_memory=True)
+    except Exception as error:  # noqa: BLE001 - told by the parent
+        return Answer(surprise=f"{type(error).__name__}: {error}")
+
+
+def _set_limit(name: str, amount: int) -> None:
+    """Set a soft limit where the system knows it and allows it; Windows knows none, macOS no limit on memory."""
+    with contextlib.suppress(ImportError, AttributeError, ValueError, OSError):
+        import resource
+
+        kind = getattr(resource, name)
+        hard = resource.getrlimit(kind)[1]
+        soft = amount if hard == resource.RLIM_INFINITY else min(amount, hard)
+        resource.setrlimit(kind, (soft, hard))
