@@ -4,7 +4,7 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install test test-all lint format demo bench clean FORCE
+.PHONY: help install test test-all lint format demo bench reproduce clean FORCE
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -22,6 +22,7 @@ help:
 	@echo "make test-all  the same with the slow tests"
 	@echo "make lint      everything but the tests"
 	@echo "make bench     time whole commands, beside a baseline of the same run, and the check of clearance"
+	@echo "make reproduce solve the cells of the three papers and write docs/reproduction.md, about six minutes"
 	@echo "make format    put the code into shape"
 	@echo "make clean     remove .venv, caches and results"
 
@@ -74,6 +75,9 @@ demo: $(STAMP)
 bench: $(STAMP)
 	$(BIN)/python benchmarks/commands.py --rounds $(ROUNDS)
 	$(BIN)/python benchmarks/clearance.py
+
+reproduce: $(STAMP)
+	$(BIN)/python docs/make_reproduction.py
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist outputs/*/

@@ -1,0 +1,54 @@
+"""Reproduce the papers' figures: ``python docs/make_reproduction.py`` writes page, plots and record anew.
+
+The record, `docs/reproduction/measured.json`, holds every figure of the page; ``--page`` writes the page from it alone.
+"""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent
+sys.path.insert(0, str(DOCS))
+
+from reproduction import ellipse, nicolato, ribeiro, vargas  # noqa: E402
+from reproduction.page import page  # noqa: E402
+from reproduction.runs import Numbers, rounded  # noqa: E402
+
+RECORD = DOCS / "reproduction" / "measured.json"
+PAGE = DOCS / "reproduction.md"
+CASES: dict[str, Callable[[], Numbers]] = {
+    "vargas_1": lambda: vargas.measure(1),
+    "vargas_2": lambda: vargas.measure(2),
+    "vargas_3": lambda: vargas.measure(3),
+    "nicolato_circle": nicolato.measure_circle,
+    "nicolato_line": nicolato.measure_line,
+    "nicolato_limits": nicolato.measure_limits,
+    "nicolato_ellipse": ellipse.measure_ellipse,
+    "nicolato_pose": nicolato.measure_pose,
+    "ribeiro_modes": ribeiro.measure_modes,
+    "ribeiro_first_layout": ribeiro.measure_first_layout,
+    "ribeiro_appendix_e": ribeiro.measure_appendix,
+}
+
+
+def recorded() -> Numbers:
+    """The figures of the last time; none when there is no record."""
+    return dict(json.loads(RECORD.read_text(encoding="utf-8"))) if RECORD.exists() else {}
+
+
+def main(words: list[str]) -> None:
+    """Measure the named cases, or all of them; then write the page."""
+    if unknown := set(words) - set(CASES) - {"--page"}:
+        raise SystemExit(f"expected --page or some of {', '.join(CASES)}, got {', '.join(sorted(unknown))}")
+    numbers = recorded()
+    for name, measure in CASES.items():
+        if name in words or not words:
+            numbers[name] = rounded(measure())
+    record = {name: numbers[name] for name in CASES if name in numbers}
+    RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    PAGE.write_text(page(record), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

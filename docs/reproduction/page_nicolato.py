@@ -1,0 +1,126 @@
+"""Lines of the page on Nicolato 2007."""
+
+from reproduction.runs import Numbers
+from reproduction.verdicts import Row, alone, bound, claim, shown
+
+ONSET = 2.85  # [s]
+STEP = 0.01  # [s] of the circle
+LARGE = 1e-3  # [m] an error that is large beside a tolerance of 1e-7 m
+SEARCHED = 1e-5  # [m] tolerance of section 4.2
+CLOSED = 0.001  # [deg] drift of a joint that comes back
+
+
+def circle_rows(numbers: Numbers) -> list[Row]:
+    """Search and damped least squares on the circle."""
+    search, dls = numbers["search"], numbers["dls"]
+    onset = dls["damped_from_s"]
+    return [
+        bound("search: largest error", search["error_m"], 4.5e-8, "m"),
+        claim(
+            "search: smooth through the singular point",
+            "smooth",
+            f"at most {shown(search['speed_rad_s'])} rad/s and {shown(search['acceleration_rad_s2'])} rad/s²",
+            holds=search["acceleration_rad_s2"] < dls["acceleration_rad_s2"],
+        ),
+        claim(
+            "DLS: damping sets in",
+            f"about {ONSET:g} s",
+            f"{onset:g} s",
+            holds=abs(onset - ONSET) <= STEP,
+            difference=f"{onset - ONSET:+.2g} s",
+        ),
+        claim(
+            "DLS: error near the singular point",
+            "grows markedly",
+            f"{shown(1e3 * dls['error_m'])} mm at {shown(dls['error_at_s'])} s",
+            holds=dls["error_m"] > LARGE,
+        ),
+        claim(
+            "DLS: joint speeds",
+            "not smooth, but bounded",
+            f"at most {shown(dls['speed_rad_s'])} rad/s and {shown(dls['acceleration_rad_s2'])} rad/s²",
+            holds=dls["acceleration_rad_s2"] > 2 * search["acceleration_rad_s2"],
+        ),
+    ]
+
+
+def line_rows(numbers: Numbers) -> list[Row]:
+    """Search and damped least squares on the line."""
+    search, dls = numbers["search"], numbers["dls"]
+    return [
+        bound("search: largest error (its tolerance)", search["error_m"], 1e-7, "m"),
+        claim(
+            "search: smooth on singular points",
+            "smooth",
+            f"at most {shown(search['speed_rad_s'])} rad/s and {shown(search['acceleration_rad_s2'])} rad/s²",
+            holds=search["acceleration_rad_s2"] < dls["acceleration_rad_s2"],
+        ),
+        claim(
+            "DLS",
+            "fails",
+            f"strays by {shown(1e3 * dls['error_m'])} mm, {shown(dls['acceleration_rad_s2'])} rad/s²",
+            holds=not dls["passed"] and dls["error_m"] > LARGE,
+        ),
+    ]
+
+
+def limit_rows(numbers: Numbers) -> list[Row]:
+    """Position limit, then speed limit."""
+    position, speed = numbers["position"], numbers["speed"]
+    low, high = position["q4_rad"]
+    fastest = speed["q4_rad_s"]
+    return [
+        claim(
+            "fourth joint within 0.60 .. 0.85 rad",
+            "held",
+            f"{low:g} .. {high:g} rad",
+            holds=low >= 0.6 and high <= 0.85,
+        ),
+        bound("error with it (its tolerance)", position["error_m"], SEARCHED, "m"),
+        claim("fourth joint within 0.5 rad/s", "held", f"at most {fastest:g} rad/s", holds=fastest <= 0.5),
+        bound("error with it (its tolerance)", speed["error_m"], SEARCHED, "m"),
+    ]
+
+
+def ellipse_rows(numbers: Numbers) -> list[Row]:
+    """Who comes back after each cycle."""
+    plain, closed, wide, tight = (numbers[name] for name in ("pseudo_inverse", "cyclic", "wide", "tightened"))
+    return [
+        claim(
+            "pseudo-inverse",
+            "not repetitive",
+            f"drifts by up to {shown(plain['drift_deg'])} deg in a cycle, {shown(plain['in_all_deg'])} deg in all",
+            holds=plain["drift_deg"] > CLOSED,
+        ),
+        claim(
+            "recursive search, limits tightened",
+            "repetitive",
+            f"{shown(tight['first_drift_deg'])} deg in the first cycle, {shown(tight['later_drift_deg'])} deg later",
+            holds=tight["later_drift_deg"] < CLOSED,
+            difference="the first cycle" if tight["later_drift_deg"] < CLOSED else "see left",
+        ),
+        alone(
+            "recursive search, wide limits",
+            f"{shown(wide['first_drift_deg'])} deg in the first cycle, {shown(wide['last_drift_deg'])} in the third",
+        ),
+        bound("recursive search: error (its tolerance)", 1e-3 * tight["error_mm"], SEARCHED, "m"),
+        alone(
+            "pseudo-inverse, `cyclic`, 25 cycles",
+            f"at most {shown(closed['drift_deg'])} deg in a cycle, error {shown(closed['error_mm'])} mm",
+        ),
+    ]
+
+
+def pose_rows(numbers: Numbers) -> list[Row]:
+    """Position and orientation."""
+    return [
+        bound("root of the cost (its tolerance)", numbers["cost"], 1e-8, "m"),
+        claim("position error", "negligible", f"{shown(numbers['error_m'])} m", holds=numbers["error_m"] < 1e-8),
+        claim("orientation error", "negligible", f"{shown(numbers['turn_rad'])} rad", holds=numbers["turn_rad"] < 1e-7),
+        claim(
+            "posture at the end",
+            "(60, 60, 45, 135, 45, 120) deg",
+            f"({', '.join(f'{angle:g}' for angle in numbers['end_deg'])}) deg",
+            holds=numbers["end_deg"] == [60.0, 60.0, 45.0, 135.0, 45.0, 120.0],
+        ),
+    ]

@@ -1,0 +1,93 @@
+"""Solving a paper's cell and keeping its curves: path, errors, joints, conditioning."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan import Cell, Report, load_cell, solve
+
+Array = NDArray[np.float64]
+Numbers = dict[str, Any]  # what was measured, by name: numbers, truths, lists of numbers, or more of these
+PAPERS = Path(__file__).resolve().parent.parent.parent / "cells" / "papers"
+DIGITS = 3  # [-] of a recorded figure: what the page can show; the rest depends on the processor's rounding
+NOTHING = 1e-12  # smaller figures are rounding, and recorded as zero
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curves:
+    """One run of one arm's only task, in SI units.
+
+    Attributes:
+        t: Instants, shape (N,).
+        q: Joint positions, shape (N, n).
+        wanted: Wanted place of the tool, shape (N, 3).
+        actual: Actual place of the tool, shape (N, 3).
+        turn: Angle from the wanted orientation, shape (N,).
+        report: The whole report.
+    """
+
+    t: Array
+    q: Array
+    wanted: Array
+    actual: Array
+    turn: Array
+    report: Report
+
+    @property
+    def error(self) -> Array:
+        """Distance from the wanted place, shape (N,)."""
+        return np.asarray(np.linalg.norm(self.wanted - self.actual, axis=1))
+
+    @property
+    def between(self) -> Array:
+        """Middle of each step, shape (N - 1,)."""
+        return 0.5 * (self.t[1:] + self.t[:-1])
+
+    @property
+    def qd(self) -> Array:
+        """Joint speeds in each step, shape (N - 1, n)."""
+        return np.diff(self.q, axis=0) / np.diff(self.t)[:, None]
+
+    @property
+    def qdd(self) -> Array:
+        """Joint accelerations at the inner instants, shape (N - 2, n)."""
+        return np.diff(self.qd, axis=0) / np.diff(self.between)[:, None]
+
+    def after(self, instant: float) -> NDArray[np.bool_]:
+        """Which instants are not before the given one."""
+        return np.asarray(self.t >= instant - 1e-9)
+
+
+def paper_cell(name: str, *, method: str | None = None) -> Cell:
+    """A cell of ``cells/papers``, as ``--method`` would change it."""
+    cell = load_cell(PAPERS / f"{name}.yaml")
+    return cell if method is None else replace(cell, solver=replace(cell.solver, method=method))  # type: ignore[arg-type]
+
+
+def curves(cell: Cell) -> Curves:
+    """Solve a cell with one arm and one task."""
+    (run,) = solve(cell).runs
+    (accuracy,) = run.report.accuracy
+    wanted = run.schedule.tasks[0].X_PT[:, :3, 3]
+    return Curves(
+        t=run.report.times,
+        q=run.report.q[cell.robots[0].name],
+        wanted=wanted,
+        actual=wanted - accuracy.position_error,
+        turn=np.asarray(np.linalg.norm(accuracy.orientation_error, axis=1)),
+        report=run.report,
+    )
+
+
+def rounded(numbers: Any) -> Any:
+    """The same numbers with the digits that are recorded."""
+    if isinstance(numbers, dict):
+        return {name: rounded(value) for name, value in numbers.items()}
+    if isinstance(numbers, list | tuple | np.ndarray):
+        return [rounded(value) for value in numbers]
+    if isinstance(numbers, bool | np.bool_ | str):
+        return numbers if isinstance(numbers, str) else bool(numbers)
+    return 0.0 if abs(numbers) < NOTHING else float(f"{numbers:.{DIGITS}g}")

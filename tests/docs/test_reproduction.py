@@ -1,0 +1,154 @@
+"""The papers' cells give the published figures, and the page says what was measured."""
+
+import importlib
+import json
+import math
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from cellplan import load_cell, solve
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+PAPERS = ROOT / "cells" / "papers"
+RECORD = ROOT / "docs" / "reproduction" / "measured.json"
+FAILS_AS_PUBLISHED = {"ribeiro_mode_3", "ribeiro_first_layout"}
+
+
+@pytest.fixture(scope="module")
+def script() -> Iterator[ModuleType]:
+    """The script that makes the page."""
+    sys.path.insert(0, str(ROOT / "docs"))
+    try:
+        yield importlib.import_module("make_reproduction")
+    finally:
+        while str(ROOT / "docs") in sys.path:
+            sys.path.remove(str(ROOT / "docs"))
+
+
+@pytest.fixture
+def unwritten(script: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Where plots and cells go while a test measures; nothing in the repository is touched."""
+    monkeypatch.setattr(sys.modules["reproduction.sheet"], "IMAGES", tmp_path / "images")
+    return tmp_path
+
+
+def assert_same_figures(measured: object, recorded: object) -> None:
+    """Equal to the digits that are recorded, with room for the last of them."""
+    if isinstance(recorded, dict):
+        assert isinstance(measured, dict)
+        assert measured.keys() == recorded.keys()
+        for name, value in recorded.items():
+            assert_same_figures(measured[name], value)
+    elif isinstance(recorded, list):
+        assert isinstance(measured, list)
+        for one, other in zip(measured, recorded, strict=True):
+            assert_same_figures(one, other)
+    elif isinstance(recorded, float):
+        assert measured == pytest.approx(recorded, rel=0.02, abs=1e-9)  # third digit; drifts of nothing are rounding
+    else:
+        assert measured == recorded
+
+
+@pytest.mark.parametrize("path", sorted(PAPERS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_cell_of_the_papers_loads_and_says_what_it_shows(path: Path) -> None:
+    header = [line for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("# ")]
+
+    assert load_cell(path).name == path.stem.replace("_", "-")
+    assert any(word in header[0] for word in ("Nicolato 2007", "Ribeiro 2010", "Vargas, Leite and Costa 2012"))
+
+
+def test_the_page_says_what_was_measured(script: ModuleType) -> None:
+    record = json.loads(RECORD.read_text(encoding="utf-8"))
+
+    assert list(record) == list(script.CASES)
+    assert script.PAGE.read_text(encoding="utf-8") == script.page(record), "run: make reproduce"
+
+
+def test_search_passes_the_singular_point_with_the_published_error() -> None:
+    (run,) = solve(load_cell(PAPERS / "nicolato_circle.yaml")).runs
+
+    assert run.report.passed
+    assert np.linalg.norm(run.report.accuracy[0].position_error, axis=1).max() < 4.5e-8
+
+
+def test_damped_least_squares_damps_from_the_published_instant(script: ModuleType) -> None:
+    runs = sys.modules["reproduction.runs"]
+    run = runs.curves(runs.paper_cell("nicolato_circle", method="damped_least_squares"))
+    inside = run.t[(run.report.conditioning.stack < 0.04) & (run.t > 2.0)]
+
+    assert inside[0] == pytest.approx(2.85, abs=0.5 * 0.01)  # one sample of 10 ms
+    assert run.error.max() > 1e-3
+
+
+def test_search_follows_the_line_on_which_damped_least_squares_fails(script: ModuleType, unwritten: Path) -> None:
+    found = script.CASES["nicolato_line"]()
+
+    assert found["search"]["error_m"] < 1e-7
+    assert found["dls"]["error_m"] > 0.01
+
+
+def test_limits_of_the_fourth_joint_are_held(script: ModuleType, unwritten: Path) -> None:
+    found = script.CASES["nicolato_limits"]()
+
+    low, high = found["position"]["q4_rad"]
+    assert 0.60 - 1e-12 <= low < high <= 0.85 + 1e-12  # the limit in deg has 15 digits
+    assert found["speed"]["q4_rad_s"] <= 0.5 + 1e-9  # tables have twelve decimals of a degree and steps of 1 ms
+    assert max(found["position"]["error_m"], found["speed"]["error_m"]) < 1e-5
+
+
+def test_a_pose_is_followed_and_ends_at_the_published_posture(script: ModuleType, unwritten: Path) -> None:
+    found = script.CASES["nicolato_pose"]()
+
+    assert found["cost"] < 1e-8
+    assert found["end_deg"] == pytest.approx([60, 60, 45, 135, 45, 120], abs=1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    [
+        "vargas_1",
+        "vargas_2",
+        "vargas_3",
+        "nicolato_circle",
+        "ribeiro_modes",
+        "ribeiro_first_layout",
+        "ribeiro_appendix_e",
+    ],
+)
+def test_what_is_recorded_is_what_comes_out(script: ModuleType, unwritten: Path, name: str) -> None:
+    measured = sys.modules["reproduction.runs"].rounded(script.CASES[name]())
+
+    assert_same_figures(measured, json.loads(RECORD.read_text(encoding="utf-8"))[name])
+
+
+@pytest.mark.slow
+def test_the_shipped_limits_are_those_of_the_procedure(script: ModuleType) -> None:
+    ellipse = sys.modules["reproduction.ellipse"]
+    wide, _ = ellipse.wide_stage()
+    (robot,) = load_cell(PAPERS / "nicolato_ellipse_tightened.yaml").robots
+    room = math.radians(1e-3)  # limits and start are written to 1e-4 deg
+
+    assert np.abs(robot.model.lower - wide.q.min(axis=0)).max() < room
+    assert np.abs(robot.model.upper - wide.q.max(axis=0)).max() < room
+    assert np.abs(robot.start - wide.q[-1]).max() < room
+
+
+@pytest.mark.slow
+def test_tightened_limits_make_the_search_repetitive() -> None:
+    (run,) = solve(load_cell(PAPERS / "nicolato_ellipse_tightened.yaml")).runs
+    drifts = np.abs([drift.drift for drift in run.report.repeatability.drifts]).max(axis=0)
+
+    assert run.report.passed
+    assert drifts[1:].max() < math.radians(0.001)  # what the check of a cyclic motion allows
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted(PAPERS.glob("ribeiro*.yaml")), ids=lambda path: path.stem)
+def test_cells_pass_where_the_paper_succeeds(path: Path) -> None:
+    assert solve(load_cell(path)).passed is (path.stem not in FAILS_AS_PUBLISHED)
