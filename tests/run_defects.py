@@ -81,10 +81,11 @@ def seal(copy: Copy) -> None:
     """Make the manifest say that all files are as they were written."""
 
     def change(record: dict[str, Any]) -> None:
-        names = [path for path in sorted(copy.run.rglob("*")) if path.is_file() and path.name != "manifest.json"]
+        files = {path.relative_to(copy.run).as_posix(): path for path in copy.run.rglob("*") if path.is_file()}
         record["files"] = {
-            path.relative_to(copy.run).as_posix(): {"bytes": path.stat().st_size, "sha256": digest(path.read_bytes())}
-            for path in sorted(names, key=lambda path: path.relative_to(copy.run).as_posix())
+            name: {"bytes": path.stat().st_size, "sha256": digest(path.read_bytes())}
+            for name, path in sorted(files.items())
+            if name != "manifest.json"
         }
         record["inputs"] = json.loads((copy.run / "report.json").read_text())["inputs"]
 
@@ -216,9 +217,9 @@ def linked_file(rng, copy):
 
 
 def linked_folder(rng, copy):
-    path = copy.run / pick(rng, ("tables", "plots"))
-    path.rename(copy.run.parent / "aside")
-    path.symlink_to(copy.run.parent / "aside", target_is_directory=True)
+    path, aside = copy.run / pick(rng, ("tables", "plots")), copy.run.parent / "aside"
+    path.rename(aside)
+    path.symlink_to(aside, target_is_directory=True)
 
 
 def other_line_ends(rng, copy):
@@ -273,20 +274,20 @@ def table_of_another_run(rng, copy):
     copy.table(name).write_bytes((copy.other / "tables" / f"{name}.csv").read_bytes())
 
 
-def sealed(defect: Defect) -> Defect:
+def then(defect: Defect, seal_or_sign: Callable[[Copy], None]) -> Defect:
     def both(rng, copy):
         defect(rng, copy)
-        seal(copy)
+        seal_or_sign(copy)
 
     return both
 
 
-def signed(defect: Defect) -> Defect:
-    def all_three(rng, copy):
-        defect(rng, copy)
-        sign(copy)
+def sealed(defect: Defect) -> Defect:
+    return then(defect, seal)
 
-    return all_three
+
+def signed(defect: Defect) -> Defect:
+    return then(defect, sign)
 
 
 def just_over_its_limit(rng, copy):

@@ -56,6 +56,8 @@ def open_gate(
     scene = Scene.from_cell(source.cell)
     motions = tuple(_verified(scene, stored, plan, progress=progress) for plan in _plans(source.cell, stored))
     _refuse_failing(stored, motions)
+    for motion in motions:
+        _refuse_other_start(stored, motion.name or "", source.cell, tables=motion.tables)
     _refuse_other_report(stored, source.cell, motions)
     return VerifiedRun(
         folder=folder,
@@ -99,7 +101,6 @@ def _verified(scene: Scene, stored: StoredRun, plan: RunPlan, *, progress: Progr
     schedule = schedule_tasks(cell, [build_toolpath(cell.task(name), cell.part, cell.origin) for name in plan.tasks])
     tables = _tables(cell, stored, place)
     _refuse_other_clock(stored, place, schedule, tables=tables)
-    _refuse_other_start(stored, place, cell, tables=tables)
     report = verify(scene, schedule, list(tables.values()), moving=plan.moving, progress=progress)
     return VerifiedMotion(name=plan.name, moving=plan.moving, schedule=schedule, tables=tables, report=report)
 

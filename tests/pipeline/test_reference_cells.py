@@ -160,7 +160,14 @@ def test_run_folder_holds_what_it_promises(four_robots, tmp_path):
     write_run(four_robots, folder)
     record = json.loads((folder / "report.json").read_text())
 
-    assert {path.name for path in folder.iterdir()} == {"cell.yaml", "plots", "report.html", "report.json", "tables"}
+    assert {path.name for path in folder.iterdir()} == {
+        "cell.yaml",
+        "manifest.json",
+        "plots",
+        "report.html",
+        "report.json",
+        "tables",
+    }
     assert {path.stem for path in (folder / "tables").iterdir()} == {"reis", "kuka", "abb", "staubli"}
     assert record["status"] == "passed"
     assert record["cycle_time_s"] == 4.0
