@@ -70,7 +70,7 @@ def _worn_row(name: str, worn: Numbers) -> Row:
 
 def layout_rows(numbers: Numbers) -> list[Row]:
     """What breaks in the first layout."""
-    b2, c4, floor = numbers["b2_deg"], numbers["c4_deg"], numbers["floor_mm"]
+    b2, c4, floor, low = numbers["b2_deg"], numbers["c4_deg"], numbers["floor_mm"], numbers["low_base"]
     return [
         claim("KUKA B2", f"beyond {B2:g} deg", f"beyond, up to {shown(b2)} deg", holds=b2 > B2),
         figure("KUKA B2, largest", b2, B2_PUBLISHED, "deg"),
@@ -82,6 +82,15 @@ def layout_rows(numbers: Numbers) -> list[Row]:
             f"{shown(floor)} mm apart ({numbers['floor_pair']})",
             holds=floor <= 0.0,
             difference=f"{shown(floor)} mm",
+        ),
+        claim(
+            f"the same with the base of the REIS {shown(low['lowered_mm'])} mm lower",
+            "touch",
+            " and ".join(
+                f"the part in its gripper touches it from {first:.3f} to {last:.3f} s" for first, last in low["hits_s"]
+            )
+            or "apart",
+            holds=bool(low["hits_s"]),
         ),
     ]
 

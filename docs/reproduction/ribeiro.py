@@ -2,16 +2,22 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from cellplan import Report, solve
+from cellplan.checks.clearance import check_clearance
+from cellplan.geometry.transforms import pose
+from cellplan.pipeline.solution import Run
+from cellplan.scene.scene import Scene
 from reproduction.runs import Array, Numbers, paper_cell
 from reproduction.sheet import Sheet, draw, draw_joints
 
 TASKS = {"circle": "kuka", "rhombus": "abb", "rectangle": "staubli"}
 MODES = {1: "all four robots", 2: "two at a time", 3: "part at rest"}
+LOWERED = 0.7  # [m] by which the base of the REIS is lowered to see it hit the floor
 WORN = ("D4", "F4")  # joints of the STAUBLI that break their limits in mode 3
 
 
@@ -48,8 +54,20 @@ def measure_first_layout() -> Numbers:
         "broken": [f"{use.robot} {use.joint}" for use in report.joints if use.margin < 0.0],
         "floor_mm": math.inf if floor.minimum is None else 1e3 * floor.minimum,
         "floor_pair": " and ".join(floor.pair or ()),
+        "low_base": _on_low_base(run),
         "errors_mm": _errors(report),
     }
+
+
+def _on_low_base(run: Run) -> Numbers:
+    """The same motion with the base of the REIS lower: when the part in its gripper hits the floor."""
+    cell = paper_cell("ribeiro_first_layout")
+    reis = cell.robot("reis")
+    low = replace(reis, X_WB=pose((0.0, 0.0, -LOWERED)) @ reis.X_WB)
+    scene = Scene.from_cell(replace(cell, robots=(low, *cell.robots[1:])))
+    found, _ = check_clearance(scene, run.schedule, run.motion.q)
+    hits = [contact for contact in found.contacts if contact.pair == ("part", "floor")]
+    return {"lowered_mm": 1e3 * LOWERED, "hits_s": [[contact.first_s, contact.last_s] for contact in hits]}
 
 
 def measure_appendix() -> Numbers:
