@@ -18,6 +18,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.mesh_ply import parse_ply
 from cellplan.geometry.mesh_polygons import Polygons, Triangles, fan
+from cellplan.geometry.words import plain_word
 
 STL_HEADER: Final = 84  # [bytes] 80 of comment and 4 of count
 STL_TRIANGLE: Final = 50  # [bytes]
@@ -196,10 +197,10 @@ def _obj_vertex(words: list[str], place: str) -> list[float]:
 def _obj_index(word: str, *, known: int, place: str) -> int:
     """Zero-based vertex of a corner ``v``, ``v/vt``, ``v/vt/vn`` or ``v//vn``; negative ones count from the end."""
     try:
-        number = int(word.partition("/")[0])
+        number = int(plain_word(word.partition("/")[0]))
     except ValueError:
         raise InputError(f"{place}: expected a vertex number, got '{word[:40]}'") from None
-    if number == 0 or number < -known:
+    if number == 0 or not -known <= number <= 3 * MAX_TRIANGLES:
         raise InputError(f"{place}: expected a vertex number from 1 to {known}, got {number}")
     return number - 1 if number > 0 else known + number
 
@@ -208,7 +209,7 @@ def _numbers(words: Iterable[str], *, count: int, place: str) -> list[float]:
     """Exactly ``count`` numbers."""
     given = list(words)
     try:
-        numbers = [float(word) for word in given]
+        numbers = [float(plain_word(word)) for word in given]
     except ValueError:
         numbers = []
     if len(numbers) != count or len(given) != count:

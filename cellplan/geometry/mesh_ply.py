@@ -129,6 +129,8 @@ def parse_ply(data: bytes, name: str) -> Triangles:
 
 def _numbers(body: bytes) -> NDArray[np.float64]:
     """All numbers of a text, piece by piece, for a list of all words would take ten times its memory."""
+    if b"_" in body:  # NumPy reads 1_000 as a number, as Python does
+        raise ValueError("a number holds '_'")
     pieces, start, count = [np.zeros(0)], 0, 0
     while start < len(body):
         end = start + CHUNK

@@ -54,6 +54,10 @@ def robot_complaints(name: str, entry: RobotEntry, model: RobotModel, document: 
     if reach > FARTHEST_FLANGE:
         text = f"expected a reach of at most {FARTHEST_FLANGE:g} m, got {reach:.6g} m; is the unit right?"
         yield document.complaint(("robots", name, "model"), text)
+    length = float(np.linalg.norm(entry.tool.xyz_mm)) / 1000.0
+    if length > FARTHEST_FLANGE:
+        text = f"expected a tool of at most {FARTHEST_FLANGE:g} m, got {length:.6g} m; is the unit right?"
+        yield document.complaint(("robots", name, "tool", "xyz_mm"), text)
 
 
 def _start_complaints(

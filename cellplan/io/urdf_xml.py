@@ -10,6 +10,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, pose
+from cellplan.geometry.words import plain_word
 from cellplan.io.complaints import shown
 from cellplan.io.input_files import read_regular_file
 
@@ -56,7 +57,7 @@ class Element:
             return np.array(list(default), dtype=float)
         text = self.text(name, owner)
         try:
-            values = np.array([float(word) for word in text.split()])
+            values = np.array([float(plain_word(word)) for word in text.split()])
         except ValueError:
             values = np.empty(0)
         if len(values) != count or not np.all(np.isfinite(values)):

@@ -26,6 +26,8 @@ FORBIDDEN_IN_KEYS: Final = frozenset("<>")  # no name has them; the schema marks
 CONTROL_CHARACTERS: Final = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff\ufffe\uffff]"
 )
+QUOTES: Final = frozenset("'\"")
+BRACKETS: Final = frozenset("{}[],")
 LINE_BREAK: Final = re.compile("\r\n|\r|\n")
 
 
@@ -140,10 +142,10 @@ def _decoded(data: bytes, file: str) -> str:
 
 def _events(text: str, file: str) -> Iterator[Any]:
     """Events of the parser; its errors become one located line."""
-    line = 1
+    line, last = 1, None
     try:
         for event in yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
-            line = _mark(event).line
+            line, last = _mark(event).line, event
             yield event
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -151,9 +153,37 @@ def _events(text: str, file: str) -> Iterator[Any]:
         if mark and text[mark.index : mark.index + 1] == "\t":
             raise InputError(f"{file}:{line}: not valid YAML: a tab cannot indent, use spaces") from None
         problem = " ".join((error.problem or error.context or "cannot be read").split())
+        opening = _left_open(text, error, last)
+        if opening is not None:
+            raise InputError(f"{file}:{opening}: not valid YAML: {problem}; what opens here is not closed") from None
         raise InputError(f"{file}:{line}: not valid YAML: {problem}") from None
     except (yaml.YAMLError, ValueError, OverflowError, IndexError):
         raise InputError(f"{file}:{line}: not valid YAML near this line") from None
+
+
+def _left_open(text: str, error: yaml.MarkedYAMLError, last: Any) -> int | None:
+    """Line of a quote or bracket without its end, which the parser misses only further down; None for other errors.
+
+    A quote is left open when the file ends in it, or when the parser stumbles right behind a text of several lines. A
+    bracket is when the parser stumbles in a line that is indented no deeper than the one with the opening.
+    """
+    opening, place = error.context_mark, error.problem_mark
+    if place is None:
+        return None
+    if isinstance(last, yaml.ScalarEvent) and last.style in QUOTES and last.end_mark.line == place.line:
+        return int(last.start_mark.line) + 1 if last.start_mark.line < place.line else None
+    if opening is None or opening.line >= place.line:
+        return None
+    lines = [*LINE_BREAK.split(text), ""]
+    mark = lines[opening.line][opening.column : opening.column + 1]
+    before = lines[place.line][: place.column]
+    is_lower = _indent(lines[place.line]) <= _indent(lines[opening.line]) and not BRACKETS & set(before)
+    return int(opening.line) + 1 if mark in QUOTES or (mark in BRACKETS and is_lower) else None
+
+
+def _indent(line: str) -> int:
+    """Blanks before the first word."""
+    return len(line) - len(line.lstrip(" "))
 
 
 @dataclass(slots=True, eq=False)

@@ -1,0 +1,12 @@
+"""Words of foreign text files that are to become numbers."""
+
+
+def plain_word(word: str) -> str:
+    """The word, if it is written as other programs write numbers: Python alone also takes ``1_000`` and ``٣``.
+
+    Raises:
+        ValueError: It holds an underscore, or a digit of another script.
+    """
+    if "_" in word or not word.isascii():
+        raise ValueError(f"not a plain number: {word!r}")
+    return word
