@@ -5,7 +5,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from run_defects import DEFECTS, Copy, edit_rows
+from run_defects import DEFECTS
+from run_edits import Copy, edit_rows
 
 from cellplan.cli.main import run
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from run_defects import edit_json
+from run_edits import edit_json
 from stored_cells import write_cell
 
 from cellplan import load_cell, open_gate, solve, write_run

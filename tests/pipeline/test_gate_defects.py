@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from run_defects import DEFECTS, Copy
+from run_defects import DEFECTS
+from run_edits import Copy
 from stored_cells import solve_into, write_cell
 
 from cellplan import export_program, open_gate
