@@ -4,7 +4,7 @@ Files are collected in a hidden folder beside the final one, each forced to the 
 place at the end. A folder that cellplan did not write is never replaced.
 """
 
-import contextlib
+import errno
 import json
 import os
 import shutil
@@ -16,6 +16,7 @@ from uuid import uuid4
 from cellplan.errors import InputError
 from cellplan.io.input_files import digest
 
+NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})  # from file systems that cannot sync folders
 MARK = '"schema": "cellplan.'  # stands in the first lines of every report.json and rehearsal.json
 MARK_WITHIN = 200  # [bytes]
 REPORTS = ("report.json", "rehearsal.json", "export.json")
@@ -132,8 +133,7 @@ class RunFolder:
             if self._aside.exists() and not self.path.exists():
                 self._aside.rename(self.path)
             raise
-        with contextlib.suppress(OSError):  # the run is in place; a folder that may not be read need not be synced
-            _sync_folder(self.path.parent)
+        _sync_folder(self.path.parent)
 
 
 def refuse_unless_replaceable(path: Path) -> None:
@@ -250,12 +250,18 @@ def _remove_empty(folders: list[Path]) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Force a folder's list of names to the disk, where the system knows how."""
+    """Force a folder's list of names to the disk, where the system knows how and lets it be read."""
     if not hasattr(os, "O_DIRECTORY"):
         return
-    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except PermissionError:  # it may be written to and not read: its owner has given up knowing
+        return
     try:
         os.fsync(handle)
+    except OSError as error:
+        if error.errno not in NOT_SYNCED:
+            raise
     finally:
         os.close(handle)
 

@@ -54,7 +54,7 @@ def test_a_sound_file_is_read(tmp_path: Path, file: str) -> None:
 
 @pytest.mark.parametrize("file", hostile_files.SOUND)
 def test_injured_files_are_read_or_refused(tmp_path: Path, file: str) -> None:
-    assert "refused" in outcomes(tmp_path, file, range(20))
+    assert "refused" in outcomes(tmp_path, file, range(12))
 
 
 @pytest.mark.slow
