@@ -152,7 +152,11 @@ def _other_sign(data: bytes, random: Random) -> bytes:
 
 def _unclosed(data: bytes, random: Random) -> bytes:
     place = random.randrange(len(data))
-    return data[:place] + random.choice([b'"', b"'", b"<", b">", b"<!--", b"<![CDATA[", b"&x;", b"\xff\xfe"]) + data[place:]
+    return (
+        data[:place]
+        + random.choice([b'"', b"'", b"<", b">", b"<!--", b"<![CDATA[", b"&x;", b"\xff\xfe"])
+        + data[place:]
+    )
 
 
 INJURIES = (
