@@ -63,10 +63,8 @@ def with_key(text: str, place: Place, key: str, value: str, *, kind: str = "key 
         return None
     mark = place.key.start_mark
     before = text[text.rfind("\n", 0, mark.index) + 1 : mark.index]
-    if before.strip(" -"):  # in the flow style, or behind other keys of one line
-        entry = f"{key}: {value}, "
-    else:
-        entry = f"{key}: {value}\n{' ' * mark.column}"
+    is_flow = bool(before.strip(" -"))  # or behind other keys of one line
+    entry = f"{key}: {value}" + (", " if is_flow else "\n" + " " * mark.column)
     return Injury(kind, (*place.path[:-1], key), mark.line + 1, f"{text[: mark.index]}{entry}{text[mark.index :]}")
 
 

@@ -5,7 +5,7 @@ from typing import Final
 
 from cellplan.errors import InputError
 from cellplan.io.allowed_folders import AllowedFolders
-from cellplan.io.complaints import did_you_mean, listed
+from cellplan.io.complaints import did_you_mean, listed, shown
 from cellplan.io.robot_table import RobotTable, load_robot_table
 from cellplan.model.robot import RobotModel
 
@@ -35,5 +35,7 @@ def load_bundled_table(name: str) -> RobotTable:
     names = bundled_names()
     if name not in names:
         hint = did_you_mean(name, names)
-        raise InputError(f"expected a bundled robot ({listed(names)}) or a .urdf or .yaml file, got '{name}'{hint}")
+        raise InputError(
+            f"expected a bundled robot ({listed(names)}) or a .urdf or .yaml file, got {shown(name)}{hint}"
+        )
     return load_robot_table(FOLDER / f"{name}.yaml", file=f"bundled:{name}", folders=AllowedFolders(folder=FOLDER))

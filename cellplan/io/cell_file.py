@@ -18,7 +18,7 @@ from cellplan.io.cell_build import (
 )
 from cellplan.io.cell_rules import rule_complaints
 from cellplan.io.cell_sources import Sources
-from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, raise_complaints
+from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, raise_complaints, shown
 from cellplan.io.robot_rules import robot_complaints
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.pieces import Pieces, read_pieces
@@ -106,7 +106,7 @@ def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: 
     for index, pair in enumerate(pieces.checks.exclude):
         for side, body in enumerate(pair.bodies):
             if body not in known:
-                text = f"expected a body of this cell, got '{body}'{did_you_mean(body, sorted(known))}"
+                text = f"expected a body of this cell, got {shown(body)}{did_you_mean(body, sorted(known))}"
                 yield document.complaint(("checks", "exclude", index, "bodies", side), text)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, listed
+from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, listed, shown
 from cellplan.io.schema.pieces import Pieces
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.solver_rules import feedback_complaints
@@ -101,7 +101,7 @@ def _known_robot(robot: str, pieces: Pieces, document: YamlDocument, path: KeyPa
     known = pieces.names["robots"]
     if robot not in known:
         hint = did_you_mean(robot, known)
-        yield document.complaint(path, f"expected a robot of this cell ({listed(known)}), got '{robot}'{hint}")
+        yield document.complaint(path, f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{hint}")
 
 
 def _times(pieces: Pieces, document: YamlDocument, name: str) -> Iterator[Complaint]:
@@ -151,6 +151,8 @@ def _layout(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
         elif robot not in pieces.names["robots"]:
             known = pieces.names["robots"]
             hint = did_you_mean(robot, known)
-            yield document.key_complaint(path, f"expected a robot of this cell ({listed(known)}), got '{robot}'{hint}")
+            yield document.key_complaint(
+                path, f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{hint}"
+            )
         elif (what == "base") == (value is True):
             yield document.complaint(path, "expected ranges for a base and true for a start posture")

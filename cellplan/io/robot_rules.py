@@ -94,7 +94,7 @@ def _unit_complaints(
     joints = {joint.name: joint for joint in model.joints}
     for name, limits in entry.limits.items():
         if name not in joints:
-            text = f"expected a joint of the robot ({listed(joints)}), got '{name}'{did_you_mean(name, joints)}"
+            text = f"expected a joint of the robot ({listed(joints)}), got {shown(name)}{did_you_mean(name, joints)}"
             yield document.key_complaint((*path, "limits", name), text)
         elif limits.unit is not None and (limits.unit == "deg") != joints[name].is_revolute:
             kind, unit = ("revolute", "deg") if joints[name].is_revolute else ("prismatic", "mm")

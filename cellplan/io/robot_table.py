@@ -81,7 +81,7 @@ def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Compla
     for index, body in enumerate(table.bodies):
         if body.link not in links:
             hint = did_you_mean(body.link, links)
-            text = f"expected a link ({listed(links)}), got '{body.link}'{hint}"
+            text = f"expected a link ({listed(links)}), got {shown(body.link)}{hint}"
             yield document.complaint(("bodies", index, "link"), text)
         if body.name is not None and TOOL_NAME.fullmatch(body.name):
             text = f"expected another name, '{body.name}' means the tool of the robot"

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, listed
+from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, listed, shown
 from cellplan.io.robot_rules import start_keys
 from cellplan.io.schema.pieces import Pieces
 from cellplan.io.schema.solver import SolverEntry
@@ -69,11 +69,11 @@ def _joint(
     """A named joint is one of the cell."""
     known = pieces.names["robots"]
     if robot not in known:
-        text = f"expected a robot of this cell ({listed(known)}), got '{robot}'{did_you_mean(robot, known)}"
+        text = f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{did_you_mean(robot, known)}"
         yield document.complaint((*path, "robot"), text)
     elif robot in models and joint not in models[robot].joint_names:
         names = models[robot].joint_names
-        text = f"expected a joint of '{robot}' ({listed(names)}), got '{joint}'{did_you_mean(joint, names)}"
+        text = f"expected a joint of '{robot}' ({listed(names)}), got {shown(joint)}{did_you_mean(joint, names)}"
         yield document.complaint((*path, "joint"), text)
 
 
@@ -86,7 +86,7 @@ def _postures(
         path = ("solver", "secondary", "posture", "at", robot)
         known = pieces.names["robots"]
         if robot not in known:
-            text = f"expected a robot of this cell ({listed(known)}), got '{robot}'{did_you_mean(robot, known)}"
+            text = f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{did_you_mean(robot, known)}"
             yield document.key_complaint(path, text)
             continue
         if robot not in models:

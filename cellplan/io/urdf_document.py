@@ -260,7 +260,9 @@ def _joint(element: Element) -> UrdfJoint:
         raise element.error(f"{owner}: expected one axis at most, got the type '{kind}', which is not supported")
     if kind not in (*MOVABLE, "fixed"):
         hint = did_you_mean(kind, (*MOVABLE, "fixed"))
-        raise element.error(f"{owner}: expected the type revolute, continuous, prismatic or fixed, got '{kind}'{hint}")
+        raise element.error(
+            f"{owner}: expected the type revolute, continuous, prismatic or fixed, got {shown(kind)}{hint}"
+        )
     ends = {tag: element.one(tag, owner) for tag in ("parent", "child")}
     for tag, end in ends.items():
         if end is None:

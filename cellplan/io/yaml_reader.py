@@ -170,8 +170,10 @@ def _left_open(text: str, error: yaml.MarkedYAMLError, last: Any) -> int | None:
     opening, place = error.context_mark, error.problem_mark
     if place is None:
         return None
-    if isinstance(last, yaml.ScalarEvent) and last.style in QUOTES and last.end_mark.line == place.line:
-        return int(last.start_mark.line) + 1 if last.start_mark.line < place.line else None
+    if isinstance(last, yaml.ScalarEvent) and last.style in QUOTES and last.start_mark and last.end_mark:
+        start, end = last.start_mark.line, last.end_mark.line
+        if end == place.line:
+            return int(start) + 1 if start < end else None
     if opening is None or opening.line >= place.line:
         return None
     lines = [*LINE_BREAK.split(text), ""]

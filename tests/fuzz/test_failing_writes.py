@@ -47,7 +47,9 @@ def write_files(folder: Path) -> None:
             target.write_bytes(name, data)
 
 
-def every_call_fails_once(place: Path, write: Callable[[Path], None], *, number: int, older: bool, step: int = 1) -> int:
+def every_call_fails_once(
+    place: Path, write: Callable[[Path], None], *, number: int, older: bool, step: int = 1
+) -> int:
     """Let one call after the other fail; the folder is then as it was, or whole. Gives the number of calls."""
     run = place / "deep" / "run"
     if older:
@@ -66,7 +68,7 @@ def every_call_fails_once(place: Path, write: Callable[[Path], None], *, number:
         assert str(caught.value).startswith(str(run)), told
         assert "\n" not in str(caught.value)
         assert content(place) in ((before, whole) if older else ({}, whole)), told
-        assert not [path for path in place.rglob(".*")], told
+        assert not list(place.rglob(".*")), told
     return calls
 
 

@@ -34,6 +34,11 @@ Refuse = Callable[..., list[str]]
             "'../pair'",
         ),
         (
+            "    tool: {xyz_mm: [0, 0, 100]}",
+            "    tool: {xyz_mm: [0, 0, 100000]}",
+            "c:10: robots.worker.tool.xyz_mm: expected a tool of at most 10 m, got 100 m; is the unit right?",
+        ),
+        (
             "length_mm: 500",
             "length_mm: 50000",
             "c:13: part.geometry: expected a part of 1 to 20000 mm, got 50000 mm; is the unit right?",

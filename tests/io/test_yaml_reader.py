@@ -192,3 +192,31 @@ def test_numbers_read_back_to_the_same_value(number: float) -> None:
     read = parse_yaml(f"a: {number!r}\n".encode(), file="f.yaml").root["a"]
 
     assert float(read) == number
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("a: 1\nb: 'x\nc: 2\nd: 'y'\n", 2),
+        ('a: "x\nb: 1\n', 1),
+        ("a: {b: 1\nc: 2\n", 1),
+        ("x: 1\na:\n  b: [1, 2\n  c: 3\n", 3),
+        ("a: {b: {c: 1}\nd: 5\ne: 6", 1),
+        ("a: [\n 1,\n 2\nb: 3\n", 1),
+    ],
+)
+def test_what_is_left_open_is_told_where_it_opens(text: str, line: int) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_yaml(text.encode(), file="f.yaml")
+
+    assert str(caught.value).startswith(f"f.yaml:{line}: not valid YAML: ")
+    assert str(caught.value).endswith("; what opens here is not closed")
+
+
+@pytest.mark.parametrize(("text", "line"), [("a:\n  - {x: 1,\n     y: 2\n     z: 3}\n", 4), ("a: 1\nb: ]\n", 2)])
+def test_other_slips_are_told_where_the_parser_stumbles(text: str, line: int) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_yaml(text.encode(), file="f.yaml")
+
+    assert str(caught.value).startswith(f"f.yaml:{line}: not valid YAML: ")
+    assert "opens here" not in str(caught.value)
