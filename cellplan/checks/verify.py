@@ -17,7 +17,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report import Check, JointUse, Report
+from cellplan.model.report import Check, JointUse, Report, TaskAccuracy
 from cellplan.scene.scene import Scene
 
 
@@ -50,11 +50,8 @@ def verify(
     accuracy = tuple(
         task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
     )
-    checks: list[Check] = []
-    for scheduled, errors in zip(schedule.tasks, accuracy, strict=True):
-        own_checks, tolerance = check_accuracy(schedule, errors, scheduled.task), scheduled.task.tolerance
-        checks += told_with_failures(own_checks, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
-    checks += check_closure(cell, schedule.times, closures := closure_accuracy(cell, scene.chains, q, X_WP))
+    closures = closure_accuracy(cell, scene.chains, q, X_WP)
+    checks = [*_accuracy_checks(cell, schedule, accuracy), *check_closure(cell, schedule.times, closures)]
     uses: list[JointUse] = []
     for robot in cell.robots:
         own = joint_uses(robot, schedule.times, q[robot.name])
@@ -85,6 +82,15 @@ def verify(
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
         closures=closures,
     )
+
+
+def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccuracy]) -> list[Check]:
+    """Whether the tools are where they must be; where a joint failed, what it cost."""
+    checks: list[Check] = []
+    for scheduled, errors in zip(schedule.tasks, accuracy, strict=True):
+        own, tolerance = check_accuracy(schedule, errors, scheduled.task), scheduled.task.tolerance
+        checks += told_with_failures(own, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
+    return checks
 
 
 def _positions(cell: Cell, schedule: Schedule, tables: Sequence[JointTable]) -> Mapping[str, Array]:

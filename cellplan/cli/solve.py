@@ -21,6 +21,9 @@ Mode = Annotated[
 ]
 Method = Annotated[str | None, typer.Option("--method", metavar="NAME", help="How joint speeds are found.")]
 Duration = Annotated[float | None, typer.Option("--duration", metavar="S", help="Time for the job in seconds.")]
+Clearance = Annotated[
+    float | None, typer.Option("--clearance-mm", metavar="MM", help="Distance to keep (default: as the cell says).")
+]
 TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Work on this task only.")]
 KeepRejected = Annotated[
     bool, typer.Option("--keep-rejected", help="Write the tables of a failed run below rejected/.")
@@ -33,6 +36,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     mode: Mode = None,
     method: Method = None,
     duration: Duration = None,
+    clearance_mm: Clearance = None,
     task: TaskName = None,
     as_json: AsJson = False,
     keep_rejected: KeepRejected = False,
@@ -52,7 +56,8 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.solve import solve as solve_cell
         from cellplan.pipeline.write_run import write_run
 
-        asked = with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), mode=mode, method=method, duration=duration)
+        given = load_cell(cell, allow_dirs=allow_dir or ())
+        asked = with_overrides(given, mode=mode, method=method, duration=duration, clearance_mm=clearance_mm)
         require_task(asked, task)
         folder = output or Path("outputs") / asked.name
         refuse_unless_replaceable(folder)

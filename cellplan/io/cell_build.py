@@ -43,6 +43,7 @@ from cellplan.model.task import (
     PolygonPath,
     SampledPath,
     SpacePolylinePath,
+    StraightMove,
     Task,
     TimedPath,
     TimeLaw,
@@ -126,15 +127,22 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
         tolerance=Tolerance(
             position=entry.tolerance.position_mm / MM, orientation=float(np.deg2rad(entry.tolerance.orientation_deg))
         ),
-        start=entry.start_s,
-        duration=entry.duration_s if has_own_time else motion.duration_s - entry.start_s,
+        start=entry.begins_s,
+        duration=entry.duration_s if has_own_time else motion.duration_s - entry.begins_s - entry.leaving_s,
         feed=None if entry.feed_mm_s is None else entry.feed_mm_s / MM,
         time_law=_time_law(law),
         blend=corners.blend_mm / MM if isinstance(corners, BlendEntry) else None,
         settle=entry.settle_s,
         repeat=entry.repeat,
+        approach=_straight_move(entry.approach_mm, entry.approach_s),
+        retract=_straight_move(entry.retract_mm, entry.retract_s),
         relative_to=Frame(entry.relative_to),
     )
+
+
+def _straight_move(distance_mm: float, duration: float) -> StraightMove | None:
+    """An approach or a retreat; none over no distance."""
+    return StraightMove(distance=distance_mm / MM, duration=duration) if distance_mm else None
 
 
 def _axis_numbers(words: Sequence[str]) -> tuple[int, ...]:
@@ -184,12 +192,13 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
     for name, task in document.tasks.items():
         entry = values["tasks"][name]
         tool_axis, entry["tool_x"] = tool_directions(task)
+        entry["start_s"] = task.begins_s
         entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
         if name not in timed:
             entry.setdefault("time_law", dumped_motion["time_law"])
             entry.setdefault("corners", dumped_motion["corners"])
             if task.duration_s is None and task.feed_mm_s is None:
-                entry["duration_s"] = motion.duration_s - task.start_s
+                entry["duration_s"] = motion.duration_s - task.begins_s - task.leaving_s
         if task.path.is_planar and task.path.project is None:
             entry["path"].setdefault("offset_mm", 0.0)
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}

@@ -109,13 +109,16 @@ def _times(pieces: Pieces, document: YamlDocument, name: str) -> Iterator[Compla
     if pieces.motion is None:
         return
     task, clock = pieces.tasks[name], pieces.motion.duration_s
-    if task.start_s >= clock:
-        text = f"expected a start before the end of the clock (motion.duration_s = {clock:g}), got {task.start_s:g}"
+    start, leaving = task.begins_s, task.leaving_s
+    if start + leaving >= clock:
+        also = f" and retract_s = {leaving:g}" if leaving else ""
+        text = f"expected a start before the end of the clock (motion.duration_s = {clock:g}){also}, got {start:g}"
         yield document.complaint(("tasks", name, "start_s"), text)
-    elif task.duration_s is not None and task.start_s + task.duration_s > clock * (1.0 + TIME_ROOM):
+    elif task.duration_s is not None and start + task.duration_s + leaving > clock * (1.0 + TIME_ROOM):
+        words = "start_s + duration_s + retract_s" if leaving else "start_s + duration_s"
         text = (
             f"expected an end within the clock (motion.duration_s = {clock:g}), "
-            f"got start_s + duration_s = {task.start_s + task.duration_s:g}"
+            f"got {words} = {start + task.duration_s + leaving:g}"
         )
         yield document.complaint(("tasks", name, "duration_s"), text)
 

@@ -9,7 +9,7 @@ from cellplan.geometry.transforms import Array, pose, rpy_from_rotation
 from cellplan.io.robot_rules import start_keys
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml_writer import yaml_text
-from cellplan.model.cell import Cell, Part, Robot
+from cellplan.model.cell import Cell, CheckSettings, Part, Robot
 from cellplan.model.robot import RobotModel
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import SampledPath, Task, TimedPath
@@ -41,6 +41,7 @@ def render_cell(cell: Cell, starts: Mapping[str, Array] | None = None) -> str:
     document["tasks"] = {task.name: _task(tasks[task.name], task) for task in cell.tasks}
     document["motion"] = _motion(document["motion"], cell)
     document["solver"] = _solver(document["solver"], cell.solver)
+    document["checks"] = _checks(document["checks"], cell.checks)
     return yaml_text(document)
 
 
@@ -110,10 +111,19 @@ def _solver(entry: Mapping[str, Any], solver: SolverSettings) -> dict[str, Any]:
     return used | {key: value for key, value in entry.items() if key not in used}
 
 
+def _checks(entry: Mapping[str, Any], checks: CheckSettings) -> dict[str, Any]:
+    """The demands; the clearance as it was asked for."""
+    as_read = entry["clearance_mm"] / 1e3
+    return {**entry, "clearance_mm": entry["clearance_mm"] if as_read == checks.clearance else 1e3 * checks.clearance}
+
+
 def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:
     """The motion; its clock holds all tasks, also those with a time of their own that is longer."""
-    ends = [task.start + task.duration for task in cell.tasks if task.duration is not None]
-    ends += [t.start + t.repeat * t.path.duration for t in cell.tasks if isinstance(t.path, TimedPath)]
+    ends = []
+    for task in cell.tasks:
+        own = task.repeat * task.path.duration if isinstance(task.path, TimedPath) else task.duration
+        leaving = task.retract.duration if task.retract else 0.0
+        ends += [] if own is None else [task.start + own + leaving]
     duration = max([cell.motion.duration, *ends])
     return {**entry, "mode": str(cell.motion.mode), "duration_s": duration, "step_s": cell.motion.step}
 

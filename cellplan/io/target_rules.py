@@ -59,7 +59,7 @@ def _end(task: TaskEntry, path: TimedPath, pieces: Pieces, *, document: YamlDocu
     """A trajectory ends within the common clock."""
     if pieces.motion is None:
         return
-    clock, end = pieces.motion.duration_s, task.start_s + task.repeat * path.duration
+    clock, end = pieces.motion.duration_s, task.begins_s + task.repeat * path.duration + task.leaving_s
     if end > clock * (1.0 + TIME_ROOM):
         cycles = f"{task.repeat} cycles of " if task.repeat > 1 else ""
         place: KeyPath = ("tasks", name, "path", "csv")

@@ -146,6 +146,14 @@ class Tolerance:
     orientation: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StraightMove:
+    """Move along the tool's axis, to a path or away from it: ``distance`` in [m], ``duration`` in [s]."""
+
+    distance: float
+    duration: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Task:
     """One operator's work on the part.
@@ -164,7 +172,7 @@ class Task:
         axes: Constrained components of the tool's motion in P, in the order x, y, z, rx, ry, rz.
         is_spin_free: Whether rotation about the tool's own axis is left open.
         tolerance: Largest allowed error.
-        start: Start of the motion on the common clock in [s].
+        start: Start of the path on the common clock in [s]; an approach ends then.
         duration: Time for the whole path in [s], all cycles together; None when the feed or a trajectory decides.
         feed: Largest speed along the path on the surface in [m/s]; None when the duration decides.
         time_law: Law of each stretch between stops.
@@ -172,6 +180,8 @@ class Task:
         settle: Time in [s] after the start during which the tool may come from beside its path: errors are reported
             and not judged.
         repeat: How often a closed path is gone through.
+        approach: How the tool comes to the start of its path; None when it starts there.
+        retract: How the tool leaves the end of its path; None when it stays there.
         relative_to: Frame that path and axes are given in. In the world, the first holder's task says where the part
             is carried; P then reads W in everything that is said of the task.
     """
@@ -194,6 +204,8 @@ class Task:
     blend: float | None
     settle: float = 0.0
     repeat: int = 1
+    approach: StraightMove | None = None
+    retract: StraightMove | None = None
     relative_to: Frame = Frame.PART
 
     @property

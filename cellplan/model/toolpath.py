@@ -27,6 +27,7 @@ class Toolpath:
         turn: Angle in [rad] by which the tool turns about its own z axis, evenly over the whole length.
         is_closed: Whether the last piece ends in the pose in which the first starts, but for the turn.
         runs_on: Whether the closed path passes its start without a corner and without a stop.
+        stand_off: Distance in [m], against the tool's axis, from which the tool comes to its start.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Toolpath:
     turn: float
     is_closed: bool
     runs_on: bool = False
+    stand_off: float = 0.0
 
     @property
     def length(self) -> float:
@@ -57,9 +59,13 @@ class Toolpath:
 
     @property
     def X_PT_start(self) -> Array:
-        """Tool tip pose at the start, shape (4, 4)."""
-        first: Array = self.poses(np.zeros(1))[0]
-        return first
+        """Tool tip pose at the start, that of an approach if there is one, shape (4, 4)."""
+        return self._backed_off(self.poses(np.zeros(1))[0])
+
+    def _backed_off(self, X_PT: Array) -> Array:
+        """A pose from which the tool has gone back along its axis by the stand-off."""
+        X_PT[:3, 3] -= self.stand_off * X_PT[:3, 2]
+        return X_PT
 
     def poses(self, s: Array) -> Array:
         """Tool tip poses X_PT, shape (N, 4, 4), at lengths in [m] from the start of the path, shape (N,)."""
@@ -99,9 +105,8 @@ class Trajectory(Toolpath):
 
     @property
     def X_PT_start(self) -> Array:
-        """Tool tip pose at the start, shape (4, 4)."""
-        first: Array = self.at(np.zeros(1))[0][0]
-        return first
+        """Tool tip pose at the start, that of an approach if there is one, shape (4, 4)."""
+        return self._backed_off(self.at(np.zeros(1))[0][0])
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Tool poses X_PT, shape (N, 4, 4), and twists in P, linear first, shape (N, 6), at times of shape (N,)."""

@@ -10,6 +10,7 @@ from cellplan.model.cell import Cell, Mode
 from cellplan.model.cell_errors import CellErrors
 from cellplan.model.solver import NULL_SPACE_METHODS, MethodName
 
+FARTHEST_MM = 10_000.0  # as in the cell file
 SHORTEST = 1e-3  # [s] shorter cycles are slips of the pen
 
 
@@ -19,6 +20,7 @@ def with_overrides(
     mode: str | None = None,
     method: str | None = None,
     duration: float | None = None,
+    clearance_mm: float | None = None,
 ) -> Cell:
     """The cell with other choices; what is None stays as it is.
 
@@ -27,6 +29,7 @@ def with_overrides(
         mode: Who moves.
         method: Resolution method.
         duration: Length of the common clock in [s], for tasks without a time or feed of their own.
+        clearance_mm: Smallest allowed distance in [mm] between things that must not touch.
 
     Raises:
         InputError: A choice does not exist, or makes no sense.
@@ -38,6 +41,10 @@ def with_overrides(
         cell = _with_method(cell, cast(MethodName, _known("--method", method, get_args(MethodName))))
     if duration is not None:
         cell = _with_duration(cell, duration)
+    if clearance_mm is not None:
+        if not 0.0 <= clearance_mm <= FARTHEST_MM:
+            raise InputError(f"--clearance-mm: expected a number from 0 to {FARTHEST_MM:g}, got {clearance_mm:g}")
+        cell = replace(cell, checks=replace(cell.checks, clearance=clearance_mm / 1e3))
     return cell
 
 
@@ -85,10 +92,11 @@ def _with_duration(cell: Cell, duration: float) -> Cell:
     old = cell.motion.duration
     tasks = []
     for task in cell.tasks:
-        fills_clock = task.duration is not None and abs(task.start + task.duration - old) <= 1e-9 * old
-        if fills_clock and task.start >= duration:
+        around = task.start + (task.retract.duration if task.retract else 0.0)
+        fills_clock = task.duration is not None and abs(around + task.duration - old) <= 1e-9 * old
+        if fills_clock and around >= duration:
             raise InputError(f"--duration: task '{task.name}' starts at {task.start:g} s, after {duration:g} s")
-        tasks.append(replace(task, duration=duration - task.start) if fills_clock else task)
+        tasks.append(replace(task, duration=duration - around) if fills_clock else task)
     return replace(cell, tasks=tuple(tasks), motion=replace(cell.motion, duration=duration))
 
 

@@ -66,11 +66,17 @@ def rehearse(
         progress: Who wants to know how far it is.
 
     Raises:
-        InputError: The cell cannot be worked with, or there are more trials than can be kept.
+        InputError: The cell cannot be worked with, several robots hold the part, or there are more trials than can be
+            kept.
         NoSolutionError: The cell has no solution.
     """
     if rounds < 1:
         raise InputError(f"--rounds: expected a whole number of at least 1, got {rounds}")
+    if cell.closures:
+        raise InputError(
+            f"{cell.origin.at('part.held_by')}: expected one robot that holds the part, got {len(cell.part.held_by)}: "
+            "where a part settles between holders that pull at it depends on their stiffness, which no cell tells"
+        )
     solution = solve(cell, progress=progress)
     trials = errors.trials if errors.is_random else 1
     _refuse_too_many(solution.runs, trials, errors)

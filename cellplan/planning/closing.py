@@ -40,7 +40,7 @@ def close(problem: TrackingProblem, schedule: Schedule, start: Array, carry: Cal
         problem.drift = lambda _k, _q: constant
         return carry(end)
 
-    constant = _closing_drift(problem, start, cycle, duration=float(schedule.times[end]))
+    constant = _closing_drift(problem, start, cycle, begin=begin, duration=float(schedule.times[end]))
     first = cycle(constant)
 
     def held(k: int, q: Array) -> Array:
@@ -53,7 +53,7 @@ def close(problem: TrackingProblem, schedule: Schedule, start: Array, carry: Cal
 
 
 def _closing_drift(
-    problem: TrackingProblem, start: Array, cycle: Callable[[Array], Array], *, duration: float
+    problem: TrackingProblem, start: Array, cycle: Callable[[Array], Array], *, begin: int, duration: float
 ) -> Array:
     r"""Joint speeds that, added in the null space at all times, close the joint motion over one cycle.
 
@@ -64,8 +64,9 @@ def _closing_drift(
     Args:
         problem: The tasks.
         start: Stacked start posture, shape (nq,).
-        cycle: Motion of one cycle under a constant drift, shape (k + 1, nq).
-        duration: Its length ``T`` in [s].
+        cycle: Motion up to the end of the first cycle under a constant drift, shape (k + 1, nq).
+        begin: Instant at which the tools set out on their paths.
+        duration: Time ``T`` of the motion in [s].
 
     Returns:
         Speeds in [rad/s] or [m/s], shape (nq,).
@@ -78,18 +79,25 @@ def _closing_drift(
     if not len(u):
         return N @ u
     B = np.eye(len(u)) / duration  # inverse of the derivative
-    drift = N.T @ (cycle(N @ u)[-1] - start)
+
+    def gap(u: Array) -> Array:
+        q = cycle(N @ u)
+        gap: Array = N.T @ (q[-1] - q[begin])
+        return gap
+
+    drift = gap(u)
     for _ in range(ROUNDS):
         if np.max(np.abs(drift)) <= CLOSED:
             return N @ u
         change = -B @ drift
-        found = N.T @ (cycle(N @ (u + change))[-1] - start)
+        found = gap(u + change)
         gained = found - drift
         B += np.outer(change - B @ gained, change @ B) / (change @ B @ gained)
         u, drift = u + change, found
     raise NoSolutionError(
         f"{problem.cell.origin.at('motion.cyclic')}: the joint motion does not close, a joint is still "
-        f"{np.degrees(np.max(np.abs(drift))):.3g} deg away after {ROUNDS} tries; another start posture may help"
+        f"{np.degrees(np.max(np.abs(drift))):.3g} deg away after {ROUNDS} tries; another start posture may help, or "
+        "no goal that keeps off obstacles"
     )
 
 

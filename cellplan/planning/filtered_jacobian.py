@@ -114,7 +114,8 @@ class FilteredMotion:
         while share >= SHORTEST:
             settled = relaxation.after(self._settings.gain * share * step, theta) * moves[:, None]
             B = self._law(settled, J)
-            speeds = B @ xdot / root + aside
+            at_work = B @ xdot / root
+            speeds = at_work + tasks.bounded(aside, beside=at_work)
             fastest = float(np.max(np.abs(speeds), initial=0.0))
             swing = self._problem.gain * float(np.linalg.norm(J @ B, 2))
             if fastest * share * step <= LONGEST_MOVE and swing * share * step <= FARTHEST:

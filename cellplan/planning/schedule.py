@@ -11,6 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.task import INSTANT_ROOM, Task
 from cellplan.model.toolpath import TOOL_Z, Toolpath, Trajectory
+from cellplan.planning.stand_off import stand_off
 from cellplan.planning.time_laws import advance, peak_rate, reached_at
 
 ROTATIONS: Final = 3  # components of a task from here on are rotations
@@ -27,7 +28,7 @@ def schedule_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> Schedule:
     Each stretch between two stops takes its own start and stop of the task's time law: with a duration given in
     proportion to its length, with a feed in the time that brings its fastest moment to the feed. A path that is gone
     through several times stops where it has corners; without any, all cycles are one stretch. A trajectory keeps its
-    own times. Before its start and after its end a tool rests on the part.
+    own times. Before its start and after its end a tool rests on the part, or off it where the task says so.
 
     Args:
         cell: The cell; its tasks give times and laws, its motion the step and the default duration.
@@ -38,7 +39,7 @@ def schedule_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> Schedule:
     """
     tasks = [cell.task(toolpath.name) for toolpath in toolpaths]
     corners = [_corner_times(cell, task, toolpath) for task, toolpath in zip(tasks, toolpaths, strict=True)]
-    times = np.round(np.arange(_step_count(cell, corners) + 1) * cell.motion.step, TIME_DECIMALS)
+    times = np.round(np.arange(_step_count(cell, _ends(tasks, corners)) + 1) * cell.motion.step, TIME_DECIMALS)
     planned = zip(tasks, toolpaths, corners, strict=True)
     return Schedule(times=times, tasks=tuple(_on_clock(times, *plan) for plan in planned))
 
@@ -52,7 +53,8 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
     if task.feed is not None:
         fastest: Array = task.start + peak_rate(task.time_law) / task.feed * behind
         return fastest
-    duration = cell.motion.duration - task.start if task.duration is None else task.duration
+    leaving = task.retract.duration if task.retract else 0.0
+    duration = cell.motion.duration - task.start - leaving if task.duration is None else task.duration
     if not duration > 0.0:
         where = cell.origin.at(f"tasks.{task.name}.start_s")
         raise InputError(
@@ -88,7 +90,7 @@ def examine_times(cell: Cell, toolpaths: Sequence[Toolpath]) -> None:
     """
     tasks = [cell.task(toolpath.name) for toolpath in toolpaths]
     corners = [_corner_times(cell, task, toolpath) for task, toolpath in zip(tasks, toolpaths, strict=True)]
-    _step_count(cell, corners)
+    _step_count(cell, _ends(tasks, corners))
     least = FEWEST_STEPS * cell.motion.step
     for task, toolpath, times in zip(tasks, toolpaths, corners, strict=True):
         whole = float(times[-1] - times[0])
@@ -107,9 +109,15 @@ def examine_times(cell: Cell, toolpaths: Sequence[Toolpath]) -> None:
             )
 
 
-def _step_count(cell: Cell, corners: Sequence[Array]) -> int:
+def _ends(tasks: Sequence[Task], corners: Sequence[Array]) -> list[float]:
+    """Instants in [s] at which the tasks are over, the tools out of the way."""
+    leaving = [task.retract.duration if task.retract else 0.0 for task in tasks]
+    return [float(times[-1]) + more for times, more in zip(corners, leaving, strict=True)]
+
+
+def _step_count(cell: Cell, ends: Sequence[float]) -> int:
     """Steps of the common clock; the last does not end before the last task."""
-    cycle = max((float(times[-1]) for times in corners), default=cell.motion.duration)
+    cycle = max(ends, default=cell.motion.duration)
     steps = np.ceil(cycle / cell.motion.step - STEP_ROOM)
     if not steps < MOST_SAMPLES:
         raise InputError(
@@ -129,6 +137,7 @@ def _on_clock(times: Array, task: Task, toolpath: Toolpath, corners: Array) -> T
     rests = (times < corners[0] - INSTANT_ROOM) | (times > corners[-1] - INSTANT_ROOM)
     V_PT_P[rests] = 0.0
     _even_out_jumps(times, corners, X_PT, V_PT_P=V_PT_P)
+    stand_off(times, task, X_PT, V_PT_P=V_PT_P, end=float(corners[-1]))
     return TaskSchedule(
         task=task,
         X_PT=X_PT,

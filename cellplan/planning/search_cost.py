@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, rotation_about, skew
-from cellplan.model.cell import Cell, Robot
+from cellplan.model.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.robot import BASE, FollowerJoint, Joint
-from cellplan.model.task import Task
+from cellplan.planning.cooperation import reference_frames
 from cellplan.planning.tracking_problem import TrackingProblem
 
 PARALLEL: Final = 1e-9  # sine of the angle below which two axes count as parallel: rounding of axis tables
@@ -106,16 +106,16 @@ class SearchCost:
     def look(self, q: Array) -> Look:
         """The cost at a posture, and what each joint does to it."""
         state = self._problem.state(q)
-        R = state.X_WP[:3, :3].T
+        X_WR = reference_frames(state, self._problem.tasks)
+        R, p = np.swapaxes(X_WR[:, :3, :3], 1, 2), X_WR[:, :3, 3]
         w = R @ state.screws_W[3:]
-        v = R @ (state.screws_W[:3] - skew(state.X_WP[:3, 3]) @ state.screws_W[3:])  # of the point at the origin of P
-        X_WT = state.X_WT[self._problem.operators]
-        poses = R @ X_WT[:, :3, :]
-        poses[:, :, 3] -= R @ state.X_WP[:3, 3]
+        v = R @ (state.screws_W[:3] - skew(p) @ state.screws_W[3:])  # of the point at the origin of P
+        poses = R @ state.X_WT[self._problem.operators][:, :3, :]
+        poses[:, :, 3] -= (R @ p[:, :, None])[:, :, 0]
         x = poses[self._owners, :, self._columns]
         signs = self._signs[self._owners][:, None, :]
-        turns = signs * w
-        a = signs * (self._is_tip * v) - skew(x) @ turns
+        turns = signs * w[self._owners]
+        a = signs * (self._is_tip * v[self._owners]) - skew(x) @ turns
         n = _cross(turns, a) * self._turns
         scale = self._weights[:, :, None]
         m = x.size
@@ -133,9 +133,10 @@ class SearchCost:
             return
         self._is_examined = True
         state = self._problem.state(q)
-        axes_P = state.X_WP[:3, :3].T @ state.screws_W[3:]
-        for task, kind, signs in zip(self._problem.tasks, self._kinds, self._signs, strict=True):
+        X_WR = reference_frames(state, self._problem.tasks)
+        for task, kind, signs, frame in zip(self._problem.tasks, self._kinds, self._signs, X_WR, strict=True):
             if kind == "turn":
+                axes_P = frame[:3, :3].T @ state.screws_W[3:]
                 turning = axes_P[:, (signs != 0.0) & (np.abs(axes_P).max(axis=0) > PARALLEL)]
                 rotations = [axis - 3 for axis in task.axes if axis >= 3]
                 others = np.delete(turning, rotations, axis=0)
@@ -149,10 +150,11 @@ class SearchCost:
         """
         wanted = wanted.copy()
         state = self._problem.state(q)
+        X_WR = reference_frames(state, self._problem.tasks)
         for index, (task, kind) in enumerate(zip(self._problem.tasks, self._kinds, strict=True)):
             if kind == "turn":
                 rotations = [axis - 3 for axis in task.axes if axis >= 3]
-                R = state.X_WP[:3, :3].T @ state.X_WT[self._problem.operators[index], :3, :3]
+                R = X_WR[index, :3, :3].T @ state.X_WT[self._problem.operators[index], :3, :3]
                 wanted[index, :3, :3] = _twist(wanted[index, :3, :3] @ R.T, rotations) @ R
         return wanted
 
@@ -177,7 +179,7 @@ def _leaders(robot: Robot) -> list[int]:
     return leaders
 
 
-def _kind(task: Task) -> str:
+def _kind(task: Relation) -> str:
     """Which directions of the tool count: all, its axis, those about one axis, or none."""
     if task.is_spin_free:
         return "axis"
@@ -203,11 +205,12 @@ def _cross(u: Array, v: Array) -> Array:
     return w
 
 
-def _refusal(cell: Cell, task: Task) -> str:
+def _refusal(cell: Cell, task: Relation) -> str:
     """Why a task's set of rotations cannot be searched for, and what could."""
     asked = ", ".join(COMPONENTS[axis] for axis in task.axes)
+    key = "part.held_by" if isinstance(task, Grasp) else f"tasks.{task.name}.axes"
     return (
-        f"{cell.origin.at(f'tasks.{task.name}.axes')}: method '{cell.solver.method}' expected all of rx, ry, rz, none "
+        f"{cell.origin.at(key)}: method '{cell.solver.method}' expected all of rx, ry, rz, none "
         "of them, free: [spin], or the one about which all joints turn (planar cells), "
         f"got {asked}; another method can take it"
     )

@@ -21,6 +21,7 @@ from cellplan.scene.scene import Scene
 SAMPLES: Final = 160  # instants of the coarse motion that a posture is judged by
 GAIN: Final = 0.5  # feedback gain times step of the coarse motion
 TOUCH_INSTANTS: Final = 12  # instants of the coarse motion that are looked at for collisions
+TRIED_WITH: Final = "weighted_pseudo_inverse"  # fast, and it shows how far a posture would go beyond its limits
 TOUCHING: Final = 2.0  # taken off the quality of a posture that collides on the way
 
 
@@ -40,8 +41,10 @@ class StartTrials:
         self._scene, self._toolpaths, self._step = scene, toolpaths, step
         self._cell = replace(
             cell,
-            motion=replace(cell.motion, step=step, locked=()),  # nobody knows beforehand which joint will fail
-            solver=replace(cell.solver, gain=GAIN / step),
+            motion=replace(
+                cell.motion, step=step, locked=(), cyclic=False
+            ),  # which joint fails is not known beforehand
+            solver=replace(cell.solver, gain=GAIN / step, method=TRIED_WITH),
         )
         self._alone = replace(self._cell, part=replace(cell.part, held_by=cell.part.held_by[:1]))
         self.open_pairs = _open_pairs(scene)

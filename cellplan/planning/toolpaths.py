@@ -56,6 +56,7 @@ def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
         turn=task.turn,
         is_closed=is_closed,
         runs_on=drawing.runs_on,
+        stand_off=task.approach.distance if task.approach else 0.0,
     )
     if not is_rigid(_probe(toolpath)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")

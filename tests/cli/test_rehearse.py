@@ -145,3 +145,18 @@ def test_a_rehearsal_does_not_stand_in_the_way_of_a_solve(pair: str) -> None:
     assert run(["rehearse", pair, "--errors", "errors.yaml"]) == 1
     assert run(["rehearse", pair, "--errors", "errors.yaml", "--feedback"]) == 0
     assert run(["solve", pair]) in {0, 1}
+
+
+def test_a_part_between_several_holders_is_refused_with_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = Path(__file__).parents[2] / "cells" / "load_sharing_planar.yaml"
+    errors = tmp_path / "errors.yaml"
+    errors.write_text("cellplan_errors: 1\nrobots:\n  left: {base: {xyz_mm: [1, 0, 0]}}\n", encoding="utf-8")
+
+    status = run(["rehearse", str(cell), "--errors", str(errors), "-o", str(tmp_path / "out")])
+
+    err = capsys.readouterr().err
+    assert status == 2
+    assert ": part.held_by: expected one robot that holds the part, got 2: where a part settles between" in err
+    assert not (tmp_path / "out").exists()

@@ -71,6 +71,7 @@ def test_a_csv_that_is_named_only_is_written_with_its_defaults(cells: Path, tmp_
         ("tool_axis: normal", "axes: [x, y]\n    tool_axis: [0, 0.3, -0.7]\n    tool_turn_deg: 33.3"),
         ("tool_axis: normal", "time_law: {trapezoid: {ramp: 0.3}}\n    corners: {blend_mm: 2.5}\n    feed_mm_s: 33.3"),
         ("tool_axis: normal", "start_s: 0.1\n    free: [spin]\n    tolerance: {position_mm: 0.03}"),
+        ("tool_axis: normal", "approach_mm: 33.3\n    retract_mm: 50\n    retract_s: 0.7"),
         ("tool: {xyz_mm: [0, 0, 100]}", "tool: {geometry: {capsule: {radius_mm: 3.3, length_mm: 70}}}"),
         ("tool: {xyz_mm: [0, 0, 100]}", "tool: {bodies: [{box: {size_mm: [1, 2, 3.3]}, at: {rpy_deg: [1, 2, 3]}}]}"),
         (

@@ -157,6 +157,27 @@ Refuse = Callable[..., list[str]]
         ),
         (
             "tool_axis: normal",
+            "approach_mm: 50\n    start_s: 0.2",
+            "c:21: tasks.ring.start_s: expected at least approach_s = 0.5, got 0.2",
+        ),
+        (
+            "tool_axis: normal",
+            "approach_mm: -5",
+            "c:20: tasks.ring.approach_mm: expected a number of millimetres of at least 0, got -5",
+        ),
+        (
+            "tool_axis: normal",
+            "approach_mm: 50\n    settle_s: 1",
+            "c:21: tasks.ring.settle_s: expected no time to settle, as the tool comes to its path by an approach",
+        ),
+        (
+            "tool_axis: normal",
+            "retract_mm: 50\n    duration_s: 3.8",
+            "c:21: tasks.ring.duration_s: expected an end within the clock (motion.duration_s = 4), got start_s + "
+            "duration_s + retract_s = 4.3",
+        ),
+        (
+            "tool_axis: normal",
             "start_s: 2\n    duration_s: 2.5",
             "c:21: tasks.ring.duration_s: expected an end within the clock (motion.duration_s = 4), got start_s "
             "+ duration_s = 4.5",

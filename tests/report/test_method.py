@@ -68,13 +68,13 @@ def test_goals_weights_iterations_and_slack_are_told_when_there_are_any() -> Non
         weighting={"near_limits": 1.5},
     )
     assert said(solver, motion([1, 4, 2], [0, 0, 0.125]))[1:] == [
-        "Besides the tasks: joint limits (gain 2), obstacles (gain 1).",
+        "Besides the tasks: joint limits (gain 2), obstacles (gain 0.1).",
         "Joint weights change along the motion: near limits 1.5.",
         "Iterations per step: 2.33 on average, 4 at most, at 0.500 s.",
         "The tasks were left on purpose: by 0.125 at 1.000 s (norm of the twist given up, m/s and rad/s as they come).",
     ]
     record = solver_record(solver)
-    assert record["secondary"] == {"joint_limits": {"gain": 2.0}, "obstacles": {"gain": 1.0, "within_mm": 150.0}}
+    assert record["secondary"] == {"joint_limits": {"gain": 2.0}, "obstacles": {"gain": 0.1, "within_mm": 150.0}}
     assert record["weighting"] == {"near_limits": 1.5, "load": 0.0}
     assert (record["damping"], solver_record(settings(damping=0.3))["damping"]) == ("auto", 0.3)
 

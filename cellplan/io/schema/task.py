@@ -23,6 +23,7 @@ from cellplan.io.schema.robot import SlidingSpeed
 
 PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
+FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
 LONGEST_S: Final = 1e6  # [s] eleven days: longer is a slip of the unit
 MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
@@ -210,6 +211,7 @@ class ToleranceEntry(Entry):
     )
 
 
+StandOff = Annotated[float, Field(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
 
 
@@ -250,8 +252,8 @@ class TaskEntry(Entry):
         default=(), description="[spin] leaves the rotation about the tool's z axis open."
     )
     tolerance: ToleranceEntry = Field(default=ToleranceEntry(), description="Largest allowed tool error.")
-    start_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
-        default=0.0, description="Start on the common clock."
+    start_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] | None = Field(
+        default=None, description="Start of the path on the common clock; when absent 0, or the end of the approach."
     )
     duration_s: Seconds | None = Field(
         default=None,
@@ -264,6 +266,14 @@ class TaskEntry(Entry):
     repeat: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
         default=1, description="How often a closed path is gone through; more than once only a closed one."
     )
+    approach_mm: StandOff = Field(
+        default=0.0, description="Distance from which the tool comes to the start of its path, along its own axis."
+    )
+    approach_s: Seconds = Field(default=0.5, description="Time for the approach, which ends when the path starts.")
+    retract_mm: StandOff = Field(
+        default=0.0, description="Distance to which the tool leaves the end of its path, along its own axis."
+    )
+    retract_s: Seconds = Field(default=0.5, description="Time for leaving.")
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
         default=0.0,
         description="Time after the start during which the tool may come from beside its path: its error is reported "
@@ -285,4 +295,23 @@ class TaskEntry(Entry):
             raise rule("unexpected key, a path in the world is not laid on the part", "path.project")
         for name, words in (("axes", self.axes), ("free", self.free)):
             require_each_once(words, name)
+        if self.start_s is not None and self.start_s < self.approaching_s:
+            raise rule(f"expected at least approach_s = {self.approach_s:g}, got {self.start_s:g}", "start_s")
+        if self.settle_s and self.approach_mm:
+            raise rule("expected no time to settle, as the tool comes to its path by an approach", "settle_s")
         return self
+
+    @property
+    def approaching_s(self) -> float:
+        """Time before the path that an approach takes."""
+        return self.approach_s if self.approach_mm else 0.0
+
+    @property
+    def leaving_s(self) -> float:
+        """Time after the path that leaving takes."""
+        return self.retract_s if self.retract_mm else 0.0
+
+    @property
+    def begins_s(self) -> float:
+        """Start of the path on the common clock."""
+        return self.approaching_s if self.start_s is None else self.start_s

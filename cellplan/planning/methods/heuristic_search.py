@@ -21,10 +21,11 @@ def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     A round goes: of all open joints the one whose best move leaves the least cost makes that move and is closed; when
     all are closed, all are opened again. The search ends as soon as the root of the cost is within the tolerance.
 
-    Besides the paper: joints stop at their position limits (speeds are not limited); a search begins where the last
-    step leads to, scaled so that it fits the goal best, if that costs less than the present posture; and rounds that
-    gain little are carried on (see `PostureSearch`). A joint that moves no tool stays: rounding alone would turn it by
-    any angle.
+    Besides the paper: joints stop dead at their position limits, and their speeds are not limited (`recursive_search`
+    limits speeds and can brake). A search begins where the last step leads to, scaled so that it fits the goal best, if
+    that costs less than the present posture: otherwise small changes of the goal change the order of the joints, and
+    redundant cells shake. Rounds that gain little are carried on (see `PostureSearch`). A joint that moves no tool
+    stays: rounding alone would turn it by any angle.
     """
     tolerance = problem.cell.solver.search.tolerance
     search = PostureSearch(problem, lambda cost: _best_first(cost, tolerance**2))

@@ -45,7 +45,7 @@ def one_step(q, *, settings=BY_VALUE, damping=None, weights=(1.0, 1.0, 1.0), dri
         step=STEP,
     )
     problem = TrackingProblem(cell, schedule, ["arm"])
-    problem.drift = drift
+    problem.drift = None if drift is None else lambda _k, _q: drift
     speeds = (damped_least_squares(problem)(0, np.array(q)).q - q) / STEP
     return tip_jacobians(LENGTHS, np.array([q]))[0], VELOCITY + GAIN * offset, speeds
 

@@ -114,7 +114,7 @@ def test_filter_that_has_not_begun_moves_nothing(method):
 def test_secondary_motion_stays_unnoticed_while_the_filter_lags(method):
     q, drift = np.array([0.2, 0.9, -1.4]), np.array([0.3, -0.2, 0.5])
     speeds = []
-    for wanted in (None, drift):
+    for wanted in (None, lambda _k, _q: drift):
         problem = arm_problem(q, filter_gain=3.0, zero=True)
         problem.drift = wanted
         speeds.append((method_named(method)(problem)(0, q).q - q) / STEP)
