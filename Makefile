@@ -4,7 +4,7 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install test test-all lint format demo bench clean FORCE
+.PHONY: help install test test-all lint format demo bench bench-methods clean FORCE
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -22,6 +22,7 @@ help:
 	@echo "make test-all  the same with the slow tests"
 	@echo "make lint      everything but the tests"
 	@echo "make bench     time whole commands, beside a baseline of the same run"
+	@echo "make bench-methods  run every method on the same cells (a quarter of an hour); writes docs/guides/which-method.md"
 	@echo "make format    put the code into shape"
 	@echo "make clean     remove .venv, caches and results"
 
@@ -73,6 +74,9 @@ demo: $(STAMP)
 
 bench: $(STAMP)
 	$(BIN)/python benchmarks/commands.py --rounds $(ROUNDS)
+
+bench-methods: $(STAMP)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/methods.py --rounds $(ROUNDS)
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist outputs/*/
