@@ -4,7 +4,7 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install test test-all lint format demo bench reproduce clean FORCE
+.PHONY: help install test test-all lint format demo bench bench-methods reproduce clean FORCE
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -23,6 +23,7 @@ help:
 	@echo "make lint      everything but the tests"
 	@echo "make bench     time whole commands, beside a baseline of the same run, and the check of clearance"
 	@echo "make reproduce solve the cells of the three papers and write docs/reproduction.md, about six minutes"
+	@echo "make bench-methods  run every method on the same cells (a quarter of an hour); writes docs/guides/which-method.md"
 	@echo "make format    put the code into shape"
 	@echo "make clean     remove .venv, caches and results"
 
@@ -78,6 +79,9 @@ bench: $(STAMP)
 
 reproduce: $(STAMP)
 	$(BIN)/python docs/make_reproduction.py
+
+bench-methods: $(STAMP)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/methods.py --rounds $(ROUNDS)
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist outputs/*/

@@ -80,7 +80,7 @@ class CombinedModel:
         """Kinematics at the stacked joint vector ``q``, shape (nq,); the result owns its arrays."""
         full = q if self._is_plain else self._spread @ q + self._offset
         pin.computeJointJacobians(self._model, self._data, full)
-        screws = self._data.J.copy() if self._is_plain else self._data.J @ self._spread_to_flange
+        screws = self._screws() if self._is_plain else self._screws() @ self._spread_to_flange
         X_WT = self._X_WT.copy()
         for index, (joint_id, X_JT) in enumerate(zip(self._flange_ids, self._X_JT, strict=True)):
             X_WT[index] = self._data.oMi[joint_id].homogeneous @ X_JT
@@ -91,7 +91,7 @@ class CombinedModel:
         """All links at the stacked joint vector ``q``, shape (nq,); the result owns its arrays."""
         pin.computeJointJacobians(self._model, self._data, self._spread @ q + self._offset)
         X_WJ = np.array([self._data.oMi[link].homogeneous for link in range(1, self._model.njoints)])
-        return LinkState(self._data.J.copy(), X_WJ.reshape(-1, 4, 4) @ self._X_JB)
+        return LinkState(self._screws(), X_WJ.reshape(-1, 4, 4) @ self._X_JB)
 
     def along_joints(self, per_axis: Array) -> Array:
         """Sum what belongs to the axes over those that each driven joint turns, shape (..., links) to (..., nq)."""
@@ -102,6 +102,11 @@ class CombinedModel:
         """Share of each axis on the way to a flange in what belongs to the joints, shape (..., nq) to (..., links)."""
         shares: Array = per_joint @ self._spread_to_flange.T
         return shares
+
+    def _screws(self) -> Array:
+        """Columns of all axes as the engine last computed them, shape (6, links); of a single one it gives a vector."""
+        screws: Array = self._data.J.copy().reshape(6, self._model.nv)
+        return screws
 
     def _add_robot(self, robot: Robot, columns: slice, carries: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> None:
         """Add one robot's joints; every joint frame is parallel to B at the reference posture."""

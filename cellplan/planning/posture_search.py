@@ -65,7 +65,7 @@ class PostureSearch:
             start: Posture there, shape (nq,); it sets which joints may move and which way tools lean.
             bounds: Where the joints may go.
             momentum: What the joints moved in the step before, shape (nq,): the search begins as far along it as
-                brings the tools nearest, at most twice as far as it went, if that costs less than the start.
+                brings the tools nearest, at most as far as it went, if that costs less than the start.
 
         Returns:
             The best posture found; its slack is the root of the cost that is left over the step.
@@ -114,11 +114,14 @@ def cheaper(one: Look, other: Look) -> Look:
 
 
 def _scaled(look: Look, way: Array) -> Array:
-    """As much of a way as brings all tools nearest to first order, at most twice its length, shape (nq,)."""
+    """As much of a way as brings all tools nearest to first order, at most its whole length, shape (nq,).
+
+    Anything longer would let motion that no tool notices grow from step to step, without end.
+    """
     shift = look.a @ way
     square = float(shift @ shift)
     share = float(look.e @ shift) / square if square > 0.0 else 0.0
-    scaled: Array = min(max(share, 0.0), 2.0) * way
+    scaled: Array = min(max(share, 0.0), 1.0) * way
     return scaled
 
 

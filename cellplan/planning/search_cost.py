@@ -15,6 +15,7 @@ from cellplan.planning.cooperation import reference_frames
 from cellplan.planning.tracking_problem import TrackingProblem
 
 PARALLEL: Final = 1e-9  # sine of the angle below which two axes count as parallel: rounding of axis tables
+NO_EFFECT: Final = 1e-24  # share of the largest k0 below which a joint does not move any tool: rounding, squared
 COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
 
 

@@ -1,5 +1,7 @@
 """Links and axes of the combined model against the other kinematics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from random_cells import random_cell
@@ -42,3 +44,12 @@ def test_first_links_follow_the_order_of_the_robots() -> None:
     cell = random_cell(4, operators=2, with_follower=True)
     counts = [len(robot.model.joints) + len(robot.model.followers) for robot in cell.robots]
     assert CombinedModel(cell).first_link == [0, counts[0], counts[0] + counts[1]]
+
+
+def test_a_cell_of_one_single_joint_has_one_column() -> None:
+    cell = random_cell(4, operators=1, held=False, joints=1)
+    cell = replace(cell, robots=cell.robots[1:])
+    q = np.array([0.3])
+    model = CombinedModel(cell)
+    assert model.state(q).screws_W.shape == model.links(q).screws_W.shape == (6, 1)
+    assert np.array_equal(model.state(q).screws_W, model.links(q).screws_W)

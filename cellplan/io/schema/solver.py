@@ -144,7 +144,9 @@ class WeightingEntry(Entry):
 class SolverEntry(Entry):
     """How joint motion is found."""
 
-    method: MethodName = Field(default="weighted_pseudo_inverse", description="Resolution method.")
+    method: MethodName = Field(
+        default="weighted_pseudo_inverse", description='Resolution method; the guide "Which method when" compares them.'
+    )
     gain_per_s: Gain | None = Field(
         default=None,
         description="Gain of the pose-error feedback; 0.5 / step_s when absent. gain_per_s * step_s is below 2.",

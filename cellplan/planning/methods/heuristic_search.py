@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.planning.joint_lines import joint_lines
 from cellplan.planning.posture_search import Bounds, Pass, PostureSearch, position_bounds
-from cellplan.planning.search_cost import Look, SearchCost
+from cellplan.planning.search_cost import NO_EFFECT, Look, SearchCost
 from cellplan.planning.tracking_problem import Advance, TrackingProblem
 
 NEGLIGIBLE: Final = 1e-12  # share of the cost that a move must gain: below it a joint would turn for rounding errors
@@ -24,7 +24,8 @@ def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     Besides the paper: joints stop dead at their position limits, and their speeds are not limited (`recursive_search`
     limits speeds and can brake). A search begins where the last step leads to, scaled so that it fits the goal best, if
     that costs less than the present posture: otherwise small changes of the goal change the order of the joints, and
-    redundant cells shake. Rounds that gain little are carried on (see `PostureSearch`).
+    redundant cells shake. Rounds that gain little are carried on (see `PostureSearch`). A joint that moves no tool
+    stays: rounding alone would turn it by any angle.
     """
     tolerance = problem.cell.solver.search.tolerance
     search = PostureSearch(problem, lambda cost: _best_first(cost, tolerance**2))
@@ -54,8 +55,10 @@ def _round(cost: SearchCost, look: Look, bounds: Bounds, target: float) -> Look:
     is_open = np.ones(len(look.q), dtype=bool)
     while is_open.any() and look.cost > target:
         lines = joint_lines(look)
+        effects = lines.aa + lines.nn
+        acts = effects > NO_EFFECT * effects.max(initial=0.0)
         moves = lines.best(bounds.lowest - look.q, bounds.highest - look.q)
-        gains = np.where(is_open, lines.gain(moves), -np.inf)
+        gains = np.where(is_open & acts, lines.gain(moves), -np.inf)
         best = int(np.argmax(gains))
         if not gains[best] > NEGLIGIBLE * look.cost:
             break

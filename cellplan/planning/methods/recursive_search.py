@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.planning.posture_search import Bounds, Pass, PostureSearch, speed_bounds
-from cellplan.planning.search_cost import Look, SearchCost
+from cellplan.planning.search_cost import NO_EFFECT, Look, SearchCost
 from cellplan.planning.tracking_problem import Advance, TrackingProblem
 
 SMALL_ANGLE: Final = 0.1  # [rad] or [m]: farther from a look its first order is not trusted at first
@@ -17,7 +17,6 @@ ROUNDS_ON_A_LOOK: Final = (
     50  # before the cell is looked at again: near a singularity all depends on where the joints are
 )
 SMALLEST_TRUST: Final = 1e-9  # [rad] or [m]: where even moves this small gain nothing there is nothing to gain
-NO_EFFECT: Final = 1e-24  # share of the largest k0 below which a joint does not move any tool: rounding, squared
 AIM: Final = 0.25  # share of the allowed cost that the rounds are to leave to first order
 STALLED: Final = 1e-9  # share of the cost below which what a round gains counts as nothing
 

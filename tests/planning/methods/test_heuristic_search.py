@@ -256,3 +256,15 @@ def test_same_input_gives_the_same_motion():
     schedule = wave_schedule(cell, start)
     first, second = (follow(cell, schedule, start=start, moving=["op0"]) for _ in range(2))
     np.testing.assert_array_equal(first.q, second.q)
+
+
+def test_joints_that_move_no_tool_stay_where_they_are():
+    """The tip of this arm is the centre of its wrist: rounding alone would turn the last three joints by any angle."""
+    cell = arm_cell(dh_arm(PUMA), method="heuristic_search", axes=(0, 1, 2))
+    start = np.array([0.3, -0.9, 0.4, 0.2, 0.0, 0.1])
+    at = tool_poses(cell, start[None])[0, :3, 3]
+    times = np.arange(21) * 2e-3
+    schedule = points_schedule(cell, times, at + np.linspace(0.0, 0.01, 21)[:, None] * [1.0, 0.0, 0.0])
+    motion = followed(cell, schedule, start)
+    assert np.ptp(motion.q[:, 3:], axis=0).max() == 0.0
+    assert position_errors(cell, schedule, motion).max() <= cell.solver.search.tolerance
