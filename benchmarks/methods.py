@@ -44,6 +44,7 @@ PLOT = ROOT / "docs/images/methods.svg"
 MEASURED = re.compile(r"(?<=<!-- measured -->\n).*?(?=<!-- end -->)", re.DOTALL)
 METHODS: tuple[MethodName, ...] = get_args(MethodName)
 BASELINE: MethodName = "weighted_pseudo_inverse"
+NOTHING = 1e-6  # [mm], [deg] or [rad/s] below which a figure says no more
 LONG_S = 4.0  # [s] a run that takes longer is timed once: its length evens out the noise
 COLOURS = ("#000000", "#e69f00", "#56b4e9", "#009e73", "#b8a800", "#0072b2", "#d55e00", "#cc79a7")  # Okabe and Ito
 MARKERS = ("o", "P", "s", "^", "v", "D")
@@ -217,7 +218,7 @@ def table(rows: dict[str, list[Row]]) -> list[str]:
     for title, each in rows.items():
         for index, row in enumerate(each):
             lead = f"| {title if index == 0 else ''} | `{row.method}` "
-            cost = f"| {row.step_cpu_s * 1e3:.1g} ms | {rounded(row.ratio)} "
+            cost = f"| {plain(row.step_cpu_s * 1e3, 1)} ms | {rounded(row.ratio)} "
             room = "yes" if row.method in NULL_SPACE_METHODS else "no"
             lines.append(f"{lead}{told(row, cost)}| {room} |")
     return lines
@@ -228,18 +229,26 @@ def told(row: Row, cost: str) -> str:
     result = row.result
     if result is None:
         return f"| {row.refusal} {cost}| | | "
-    error = f"{result.position_mm:.2g} mm"
+    error = f"{plain(result.position_mm, 2)} mm"
     if result.orientation_deg is not None:
-        error += f", {result.orientation_deg:.1g}°"
+        error += f", {plain(result.orientation_deg, 1)}°"
     median, most = result.iterations
     looks = f"{median:g}" if median == most else f"{median:g}, at most {most:g}"
-    speed = f"{result.peak_rad_s:.2g} rad/s ({100 * result.peak_share:.2g} %)"
+    speed = f"{plain(result.peak_rad_s, 2)} rad/s ({plain(100 * result.peak_share, 2)} %)"
     return f"| {error} {cost}| {looks} | {speed} | {'yes' if result.keeps_limits else '**no**'} "
+
+
+def plain(value: float, digits: int) -> str:
+    """A number of at least 0 with few digits and no exponent."""
+    if value < NOTHING:
+        return f"< {NOTHING:f}"
+    places = max(digits - 1 - int(np.floor(np.log10(value))), 0)
+    return f"{float(f'{value:.{digits - 1}e}'):.{places}f}"
 
 
 def rounded(ratio: float) -> str:
     """A ratio with as many digits as another run would give again."""
-    return f"{ratio:.1f}" if ratio < 3.0 else f"{float(f'{ratio:.1g}'):g}"
+    return f"{ratio:.1f}" if ratio < 3.0 else plain(ratio, 1)
 
 
 def draw(rows: dict[str, list[Row]]) -> None:
