@@ -78,8 +78,14 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Pa
     folder = tmp_path / "run"
     command = [*PROGRAM, "solve", str(cells / "four_robots.yaml"), "-o", str(folder), "--duration", "60"]
 
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(2.0)
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # noqa: PLW1509 - background jobs inherit SIG_IGN
+    )
+    time.sleep(4.0)  # the motion of a minute takes longer than that, the imports do not
     process.send_signal(number)
     out, err = process.communicate(timeout=10)
 
