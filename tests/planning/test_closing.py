@@ -89,6 +89,7 @@ def tool_error(cell: Cell, schedule: Schedule, motion: Motion) -> float:
     )
 
 
+@pytest.mark.slow
 def test_nicolato_s_ellipse_closes_in_each_of_25_cycles() -> None:
     """The published motion drifts; a constant drift alone would be lost again, as one cycle's map is no contraction."""
     cell = load_cell(FOLDER / "papers" / "nicolato_ellipse.yaml")
