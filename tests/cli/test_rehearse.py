@@ -137,6 +137,7 @@ def test_a_folder_with_other_things_in_it_is_never_replaced(pair: str, capsys: p
     assert Path("mine/thesis.tex").read_text(encoding="utf-8") == "years of work"
 
 
+@pytest.mark.slow
 def test_a_rehearsal_does_not_stand_in_the_way_of_a_solve(pair: str) -> None:
     assert run(["rehearse", pair, "--errors", "errors.yaml"]) == 1
     assert run(["solve", pair]) in {0, 1}

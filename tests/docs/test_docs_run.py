@@ -67,7 +67,11 @@ def assert_shown(expected: str, output: str) -> None:
     assert re.search(r"\n(?:[^\n]*\n)*?".join(lines), output), f"expected:\n{expected}\ngot:\n{output}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=page_name)
+LONG = {"verify-and-export.md", "which-method.md", "rehearse-with-errors.md", "limits.md"}  # half a minute each
+RUNNABLE = [pytest.param(page, marks=pytest.mark.slow if page.name in LONG else ()) for page in PAGES]
+
+
+@pytest.mark.parametrize("page", RUNNABLE, ids=page_name)
 def test_every_block_of_a_page_runs(page: Path, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "cells", tmp_path / "cells")
     output = ""

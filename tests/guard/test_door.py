@@ -101,10 +101,14 @@ def test_an_interruption_ends_the_child_and_the_next_job_gets_its_own_answer() -
     import threading
 
     in_child(hostile_work.process, guard=READER)
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background inherit it as ignored
     threading.Timer(0.3, os.kill, [os.getpid(), signal.SIGINT]).start()
 
-    with pytest.raises(KeyboardInterrupt):
-        in_child(hostile_work.sleep_long, guard=READER)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            in_child(hostile_work.sleep_long, guard=READER)
+    finally:
+        signal.signal(signal.SIGINT, usual)
 
     assert in_child(hostile_work.same, 5, guard=READER) == 5
 
