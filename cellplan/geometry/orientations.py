@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.curves import BezierCurve, Interval, spans_at, tangents
 from cellplan.geometry.surfaces import Patch
-from cellplan.geometry.transforms import Array, frame_from_axes, rotation_exp, rotation_vector
+from cellplan.geometry.transforms import Array, cross, frame_from_axes, rotation_exp, rotation_vector
 
 THIRD: Final = 1.0 / 3.0  # [-] share of an end slope in the first and last factor of a cubic
 
@@ -155,8 +155,8 @@ def leaning_frames(z: Array, dz: Array, x_hint: Array) -> tuple[Array, Array]:
     lean_rate = -np.sum(x_hint * dz, axis=1, keepdims=True) * z - along * dz
     lean = np.sum(x_hint * x, axis=1, keepdims=True)
     dx = (lean_rate - np.sum(lean_rate * x, axis=1, keepdims=True) * x) / lean
-    dy = np.cross(dz, x) + np.cross(z, dx)
-    return R, 0.5 * (np.cross(x, dx) + np.cross(y, dy) + np.cross(z, dz))
+    dy = cross(dz, x) + cross(z, dx)
+    return R, 0.5 * (cross(x, dx) + cross(y, dy) + cross(z, dz))
 
 
 def _turned(R: Array, v: Array) -> Array:

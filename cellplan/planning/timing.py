@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
+from cellplan.geometry.arc_length import QuickParameters, quickly
 from cellplan.geometry.curves import Interval
 from cellplan.geometry.transforms import Array, rotation_about
 from cellplan.model.cell import Cell
@@ -16,6 +17,7 @@ from cellplan.planning.stand_off import stand_off
 from cellplan.planning.time_laws import advance, peak_rate, reached_at
 
 MOST_SAMPLES: Final = 2_000_000  # tables longer than this fill disks, not controllers
+SAME_PLACE: Final = 1e-12  # [-] of the whole length: knots nearer to a stop lie on it
 MOST_BREAKS: Final = 2_000_000  # smooth stretches of a motion beyond which nobody integrates from one to the next
 
 
@@ -29,6 +31,7 @@ class ClockedPath:
         corners: Instants in [s] at which the stretches begin, and the one at which the last ends: each takes its own
             start and stop of the time law. The cycles of a trajectory are its stretches.
         behind: Length in [m] behind each stop of one cycle, shape (pieces + 1,).
+        quick: Way from lengths to parameters of the path for a few instants at a time.
         where: Place of the path in the cell file, for complaints.
     """
 
@@ -36,6 +39,7 @@ class ClockedPath:
     toolpath: Toolpath
     corners: Array
     behind: Array
+    quick: QuickParameters
     where: str
 
     @property
@@ -95,8 +99,10 @@ class ClockedPath:
         low, high = within
         inside = np.clip(times, low, high)
         middle = np.broadcast_to(np.asarray(0.5 * (low + high)), inside.shape)
-        stretch = self.stretches(middle)
-        X_PT, V_PT_P, _ = self.targets(inside, stretch)
+        if isinstance(self.toolpath, Trajectory):
+            X_PT, V_PT_P = self.toolpath.at(self._own_times(inside, self.toolpath.duration)[1])
+        else:
+            X_PT, V_PT_P, _ = self._by_time_law(inside, self.stretches(middle), quick=self.quick)
         V_PT_P[(middle < self.corners[0]) | (middle > self.corners[-1])] = 0.0
         stand_off(inside, self.task, X_PT, V_PT_P=V_PT_P, end=self.end)
         return X_PT, V_PT_P
@@ -118,20 +124,22 @@ class ClockedPath:
             Poses X_PT, shape (N, 4, 4), twists V_PT_P, shape (N, 6), and lengths in [m] that grow from cycle to cycle,
             shape (N,).
         """
-        if isinstance(self.toolpath, Trajectory):
-            return self._on_own_clock(times, self.toolpath)
+        path = self.toolpath
+        if isinstance(path, Trajectory):
+            cycle, t = self._own_times(times, path.duration)
+            return *path.at(t), cycle * path.length + path.arc.lengths(t)
         return self._by_time_law(times, stretch)
 
-    def _on_own_clock(self, times: Array, path: Trajectory) -> tuple[Array, Array, Array]:
-        """See `targets`, on a trajectory: it passes from cycle to cycle as smoothly as within one."""
+    def _own_times(self, times: Array, period: float) -> tuple[Array, Array]:
+        """Cycles of a trajectory and times within them, shape (N,); it passes from one to the next smoothly."""
         starts = self.corners
         elapsed = np.clip(times - starts[0], 0.0, starts[-1] - starts[0])
-        cycle = np.minimum(elapsed // path.duration, len(starts) - 2)
-        t = np.clip(elapsed - cycle * path.duration, 0.0, path.duration)
-        X_PT, V_PT_P = path.at(t)
-        return X_PT, V_PT_P, cycle * path.length + path.arc.lengths(t)
+        cycle = np.minimum(elapsed // period, len(starts) - 2)
+        return cycle, np.clip(elapsed - cycle * period, 0.0, period)
 
-    def _by_time_law(self, times: Array, stretch: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+    def _by_time_law(
+        self, times: Array, stretch: NDArray[np.intp], *, quick: QuickParameters | None = None
+    ) -> tuple[Array, Array, Array]:
         """See `targets`, where each stretch takes its own start and stop of the time law."""
         task, toolpath, behind = self.task, self.toolpath, self.behind
         begin, duration = self.corners[stretch], self.corners[stretch + 1] - self.corners[stretch]
@@ -149,7 +157,7 @@ class ClockedPath:
             cycle, piece = np.divmod(stretch, len(behind) - 1)
             length = np.diff(behind)[piece]
             s = behind[piece] + law.share * length
-        X_PT, twists = toolpath.targets(piece, s)
+        X_PT, twists = toolpath.targets(piece, s, quick=quick)
         if task.repeat > 1 and toolpath.turn:
             X_PT[:, :3, :3] = X_PT[:, :3, :3] @ rotation_about(TOOL_Z, cycle * toolpath.turn)
         return X_PT, twists * (law.rate * length / duration)[:, None], cycle * behind[-1] + s
@@ -168,13 +176,16 @@ class ClockedPath:
         if isinstance(path, Trajectory):
             own: Array = (self.corners[:-1, None] + knots).ravel()
             return own
+        pieces = len(self.behind) - 1
         s = path.arc.lengths(knots)
+        piece = np.clip(np.searchsorted(self.behind, s, side="right") - 1, 0, pieces - 1)
+        room = SAME_PLACE * self.behind[-1]
+        is_inside = (s > self.behind[piece] + room) & (s < self.behind[piece + 1] - room)  # the stops are corners
+        s, piece = s[is_inside], piece[is_inside]
         if path.runs_on:
-            share = (cycles + s / self.behind[-1]).ravel() / self.task.repeat
+            share = (cycles + np.append(0.0, s / self.behind[-1])).ravel() / self.task.repeat
             whole: Array = self.start + (self.end - self.start) * reached_at(law, share)
             return whole
-        pieces = len(self.behind) - 1
-        piece = np.clip(np.searchsorted(path.stops, knots, side="right") - 1, 0, pieces - 1)
         tau = reached_at(law, (s - self.behind[piece]) / np.diff(self.behind)[piece])
         stretch = cycles * pieces + piece
         instants: Array = (self.corners[stretch] + np.diff(self.corners)[stretch] * tau).ravel()
@@ -219,6 +230,7 @@ def clock_path(cell: Cell, task: Task, toolpath: Toolpath) -> ClockedPath:
         toolpath=toolpath,
         corners=_corner_times(cell, task, toolpath),
         behind=toolpath.behind,
+        quick=quickly(toolpath.arc),
         where=cell.origin.at(f"tasks.{task.name}.path"),
     )
 
