@@ -7,6 +7,7 @@ filled up to the longest chain with axes that do nothing. Lanes may differ in ba
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array, skew
 from cellplan.model.cell import Cell, Robot
@@ -28,6 +29,21 @@ class Placement:
     p_WB: Array
     R_LT: Array
     p_LT: Array
+
+    def of(self, lanes: NDArray[np.intp]) -> "Placement":
+        """That of some lanes only."""
+        return self if self.R_WB.shape[-1] == 1 else Placement(*(part[..., lanes] for part in self._parts))
+
+    def repeated(self, count: int) -> "Placement":
+        """Each lane so many times, one after the other."""
+        if self.R_WB.shape[-1] == 1:
+            return self
+        return Placement(*(np.repeat(part, count, axis=-1) for part in self._parts))
+
+    @property
+    def _parts(self) -> tuple[Array, Array, Array, Array]:
+        """All arrays."""
+        return self.R_WB, self.p_WB, self.R_LT, self.p_LT
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,6 +26,10 @@ class Wanted:
     p: Array
     twists: Array
 
+    def between(self, low: int, high: int) -> "Wanted":
+        """The instants from one number up to another."""
+        return Wanted(*(part[..., low:high].copy() for part in (self.R, self.p, self.twists)))
+
     def repeated(self, count: int) -> "Wanted":
         """The same instants for so many cells, one cell after the other."""
         if count == 1:
@@ -109,6 +113,12 @@ class LaneTasks:
         Components that a task leaves open are zero. With free spin the rotation is given in the wanted tool frame.
         """
         return self._errors(self._seen(self.chains.state(q, placement)), wanted)
+
+    def task_errors(self, q: Array, wanted: Wanted, placement: Placement) -> Array:
+        """Pose errors with all rotations in the frames of the tasks, shape (6, tasks, lanes)."""
+        errors, free = self.errors(q, wanted, placement), self._is_spin_free
+        errors[3:, free] = np.einsum("ijtb,jtb->itb", wanted.R[:, :, free], errors[3:, free])
+        return errors
 
     def stacked(self, own: Array, shared: Array) -> Array:
         """What belongs to the joints, sorted into the stacked joint vector, shape (nq, lanes)."""
