@@ -98,7 +98,7 @@ def _with_integrator(cell: Cell, name: str, *, is_new_method: bool) -> Cell:
     if integrator is Integrator.ACCURATE:
         complaints = [InputError(_why_not(cell, key, is_new_method)) for key in cell.solver.against_accurate]
         if complaints:
-            raise InvalidFileError(complaints)
+            raise complaints[0] if len(complaints) == 1 else InvalidFileError(complaints)
     return replace(cell, solver=replace(cell.solver, integrator=integrator))
 
 
