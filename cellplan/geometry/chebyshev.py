@@ -34,12 +34,13 @@ class ChebyshevBasis:
         self.integral = 0.5 * self.nodes[:, None] * np.einsum("g,igk->ik", weights, shares)
 
     def values(self, x: Array) -> Array:
-        """Matrix that gives the values at points of 0..1, shape (m,), shape (m, degree + 1): the barycentric formula."""
+        """Matrix that gives the values at points of 0..1, shape (m,), by the barycentric formula."""
         away = x[:, None] - self.nodes
         hit = away == 0.0
         terms = self._signs / np.where(hit, 1.0, away)
         matrix = np.where(hit.any(axis=1, keepdims=True), hit.astype(float), terms)
-        return matrix / matrix.sum(axis=1, keepdims=True)
+        matrix /= matrix.sum(axis=1, keepdims=True)
+        return matrix
 
     def _derivative(self) -> Array:
         """Differentiation matrix; each row sums to zero, as constants have no derivative."""

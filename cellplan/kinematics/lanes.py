@@ -127,8 +127,10 @@ class LaneChains:
         return LaneState(np.swapaxes(frames[:, :, 4], 0, 1), np.swapaxes(points, 0, 1), R_WT, p_WT)
 
     def _steps(self, q: Array) -> Array:
-        """From axis to axis, seen from the link before: how it turns what follows (three columns), where it is, where it
-        points to, shape (levels, 3, 5, robots, lanes)."""
+        """How each axis turns what follows (three columns), where it is and where it points to.
+
+        All are seen from the link before it, shape (levels, 3, 5, robots, lanes).
+        """
         position = self._ratio[..., None] * q[self._leader] + self._offset[..., None]
         steps = np.empty((self.levels, 3, 5, *position.shape[1:]))
         sine, versine = np.sin(position)[:, None, None], (1.0 - np.cos(position))[:, None, None]

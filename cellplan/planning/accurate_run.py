@@ -82,7 +82,7 @@ class AccurateRun:
             self.collocation.mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
             if not len(self.collocation.carry(windows_between(breaks, whole=self.end), at, ONLY, record)):
                 break
-        return JointPath(panels, nodes)
+        return JointPath(q, begin, panels, nodes)
 
     def _stretches(self, begin: float, end: float) -> list[Array]:
         """Breaks between two instants, cut where a joint fails."""
@@ -97,4 +97,5 @@ def _settled(cell: Cell, timed: TimedTasks, grasps: int) -> Array:
     """Instants in [s] until which each tool, and that of each further holder, may be on its way to where it belongs."""
     given = [path.task.start + path.task.settle if path.task.settle else 0.0 for path in timed.paths]
     soon = min(SETTLING_STEPS * cell.motion.step, 0.5 * float(timed.times[-1]))
-    return np.maximum(np.array(given + [0.0] * grasps), soon)
+    until: Array = np.maximum(np.array(given + [0.0] * grasps), soon)
+    return until

@@ -57,9 +57,7 @@ def close(problem: TrackingProblem, schedule: Schedule, start: Array, carry: Cal
     problem.drift = held
 
 
-def closing_drift(
-    problem: TrackingProblem, start: Array, moved: Callable[[Array], Array], *, duration: float
-) -> Array:
+def closing_drift(problem: TrackingProblem, start: Array, moved: Callable[[Array], Array], *, duration: float) -> Array:
     r"""Joint speeds that, added in the null space at all times, close the joint motion over one cycle.
 
     The drift of one cycle lies in the null space ``N`` of the tasks at the start, as the tools come back. Its ``r``

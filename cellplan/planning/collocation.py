@@ -96,7 +96,7 @@ class Collocation:
             q[:, through] = attempt.q[:, is_exact, -1]
             record(window, through, attempt.q[:, is_exact], attempt.errors[:, is_exact].max(axis=0))
         is_rough = attempt.is_settled & ~is_exact
-        finer = [(~attempt.is_settled, window.halves())]
+        finer: list[tuple[NDArray[np.bool_], tuple[Window, ...]]] = [(~attempt.is_settled, window.halves())]
         if is_rough.any():
             finer.append((is_rough, window.refined(np.any(attempt.errors[:, is_rough] > self._accuracy, axis=1))))
         arrived = [through]

@@ -42,10 +42,8 @@ def follow(
     return carry(problem, start, last=len(schedule.times) - 1, progress=progress)
 
 
-def carry(
-    problem: TrackingProblem, start: Array, *, first: int = 0, last: int, progress: Progress = silent
-) -> Motion:
-    """Motion from the posture ``start`` at the instant ``first`` to the instant ``last``; rows before are not filled in.
+def carry(problem: TrackingProblem, start: Array, *, first: int = 0, last: int, progress: Progress = silent) -> Motion:
+    """Motion from a start posture at the instant ``first`` to the instant ``last``; rows before it repeat the start.
 
     Raises:
         DivergedError: A tool lost its path.

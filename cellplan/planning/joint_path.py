@@ -16,17 +16,26 @@ class JointPath:
     """Motion of all joints, continuous over all panels.
 
     Attributes:
-        panels: Stretches of time, one after the other.
+        start: Stacked joint vector at the beginning, shape (nq,).
+        begin: First instant in [s].
+        panels: Stretches of time, one after the other; none where no way leads on from the start.
         nodes: Stacked joint vectors at the nodes of each panel, shape (nq, degree + 1).
     """
 
+    start: Array
+    begin: float
     panels: Sequence[Panel]
     nodes: Sequence[Array]
 
     @property
     def end(self) -> float:
         """Last instant in [s]."""
-        return self.panels[-1].end
+        return self.panels[-1].end if self.panels else self.begin
+
+    @property
+    def last(self) -> Array:
+        """Stacked joint vector at the end, shape (nq,)."""
+        return self.nodes[-1][:, -1] if self.nodes else self.start
 
     @property
     def node_count(self) -> int:
@@ -35,9 +44,8 @@ class JointPath:
 
     def at(self, times: Array) -> Array:
         """Stacked joint vectors at increasing instants in [s] within the path, shape (N, nq)."""
-        q = np.empty((len(times), len(self.nodes[0])))
+        q = np.tile(self.start, (len(times), 1))
         ends = np.array([panel.end for panel in self.panels])
-        ends[-1] = np.inf
         cuts = np.searchsorted(times, ends + INSTANT_ROOM, side="right")
         first = 0
         for panel, nodes, last in zip(self.panels, self.nodes, cuts.tolist(), strict=True):

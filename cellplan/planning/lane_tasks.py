@@ -68,7 +68,7 @@ class LaneTasks:
         self.chains, self.joint_count = LaneChains(cell), cell.joint_count
         self._robots = np.array([names.index(task.robot) for task in tasks], dtype=np.intp)
         self._holder = names.index(holders[0]) if holders else None
-        self._X_TP = inverse(cell.part.held_by[0].X_PT) if holders else cell.part.X_WP
+        self._X_TP = _part_in_carrier(cell)
         self._is_on_part = np.array([task.relative_to is Frame.PART for task in tasks])
         self._is_spin_free = np.array([task.is_spin_free for task in tasks])
         self._kept = np.array([_kept(task) for task in tasks]).T[:, :, None]
@@ -171,7 +171,8 @@ class LaneTasks:
         twists = wanted.twists.copy()
         free = self._is_spin_free
         twists[3:, free] = np.einsum("jitb,jtb->itb", wanted.R[:, :, free], twists[3:, free])
-        return twists * self._kept
+        twists *= self._kept
+        return twists
 
     def _columns(self, state: LaneState, seen: Seen, wanted: Wanted) -> Array:
         """Tool twists per unit speed of joints: of each task's own robot, then of the positioner at each tip.
@@ -216,7 +217,7 @@ class Look:
     def __init__(
         self, tasks: LaneTasks, arrow: ArrowInverse, *, errors: Array, rows: Array | None, wanted: Array, mobile: Array
     ) -> None:
-        """Keep what was found; ``rows`` turns errors and twists into the frame of the columns where it is not theirs."""
+        """Keep what was found; ``rows`` turn errors and twists into the frame of the columns, if it is another."""
         self._tasks, self._arrow, self._rows, self._wanted, self._mobile = tasks, arrow, rows, wanted, mobile
         self.errors = errors
 
@@ -241,6 +242,15 @@ class Look:
         np.einsum("ijtb,jtb->itb", self._rows, b[:3], out=turned[:3])
         np.einsum("ijtb,jtb->itb", self._rows, b[3:], out=turned[3:])
         return turned
+
+
+def _part_in_carrier(cell: Cell) -> Array:
+    """The part in the tool frame of the robot that carries the part frame, or in W where nobody holds it."""
+    if cell.part.held_by:
+        return inverse(cell.part.held_by[0].X_PT)
+    if cell.part.X_WP is None:
+        raise ValueError("a part that nobody holds needs a pose in the world")
+    return cell.part.X_WP
 
 
 def _kept(task: Relation) -> Array:

@@ -54,3 +54,44 @@ def resolve(
     else:
         path = run.path(start, begin=0.0, end=run.end)
     return _sampled(run, path, TrackingProblem(cell, schedule, moving, start=start), start=start, progress=progress)
+
+
+def _closed(run: AccurateRun, problem: TrackingProblem, schedule: Schedule, *, start: Array) -> JointPath:
+    """A path that closes after the first cycle; later cycles repeat it."""
+    begin, end = (float(schedule.times[k]) for k in first_cycle(problem.cell, schedule))
+
+    def moved(drift: Array) -> Array:
+        at = run.path(start, begin=0.0, end=begin, drift=drift).last if begin > 0.0 else start
+        round_trip: Array = run.path(at, begin=begin, end=end, drift=drift).last - at
+        return round_trip
+
+    drift = closing_drift(problem, start, moved, duration=end)
+    return run.path(start, begin=0.0, end=run.end, drift=drift)
+
+
+def _sampled(
+    run: AccurateRun, path: JointPath, problem: TrackingProblem, *, start: Array, progress: Progress
+) -> Motion:
+    """The path at the instants of the clock; from where it ends, Euler's steps."""
+    times, last = problem.times, len(problem.times) - 1
+    reached = int(np.searchsorted(times, path.end + INSTANT_ROOM, side="right")) - 1
+    q = path.at(times[: reached + 1])
+    q[0] = start
+    if reached < last:
+        stepped = carry(problem, q[-1], first=reached, last=last, progress=progress)
+        q = np.concatenate([q, stepped.q[reached + 1 :]])
+    resolution = Resolution(
+        integrator=Integrator.ACCURATE,
+        panels=len(path.panels),
+        nodes=path.node_count,
+        sweeps=run.collocation.sweeps,
+        solves=run.collocation.solves,
+        error_between=run.worst if path.panels else None,
+        euler_from=float(times[reached]) if reached < last else None,
+    )
+    return Motion(times=times, q=q, resolution=resolution)
+
+
+def _steps(count: int) -> Resolution:
+    """What Euler's steps took: a node and a system of equations each."""
+    return Resolution(integrator=Integrator.EULER, panels=0, nodes=count + 1, sweeps=0, solves=count)

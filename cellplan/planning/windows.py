@@ -11,7 +11,11 @@ import numpy as np
 from cellplan.geometry.chebyshev import chebyshev
 from cellplan.geometry.transforms import Array
 
-DEGREES: Final = (6, 12, 24)  # of polynomials: a panel that is not exact enough gets the next, or is halved after the last
+DEGREES: Final = (
+    6,
+    12,
+    24,
+)  # of polynomials: a panel that is not exact enough gets the next, or is halved after the last
 MOST_NODES: Final = 50  # of a window; more cost as much as a second window saves
 SHARE_OF_MOTION: Final = 0.3  # longest window, of the whole motion: it takes more passes to resolve than a short one
 FINE_SHARES: Final = (1.0 / 128.0, 1.0 / 32.0)  # of the motion: a stretch below these begins with a lower degree
@@ -66,7 +70,7 @@ class Window:
     @cached_property
     def count(self) -> int:
         """Number of nodes."""
-        return self.places[-1].stop
+        return sum(panel.degree + 1 for panel in self.panels)
 
     @cached_property
     def instants(self) -> Array:
