@@ -114,7 +114,8 @@ def test_a_report_of_another_version_of_cellplan_may_have_other_keys(copy: Path)
 
 def test_a_failed_run_is_told_with_its_reason(tmp_path: Path) -> None:
     cell = write_cell(tmp_path / "cell")
-    cell.write_text(cell.read_text().replace("position_mm: 1,", "position_mm: 0.0001,"), encoding="utf-8")
+    by_steps = cell.read_text().replace("position_mm: 1,", "position_mm: 0.0001,") + "solver: {integrator: euler}\n"
+    cell.write_text(by_steps, encoding="utf-8")
     write_run(solve(load_cell(cell)), tmp_path / "run", keep_rejected=True)
 
     message = refusal(tmp_path / "run", cell, NotVerifiedError)
