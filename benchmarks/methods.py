@@ -28,7 +28,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
-from cellplan.model.solver import NULL_SPACE_METHODS, MethodName
+from cellplan.model.solver import NULL_SPACE_METHODS, Integrator, MethodName
 from cellplan.planning.follow import follow
 from cellplan.planning.modes import plan_runs
 from cellplan.planning.schedule import schedule_tasks
@@ -120,8 +120,9 @@ CASES = (
 
 
 def problem_of(case: Case) -> Problem:
-    """The cell with its toolpaths laid, its start posture found and its clock set."""
+    """The cell with its toolpaths laid, its start posture found and its clock set, for Euler's steps."""
     cell = load_cell(ROOT / case.file)
+    cell = replace(cell, solver=replace(cell.solver, integrator=Integrator.EULER))
     if case.step_s is not None:
         gain = cell.solver.gain * cell.motion.step / case.step_s
         motion, solver = replace(cell.motion, step=case.step_s), replace(cell.solver, gain=gain)

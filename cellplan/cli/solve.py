@@ -20,6 +20,12 @@ Mode = Annotated[
     typer.Option("--mode", metavar="MODE", help="Who moves: simultaneous, pairwise or part_at_rest."),
 ]
 Method = Annotated[str | None, typer.Option("--method", metavar="NAME", help="How joint speeds are found.")]
+Integrator = Annotated[
+    str | None,
+    typer.Option(
+        "--integrator", metavar="NAME", help="accurate, or euler: steps along the clock (default: as the cell says)."
+    ),
+]
 Duration = Annotated[float | None, typer.Option("--duration", metavar="S", help="Time for the job in seconds.")]
 Clearance = Annotated[
     float | None, typer.Option("--clearance-mm", metavar="MM", help="Distance to keep (default: as the cell says).")
@@ -35,6 +41,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     output: Output = None,
     mode: Mode = None,
     method: Method = None,
+    integrator: Integrator = None,
     duration: Duration = None,
     clearance_mm: Clearance = None,
     task: TaskName = None,
@@ -57,7 +64,9 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.write_run import write_run
 
         given = load_cell(cell, allow_dirs=allow_dir or ())
-        asked = with_overrides(given, mode=mode, method=method, duration=duration, clearance_mm=clearance_mm)
+        asked = with_overrides(
+            given, mode=mode, method=method, integrator=integrator, duration=duration, clearance_mm=clearance_mm
+        )
         require_task(asked, task)
         folder = output or Path("outputs") / asked.name
         refuse_unless_replaceable(folder)

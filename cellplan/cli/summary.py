@@ -38,6 +38,7 @@ def figure_lines(record: Record) -> list[str]:
         *_drift_lines(record.get("repeatability", {})),
         *_clearance_lines(record["clearance"]["whole"]),
         *_slack_lines(record["solver"]["slack"]),
+        *_fallback_lines(record["solver"]),
     ]
 
 
@@ -109,6 +110,13 @@ def _slack_lines(slack: Record | None) -> Iterator[str]:
     """By how much a method left the tasks on purpose."""
     if slack and slack["max"]:
         yield f"  tasks left on purpose by at most {slack['max']:.2g} ({slack['unit']}){_instant(slack['max_at_s'])}"
+
+
+def _fallback_lines(solver: Record) -> Iterator[str]:
+    """Where the accurate mode found no way on."""
+    resolution = solver.get("resolution")
+    if resolution and solver["integrator"] == "accurate" and resolution["euler_from_s"] is not None:
+        yield f"  no accurate way on: Euler steps from {resolution['euler_from_s']:.3f} s"
 
 
 def _failure_lines(checks: list[Record]) -> Iterator[str]:

@@ -8,13 +8,17 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.curves import BezierCurve, Interval, spans_at, tangents
 from cellplan.geometry.surfaces import Patch
-from cellplan.geometry.transforms import Array, frame_from_axes, rotation_exp, rotation_vector
+from cellplan.geometry.transforms import Array, cross, frame_from_axes, rotation_exp, rotation_vector
 
 THIRD: Final = 1.0 / 3.0  # [-] share of an end slope in the first and last factor of a cubic
 
 
 class Orientation(Protocol):
-    """Tool frames along a curve."""
+    """Tool frames along a curve: smooth between its knots where the curve is."""
+
+    @property
+    def knots(self) -> Array:
+        """Increasing parameters at which the frames' dependence on parameter and tip changes, shape (M,)."""
 
     def frames(self, u: Array, interval: Interval, *, p: Array, dp: Array) -> tuple[Array, Array]:
         """Tool frames and their turning rate.
@@ -37,6 +41,11 @@ class FixedFrame:
 
     R: Array
 
+    @property
+    def knots(self) -> Array:
+        """None, see `Orientation`."""
+        return np.zeros(0)
+
     def frames(self, u: Array, interval: Interval, *, p: Array, dp: Array) -> tuple[Array, Array]:  # noqa: ARG002
         """Tool frames and their turning rate, see `Orientation`."""
         return np.broadcast_to(self.R, (len(u), 3, 3)), np.zeros((len(u), 3))
@@ -49,6 +58,11 @@ class NormalFrame:
     patch: Patch
     x_hint: Array
 
+    @property
+    def knots(self) -> Array:
+        """None: a patch is smooth, see `Orientation`."""
+        return np.zeros(0)
+
     def frames(self, u: Array, interval: Interval, *, p: Array, dp: Array) -> tuple[Array, Array]:  # noqa: ARG002
         """Tool frames and their turning rate, see `Orientation`."""
         return leaning_frames(-self.patch.normals(p), -self.patch.normal_rates(p, dp), self.x_hint)
@@ -60,6 +74,11 @@ class AxisFrame:
 
     axes: BezierCurve
     x_hint: Array
+
+    @property
+    def knots(self) -> Array:
+        """Those of the axis, see `Orientation`."""
+        return self.axes.knots
 
     def frames(self, u: Array, interval: Interval, *, p: Array, dp: Array) -> tuple[Array, Array]:  # noqa: ARG002
         """Tool frames and their turning rate, see `Orientation`."""
@@ -136,8 +155,8 @@ def leaning_frames(z: Array, dz: Array, x_hint: Array) -> tuple[Array, Array]:
     lean_rate = -np.sum(x_hint * dz, axis=1, keepdims=True) * z - along * dz
     lean = np.sum(x_hint * x, axis=1, keepdims=True)
     dx = (lean_rate - np.sum(lean_rate * x, axis=1, keepdims=True) * x) / lean
-    dy = np.cross(dz, x) + np.cross(z, dx)
-    return R, 0.5 * (np.cross(x, dx) + np.cross(y, dy) + np.cross(z, dz))
+    dy = cross(dz, x) + cross(z, dx)
+    return R, 0.5 * (cross(x, dx) + cross(y, dy) + cross(z, dz))
 
 
 def _turned(R: Array, v: Array) -> Array:

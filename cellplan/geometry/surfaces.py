@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.curves import Curve, Interval
 from cellplan.geometry.shapes import Box, Cylinder, Sphere
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.transforms import Array, cross
 
 BORDER_ROOM: Final = 1e-9  # [m] a point this far beyond the border of a patch still lies on it: rounding of the input
 PARALLEL: Final = 1e-12  # [-] squared share of a direction across an axis below which it runs along it
@@ -218,7 +218,7 @@ def _round_hits(points: Array, direction: Array, *, across: Array, offset: Array
     ``offset`` and ``across`` are position and direction in the section's plane (for a ball: in space).
     """
     square = across @ across
-    aside = np.cross(offset, across)
+    aside = cross(offset, across)
     rest = radius**2 * square - np.sum(aside * aside, axis=-1)
     root = np.sqrt(np.where(rest >= 0.0, rest, np.nan))
     height = (root - offset @ across) / square

@@ -10,6 +10,9 @@ Array = NDArray[np.float64]
 SMALL_ANGLE: Final = 1e-6  # [rad] below this the series of sin and cos are exact to double precision
 HALF_TURN_ROOM: Final = 1e-4  # [rad] nearer to pi than this the skew part of R is too small to give the axis
 
+_NEXT: Final = np.array([1, 2, 0])
+_AFTER: Final = np.array([2, 0, 1])
+
 
 def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), rpy: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     """Pose from a position in [m] and fixed-axis roll, pitch, yaw in [rad] (``R = Rz Ry Rx``, as in URDF)."""
@@ -66,6 +69,12 @@ def skew(v: Array) -> Array:
     S[..., 0, 1], S[..., 0, 2], S[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     S[..., 1, 0], S[..., 2, 0], S[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
     return S
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross products of vectors, shape (..., 3): to the last bit those of NumPy, in a third of its time for a few."""
+    c: Array = a[..., _NEXT] * b[..., _AFTER] - a[..., _AFTER] * b[..., _NEXT]
+    return c
 
 
 def rotation_about(axis: Array, angle: ArrayLike) -> Array:
@@ -139,7 +148,7 @@ def frame_from_axes(z: Array, x_hint: Array) -> Array:
     x = x_hint - np.sum(x_hint * z, axis=-1, keepdims=True) * z
     with np.errstate(invalid="ignore", divide="ignore"):
         x = x / np.linalg.norm(x, axis=-1, keepdims=True)
-    return np.stack([x, np.cross(z, x), z], axis=-1)
+    return np.stack([x, cross(z, x), z], axis=-1)
 
 
 def is_rigid(X: Array, tolerance: float = 1e-9) -> bool:

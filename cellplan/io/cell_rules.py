@@ -6,7 +6,7 @@ from typing import Final
 from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, listed, shown
 from cellplan.io.schema.pieces import Pieces
 from cellplan.io.schema.task import TaskEntry
-from cellplan.io.solver_rules import feedback_complaints
+from cellplan.io.solver_rules import accurate_complaints, feedback_complaints
 from cellplan.io.yaml_reader import YamlDocument
 
 TIME_ROOM: Final = 1e-9  # [-] of the duration: rounding of start_s + duration_s
@@ -23,6 +23,7 @@ def rule_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Complain
         yield from _times(pieces, document, name)
         yield from _tool_axis(task, document, name)
     yield from feedback_complaints(pieces, document)
+    yield from accurate_complaints(pieces, document)
     yield from _layout(pieces, document)
 
 

@@ -11,7 +11,7 @@ from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml_writer import yaml_text
 from cellplan.model.cell import Cell, CheckSettings, Part, Robot
 from cellplan.model.robot import RobotModel
-from cellplan.model.solver import SolverSettings
+from cellplan.model.solver import Integrator, SolverSettings
 from cellplan.model.task import SampledPath, Task, TimedPath
 
 NEIGHBOURS: Final = 3  # units in the last place round the quotient in which the written number is sought
@@ -106,9 +106,11 @@ def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
 
 
 def _solver(entry: Mapping[str, Any], solver: SolverSettings) -> dict[str, Any]:
-    """The solver, its gain and method as they were used; what the cell gives besides stays."""
+    """The solver, its method, integrator and gain as they were used; what the cell gives besides stays."""
     used = {
         "method": solver.method,
+        "integrator": str(Integrator.ACCURATE if solver.is_accurate else Integrator.EULER),
+        "accuracy_mm": _file_number(solver.accuracy, is_revolute=False),
         "gain_per_s": solver.gain,
         "damping": "auto" if solver.damping is None else solver.damping,
         "seed": solver.seed,

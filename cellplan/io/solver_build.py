@@ -8,11 +8,13 @@ import numpy as np
 from cellplan.io.robot_rules import start_keys
 from cellplan.io.schema.solver import PostureGoalEntry, SecondaryEntry, SolverEntry
 from cellplan.io.shape_build import MM
+from cellplan.io.solver_rules import keys_against_accurate
 from cellplan.model.robot import RobotModel
 from cellplan.model.solver import (
     DampedLeastSquaresSettings,
     FilteredInverseSettings,
     GoalKind,
+    Integrator,
     QuadraticProgramSettings,
     SearchSettings,
     SecondaryGoal,
@@ -52,7 +54,16 @@ def build_solver(entry: SolverEntry, step: float, models: Mapping[str, RobotMode
         quadratic_program=QuadraticProgramSettings(slack_weight=program.slack_weight, ramp=program.ramp_s),
         weighting=WeightingSettings(near_limits=entry.weighting.near_limits, load=entry.weighting.load),
         goals=_goals(entry.secondary, models),
+        integrator=_integrator(entry),
+        accuracy=entry.accuracy_mm / MM,
     )
+
+
+def _integrator(entry: SolverEntry) -> Integrator:
+    """The integrator that is asked for; the accurate one wherever it goes when nothing is said."""
+    if entry.integrator is not None:
+        return Integrator(entry.integrator)
+    return Integrator.EULER if keys_against_accurate(entry) else Integrator.ACCURATE
 
 
 def _goals(entry: SecondaryEntry, models: Mapping[str, RobotModel]) -> tuple[SecondaryGoal, ...]:

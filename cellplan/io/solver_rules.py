@@ -9,9 +9,10 @@ from cellplan.io.schema.pieces import Pieces
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.yaml_reader import YamlDocument
 from cellplan.model.robot import RobotModel
-from cellplan.model.solver import NULL_SPACE_METHODS
+from cellplan.model.solver import ACCURATE_METHODS, NULL_SPACE_METHODS, against_accurate
 
 FEEDBACK_LIMIT: Final = 2.0  # gain_per_s * step_s at which Euler's steps begin to swing ever wider
+OR_EULER: Final = "or choose solver.integrator: euler"
 
 
 def feedback_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
@@ -25,6 +26,39 @@ def feedback_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Comp
             "the error feedback would swing ever wider"
         )
         yield document.complaint(("solver", "gain_per_s"), text)
+
+
+def keys_against_accurate(solver: SolverEntry) -> tuple[str, ...]:
+    """Keys of the solver that rule the accurate mode out, whether it is asked for or not."""
+    return against_accurate(
+        solver.method,
+        has_goals=bool(_goals(solver)),
+        near_limits=solver.weighting.near_limits,
+        load=solver.weighting.load,
+    )
+
+
+def accurate_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """The accurate mode, when asked for by name, goes with everything else that is asked of the solver."""
+    solver = pieces.solver
+    if solver is None or solver.integrator != "accurate":
+        return
+    texts = {
+        "method": f"expected {listed(sorted(ACCURATE_METHODS))} in the accurate mode, got {shown(solver.method)}; "
+        f"choose it, {OR_EULER}",
+        "secondary": f"expected no goals besides the tasks in the accurate mode, got {listed(_goals(solver))}; "
+        f"remove them, {OR_EULER}",
+        "weighting.near_limits": f"expected 0 in the accurate mode, got {shown(solver.weighting.near_limits)}; "
+        f"remove it, {OR_EULER}",
+        "weighting.load": f"expected 0 in the accurate mode, got {shown(solver.weighting.load)}; remove it, {OR_EULER}",
+    }
+    for key in keys_against_accurate(solver):
+        yield document.complaint(("solver", *key.split(".")), texts[key])
+
+
+def _goals(solver: SolverEntry) -> list[str]:
+    """Names of the goals that are given."""
+    return [name for name, goal in dict(solver.secondary).items() if goal is not None]
 
 
 def solver_complaints(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Complaint]:
@@ -57,7 +91,7 @@ def solver_complaints(pieces: Pieces, models: Mapping[str, RobotModel], document
 def _without_null_space(solver: SolverEntry, pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
     """What a method that leaves no room besides the tasks cannot do."""
     text = f"expected a method that leaves room besides the tasks ({listed(sorted(NULL_SPACE_METHODS))})"
-    if any(goal is not None for goal in dict(solver.secondary).values()):
+    if _goals(solver):
         yield document.complaint(("solver", "secondary"), f"{text}, got '{solver.method}'")
     if pieces.motion is not None and pieces.motion.cyclic:
         yield document.complaint(("motion", "cyclic"), f"{text}, got '{solver.method}'")

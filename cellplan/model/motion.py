@@ -1,10 +1,12 @@
 """Schedule, motion and program: where each tool must be, what all joints do, and what is written for each robot."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.solver import Integrator
 from cellplan.model.task import Task
 
 
@@ -50,6 +52,38 @@ class Schedule:
         return float(self.times[-1] / (len(self.times) - 1))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resolution:
+    """How finely a motion was resolved, and what that took.
+
+    Attributes:
+        integrator: What carried the joints from the start on; ``euler_from`` tells where the accurate one gave up.
+        panels: Stretches of time on each of which all joints are one polynomial.
+        nodes: Instants at which the joints were solved for.
+        sweeps: Passes over all nodes of a panel, added up.
+        solves: Systems of equations that were solved.
+        error_between: Largest tool error between the nodes in [m]; None when nobody looked, as with Euler's steps.
+        euler_from: Instant in [s] from which on Euler's steps had to be taken; None when they never had to.
+    """
+
+    integrator: Integrator
+    panels: int
+    nodes: int
+    sweeps: int
+    solves: int
+    error_between: float | None = None
+    euler_from: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check at the door that every figure is one."""
+        counts = (self.panels, self.nodes, self.sweeps, self.solves)
+        if min(counts) < 0:
+            raise ValueError(f"resolution: expected counts of at least 0, got {counts}")
+        for figure in (self.error_between, self.euler_from):
+            if figure is not None and not 0.0 <= figure < math.inf:  # also what is not a number
+                raise ValueError(f"resolution: expected a finite number of at least 0, got {figure}")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Motion:
     """Joint positions of all robots on the common clock.
@@ -60,12 +94,14 @@ class Motion:
         iterations: How often the method looked at the tasks for each step, shape (N - 1,); None when nobody counted.
         slack: By how much each step leaves the tasks on purpose, as the norm of the twist that it gives up (metres
             and radians per second as they come), shape (N - 1,); None when nobody measured it.
+        resolution: How finely it was resolved; None when nobody kept account.
     """
 
     times: Array
     q: Array
     iterations: Array | None = None
     slack: Array | None = None
+    resolution: Resolution | None = None
 
     def __post_init__(self) -> None:
         """Check at the door that nothing is missing or not finite."""

@@ -29,6 +29,38 @@ NULL_SPACE_METHODS: Final[frozenset[str]] = frozenset(
 )  # methods that leave room for goals besides the tasks
 
 
+ACCURATE_METHODS: Final[frozenset[str]] = frozenset({"weighted_pseudo_inverse"})  # methods with an accurate mode
+
+
+class Integrator(StrEnum):
+    """How joint speeds become joint positions.
+
+    ``ACCURATE`` finds joint positions as polynomials in time that keep the tools on their tasks, within a stated error;
+    ``EULER`` goes on from instant to instant of the clock and feeds the pose error back.
+    """
+
+    ACCURATE = "accurate"
+    EULER = "euler"
+
+
+def against_accurate(method: str, *, has_goals: bool, near_limits: float, load: float) -> tuple[str, ...]:
+    """Keys of the solver's settings, as in the cell file, that rule the accurate mode out.
+
+    Args:
+        method: The resolution method.
+        has_goals: Whether anything is pursued besides the tasks.
+        near_limits: See ``WeightingSettings``.
+        load: See ``WeightingSettings``.
+    """
+    obstacles = {
+        "method": method not in ACCURATE_METHODS,
+        "secondary": has_goals,
+        "weighting.near_limits": near_limits != 0.0,
+        "weighting.load": load != 0.0,
+    }
+    return tuple(key for key, stands in obstacles.items() if stands)
+
+
 class SingularityMeasure(StrEnum):
     """What tells how near a singularity is."""
 
@@ -142,8 +174,8 @@ class SolverSettings:
 
     Attributes:
         method: The resolution method.
-        gain: Error feedback gain in [1/s].
-        damping: Largest damping factor; None lets the smallest singular value decide (``auto``).
+        gain: Error feedback gain in [1/s] of Euler's steps.
+        damping: Largest damping factor of Euler's steps; None lets the smallest singular value decide (``auto``).
         seed: Seed of every random search.
         damped_least_squares: Settings of that method.
         filtered_inverse: Settings of both filtered inverses.
@@ -151,6 +183,8 @@ class SolverSettings:
         quadratic_program: Settings of that method.
         weighting: How joint weights change along the motion.
         goals: Secondary goals in the null space.
+        integrator: How joint speeds become positions; ``is_accurate`` says whether the other settings allow it.
+        accuracy: Largest tool error between the nodes of the accurate mode in [m]; angles in as many [rad].
     """
 
     method: MethodName
@@ -163,3 +197,17 @@ class SolverSettings:
     quadratic_program: QuadraticProgramSettings = QuadraticProgramSettings()
     weighting: WeightingSettings = WeightingSettings()
     goals: tuple[SecondaryGoal, ...] = ()
+    integrator: Integrator = Integrator.EULER
+    accuracy: float = 1e-7
+
+    @property
+    def against_accurate(self) -> tuple[str, ...]:
+        """Keys of these settings that rule the accurate mode out."""
+        return against_accurate(
+            self.method, has_goals=bool(self.goals), near_limits=self.weighting.near_limits, load=self.weighting.load
+        )
+
+    @property
+    def is_accurate(self) -> bool:
+        """Whether the motion is resolved accurately: it is asked for, and nothing rules it out."""
+        return self.integrator is Integrator.ACCURATE and not self.against_accurate

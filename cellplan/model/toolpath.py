@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.geometry.arc_length import ArcLength
+from cellplan.geometry.arc_length import ArcLength, QuickParameters
 from cellplan.geometry.curves import Curve
 from cellplan.geometry.orientations import Orientation
 from cellplan.geometry.transforms import Array, pose_from, rotation_about
@@ -72,19 +72,22 @@ class Toolpath:
         pieces = np.clip(np.searchsorted(self.behind, s, side="right") - 1, 0, len(self.stops) - 2)
         return self.targets(pieces, s)[0]
 
-    def targets(self, pieces: NDArray[np.intp], s: Array) -> tuple[Array, Array]:
+    def targets(
+        self, pieces: NDArray[np.intp], s: Array, *, quick: QuickParameters | None = None
+    ) -> tuple[Array, Array]:
         """Tool poses and their change per length of path.
 
         Args:
             pieces: Which piece each target belongs to, shape (N,): it says which side counts at a stop.
             s: Lengths in [m] from the start of the path, shape (N,); beyond its piece the nearer end is taken.
+            quick: Another way to the parameters at these lengths, for a few at a time.
 
         Returns:
             Poses X_PT, shape (N, 4, 4), and tool twists in P per length, linear first, shape (N, 6), in [m/m] and
             [rad/m].
         """
         interval = (self.stops[pieces], self.stops[pieces + 1])
-        u = self.arc.parameters(s, interval)
+        u = (quick or self.arc).parameters(s, interval)
         p, dp = self.tip.evaluate(u, interval)
         R, w = self.orientation.frames(u, interval, p=p, dp=dp)
         twists = np.concatenate([dp, w], axis=1) / np.linalg.norm(dp, axis=1, keepdims=True)

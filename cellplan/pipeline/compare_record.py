@@ -11,8 +11,14 @@ Record = Mapping[str, Any]
 RELATIVE: Final = 1e-6  # [-] figures have seven digits at least
 ABSOLUTE: Final = 1e-7  # [-] in printed units; below it stands the noise of the arithmetic
 COMPARED_ELSEWHERE: Final = frozenset({"inputs", "versions", "digests"})
-KNOWN_TO_THE_PLANNER: Final = frozenset(  # what the steps of the planner took cannot be seen in the tables
-    {("solver", "iterations"), ("solver", "slack"), ("series", "iterations"), ("series", "slack")}
+KNOWN_TO_THE_PLANNER: Final = frozenset(  # what the planner's steps and nodes took cannot be seen in the tables
+    {
+        ("solver", "iterations"),
+        ("solver", "slack"),
+        ("solver", "resolution"),
+        ("series", "iterations"),
+        ("series", "slack"),
+    }
 )
 INSTANT: Final = "at_s"  # ends the names of instants; of two extremes that are alike, the noise picks one
 WORDS: Final = frozenset({"message", "pair", "axis", "joint", "sliding_joint", "busiest_joint"})  # likewise of words

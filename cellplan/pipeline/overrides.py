@@ -5,10 +5,10 @@ from dataclasses import replace
 from difflib import get_close_matches
 from typing import cast, get_args
 
-from cellplan.errors import InputError
+from cellplan.errors import InputError, InvalidFileError
 from cellplan.model.cell import Cell, Mode
 from cellplan.model.cell_errors import CellErrors
-from cellplan.model.solver import NULL_SPACE_METHODS, MethodName
+from cellplan.model.solver import ACCURATE_METHODS, NULL_SPACE_METHODS, Integrator, MethodName
 
 FARTHEST_MM = 10_000.0  # as in the cell file
 SHORTEST = 1e-3  # [s] shorter cycles are slips of the pen
@@ -19,6 +19,7 @@ def with_overrides(
     *,
     mode: str | None = None,
     method: str | None = None,
+    integrator: str | None = None,
     duration: float | None = None,
     clearance_mm: float | None = None,
 ) -> Cell:
@@ -27,18 +28,24 @@ def with_overrides(
     Args:
         cell: The cell as written.
         mode: Who moves.
-        method: Resolution method.
+        method: Resolution method. A cell that does not name its integrator takes the one that goes with the method.
+        integrator: How joint speeds become positions.
         duration: Length of the common clock in [s], for tasks without a time or feed of their own.
         clearance_mm: Smallest allowed distance in [mm] between things that must not touch.
 
     Raises:
         InputError: A choice does not exist, or makes no sense.
     """
+    written = cell.solver.method
     if mode is not None:
         motion = replace(cell.motion, mode=Mode(_known("--mode", mode, [str(each) for each in Mode])))
         cell = replace(cell, motion=motion)
     if method is not None:
         cell = _with_method(cell, cast(MethodName, _known("--method", method, get_args(MethodName))))
+    if integrator is not None:
+        cell = _with_integrator(cell, integrator, is_new_method=method is not None)
+    elif cell.solver.method != written:
+        cell = _with_fitting_integrator(cell)
     if duration is not None:
         cell = _with_duration(cell, duration)
     if clearance_mm is not None:
@@ -83,6 +90,42 @@ def _with_method(cell: Cell, name: MethodName) -> Cell:
             f"it ({', '.join(sorted(NULL_SPACE_METHODS))}), got '{name}'"
         )
     return replace(cell, solver=replace(cell.solver, method=name))
+
+
+def _with_integrator(cell: Cell, name: str, *, is_new_method: bool) -> Cell:
+    """The cell with another integrator, which must go with all that is asked of the solver."""
+    integrator = Integrator(_known("--integrator", name, [str(each) for each in Integrator]))
+    if integrator is Integrator.ACCURATE:
+        complaints = [InputError(_why_not(cell, key, is_new_method)) for key in cell.solver.against_accurate]
+        if complaints:
+            raise complaints[0] if len(complaints) == 1 else InvalidFileError(complaints)
+    return replace(cell, solver=replace(cell.solver, integrator=integrator))
+
+
+def _why_not(cell: Cell, key: str, is_new_method: bool) -> str:
+    """What rules the accurate mode out, where it stands, and what helps."""
+    place, methods = cell.origin.at(f"solver.{key}"), ", ".join(sorted(ACCURATE_METHODS))
+    if key == "method" and is_new_method:
+        return f"--method: expected {methods} with --integrator accurate, got '{cell.solver.method}'"
+    if key == "method":
+        found = f"{place} is '{cell.solver.method}'"
+        return f"--integrator: expected euler, as {found}, got 'accurate'; add --method {methods}"
+    what = "goals besides the tasks" if key == "secondary" else "joint weights that change along the motion"
+    return f"--integrator: expected euler, as {place} asks for {what}, got 'accurate'; remove them from the cell"
+
+
+def _with_fitting_integrator(cell: Cell) -> Cell:
+    """The cell with the integrator that its new method calls for, unless it names one itself."""
+    key = "solver.integrator"
+    if key in cell.origin.lines or not cell.origin.document:
+        if cell.solver.integrator is Integrator.ACCURATE and cell.solver.against_accurate:
+            raise InputError(
+                f"--method: expected {', '.join(sorted(ACCURATE_METHODS))}, as {cell.origin.at(key)} asks for the "
+                f"accurate mode, got '{cell.solver.method}'; add --integrator euler"
+            )
+        return cell
+    integrator = Integrator.EULER if cell.solver.against_accurate else Integrator.ACCURATE
+    return replace(cell, solver=replace(cell.solver, integrator=integrator))
 
 
 def _with_duration(cell: Cell, duration: float) -> Cell:

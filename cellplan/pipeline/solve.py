@@ -17,10 +17,10 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.model.toolpath import Toolpath
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.planning.follow import follow
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.modes import RunPlan, plan_runs
-from cellplan.planning.schedule import examine_times, schedule_tasks
+from cellplan.planning.resolve import resolve
+from cellplan.planning.schedule import examine_times, sample, time_tasks
 from cellplan.planning.start_search import find_start
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.scene import Scene
@@ -55,8 +55,9 @@ def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -
 def _run(scene: Scene, toolpaths: Mapping[str, Toolpath], plan: RunPlan, *, start: Array, progress: Progress) -> Run:
     """Follow the tasks of one run and verify what would be written."""
     cell = scene.cell
-    schedule = schedule_tasks(cell, [toolpaths[name] for name in plan.tasks])
-    motion = follow(cell, schedule, start=start, moving=plan.moving, progress=progress)
+    timed = time_tasks(cell, [toolpaths[name] for name in plan.tasks])
+    schedule = sample(timed)
+    motion = resolve(cell, timed, schedule, start=start, moving=plan.moving, progress=progress)
     program = render_program(cell, motion)
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
     report = verify(scene, schedule, tables, moving=plan.moving, progress=progress)

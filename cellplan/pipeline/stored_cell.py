@@ -16,10 +16,13 @@ from cellplan.model.cell import Cell
 
 ANY: Final = "*"
 FOUND: Final = frozenset({"start", "start_deg"})  # written ``auto`` in a cell whose start was to be found
+METHOD: Final = ("solver", "method")
+INTEGRATOR: Final = ("solver", "integrator")
 ASKED: Final = (  # what the command line may have chosen instead of the cell file
     ("motion", "mode"),
     ("motion", "duration_s"),
-    ("solver", "method"),
+    METHOD,
+    INTEGRATOR,
     ("tasks", ANY, "duration_s"),
 )
 
@@ -66,7 +69,7 @@ def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequen
     remarks = [
         f"{key_text(path)}: {shown(new)} was chosen on the command line; the cell file has {shown(old)}"
         for path, old, new in chosen
-        if path[-1] not in FOUND
+        if path[-1] not in FOUND and not _follows(path, original, chosen)
     ]
     return StoredCell(cell=resolved, compared=tuple(now), remarks=tuple(remarks))
 
@@ -147,6 +150,12 @@ def _may_differ(path: KeyPath, old: object) -> bool:
         len(path) == len(asked) and all(word in (ANY, part) for word, part in zip(asked, path, strict=True))
         for asked in ASKED
     )
+
+
+def _follows(path: KeyPath, original: Cell, chosen: Sequence[tuple[KeyPath, object, object]]) -> bool:
+    """Whether nobody chose a value: an integrator that the cell file leaves open goes with the method."""
+    is_open = path == INTEGRATOR and key_text(path) not in original.origin.lines
+    return is_open and any(other == METHOD for other, _, _ in chosen)
 
 
 def _foreign(stored: StoredRun, cell: Path, difference: tuple[KeyPath, object, object]) -> InputError:

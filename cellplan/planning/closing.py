@@ -34,13 +34,18 @@ def close(problem: TrackingProblem, schedule: Schedule, start: Array, carry: Cal
         InputError: A path is open, or its cycle does not end on an instant of the clock.
         NoSolutionError: The cycle does not close.
     """
-    begin, end = _first_cycle(problem.cell, schedule)
+    begin, end = first_cycle(problem.cell, schedule)
 
     def cycle(constant: Array) -> Array:
         problem.drift = lambda _k, _q: constant
         return carry(end)
 
-    constant = _closing_drift(problem, start, cycle, begin=begin, duration=float(schedule.times[end]))
+    def gap(constant: Array) -> Array:
+        q = cycle(constant)
+        moved: Array = q[-1] - q[begin]
+        return moved
+
+    constant = closing_drift(problem, start, gap, duration=float(schedule.times[end]))
     first = cycle(constant)
 
     def held(k: int, q: Array) -> Array:
@@ -52,9 +57,7 @@ def close(problem: TrackingProblem, schedule: Schedule, start: Array, carry: Cal
     problem.drift = held
 
 
-def _closing_drift(
-    problem: TrackingProblem, start: Array, cycle: Callable[[Array], Array], *, begin: int, duration: float
-) -> Array:
+def closing_drift(problem: TrackingProblem, start: Array, moved: Callable[[Array], Array], *, duration: float) -> Array:
     r"""Joint speeds that, added in the null space at all times, close the joint motion over one cycle.
 
     The drift of one cycle lies in the null space ``N`` of the tasks at the start, as the tools come back. Its ``r``
@@ -64,8 +67,7 @@ def _closing_drift(
     Args:
         problem: The tasks.
         start: Stacked start posture, shape (nq,).
-        cycle: Motion up to the end of the first cycle under a constant drift, shape (k + 1, nq).
-        begin: Instant at which the tools set out on their paths.
+        moved: How far the joints are from where they began after one cycle under a constant drift, shape (nq,).
         duration: Time ``T`` of the motion in [s].
 
     Returns:
@@ -81,8 +83,7 @@ def _closing_drift(
     B = np.eye(len(u)) / duration  # inverse of the derivative
 
     def gap(u: Array) -> Array:
-        q = cycle(N @ u)
-        gap: Array = N.T @ (q[-1] - q[begin])
+        gap: Array = N.T @ moved(N @ u)
         return gap
 
     drift = gap(u)
@@ -101,7 +102,7 @@ def _closing_drift(
     )
 
 
-def _first_cycle(cell: Cell, schedule: Schedule) -> tuple[int, int]:
+def first_cycle(cell: Cell, schedule: Schedule) -> tuple[int, int]:
     """Instants at which the first cycle begins and ends: the whole motion when the tasks keep no common cycle.
 
     Raises:

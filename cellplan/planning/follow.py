@@ -38,18 +38,22 @@ def follow(
     """
     problem = TrackingProblem(cell, schedule, moving, start=start)
     if cell.motion.cyclic:
-        close(problem, schedule, start, lambda last: _carry(problem, start, last=last, progress=progress).q)
-    return _carry(problem, start, last=len(schedule.times) - 1, progress=progress)
+        close(problem, schedule, start, lambda last: carry(problem, start, last=last, progress=progress).q)
+    return carry(problem, start, last=len(schedule.times) - 1, progress=progress)
 
 
-def _carry(problem: TrackingProblem, start: Array, *, last: int, progress: Progress) -> Motion:
-    """Motion from the first instant to the instant ``last``."""
+def carry(problem: TrackingProblem, start: Array, *, first: int = 0, last: int, progress: Progress = silent) -> Motion:
+    """Motion from a start posture at the instant ``first`` to the instant ``last``; rows before it repeat the start.
+
+    Raises:
+        DivergedError: A tool lost its path.
+        NoSolutionError: The method found no way on.
+    """
     cell = problem.cell
     advance = method_named(cell.solver.method)(problem)
-    q = np.empty((last + 1, cell.joint_count))
-    iterations, slack = np.empty(last), np.empty(last)
-    q[0] = start
-    for k in range(last):
+    q = np.tile(start, (last + 1, 1))
+    iterations, slack = np.zeros(last), np.zeros(last)
+    for k in range(first, last):
         try:
             step = advance(k, q[k])
             _refuse_leap(q[k], step)

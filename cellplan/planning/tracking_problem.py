@@ -20,6 +20,7 @@ from cellplan.planning.cooperation import (
     pose_errors,
     reference_frames,
 )
+from cellplan.planning.locked_joints import locked_since
 from cellplan.planning.secondary_goals import SecondaryGoals, Stance, share_within
 from cellplan.planning.weighting import JointWeights
 
@@ -124,7 +125,7 @@ class TrackingProblem:
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
         self.drift: Drift | None = None
         self._goals = self._secondary_goals(start) if cell.solver.goals else None
-        self._locked_since = _locked_since(cell)
+        self._locked_since = locked_since(cell)
         self._may_move = np.isin(_owners(cell), moving)
 
     def step(self, k: int) -> float:
@@ -226,12 +227,3 @@ def _place(task: Relation) -> str:
 def _owners(cell: Cell) -> list[str]:
     """Name of the robot of each joint."""
     return [robot.name for robot in cell.robots for _ in robot.model.joints]
-
-
-def _locked_since(cell: Cell) -> Array:
-    """Instant in [s] from which each joint stays where it is, inf for those that do not fail, shape (nq,)."""
-    since = np.full(cell.joint_count, np.inf)
-    for lock in cell.motion.locked:
-        index = cell.columns(lock.robot).start + cell.robot(lock.robot).model.joint_names.index(lock.joint)
-        since[index] = min(since[index], lock.since)
-    return since

@@ -80,7 +80,7 @@ def report_html(
             "check_groups": _check_groups(report.checks),
             "shares": _shares(record),
             "excluded": _by_reason(record["exclusions"]),
-            "method": list(method_lines(record["solver"])),
+            "method": list(method_lines(record["solver"], record["step_s"])),
             "plots": _inline_plots(plots),
         },
     )

@@ -39,7 +39,7 @@ tasks:
     axes: [x, y]
 {words}    tolerance: {{position_mm: 0.01}}
 motion: {{duration_s: {duration:g}, step_s: 0.001}}
-solver: {{method: recursive_search, search: {{tolerance_mm: 0.01, brakes: true}}}}
+solver: {{method: recursive_search, integrator: euler, search: {{tolerance_mm: 0.01, brakes: true}}}}
 """
 HEADER = """\
 # Nicolato 2007, section 4.2, figure 4.7: the ellipse of `nicolato_ellipse.yaml` by recursive search within tightened

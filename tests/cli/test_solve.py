@@ -91,6 +91,7 @@ def test_rejected_tables_are_kept_on_request(
         ("--mode", "pair", "error: --mode: expected one of simultaneous, pairwise, part_at_rest, got 'pair'"),
         ("--task", "circel", "error: --task: expected one of circle, rhombus, rectangle, got 'circel'"),
         ("--method", "magic", "error: --method: expected one of "),
+        ("--integrator", "rk4", "error: --integrator: expected one of accurate, euler, got 'rk4'"),
         ("--duration", "-4", "error: --duration: expected a number of seconds of at least 0.001, got -4"),
         ("--duration", "nan", "error: --duration: expected a number of seconds of at least 0.001, got nan"),
     ],
@@ -107,6 +108,36 @@ def test_a_wrong_choice_is_refused_before_anything_is_done(
     assert err.startswith(complaint)
     assert err.count("\n") == 1
     assert not folder.exists()
+
+
+def test_the_integrator_is_chosen_on_the_command_line_and_reported(
+    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+
+    status = run(["solve", str(coarse_cell), "-o", str(folder), "--task", "circle", "--integrator", "euler"])
+
+    capsys.readouterr()
+    record = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    assert (status, record["solver"]["integrator"], record["solver"]["accuracy_mm"]) == (0, "euler", 1e-4)
+    assert "Euler steps of 5 ms; errors are fed back" in (folder / "report.html").read_text(encoding="utf-8")
+    assert "integrator: euler" in (folder / "cell.yaml").read_text(encoding="utf-8")
+
+
+def test_an_integrator_that_does_not_go_with_the_cell_names_its_line(
+    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = coarse_cell.read_text(encoding="utf-8").replace("gain_per_s: 200", "gain_per_s: 200, weighting: {load: 1}")
+    coarse_cell.write_text(text, encoding="utf-8")
+    line = 1 + text[: text.index("weighting")].count("\n")
+
+    status = run(["solve", str(coarse_cell), "-o", str(tmp_path / "out"), "--integrator", "accurate"])
+
+    assert status == 2
+    assert capsys.readouterr().err == (
+        f"--integrator: expected euler, as {coarse_cell}:{line}: solver.weighting.load asks for joint weights "
+        "that change along the motion, got 'accurate'; remove them from the cell\n"
+    )
 
 
 def test_a_folder_with_other_things_in_it_is_never_replaced(

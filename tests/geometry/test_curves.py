@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cellplan.geometry.arc_length import measure
+from cellplan.geometry.arc_length import measure, quickly
 from cellplan.geometry.curves import (
     CircleCurve,
     Curve,
@@ -197,6 +197,34 @@ def test_parameters_at_lengths_invert_the_length(curve: Curve) -> None:
             rates = curve.evaluate(a + 0.5 * (nodes + 1.0) * (b - a), whole)[1]
             length += 0.5 * (b - a) * float(weights @ np.linalg.norm(rates, axis=1))
         assert length == pytest.approx(way, abs=1e-11 * arc.total)
+
+
+@pytest.mark.parametrize(
+    "curve", [*_curves(), CircleCurve(centre=EZ, first=EX, second=1e-3 * EY)], ids=lambda value: type(value).__name__
+)
+@pytest.mark.parametrize("count", [1, 12, 300])
+def test_the_quick_way_to_parameters_leads_to_the_same(curve: Curve, count: int) -> None:
+    arc = measure(curve)
+    whole = (float(curve.knots[0]), float(curve.knots[-1]))
+    wanted = np.sort(np.random.default_rng(count).uniform(0.0, arc.total, count))
+
+    u = quickly(arc).parameters(wanted, whole)
+
+    # both are roots to rounding of the length; the flat ellipse is slow at its ends
+    assert np.abs(arc.lengths(u) - wanted).max() <= 1e-14 * arc.total
+    assert np.allclose(u, arc.parameters(wanted, whole), rtol=0.0, atol=1e-11)
+
+
+def test_the_quick_way_keeps_within_its_interval() -> None:
+    curve = next(curve for curve in _curves() if len(curve.knots) > 2)
+    arc = measure(curve)
+    low, high = (float(knot) for knot in curve.knots[1:3])
+
+    u = quickly(arc).parameters(np.array([0.0, arc.total]), (low, high))
+
+    assert u == pytest.approx([low, high], rel=1e-15)
+    assert low <= u[0]
+    assert u[1] <= high
 
 
 def test_a_flat_ellipse_is_measured_as_well() -> None:

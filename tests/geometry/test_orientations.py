@@ -87,3 +87,11 @@ def test_between_two_stops_the_tool_turns_evenly_about_one_axis() -> None:
     turn = rotation_vector(ROTATIONS[3] @ ROTATIONS[2].T)
     assert np.allclose(w, turn / 0.6, atol=1e-13)
     assert np.allclose(R[10], rotation_exp(0.5 * turn) @ ROTATIONS[2], atol=1e-14)
+
+
+def test_orientations_know_where_they_are_joined() -> None:
+    axes = AxisFrame(axes=smooth_through(KNOTS, AXES, breaks=INNER), x_hint=np.array([0.1, -2.0, 0.3]))
+    ball = NormalFrame(patch=Ball(centre=np.zeros(3), radius=1.0), x_hint=np.array([1.0, 0.0, 0.0]))
+
+    assert axes.knots.tolist() == rotations_through(KNOTS, ROTATIONS, breaks=INNER).knots.tolist() == KNOTS.tolist()
+    assert len(ball.knots) == len(FixedFrame(R=np.eye(3)).knots) == 0

@@ -33,7 +33,7 @@ tasks:
     axes: [x, y]
     {words}
 motion: {{duration_s: {duration}, step_s: {step}}}
-solver: {{gain_per_s: {gain}}}
+solver: {{integrator: euler, gain_per_s: {gain}}}
 """
 RECTANGLE = "{rectangle: {sides_mm: [400, 300], plane: xy, center_mm: [1300, 0]}}"
 CIRCLE = "{circle: {radius_mm: 300, plane: xy, center_mm: [1300, 0]}}"

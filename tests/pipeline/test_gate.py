@@ -13,6 +13,8 @@ from stored_cells import write_cell
 
 from cellplan import load_cell, open_gate, solve, write_run
 from cellplan.errors import InputError, NotVerifiedError
+from cellplan.model.motion import Resolution
+from cellplan.model.solver import Integrator
 from cellplan.model.verified_run import SEAL, VerifiedRun
 from cellplan.pipeline.overrides import with_overrides
 
@@ -112,7 +114,8 @@ def test_a_report_of_another_version_of_cellplan_may_have_other_keys(copy: Path)
 
 def test_a_failed_run_is_told_with_its_reason(tmp_path: Path) -> None:
     cell = write_cell(tmp_path / "cell")
-    cell.write_text(cell.read_text().replace("position_mm: 1,", "position_mm: 0.0001,"), encoding="utf-8")
+    by_steps = cell.read_text().replace("position_mm: 1,", "position_mm: 0.0001,") + "solver: {integrator: euler}\n"
+    cell.write_text(by_steps, encoding="utf-8")
     write_run(solve(load_cell(cell)), tmp_path / "run", keep_rejected=True)
 
     message = refusal(tmp_path / "run", cell, NotVerifiedError)
@@ -153,6 +156,56 @@ def test_what_the_command_line_chose_is_told(sound: Path, tmp_path: Path) -> Non
         "motion.mode: 'part_at_rest' was chosen on the command line; the cell file has 'simultaneous'",
         "tasks.path.duration_s: 1.5 was chosen on the command line; the cell file has 1",
     ]
+
+
+@pytest.mark.parametrize(
+    ("choices", "remarks"),
+    [
+        (
+            {"integrator": "euler"},
+            ["solver.integrator: 'euler' was chosen on the command line; the cell file has 'accurate'"],
+        ),
+        (
+            {"method": "damped_least_squares"},  # brings its integrator along, which nobody chose
+            [
+                "solver.method: 'damped_least_squares' was chosen on the command line; the cell file has "
+                "'weighted_pseudo_inverse'"
+            ],
+        ),
+    ],
+)
+def test_a_run_with_another_integrator_passes_and_tells_what_was_chosen(
+    sound: Path, tmp_path: Path, choices: dict[str, str], remarks: list[str]
+) -> None:
+    cell = load_cell(sound / "cell" / "small.yaml")
+    write_run(solve(with_overrides(cell, **choices)), tmp_path / "run")
+
+    run = open_gate(tmp_path / "run", cell=sound / "cell" / "small.yaml")
+
+    assert list(run.remarks) == remarks
+    assert run.cell.solver.integrator is Integrator.EULER
+
+
+def test_how_finely_a_motion_was_resolved_is_left_to_the_planner(sound: Path, tmp_path: Path) -> None:
+    solution = solve(load_cell(sound / "cell" / "small.yaml"))
+    made = Resolution(integrator=Integrator.ACCURATE, panels=4, nodes=36, sweeps=9, solves=324, error_between=3e-9)
+    runs = tuple(replace(run, motion=replace(run.motion, resolution=made)) for run in solution.runs)
+
+    write_run(replace(solution, runs=runs), tmp_path / "run")
+
+    record = json.loads((tmp_path / "run" / "report.json").read_text(encoding="utf-8"))
+    assert record["solver"]["resolution"]["error_between_nodes_mm"] == 3e-6
+    assert "36 nodes in 4 panels" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert open_gate(tmp_path / "run", cell=sound / "cell" / "small.yaml").remarks == ()
+
+
+def test_another_integrator_than_that_of_the_run_is_found_in_its_report(copy: Path) -> None:
+    edit_json(copy / "run" / "report.json", lambda record: record["solver"].update(integrator="euler"))
+    seal_again(copy / "run")
+
+    assert refusal(copy / "run", copy / "cell" / "small.yaml") == (
+        f"{copy / 'run' / 'report.json'}: solver.integrator: 'euler' stands there, 'accurate' was found"
+    )
 
 
 def test_runs_of_single_tasks_are_verified_one_by_one(sound: Path, tmp_path: Path) -> None:

@@ -107,7 +107,7 @@ def test_planar_pair_of_appendix_e(cells):
 
 def test_euler_reference_agrees_with_a_finer_one(cells):
     """The redundancy is resolved too: the final posture at half the step is the same to first order."""
-    cell = with_overrides(load_cell(cells / "four_robots.yaml"), duration=4.0)
+    cell = with_overrides(load_cell(cells / "four_robots.yaml"), integrator="euler", duration=4.0)
     finer = replace(
         cell, motion=replace(cell.motion, step=5e-4), solver=replace(cell.solver, gain=2 * cell.solver.gain)
     )
@@ -221,8 +221,8 @@ def test_idle_robots_in_the_way_of_the_part_are_to_be_withdrawn(cells, tmp_path)
 
 
 def test_one_failed_run_withholds_the_tables_of_all(cells, tmp_path):
-    """With 0.1 um allowed the circle cannot pass; the rhombus alone would, but the job as a whole did not."""
-    cell = with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise")
+    """With 0.1 um allowed Euler's circle cannot pass; the rhombus alone would, but the job as a whole did not."""
+    cell = with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise", integrator="euler")
     strict = replace(cell.task("circle"), tolerance=Tolerance(position=1e-7, orientation=1e-3))
     cell = replace(cell, tasks=(strict, cell.task("rhombus")))
     solution = solve(cell)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cellplan.model.motion import Motion
+from cellplan.model.motion import Motion, Resolution
+from cellplan.model.solver import Integrator
 from cellplan.report.json_report import report_json, summary_json
 
 OWN_NAMES = {"inputs", "digests", "versions"}  # the keys below these are names of files and packages
@@ -28,7 +29,8 @@ def keys(tree: Any, names: set[str]) -> set[str]:
 def reports(rail_run: Any, pairwise_runs: Any) -> list[Any]:
     steps = len(rail_run.report.times) - 1
     q = np.zeros((steps + 1, 1))
-    motion = Motion(times=rail_run.report.times, q=q, iterations=np.ones(steps), slack=np.zeros(steps))
+    made = Resolution(integrator=Integrator.ACCURATE, panels=2, nodes=18, sweeps=4, solves=72, error_between=1e-9)
+    motion = Motion(times=rail_run.report.times, q=q, iterations=np.ones(steps), slack=np.zeros(steps), resolution=made)
     one = report_json(rail_run.report, cell=rail_run.cell, provenance=rail_run.provenance, motion=motion)
     runs = {name: run.report for name, run in pairwise_runs.items()}
     several = summary_json(runs, cell=rail_run.cell, provenance=rail_run.provenance)

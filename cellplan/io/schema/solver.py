@@ -147,13 +147,27 @@ class SolverEntry(Entry):
     method: MethodName = Field(
         default="weighted_pseudo_inverse", description='Resolution method; the guide "Which method when" compares them.'
     )
+    integrator: Literal["accurate", "euler"] | None = Field(
+        default=None,
+        description="How joint speeds become positions: accurate resolves the motion until the tool error between all "
+        "nodes is below accuracy_mm, euler steps along the clock and feeds the error back. accurate goes with "
+        "weighted_pseudo_inverse, without secondary goals, near_limits and load. When absent: accurate where it goes, "
+        "else euler; gain_per_s and damping do not count in this.",
+    )
+    accuracy_mm: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
+        default=1e-4,
+        description="Largest tool error between the nodes of the accurate mode; for angles the same number in "
+        "milliradians. euler does not use it.",
+    )
     gain_per_s: Gain | None = Field(
         default=None,
-        description="Gain of the pose-error feedback; 0.5 / step_s when absent. gain_per_s * step_s is below 2.",
+        description="Gain of the pose-error feedback; 0.5 / step_s when absent. gain_per_s * step_s is below 2. Used "
+        "by euler, and by accurate only where it has to fall back to Euler's steps.",
     )
     damping: DampingChoice = Field(
         default="auto",
-        description="Largest damping factor; auto lets the smallest singular value decide, 0 turns it off.",
+        description="Largest damping factor; auto lets the smallest singular value decide, 0 turns it off. Used by "
+        "euler, and by accurate only where it has to fall back to Euler's steps.",
     )
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(default=0, description="Seed of every random search.")
     damped_least_squares: DampedLeastSquaresEntry = Field(

@@ -1,0 +1,183 @@
+"""Kinematics of all robots at many postures at once, postures last: each lane of an array is one posture of one cell.
+
+The arrays are laid out so that NumPy works through thousands of postures in one call; robots lie side by side and are
+filled up to the longest chain with axes that do nothing. Lanes may differ in base poses and tools.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.transforms import Array, skew
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.robot import BASE, FollowerJoint, Joint
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Where robots stand, what they hold, and how the part is held; the last axis is one for all lanes, or the lanes.
+
+    Attributes:
+        R_WB: Base orientations, shape (3, 3, robots, lanes or 1).
+        p_WB: Base positions in [m], shape (3, robots, lanes or 1).
+        R_LT: Tool orientations seen from the last link, shape (3, 3, robots, lanes or 1).
+        p_LT: Tool tips seen from the last link in [m], shape (3, robots, lanes or 1).
+    """
+
+    R_WB: Array
+    p_WB: Array
+    R_LT: Array
+    p_LT: Array
+
+    def of(self, lanes: NDArray[np.intp]) -> "Placement":
+        """That of some lanes only."""
+        return self if self.R_WB.shape[-1] == 1 else Placement(*(part[..., lanes] for part in self._parts))
+
+    def repeated(self, count: int) -> "Placement":
+        """Each lane so many times, one after the other."""
+        if self.R_WB.shape[-1] == 1:
+            return self
+        return Placement(*(np.repeat(part, count, axis=-1) for part in self._parts))
+
+    @property
+    def _parts(self) -> tuple[Array, Array, Array, Array]:
+        """All arrays."""
+        return self.R_WB, self.p_WB, self.R_LT, self.p_LT
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaneState:
+    """All robots at all lanes.
+
+    Attributes:
+        axes: Directions of the axes on the way to the flanges in W, shape (3, levels, robots, lanes).
+        points: A point on each, in [m], shape (3, levels, robots, lanes).
+        R_WT: Tool orientations, shape (3, 3, robots, lanes).
+        p_WT: Tool tips in [m], shape (3, robots, lanes).
+    """
+
+    axes: Array
+    points: Array
+    R_WT: Array
+    p_WT: Array
+
+
+class LaneChains:
+    """The chains from base to flange of all robots of a cell, level by level.
+
+    Attributes:
+        levels: Axes of the longest chain.
+        joints: Joints of the robot with the most.
+        is_turning: 1 where an axis turns, 0 where it slides or only fills up, shape (levels, robots).
+        is_sliding: 1 where an axis slides, shape (levels, robots).
+        to_joints: Share of each axis in its joint, shape (levels, joints, robots); followers add to their leaders.
+        is_plain: Whether every axis on the way to a flange is a joint, in order, and every joint is on the way.
+        is_all_turning: Whether no axis slides.
+        columns: Place of each joint in the stacked joint vector, shape (joints, robots); -1 where a robot has fewer.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        """Take the axes at the reference posture; all link frames are parallel to the base there."""
+        chains = [_chain(robot) for robot in cell.robots]
+        robots = len(chains)
+        self.levels = max(1, *(len(chain) for chain in chains))
+        self.joints = max(1, *(len(robot.model.joints) for robot in cell.robots))
+        self.is_turning = np.zeros((self.levels, robots))
+        self.is_sliding = np.zeros((self.levels, robots))
+        self.to_joints = np.zeros((self.levels, self.joints, robots))
+        self.columns = np.full((self.joints, robots), -1)
+        self._axis = np.zeros((self.levels, 3, robots))
+        self._step = np.zeros((self.levels, 3, robots))
+        self._leader = np.zeros((self.levels, robots), dtype=np.intp)
+        self._offset = np.zeros((self.levels, robots))
+        self._ratio = np.zeros((self.levels, robots))
+        for index, (robot, chain) in enumerate(zip(cell.robots, chains, strict=True)):
+            self._take(index, robot, chain, first=cell.columns(robot.name).start)
+        S = skew(np.moveaxis(self._axis, 1, -1))  # (levels, robots, 3, 3)
+        turning = self.is_turning[:, None, None]
+        self._S = (np.moveaxis(S, 1, -1) * turning)[..., None]
+        self._S2 = (np.moveaxis(S @ S, 1, -1) * turning)[..., None]
+        self._places = np.stack([self._step, self._axis], axis=2)[..., None]
+        self._slide = (self._axis * self.is_sliding[:, None])[..., None]
+        self._last_point = np.array([_last_point(robot) for robot in cell.robots])
+        self.is_all_turning = not self.is_sliding.any()
+        own = np.arange(self.joints)[:, None] < [len(robot.model.joints) for robot in cell.robots]
+        plain = np.eye(self.levels, self.joints)[:, :, None] * own
+        self.is_plain = bool(self.levels == self.joints and np.array_equal(self.to_joints, plain))
+
+    def placement(self, cell: Cell) -> Placement:
+        """Where the robots of a cell like this one stand, and their tools: one for all lanes."""
+        X_WB = np.stack([robot.X_WB for robot in cell.robots], axis=-1)[..., None]
+        X_LT = np.stack([robot.model.X_BF @ robot.tool.X_FT for robot in cell.robots], axis=-1)[..., None]
+        p_LT = X_LT[:3, 3] - self._last_point.T[..., None]
+        return Placement(X_WB[:3, :3], X_WB[:3, 3], X_LT[:3, :3], p_LT)
+
+    def state(self, q: Array, placement: Placement) -> LaneState:
+        """Kinematics at stacked joint vectors, shape (nq, lanes)."""
+        frames = self._steps(q)
+        R: Array = np.broadcast_to(placement.R_WB, (3, 3, *frames.shape[3:]))
+        for level in range(self.levels):
+            frames[level] = np.einsum("ijrb,jcrb->icrb", R, frames[level])
+            R = frames[level, :, :3]
+        frames[0, :, 3] += placement.p_WB
+        points = np.cumsum(frames[:, :, 3], axis=0)
+        R_WT = np.einsum("ijrb,jkrb->ikrb", R, np.broadcast_to(placement.R_LT, R.shape))
+        p_WT = points[-1] + np.einsum("ijrb,jrb->irb", R, np.broadcast_to(placement.p_LT, R.shape[1:]))
+        return LaneState(np.swapaxes(frames[:, :, 4], 0, 1), np.swapaxes(points, 0, 1), R_WT, p_WT)
+
+    def _steps(self, q: Array) -> Array:
+        """How each axis turns what follows (three columns), where it is and where it points to.
+
+        All are seen from the link before it, shape (levels, 3, 5, robots, lanes).
+        """
+        position = self._ratio[..., None] * q[self._leader] + self._offset[..., None]
+        steps = np.empty((self.levels, 3, 5, *position.shape[1:]))
+        sine, versine = np.sin(position)[:, None, None], (1.0 - np.cos(position))[:, None, None]
+        np.multiply(self._S, sine, out=steps[:, :, :3])
+        steps[:, :, :3] += self._S2 * versine
+        for k in range(3):
+            steps[:, k, k] += 1.0
+        steps[:, :, 3:] = self._places
+        if not self.is_all_turning:
+            steps[:, :, 3] += self._slide * position[:, None]
+        return steps
+
+    def _take(self, index: int, robot: Robot, chain: list[int], *, first: int) -> None:
+        """Fill in one robot."""
+        model = robot.model
+        every: tuple[Joint | FollowerJoint, ...] = (*model.joints, *model.followers)
+        before = np.zeros(3)
+        for level, link in enumerate(chain):
+            axis = every[link]
+            self._axis[level, :, index] = axis.axis_B
+            self._step[level, :, index] = axis.point_B - before
+            before = axis.point_B
+            leader, self._ratio[level, index] = link, 1.0
+            if isinstance(axis, FollowerJoint):
+                leader, self._ratio[level, index] = axis.leader, axis.ratio
+                self._offset[level, index] = axis.offset
+            self._leader[level, index] = first + leader
+            self.is_turning[level, index] = float(axis.is_revolute)
+            self.is_sliding[level, index] = float(not axis.is_revolute)
+            self.to_joints[level, leader, index] = self._ratio[level, index]
+        self.columns[: len(model.joints), index] = first + np.arange(len(model.joints))
+
+
+def _chain(robot: Robot) -> list[int]:
+    """Links on the way from the base to the flange, in order."""
+    every: tuple[Joint | FollowerJoint, ...] = (*robot.model.joints, *robot.model.followers)
+    links: list[int] = []
+    link = robot.model.flange_link
+    while link != BASE:
+        links.append(link)
+        link = every[link].parent
+    return links[::-1]
+
+
+def _last_point(robot: Robot) -> Array:
+    """The point of the axis that carries the flange, at the reference posture in B; the base origin without one."""
+    if robot.model.flange_link == BASE:
+        return np.zeros(3)
+    every: tuple[Joint | FollowerJoint, ...] = (*robot.model.joints, *robot.model.followers)
+    return every[robot.model.flange_link].point_B

@@ -1,0 +1,88 @@
+"""Inverse of the arrow-shaped cooperation Jacobian, at thousands of postures at once.
+
+Only the columns of the positioner couple the operators, so that the work grows linearly with their number. As in
+`kinematics.lanes` the last axis of every array is that of the postures.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+
+REGULAR: Final = 1e-10  # share of the largest diagonal entry that keeps a block invertible where its rank is lost
+
+
+class ArrowInverse:
+    r"""Weighted pseudo-inverse of ``J = [diag(A_i), C]`` without ever forming it ([Ribeiro2010]_ Eqs. 4.33, D.28).
+
+    With ``D_i = A_i W_i^{-1} A_i^T`` and ``S = W_c + \sum C_i^T D_i^{-1} C_i`` (Woodbury)
+
+    .. math:: \dot q_c = S^{-1} \sum_i C_i^T D_i^{-1} b_i, \qquad
+              \dot q_i = W_i^{-1} A_i^T D_i^{-1} (b_i - C_i \dot q_c)
+
+    is ``J^# b`` for ``J^# = W^{-1} J^T (J W^{-1} J^T)^{-1}``. A trace of damping keeps the blocks of operators
+    invertible that cannot do their task alone; whoever calls corrects what it costs, as Newton's method does.
+    """
+
+    def __init__(self, A: Array, C: Array, *, mobility: Array, coupling_weights: Array, idle: Array) -> None:
+        """Factorise.
+
+        Args:
+            A: Columns of each task's own robot, shape (6, n, tasks, lanes).
+            C: Columns of the joints that all tasks share, shape (6, m, tasks, lanes).
+            mobility: Inverse weights of the own joints, 0 for those that may not move, shape (n, tasks, 1 or lanes).
+            coupling_weights: Weights of the shared joints, shape (m,); their columns are 0 where they may not move.
+            idle: 1 for components that a task leaves open, whose rows are 0, shape (6, tasks, 1).
+        """
+        self._A, self._C = A, C
+        self._mobile_A = A * mobility
+        D = np.einsum("intb,jntb->ijtb", self._mobile_A, A)
+        scale = np.einsum("iitb->tb", D) + np.einsum("imtb,imtb,m->tb", C, C, 1.0 / coupling_weights)
+        diagonal = np.einsum("iitb->itb", D)
+        diagonal += REGULAR * scale + idle
+        lower = eliminated(D, C)
+        self._D_factor, self._Y = lower[:, :6], lower[:, 6:]
+        S = np.einsum("ijtb,iktb->jkb", self._Y, self._Y)
+        np.einsum("jjb->jb", S)[:] += coupling_weights[:, None]
+        self._S_factor = eliminated(S)
+
+    def speeds(self, b: Array) -> tuple[Array, Array]:
+        """Smallest weighted joint speeds for twists, shape (6, tasks, lanes).
+
+        Returns:
+            Speeds of the own joints, shape (n, tasks, lanes), and of the shared ones, shape (m, lanes).
+        """
+        u = np.einsum("ijtb,jtb->itb", self._D_factor, b)
+        g = np.einsum("ijb,jb->ib", self._S_factor, np.einsum("imtb,itb->mb", self._Y, u))
+        shared = np.einsum("jib,jb->ib", self._S_factor, g)
+        u -= np.einsum("imtb,mb->itb", self._Y, shared)
+        y = np.einsum("jitb,jtb->itb", self._D_factor, u)
+        return np.einsum("intb,itb->ntb", self._mobile_A, y), shared
+
+    def twists(self, own: Array, shared: Array) -> Array:
+        """Tool twists that joint speeds give, ``J q_dot``, shape (6, tasks, lanes)."""
+        twists: Array = np.einsum("intb,ntb->itb", self._A, own) + np.einsum("imtb,mb->itb", self._C, shared)
+        return twists
+
+
+def eliminated(M: Array, *beside: Array) -> Array:
+    """Inverse ``F`` of the lower Cholesky factors of symmetric positive matrices, and ``F`` times what stands beside.
+
+    Gauss's elimination on ``[M, I, B]`` with the pivots shared between both sides: ``M^-1 = F^T F``. Lanes that are not
+    positive give what is not a number.
+
+    Args:
+        M: The matrices, shape (k, k, ...).
+        beside: Further columns ``B``, shape (k, m, ...) each.
+
+    Returns:
+        ``[F, F B]``, shape (k, k + m, ...).
+    """
+    size = len(M)
+    unit = np.broadcast_to(np.eye(size).reshape(size, size, *[1] * (M.ndim - 2)), M.shape)
+    rows = np.concatenate([M, unit, *beside], axis=1)
+    for j in range(size):
+        rows[j] /= np.sqrt(rows[j, j])
+        rows[j + 1 :, j + 1 :] -= rows[j, j + 1 : size, None] * rows[j, None, j + 1 :]
+    return rows[:, size:]

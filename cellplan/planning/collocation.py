@@ -1,0 +1,148 @@
+r"""Collocation: joints as polynomials in time that hold the tools on their tasks and resolve the redundancy.
+
+On each panel the joints are polynomials through Chebyshev points, the nodes. At every node the tools are on their
+tasks, and in the null space of the tasks the joints are the integral of the weighted pseudo-inverse
+([Ribeiro2010]_ Eq. D.28):
+
+.. math:: e(t_j, q_j) = 0, \qquad N_j \left( q(t_0) + \int_{t_0}^{t_j} J^\# \dot x_d \, dt - q_j \right) = 0
+
+Picard's iteration finds the integral, Newton's the tasks, both in one pass over all nodes of a window: with
+``d_j`` what Picard would add to ``q_j``, the pass adds ``d_j + J^# (e_j - J d_j)``.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.transforms import Array
+from cellplan.kinematics.lanes import Placement
+from cellplan.planning.lane_targets import LaneTargets
+from cellplan.planning.lane_tasks import LaneTasks, Wanted
+from cellplan.planning.windows import Window
+
+Indices = NDArray[np.intp]
+Record = Callable[[Window, Indices, Array, Array], None]  # window, cells, q (nq, cells, nodes), errors (cells,)
+
+MOST_PASSES: Final = 20  # over a window; where passes help, about eight do
+SLOW: Final = 0.7  # a pass that leaves more than this share of the change before does not lead to a solution
+FREE_PASSES: Final = 3  # before a pass is judged by that
+LONGEST_MOVE: Final = np.pi  # [rad] or [m]: a pass that moves a joint farther has lost its way
+POSTURE_SHARE: Final = 10.0  # postures may be this many times as far from their limit as tools, in [rad] for [m]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Attempt:
+    """What came of one window.
+
+    Attributes:
+        q: Postures at the nodes, shape (nq, cells, nodes).
+        is_settled: Whether the passes came to an end, shape (cells,).
+        errors: Largest tool error at the nodes and between them, [m] or [rad], by panel, shape (panels, cells).
+    """
+
+    q: Array
+    is_settled: NDArray[np.bool_]
+    errors: Array
+
+
+class Collocation:
+    """Resolves one run of many cells that differ in bases, tools and start postures only.
+
+    Attributes:
+        sweeps: Passes over windows so far.
+        solves: Systems of equations solved so far: nodes of all passes.
+        is_lost: Which cells could not be carried on, shape (cells,).
+    """
+
+    def __init__(self, tasks: LaneTasks, targets: LaneTargets, placement: Placement, *, accuracy: float) -> None:
+        """Begin with no cell lost.
+
+        Args:
+            tasks: The tasks of the run.
+            targets: Where the tools are wanted.
+            placement: Where the robots of the cells stand; one for all, or one per cell.
+            accuracy: Largest tool error at the nodes and between them, in [m] and [rad].
+        """
+        self._tasks, self._targets, self._placement, self._accuracy = tasks, targets, placement, accuracy
+        self.sweeps = self.solves = 0
+        self.mobile: Array = np.ones(tasks.joint_count)
+        self.drift: Array | None = None
+        self.shortest = 0.0
+
+    def carry(self, windows: tuple[Window, ...], q: Array, cells: Indices, record: Record) -> Indices:
+        """Carry cells through windows, refined where that is needed; returns those that came to the end.
+
+        Args:
+            windows: Windows in order.
+            q: Postures of all cells, shape (nq, all cells); those of the cells are carried on in place.
+            cells: Indices of the cells to carry.
+            record: Is told of every window that cells passed, in order for each of them.
+        """
+        for window, wanted in zip(windows, self._targets.in_windows(windows), strict=True):
+            if not len(cells):
+                break
+            cells = self._carry_on(window, wanted, q, cells, record=record)
+        return cells
+
+    def _carry_on(self, window: Window, wanted: Wanted, q: Array, cells: Indices, *, record: Record) -> Indices:
+        """Carry cells through one window; those for which it is too coarse go through finer ones."""
+        attempt = self.attempt(window, wanted, q[:, cells], self._placement.of(cells))
+        is_exact = attempt.is_settled & np.all(attempt.errors <= self._accuracy, axis=0)
+        through = cells[is_exact]
+        if len(through):
+            q[:, through] = attempt.q[:, is_exact, -1]
+            record(window, through, attempt.q[:, is_exact], attempt.errors[:, is_exact].max(axis=0))
+        is_rough = attempt.is_settled & ~is_exact
+        finer: list[tuple[NDArray[np.bool_], tuple[Window, ...]]] = [(~attempt.is_settled, window.halves())]
+        if is_rough.any():
+            finer.append((is_rough, window.refined(np.any(attempt.errors[:, is_rough] > self._accuracy, axis=1))))
+        arrived = [through]
+        for which, windows in finer:
+            if which.any() and all(panel.length >= self.shortest for each in windows for panel in each.panels):
+                arrived.append(self.carry(windows, q, cells[which], record))
+        return np.sort(np.concatenate(arrived))
+
+    def attempt(self, window: Window, wanted: Wanted, q0: Array, placement: Placement) -> Attempt:
+        """Resolve one window from start postures, shape (nq, cells)."""
+        cells, nodes = q0.shape[1], window.count
+        at_nodes, spread = wanted.between(0, nodes).repeated(cells), placement.repeated(nodes)
+        q = np.repeat(q0[:, :, None], nodes, axis=2)
+        is_settled, is_open = np.zeros(cells, dtype=bool), np.ones(cells, dtype=bool)
+        before = np.full(cells, np.inf)
+        for number in range(MOST_PASSES):
+            moved = self._pass(window, at_nodes, q, spread, q0=q0)
+            q += moved
+            change = np.abs(moved).max(axis=(0, 2))
+            ratio = change / before if number else np.full(cells, SLOW)
+            left = change * ratio / np.maximum(1.0 - ratio, 1.0 - SLOW)
+            is_settled |= is_open & (left <= POSTURE_SHARE * self._accuracy)
+            is_open &= ~is_settled & (change < LONGEST_MOVE) & ((ratio <= SLOW) | (number < FREE_PASSES))
+            before = change
+            if not is_open.any():
+                break
+        return Attempt(q, is_settled, self._errors(window, wanted.repeated(cells), q, placement))
+
+    def _pass(self, window: Window, wanted: Wanted, q: Array, placement: Placement, *, q0: Array) -> Array:
+        """What one pass adds to the postures at the nodes, shape (nq, cells, nodes)."""
+        self.sweeps += 1
+        self.solves += q.shape[1] * q.shape[2]
+        look = self._tasks.look(q.reshape(len(q), -1), wanted, placement, mobile=self.mobile)
+        speeds = look.speeds(self.drift).reshape(q.shape)
+        picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
+        moved: Array = (picard + look.correction(picard)).reshape(q.shape)
+        moved[:, :, 0] = 0.0
+        return moved
+
+    def _errors(self, window: Window, wanted: Wanted, q: Array, placement: Placement) -> Array:
+        """Largest tool errors at the nodes and between them, by panel, shape (panels, cells)."""
+        everywhere = np.concatenate([q, q @ window.between.T], axis=2)
+        cells, instants = everywhere.shape[1:]
+        errors = self._tasks.errors(everywhere.reshape(len(q), -1), wanted, placement.repeated(instants))
+        squares = np.maximum(np.sum(errors[:3] ** 2, axis=0), np.sum(errors[3:] ** 2, axis=0)).max(axis=0)
+        worst = np.sqrt(squares).reshape(cells, instants)
+        largest = np.zeros((len(window.panels), cells))
+        np.maximum.at(largest, window.panel_of, worst.T)
+        return largest

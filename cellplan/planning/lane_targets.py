@@ -1,0 +1,47 @@
+"""Where all tools are wanted, at the instants of windows, in lanes."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Grasp
+from cellplan.planning.lane_tasks import Wanted
+from cellplan.planning.start_offset import StartOffset
+from cellplan.planning.timing import TimedTasks
+from cellplan.planning.windows import Window
+
+
+class LaneTargets:
+    """The tools of timed tasks, then those of further holders, whose grasps never change.
+
+    Attributes:
+        offset: How far the tools stand beside their paths at the start; None when they stand on them.
+    """
+
+    def __init__(self, timed: TimedTasks, grasps: Sequence[Grasp]) -> None:
+        """Take what asks for a tool's motion."""
+        self._timed, self._grasps = timed, tuple(grasps)
+        self.offset: StartOffset | None = None
+
+    def in_windows(self, windows: Sequence[Window]) -> list[Wanted]:
+        """Targets at the instants of each window; each sees corners from inside its panels."""
+        times = np.concatenate([window.instants for window in windows])
+        begins, ends = (np.concatenate(parts) for parts in zip(*(window.stretches for window in windows), strict=True))
+        wanted = self.at(times, begins, ends)
+        cuts = np.cumsum([0, *(len(window.instants) for window in windows)]).tolist()
+        return [wanted.between(low, high) for low, high in pairwise(cuts)]
+
+    def at(self, times: Array, begins: Array, ends: Array) -> Wanted:
+        """Targets at instants in [s], each between two breaks, shape (N,) each."""
+        count = len(self._timed.paths)
+        X = np.empty((4, 4, count + len(self._grasps), len(times)))
+        twists = np.zeros((6, X.shape[2], X.shape[3]))
+        for index, path in enumerate(self._timed.paths):
+            X_PT, V_PT_P = path.at(times, (begins, ends))
+            X[:, :, index], twists[:, index] = np.moveaxis(X_PT, 0, -1), V_PT_P.T
+        for index, grasp in enumerate(self._grasps, start=count):
+            X[:, :, index] = grasp.X_PT[:, :, None]
+        R, p = X[:3, :3], X[:3, 3]
+        return Wanted(R, p, twists) if self.offset is None else Wanted(*self.offset.applied(times, R, p, twists))

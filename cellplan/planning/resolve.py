@@ -1,0 +1,97 @@
+"""Resolve a run: from timed tasks to the motion of all joints, by the integrator that the cell asks for."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Motion, Resolution, Schedule
+from cellplan.model.progress import Progress, silent
+from cellplan.model.solver import Integrator
+from cellplan.model.task import INSTANT_ROOM
+from cellplan.planning.accurate_run import AccurateRun
+from cellplan.planning.closing import closing_drift, first_cycle
+from cellplan.planning.follow import carry, follow
+from cellplan.planning.joint_path import JointPath
+from cellplan.planning.timing import TimedTasks
+from cellplan.planning.tracking_problem import TrackingProblem
+
+
+def resolve(
+    cell: Cell,
+    timed: TimedTasks,
+    schedule: Schedule,
+    *,
+    start: Array,
+    moving: Sequence[str],
+    progress: Progress = silent,
+) -> Motion:
+    """Motion of all joints that follows the tasks.
+
+    Where the accurate mode finds no way on, Euler's steps with damping and feedback go on to the end: the checks tell
+    what that costs.
+
+    Args:
+        cell: The cell; its solver names the integrator.
+        timed: The tasks on the common clock.
+        schedule: The same, sampled at the instants of the clock.
+        start: Stacked start posture, shape (nq,), in [rad] or [m].
+        moving: Names of the robots that may move.
+        progress: Who wants to know how far it is.
+
+    Raises:
+        DivergedError: A tool lost its path.
+        NoSolutionError: No way leads on, or no cycle closes.
+    """
+    if not cell.solver.is_accurate:
+        motion = follow(cell, schedule, start=start, moving=moving, progress=progress)
+        return replace(motion, resolution=_steps(len(motion.times) - 1))
+    run = AccurateRun(cell, timed, start=start, moving=moving, progress=progress)
+    if cell.motion.cyclic:
+        path = _closed(run, TrackingProblem(cell, schedule, moving, start=start), schedule, start=start)
+    else:
+        path = run.path(start, begin=0.0, end=run.end)
+    return _sampled(run, path, TrackingProblem(cell, schedule, moving, start=start), start=start, progress=progress)
+
+
+def _closed(run: AccurateRun, problem: TrackingProblem, schedule: Schedule, *, start: Array) -> JointPath:
+    """A path that closes after the first cycle; later cycles repeat it."""
+    begin, end = (float(schedule.times[k]) for k in first_cycle(problem.cell, schedule))
+
+    def moved(drift: Array) -> Array:
+        at = run.path(start, begin=0.0, end=begin, drift=drift).last if begin > 0.0 else start
+        round_trip: Array = run.path(at, begin=begin, end=end, drift=drift).last - at
+        return round_trip
+
+    drift = closing_drift(problem, start, moved, duration=end)
+    return run.path(start, begin=0.0, end=run.end, drift=drift)
+
+
+def _sampled(
+    run: AccurateRun, path: JointPath, problem: TrackingProblem, *, start: Array, progress: Progress
+) -> Motion:
+    """The path at the instants of the clock; from where it ends, Euler's steps."""
+    times, last = problem.times, len(problem.times) - 1
+    reached = int(np.searchsorted(times, path.end + INSTANT_ROOM, side="right")) - 1
+    q = path.at(times[: reached + 1])
+    q[0] = start
+    if reached < last:
+        stepped = carry(problem, q[-1], first=reached, last=last, progress=progress)
+        q = np.concatenate([q, stepped.q[reached + 1 :]])
+    resolution = Resolution(
+        integrator=Integrator.ACCURATE,
+        panels=len(path.panels),
+        nodes=path.node_count,
+        sweeps=run.collocation.sweeps,
+        solves=run.collocation.solves,
+        error_between=run.worst if path.panels else None,
+        euler_from=float(times[reached]) if reached < last else None,
+    )
+    return Motion(times=times, q=q, resolution=resolution)
+
+
+def _steps(count: int) -> Resolution:
+    """What Euler's steps took: a node and a system of equations each."""
+    return Resolution(integrator=Integrator.EULER, panels=0, nodes=count + 1, sweeps=0, solves=count)
