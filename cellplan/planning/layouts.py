@@ -96,6 +96,16 @@ class Screening:
         names = [field.name for field in fields(self)]
         return Screening(**{name: np.concatenate([getattr(each, name) for each in (self, *others)]) for name in names})
 
+    def worst(self, other: "Screening") -> "Screening":
+        """Of two runs from the same candidates, the worse figures; the start postures of the later one."""
+        return Screening(
+            start=other.start,
+            lost_at=np.minimum(self.lost_at, other.lost_at),
+            error=np.maximum(self.error, other.error),
+            margins=np.minimum(self.margins, other.margins),
+            speed_ratios=np.maximum(self.speed_ratios, other.speed_ratios),
+        )
+
     @property
     def is_followed(self) -> NDArray[np.bool_]:
         """Which candidates did the whole job, shape (K,)."""
@@ -159,7 +169,7 @@ class _Screen:
     def of(self, X_WB: Array, X_FT: Array, start: Array) -> Screening:
         """Figures of one group of candidates; see `Candidates`."""
         placement = self._tasks.chains.placement(X_WB, X_FT)
-        q, arrived = self._settled(start.T, placement)
+        q, arrived = self._settled(start.T.copy(), placement)
         found = Screening.unknown(q.T.copy())
         found.lost_at[arrived] = 0.0
         collocation = Collocation(self._tasks, self._targets, placement, accuracy=self._accuracy)
