@@ -25,13 +25,16 @@ if TYPE_CHECKING:
     from cellplan.pipeline.export import export_program
     from cellplan.pipeline.gate import open_gate
     from cellplan.pipeline.rehearse import rehearse
+    from cellplan.pipeline.screen import screen
     from cellplan.pipeline.solution import Solution
     from cellplan.pipeline.solve import solve
     from cellplan.pipeline.verify import verify
     from cellplan.pipeline.write_rehearsal import write_rehearsal
     from cellplan.pipeline.write_run import write_run
+    from cellplan.planning.layouts import Candidates, Screening
 
 _HOME: Final = {
+    "Candidates": "planning.layouts",
     "Cell": "model.cell",
     "CellplanError": "errors",
     "Check": "model.report",
@@ -40,6 +43,7 @@ _HOME: Final = {
     "Program": "model.motion",
     "Report": "model.report",
     "Robot": "model.cell",
+    "Screening": "planning.layouts",
     "Solution": "pipeline.solution",
     "Task": "model.task",
     "Toolpath": "model.toolpath",
@@ -48,6 +52,7 @@ _HOME: Final = {
     "load_errors": "io.errors_file",
     "open_gate": "pipeline.gate",
     "rehearse": "pipeline.rehearse",
+    "screen": "pipeline.screen",
     "solve": "pipeline.solve",
     "verify": "pipeline.verify",
     "write_rehearsal": "pipeline.write_rehearsal",
@@ -55,6 +60,7 @@ _HOME: Final = {
 }
 
 __all__ = [
+    "Candidates",
     "Cell",
     "CellplanError",
     "Check",
@@ -63,6 +69,7 @@ __all__ = [
     "Program",
     "Report",
     "Robot",
+    "Screening",
     "Solution",
     "Task",
     "Toolpath",
@@ -72,6 +79,7 @@ __all__ = [
     "load_errors",
     "open_gate",
     "rehearse",
+    "screen",
     "solve",
     "verify",
     "write_rehearsal",

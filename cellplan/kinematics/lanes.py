@@ -100,31 +100,37 @@ class LaneChains:
         self._S2 = (np.moveaxis(S @ S, 1, -1) * turning)[..., None]
         self._places = np.stack([self._step, self._axis], axis=2)[..., None]
         self._slide = (self._axis * self.is_sliding[:, None])[..., None]
+        self._X_BF = np.stack([robot.model.X_BF for robot in cell.robots])
         self._last_point = np.array([_last_point(robot) for robot in cell.robots])
         self.is_all_turning = not self.is_sliding.any()
         own = np.arange(self.joints)[:, None] < [len(robot.model.joints) for robot in cell.robots]
         plain = np.eye(self.levels, self.joints)[:, :, None] * own
         self.is_plain = bool(self.levels == self.joints and np.array_equal(self.to_joints, plain))
 
-    def placement(self, cell: Cell) -> Placement:
-        """Where the robots of a cell like this one stand, and their tools: one for all lanes."""
-        X_WB = np.stack([robot.X_WB for robot in cell.robots], axis=-1)[..., None]
-        X_LT = np.stack([robot.model.X_BF @ robot.tool.X_FT for robot in cell.robots], axis=-1)[..., None]
-        p_LT = X_LT[:3, 3] - self._last_point.T[..., None]
-        return Placement(X_WB[:3, :3], X_WB[:3, 3], X_LT[:3, :3], p_LT)
+    def placement(self, X_WB: Array, X_FT: Array) -> Placement:
+        """Robots with bases and tool tips at these places: of one cell, for all lanes, or of one cell per lane.
+
+        Args:
+            X_WB: Bases in the world, shape (cells, robots, 4, 4).
+            X_FT: Tool tips in the flange frames, shape (cells, robots, 4, 4).
+        """
+        bases, tools = np.moveaxis(X_WB, 0, -1), np.moveaxis(self._X_BF @ X_FT, 0, -1)
+        R_WB, R_LT = np.moveaxis(bases[:, :3, :3], 0, 2), np.moveaxis(tools[:, :3, :3], 0, 2)
+        p_WB, p_LT = np.moveaxis(bases[:, :3, 3], 0, 1), np.moveaxis(tools[:, :3, 3], 0, 1)
+        return Placement(R_WB, p_WB, R_LT, p_LT - self._last_point.T[..., None])
 
     def state(self, q: Array, placement: Placement) -> LaneState:
         """Kinematics at stacked joint vectors, shape (nq, lanes)."""
         frames = self._steps(q)
         R: Array = np.broadcast_to(placement.R_WB, (3, 3, *frames.shape[3:]))
+        p: Array = placement.p_WB
         for level in range(self.levels):
             frames[level] = np.einsum("ijrb,jcrb->icrb", R, frames[level])
-            R = frames[level, :, :3]
-        frames[0, :, 3] += placement.p_WB
-        points = np.cumsum(frames[:, :, 3], axis=0)
+            frames[level, :, 3] += p
+            R, p = frames[level, :, :3], frames[level, :, 3]
         R_WT = np.einsum("ijrb,jkrb->ikrb", R, np.broadcast_to(placement.R_LT, R.shape))
-        p_WT = points[-1] + np.einsum("ijrb,jrb->irb", R, np.broadcast_to(placement.p_LT, R.shape[1:]))
-        return LaneState(np.swapaxes(frames[:, :, 4], 0, 1), np.swapaxes(points, 0, 1), R_WT, p_WT)
+        p_WT = p + np.einsum("ijrb,jrb->irb", R, np.broadcast_to(placement.p_LT, R.shape[1:]))
+        return LaneState(np.swapaxes(frames[:, :, 4], 0, 1), np.swapaxes(frames[:, :, 3], 0, 1), R_WT, p_WT)
 
     def _steps(self, q: Array) -> Array:
         """How each axis turns what follows (three columns), where it is and where it points to.

@@ -47,7 +47,10 @@ class AccurateRun:
         """
         grasps, accuracy = closures(cell, moving), cell.solver.accuracy
         tasks = LaneTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
-        targets, placement = LaneTargets(timed, grasps), tasks.chains.placement(cell)
+        targets = LaneTargets(timed, grasps)
+        X_WB = np.array([[robot.X_WB for robot in cell.robots]])
+        X_FT = np.array([[robot.tool.X_FT for robot in cell.robots]])
+        placement = tasks.chains.placement(X_WB, X_FT)
         until, first = _settled(cell, timed, len(grasps)), timed.breaks[:2]
         wanted = targets.at(first[:1], first[:1], first[1:])
         targets.offset = start_offset(tasks, wanted, placement, start=start, until=until, accuracy=accuracy)

@@ -108,20 +108,28 @@ class Collocation:
     def attempt(self, window: Window, wanted: Wanted, q0: Array, placement: Placement) -> Attempt:
         """Resolve one window from start postures, shape (nq, cells)."""
         cells, nodes = q0.shape[1], window.count
-        at_nodes, spread = wanted.between(0, nodes).repeated(cells), placement.repeated(nodes)
+        wanted_there = wanted.between(0, nodes)
         q = np.repeat(q0[:, :, None], nodes, axis=2)
-        is_settled, is_open = np.zeros(cells, dtype=bool), np.ones(cells, dtype=bool)
-        before = np.full(cells, np.inf)
+        is_settled, before = np.zeros(cells, dtype=bool), np.full(cells, np.inf)
+        going = np.arange(cells)
         for number in range(MOST_PASSES):
-            moved = self._pass(window, at_nodes, q, spread, q0=q0)
-            q += moved
+            moved = self._pass(
+                window,
+                wanted_there.repeated(len(going)),
+                q[:, going],
+                placement.of(going).repeated(nodes),
+                q0=q0[:, going],
+            )
+            q[:, going] += moved
             change = np.abs(moved).max(axis=(0, 2))
-            ratio = change / before if number else np.full(cells, SLOW)
+            ratio = change / before[going] if number else np.full(cells, SLOW)
             left = change * ratio / np.maximum(1.0 - ratio, 1.0 - SLOW)
-            is_settled |= is_open & (left <= POSTURE_SHARE * self._accuracy)
-            is_open &= ~is_settled & (change < LONGEST_MOVE) & ((ratio <= SLOW) | (number < FREE_PASSES))
-            before = change
-            if not is_open.any():
+            is_there = left <= POSTURE_SHARE * self._accuracy
+            is_settled[going[is_there]] = True
+            before[going] = change
+            is_lost = ~(change < LONGEST_MOVE) | ((ratio > SLOW) & (number >= FREE_PASSES))
+            going = going[~is_there & ~is_lost]
+            if not len(going):
                 break
         return Attempt(q, is_settled, self._errors(window, wanted.repeated(cells), q, placement))
 

@@ -110,6 +110,14 @@ class Window:
         return matrix
 
     @cached_property
+    def rates(self) -> Array:
+        """Derivatives by the time at the nodes and at the points between them, shape (nodes + points, nodes)."""
+        matrix = np.zeros((self.count, self.count))
+        for panel, place in zip(self.panels, self.places, strict=True):
+            matrix[place, place] = chebyshev(panel.degree).derivative / panel.length
+        return np.concatenate([matrix, self.between @ matrix])
+
+    @cached_property
     def panel_of(self) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
         """Number of the panel that each of the instants belongs to."""
         counts = [panel.degree + 1 for panel in self.panels] + [panel.degree for panel in self.panels]
@@ -131,17 +139,18 @@ class Window:
         return Window((first,)), Window((second,))
 
 
-def windows_between(breaks: Array, *, whole: float) -> tuple[Window, ...]:
+def windows_between(breaks: Array, *, whole: float, highest: int = DEGREES[-1]) -> tuple[Window, ...]:
     """Windows over a stretch of a motion.
 
     Args:
         breaks: Instants in [s], increasing, between neighbours of which the targets are smooth, shape (n,).
         whole: Duration of the whole motion in [s].
+        highest: Highest degree to begin with; panels that are not exact enough get a higher one.
     """
     longest = SHARE_OF_MOTION * whole
     panels: list[Panel] = []
     for begin, end in pairwise(breaks.tolist()):
-        degree = DEGREES[int(np.searchsorted(FINE_SHARES, (end - begin) / whole))]
+        degree = min(highest, DEGREES[int(np.searchsorted(FINE_SHARES, (end - begin) / whole))])
         cuts = np.linspace(begin, end, int(np.ceil((end - begin) / longest)) + 1).tolist()
         panels += [Panel(low, high, degree) for low, high in pairwise(cuts)]
     return grouped(panels, longest=longest)

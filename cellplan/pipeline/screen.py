@@ -1,0 +1,40 @@
+"""Screen candidate layouts: the whole job of a cell in hundreds of them, before any is looked at more closely."""
+
+from functools import reduce
+
+from cellplan.model.cell import Cell
+from cellplan.planning.layouts import Candidates, Screening, screen_layouts
+from cellplan.planning.modes import plan_runs
+from cellplan.planning.schedule import examine_times, time_tasks
+from cellplan.planning.toolpaths import build_toolpath
+
+
+def screen(cell: Cell, candidates: Candidates, *, task: str | None = None, accuracy: float = 1e-5) -> Screening:
+    """Resolve the job of a cell in many candidates for it; a job of several runs is as good as its worst.
+
+    Nothing is checked but what the figures say: no collision, no clearance. What passes is solved and verified
+    afterwards, as any cell.
+
+    Args:
+        cell: The cell, as ``load_cell`` gives it.
+        candidates: Cells that differ from it in base poses, tool tips and start postures.
+        task: Name of the only task to work on; None for all.
+        accuracy: Largest tool error that is let pass, in [m] and [rad].
+
+    Raises:
+        InputError: The cell cannot be worked with, or there is no such task.
+        ValueError: The candidates are not cells of these robots.
+    """
+    toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    examine_times(cell, tuple(toolpaths.values()))
+    runs = [
+        screen_layouts(
+            cell,
+            time_tasks(cell, [toolpaths[name] for name in plan.tasks]),
+            candidates,
+            moving=plan.moving,
+            accuracy=accuracy,
+        )
+        for plan in plan_runs(cell, only=task)
+    ]
+    return reduce(Screening.worst, runs)
