@@ -8,10 +8,11 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
+from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import INSTANT_ROOM
 from cellplan.planning.closures import closures
-from cellplan.planning.collocation import Collocation, Indices
+from cellplan.planning.collocation import Collocation, Indices, largest
 from cellplan.planning.joint_path import JointPath
 from cellplan.planning.lane_targets import LaneTargets
 from cellplan.planning.lane_tasks import LaneTasks
@@ -21,6 +22,7 @@ from cellplan.planning.timing import TimedTasks, distinct
 from cellplan.planning.windows import Panel, Window, windows_between
 
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
+AT_ONCE: Final = 512  # [samples] looked at together: their arrays stay in the cache
 ONLY: Final = np.zeros(1, dtype=np.intp)  # the one cell among all of a collocation
 
 
@@ -29,6 +31,7 @@ class AccurateRun:
 
     Attributes:
         end: End of the run in [s].
+        accuracy: Largest tool error that is let pass, in [m] and [rad].
         worst: Largest tool error so far at the nodes and between them, in [m] or [rad].
         collocation: What resolves it, and counts how much that takes.
     """
@@ -45,21 +48,23 @@ class AccurateRun:
             moving: Names of the robots that may move.
             progress: Who wants to know how far it is.
         """
-        grasps, accuracy = closures(cell, moving), cell.solver.accuracy
+        grasps, self.accuracy = closures(cell, moving), cell.solver.accuracy
         tasks = LaneTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
+        breaks = timed.breaks
         targets = LaneTargets(timed, grasps)
         X_WB = np.array([[robot.X_WB for robot in cell.robots]])
         X_FT = np.array([[robot.tool.X_FT for robot in cell.robots]])
         placement = tasks.chains.placement(X_WB, X_FT)
-        until, first = _settled(cell, timed, len(grasps)), timed.breaks[:2]
-        wanted = targets.at(first[:1], first[:1], first[1:])
-        targets.offset = start_offset(tasks, wanted, placement, start=start, until=until, accuracy=accuracy)
-        self.collocation = Collocation(tasks, targets, placement, accuracy=accuracy)
+        until = _settled(cell, timed, len(grasps))
+        wanted = targets.at(breaks[:1], breaks[:1], breaks[1:2])
+        targets.offset = start_offset(tasks, wanted, placement, start=start, until=until, accuracy=self.accuracy)
+        self.collocation = Collocation(tasks, targets, placement, accuracy=self.accuracy)
         self.collocation.shortest = cell.motion.step
         self.end, self.worst = float(timed.times[-1]), 0.0
         self._locked_since, self._progress = locked_since(cell), progress
-        inner = np.concatenate([timed.breaks, self._locked_since, *([] if targets.offset is None else [until])])
+        inner = np.concatenate([breaks, self._locked_since, *([] if targets.offset is None else [until])])
         self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
+        self._tasks, self._targets, self._placement = tasks, targets, placement
 
     def path(self, q: Array, *, begin: float, end: float, drift: Array | None = None) -> JointPath:
         """Motion from a posture at ``begin``, shape (nq,), up to ``end``, or as far as a way leads.
@@ -86,6 +91,30 @@ class AccurateRun:
             if not len(self.collocation.carry(windows_between(breaks, whole=self.end), at, ONLY, record)):
                 break
         return JointPath(q, begin, panels, nodes)
+
+    def errors(self, schedule: Schedule, q: Array) -> Array:
+        """Largest tool error at each instant of the clock in [m] or [rad], shape (N,), at postures, shape (N, nq)."""
+        worst = np.empty(len(q))
+        for first in range(0, len(q), AT_ONCE):
+            some = slice(first, min(first + AT_ONCE, len(q)))
+            wanted = self._targets.sampled(schedule, some)
+            worst[some] = largest(self._tasks.errors(q[some].T, wanted, self._placement))
+        return worst
+
+    def look_closer(self, path: JointPath, times: Array, errors: Array) -> None:
+        """Cut panels in which an instant of the clock has too large an error, at the worst, for the next path.
+
+        Args:
+            path: The path that was found.
+            times: Instants in [s], shape (N,).
+            errors: Errors at them, shape (N,).
+        """
+        ends = np.array([panel.end for panel in path.panels])
+        panel = np.searchsorted(ends, times)
+        is_rough = errors > self.accuracy
+        worst = [int(np.argmax(np.where(panel == number, errors, -1.0))) for number in np.unique(panel[is_rough])]
+        self._breaks = distinct(np.concatenate([self._breaks, times[worst]]))
+        self.worst = 0.0
 
     def _stretches(self, begin: float, end: float) -> list[Array]:
         """Breaks between two instants, cut where a joint fails."""

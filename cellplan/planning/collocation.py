@@ -149,8 +149,13 @@ class Collocation:
         everywhere = np.concatenate([q, q @ window.between.T], axis=2)
         cells, instants = everywhere.shape[1:]
         errors = self._tasks.errors(everywhere.reshape(len(q), -1), wanted, placement.repeated(instants))
-        squares = np.maximum(np.sum(errors[:3] ** 2, axis=0), np.sum(errors[3:] ** 2, axis=0)).max(axis=0)
-        worst = np.sqrt(squares).reshape(cells, instants)
-        largest = np.zeros((len(window.panels), cells))
-        np.maximum.at(largest, window.panel_of, worst.T)
-        return largest
+        by_panel = np.zeros((len(window.panels), cells))
+        np.maximum.at(by_panel, window.panel_of, largest(errors).reshape(cells, instants).T)
+        return by_panel
+
+
+def largest(errors: Array) -> Array:
+    """Largest distance in [m] or angle in [rad] of all tasks, shape (6, tasks, lanes) to (lanes,)."""
+    squares = np.maximum(np.sum(errors[:3] ** 2, axis=0), np.sum(errors[3:] ** 2, axis=0))
+    worst: Array = np.sqrt(squares.max(axis=0))
+    return worst

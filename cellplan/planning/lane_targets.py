@@ -7,6 +7,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Grasp
+from cellplan.model.motion import Schedule
 from cellplan.planning.lane_tasks import Wanted
 from cellplan.planning.start_offset import StartOffset
 from cellplan.planning.timing import TimedTasks
@@ -35,13 +36,20 @@ class LaneTargets:
 
     def at(self, times: Array, begins: Array, ends: Array) -> Wanted:
         """Targets at instants in [s], each between two breaks, shape (N,) each."""
-        count = len(self._timed.paths)
-        X = np.empty((4, 4, count + len(self._grasps), len(times)))
+        return self._wanted(times, [path.at(times, (begins, ends)) for path in self._timed.paths])
+
+    def sampled(self, schedule: Schedule, instants: slice) -> Wanted:
+        """Targets at some instants of the clock, from the sampled tasks."""
+        poses = [(task.X_PT[instants], task.V_PT_P[instants]) for task in schedule.tasks]
+        return self._wanted(schedule.times[instants], poses)
+
+    def _wanted(self, times: Array, tasks: Sequence[tuple[Array, Array]]) -> Wanted:
+        """Poses and twists of the tasks, and the grasps beside them, as lanes."""
+        X = np.empty((4, 4, len(tasks) + len(self._grasps), len(times)))
         twists = np.zeros((6, X.shape[2], X.shape[3]))
-        for index, path in enumerate(self._timed.paths):
-            X_PT, V_PT_P = path.at(times, (begins, ends))
+        for index, (X_PT, V_PT_P) in enumerate(tasks):
             X[:, :, index], twists[:, index] = np.moveaxis(X_PT, 0, -1), V_PT_P.T
-        for index, grasp in enumerate(self._grasps, start=count):
+        for index, grasp in enumerate(self._grasps, start=len(tasks)):
             X[:, :, index] = grasp.X_PT[:, :, None]
         R, p = X[:3, :3], X[:3, 3]
         return Wanted(R, p, twists) if self.offset is None else Wanted(*self.offset.applied(times, R, p, twists))

@@ -53,12 +53,17 @@ def peak_rate(law: TimeLaw) -> float:
 
 def reached_at(law: TimeLaw, share: Array) -> Array:
     """Shares of the time, 0..1, at which a law has come to shares of the stretch, shape (N,): by halving."""
-    low, high = np.zeros_like(share), np.ones_like(share)
+    tau: Array = np.where(share >= 1.0, 1.0, 0.0)
+    is_inside = (share > 0.0) & (share < 1.0)
+    inside = share[is_inside]
+    if not len(inside):
+        return tau
+    low, high = np.zeros_like(inside), np.ones_like(inside)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        is_short = advance(law, middle).share < share
+        is_short = advance(law, middle).share < inside
         low, high = np.where(is_short, middle, low), np.where(is_short, high, middle)
-    tau: Array = np.where(share <= 0.0, 0.0, np.where(share >= 1.0, 1.0, 0.5 * (low + high)))
+    tau[is_inside] = 0.5 * (low + high)
     return tau
 
 
