@@ -102,7 +102,8 @@ def draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: Er
     is_in_sight = allowed <= 4.0 * largest or largest == 0.0
     highest = scale * (max(largest, allowed) if is_in_sight else largest)
     is_ripple = scale * largest < LEAST_IN_UNIT
-    span = (0.0, 1.0 if is_ripple and not is_in_sight else highest)
+    least = (scale * allowed if is_in_sight else 1.0) if is_ripple else 0.0
+    span = (0.0, max(highest, least))
     note = f"tolerance {allowed * main_scale:.6g} {main_unit}{'' if is_in_sight else ', out of sight'}"
     panel = sheet.panel(2 * row, f"{kind.name}, total, in {unit}", note=note, span=span, is_floored=True)
     if is_in_sight:
@@ -110,7 +111,7 @@ def draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: Er
     sheet.curve(panel, sheet.times, scale * total, colour=INK)
     sheet.dot(panel, float(sheet.times[total.argmax()]), scale * largest, colour=LIMIT if largest > allowed else INK)
 
-    reach = 1.0 if is_ripple else scale * float(np.abs(error).max())
+    reach = max(scale * float(np.abs(error).max()), least)
     panel = sheet.panel(2 * row + 1, f"{kind.name} by axis, in {unit}", span=(-reach, reach))
     for i, (axis, colour) in enumerate(zip(kind.axes, palette.AXES, strict=True)):
         sheet.curve(panel, sheet.times, scale * error[:, i], colour=colour, width=1.1)
