@@ -16,6 +16,7 @@ from cellplan.report.plots_canvas import Sheet, pictures, style
 from cellplan.report.record import rounded_down
 
 JOINT_COLUMNS = 3
+LEAST_IN_UNIT = 0.5  # [-] of an error in its unit: a larger unit is not chosen below
 LEAST_PLAIN, SMALLEST_DRAWN = 1e-2, 1e-200  # [-] of a manipulability: below, in powers of ten; below, as zero
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 CLASS_TITLES: Mapping[ClearanceClass, str] = {
@@ -35,17 +36,13 @@ class ErrorKind:
     axes: tuple[str, str, str]
 
 
-POSITION = ErrorKind(
-    name="position error", units=(("mm", 1e3), ("µm", 1e6), ("nm", 1e9), ("pm", 1e12)), axes=("x", "y", "z")
-)
+POSITION = ErrorKind(name="position error", units=(("mm", 1e3), ("µm", 1e6), ("nm", 1e9)), axes=("x", "y", "z"))
 ORIENTATION = ErrorKind(
     name="orientation error",
     units=(
         ("deg", math.degrees(1.0)),
         ("10⁻³ deg", math.degrees(1e3)),
         ("10⁻⁶ deg", math.degrees(1e6)),
-        ("10⁻⁹ deg", math.degrees(1e9)),
-        ("10⁻¹² deg", math.degrees(1e12)),
     ),
     axes=("rx", "ry", "rz"),
 )
@@ -94,21 +91,27 @@ def _draw_closure(closure: ClosureAccuracy, times: Array, cell: Cell) -> dict[st
 
 
 def draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: ErrorKind) -> None:
-    """One row: the total, with the tolerance where it lies within the picture, and the three axes beside it."""
+    """One row: the total, with the tolerance where it lies within the picture, and the three axes beside it.
+
+    Ripples below the smallest unit are not blown up to fill the picture.
+    """
     total = np.linalg.norm(error, axis=1)
     largest = float(total.max())
     unit, scale = readable_unit(largest, kind.units)
     main_unit, main_scale = kind.units[0]
-    is_in_sight = allowed <= 4.0 * largest
-    span = (0.0, scale * (max(largest, allowed) if is_in_sight else largest) or 1.0)
-    note = f"tolerance {allowed * main_scale:.6g} {main_unit}"
+    is_in_sight = allowed <= 4.0 * largest or largest == 0.0
+    highest = scale * (max(largest, allowed) if is_in_sight else largest)
+    is_ripple = scale * largest < LEAST_IN_UNIT
+    least = (scale * allowed if is_in_sight else 1.0) if is_ripple else 0.0
+    span = (0.0, max(highest, least))
+    note = f"tolerance {allowed * main_scale:.6g} {main_unit}{'' if is_in_sight else ', out of sight'}"
     panel = sheet.panel(2 * row, f"{kind.name}, total, in {unit}", note=note, span=span, is_floored=True)
     if is_in_sight:
         sheet.limit(panel, scale * allowed)
     sheet.curve(panel, sheet.times, scale * total, colour=INK)
     sheet.dot(panel, float(sheet.times[total.argmax()]), scale * largest, colour=LIMIT if largest > allowed else INK)
 
-    reach = scale * float(np.abs(error).max()) or 1.0
+    reach = max(scale * float(np.abs(error).max()), least)
     panel = sheet.panel(2 * row + 1, f"{kind.name} by axis, in {unit}", span=(-reach, reach))
     for i, (axis, colour) in enumerate(zip(kind.axes, palette.AXES, strict=True)):
         sheet.curve(panel, sheet.times, scale * error[:, i], colour=colour, width=1.1)
@@ -117,10 +120,10 @@ def draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: Er
 
 
 def readable_unit(largest: float, units: tuple[tuple[str, float], ...]) -> tuple[str, float]:
-    """The largest unit in which the value is at least one half; the first of all for zero."""
+    """The largest unit in which the value is at least one half, or the smallest of all; the first one for zero."""
     if largest == 0.0:
         return units[0]
-    return next((unit for unit in units if largest * unit[1] >= 0.5), units[-1])
+    return next((unit for unit in units if largest * unit[1] >= LEAST_IN_UNIT), units[-1])
 
 
 def _draw_positions(robot: str, uses: list[JointUse], report: Report, colour: str) -> dict[str, bytes]:

@@ -63,8 +63,33 @@ def test_unit_of_an_error_suits_its_size(passed_run: Any) -> None:
         return text_of(draw_plots(report, cell=passed_run.cell)["task_circle.svg"])
 
     assert "position error, total, in µm" in title(passed_run.report.accuracy)
-    assert "position error, total, in pm" in title(tiny)
+    assert "position error, total, in nm" in title(tiny)
     assert "position error, total, in mm" in title(zero)
+
+
+def test_ripples_below_a_nanometre_look_small_and_the_tolerance_is_said_to_be_out_of_sight(passed_run: Any) -> None:
+    """Given errors of a tenth of a picometre: then the frame ends at 1 nm, so that it has the ticks of 0..1."""
+    largest = max(float(np.abs(entry.position_error).max()) for entry in passed_run.report.accuracy)
+    ripples = tuple(
+        replace(entry, position_error=1e-13 / largest * entry.position_error) for entry in passed_run.report.accuracy
+    )
+    report = replace(passed_run.report, accuracy=ripples[:1], q={}, qd={}, joints=())
+
+    words = text_of(draw_plots(report, cell=passed_run.cell)["task_circle.svg"])
+
+    total = words[: words.index("position error, total, in nm")]
+    assert [word for word in total if word in {"0", "0.25", "0.5", "0.75", "1"}] == ["0", "0.25", "0.5", "0.75", "1"]
+    assert "tolerance 0.1 mm, out of sight" in words
+
+
+def test_error_of_zero_is_drawn_below_its_tolerance(passed_run: Any) -> None:
+    exact = tuple(replace(entry, position_error=0.0 * entry.position_error) for entry in passed_run.report.accuracy)
+    report = replace(passed_run.report, accuracy=exact[:1], q={}, qd={}, joints=())
+
+    words = text_of(draw_plots(report, cell=passed_run.cell)["task_circle.svg"])
+
+    assert "tolerance 0.1 mm" in words
+    assert "0.1" in words
 
 
 def test_same_run_gives_the_same_bytes_whatever_the_user_has_set(failed_run: Any, drawn: dict[str, bytes]) -> None:
