@@ -108,7 +108,7 @@ def _minimum(seen: Survey, times: Array, kind: ClearanceClass, *, open_rows: Seq
     row = min(rows, key=lambda row: seen.found[row].distance)
     found, points = seen.found[row], seen.nearest_points(row, solid_ends(seen.scene).get(row))
     return ClearanceMinimum(
-        minimum=max(0.0, min(found.distance, float(seen.low[rows].min()))),
+        minimum=max(0.0, min(found.distance, float(seen.lowest(rows).min()))),
         pair=seen.scene.names(pairs[row]),
         at_s=float(seconds(times, np.array([found.at]))[0]),
         certified=True,
@@ -154,7 +154,7 @@ def _curves(
         rows = seen.watched(kind)
         if seen.rows(kind):
             touched = [row for row in rows if seen.found[row].touches or seen.found[row].unproved]
-            kept = seen.low[[*seen.rows(kind), *touched]].min(axis=0)
+            kept = seen.lowest([*seen.rows(kind), *touched])
             curves[kind] = np.maximum(kept, 0.0)[block]
     return curve_times, curves
 

@@ -1,6 +1,6 @@
 """The work of a survey: stretch by stretch through the program, pair by pair, the nearest first."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -15,13 +15,13 @@ from cellplan.model.report import ClearanceClass
 from cellplan.scene.curves import CurveRefiner
 from cellplan.scene.ground_search import GroundSearch
 from cellplan.scene.lever_arms import LeverArms
-from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 from cellplan.scene.straight_motion import StraightMotion
 from cellplan.scene.survey import Survey
 
 CHUNK_WORK: Final = 400_000  # [-] bodies times samples worked on at once: 40 MB of poses
 MOST_SAMPLES: Final = 16_384  # [-] samples worked on at once, however few bodies there are
+PAIR_WORK: Final = 2_000_000  # [-] pairs times blocks bounded at once: 100 MB
 FIRST_LOOKS: Final = 12  # [-] pairs of each class measured once before any search: a small distance saves much later
 
 
@@ -39,9 +39,10 @@ def survey(
     """
     found = Survey(scene, q, left_out=left_out)
     arms = LeverArms(scene, q)
+    ends = solid_ends(scene)
     for first, last in _stretches(found):
         motion = StraightMotion.of_cell(scene, arms, q[found.edges[first] : found.edges[last] + 1])
-        stretch = _Stretch(found, motion, first, last)
+        stretch = _Stretch(found, motion, first, last, solid=ends)
         stretch.search_all()
         for kind in ClearanceClass:
             stretch.raise_curve(kind)
@@ -70,10 +71,12 @@ def _stretches(found: Survey) -> Iterator[tuple[int, int]]:
 class _Stretch:
     """Some blocks of the program."""
 
-    def __init__(self, found: Survey, motion: StraightMotion, first: int, last: int) -> None:
+    def __init__(
+        self, found: Survey, motion: StraightMotion, first: int, last: int, *, solid: Mapping[int, Pair]
+    ) -> None:
         """Bound all pairs over the stretch by the cheapest means."""
         self._found, self._motion, self._first, self._last = found, motion, first, last
-        self._scene, self._solid = found.scene, solid_ends(found.scene)
+        self._scene, self._solid = found.scene, solid
         self._edges = found.edges[first : last + 1] - found.edges[first]
         self._bound_solids()
         self._grounds: dict[int, GroundSearch] = {}
@@ -86,7 +89,10 @@ class _Stretch:
     def search_all(self) -> None:
         """Search every pair as far as it matters."""
         looks = {row: look for kind in ClearanceClass for row, look in self._first_looks(kind)}
-        for row in np.argsort(self._low().min(axis=1, initial=np.inf), kind="stable").tolist():
+        lowest = self._low().min(axis=1, initial=np.inf)
+        for row in np.argsort(lowest, kind="stable").tolist():
+            if lowest[row] >= self._found.largest_cutoff():
+                break  # and so are all that follow
             self._search(row, looks.get(row))
 
     def raise_curve(self, kind: ClearanceClass) -> None:
@@ -102,9 +108,8 @@ class _Stretch:
     def note_work(self) -> None:
         """Write down from when to when tools at work are at the part, whatever breaks there are."""
         begin, spans = int(self._found.edges[self._first]), self._found.at_surface
-        for row, pair in enumerate(self._scene.pairs):
-            if pair.rule is not Rule.PROCESS or row in self._found.left_out:
-                continue
+        for row in self._found.at_work:
+            pair = self._scene.pairs[row]
             span = surface_span(self._scene.engine, (pair.first, pair.second), self._motion)
             if span is not None:
                 spans[row] = spans.get(row, (begin + span[0], 0))[0], begin + span[1]
@@ -123,9 +128,11 @@ class _Stretch:
         for index in range(len(engine.bodies)):
             way = np.linalg.norm(np.diff(motion.centres[index], axis=0), axis=1) + motion.bend[index] / 3.0
             ways[index] = np.add.reduceat(way, self._edges[:-1])
-        a, b = pairs.T
-        gaps = np.linalg.norm(centres[b] - centres[a], axis=2) - (engine.radii[a] + engine.radii[b])[:, None]
-        self._low()[self._scene.solid_rows] = 0.5 * (gaps[:, 1:] + gaps[:, :-1] - ways[a] - ways[b])
+        for first in range(0, len(pairs), step := max(1, PAIR_WORK // ways.shape[1])):
+            a, b = pairs[first : first + step].T
+            gaps = np.linalg.norm(centres[b] - centres[a], axis=2) - (engine.radii[a] + engine.radii[b])[:, None]
+            low = 0.5 * (gaps[:, 1:] + gaps[:, :-1] - ways[a] - ways[b])
+            self._low()[self._scene.solid_rows[first : first + step]] = low
 
     def _first_looks(self, kind: ClearanceClass) -> Iterator[tuple[int, tuple[int, Reading]]]:
         """Measure the pairs of a class that seem nearest once, at an edge of the block where they do."""
