@@ -95,7 +95,7 @@ def _text(operators: int, starts: dict[str, str], clock: str) -> str:
         "  tray:",
         "    model: reis_rv20_16",
         f"    base: {{xyz_mm: [{_mm(-FLANGE[0])}, 0, 0]}}",
-        f"    tool: {{xyz_mm: [0, 0, {_mm(STAND)}], geometry: {{cylinder: {{radius_mm: 30, length_mm: {_mm(STAND)}}}}}}}",
+        f"    tool: {_tool(STAND, radius=0.03)}",
         f"    start_deg: [{', '.join(f'{angle:g}' for angle in TRAY)}]",
     ]
     for k, angle in enumerate(angles):
@@ -125,7 +125,7 @@ def _robot(k: int, angle: float, *, ring: float, top: float, start: str) -> list
         f"  r{k + 1}:",
         f"    model: {arm.model}",
         f"    base: {{xyz_mm: [{place}], rpy_deg: [0, 0, {math.degrees(angle) - 180.0:.6f}]}}",
-        "    tool: {xyz_mm: [0, 0, 150], geometry: {cylinder: {radius_mm: 12, length_mm: 150}}}",
+        f"    tool: {_tool(0.15, radius=0.012)}",
         f"    start_deg: {start}",
     ]
 
@@ -149,6 +149,12 @@ def _task(k: int, angle: float, *, at: float) -> list[str]:
     ]
 
 
+def _tool(length: float, *, radius: float) -> str:
+    """A straight round tool of a length and radius in [m]."""
+    shape = f"cylinder: {{radius_mm: {_mm(radius)}, length_mm: {_mm(length)}}}"
+    return f"{{xyz_mm: [0, 0, {_mm(length)}], geometry: {{{shape}}}}}"
+
+
 def _mm(value: float) -> str:
     """A length in [m] as the file has it."""
     return f"{1e3 * value:.6f}".rstrip("0").rstrip(".")
@@ -167,9 +173,7 @@ def _starts(cell: Cell) -> dict[str, str]:
 def _start(cell: Cell, robot: Robot, task: Task, *, X_WP: np.ndarray, ready: np.ndarray) -> np.ndarray:
     """The posture on the start of a task that is found from a posture ready for work."""
     X_PT = build_toolpath(task, cell.part, cell.origin).X_PT_start
-    found = within_limits(
-        robot.model, reaching_postures(ScrewChain(robot), task, X_PT, X_WP=X_WP, seeds=ready[None])
-    )
+    found = within_limits(robot.model, reaching_postures(ScrewChain(robot), task, X_PT, X_WP=X_WP, seeds=ready[None]))
     if not len(found):
         raise ValueError(f"{robot.name}: the start of its task was not reached")
     return found[0]

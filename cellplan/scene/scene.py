@@ -21,7 +21,6 @@ from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, scene_
 from cellplan.scene.by_design import apply_design
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
 
-
 _Outside = dict[tuple[Solid, bytes], tuple[CollisionBody | None, bool]]
 
 

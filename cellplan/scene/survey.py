@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.collision.certify import SEARCH_ROOM, Found, Search
 from cellplan.collision.measure import SURELY_APART
@@ -19,6 +20,8 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.report import ClearanceClass
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
+
+Rows = NDArray[np.intp]  # indices of pairs
 
 BLOCKS: Final = 200  # [-] stretches of the program that have a bound of their own
 ROWS_AT_ONCE: Final = 10_000  # [-] pairs whose bounds are copied at once: 16 MB
@@ -44,6 +47,7 @@ class Survey:
             nothing is proved; inf where nothing of a tool sticks out of its contact zone. May be negative where nobody
             looked: for pairs left out.
         found: What is known of each pair; instants are counted in samples.
+        solid_ends: The engine's bodies of each pair of solids, by the pair.
         at_work: Pairs of a tool at work and the part.
         at_surface: First and last sample at which a tool at work is at the surface of the part, by pair.
         left_out: Pairs of which contacts are looked for at the samples only.
@@ -63,7 +67,11 @@ class Survey:
         self.low = np.full((count, len(self.edges) - 1), np.inf)
         self.found = [Found(most_cuts=0) if row in self.left_out else Found() for row in range(count)]
         self.at_surface: dict[int, tuple[int, int]] = {}
-        self.at_work = [row for row, pair in enumerate(scene.pairs) if pair.rule is Rule.PROCESS and row not in left_out]
+        pairs = zip(scene.solid_rows.tolist(), scene.solid_pairs.tolist(), strict=True)
+        self.solid_ends: dict[int, Pair] = {row: (first, second) for row, (first, second) in pairs}
+        self.at_work = [
+            row for row, pair in enumerate(scene.pairs) if pair.rule is Rule.PROCESS and row not in left_out
+        ]
         self._nearest = np.full(count, np.inf)  # smallest distance found in [m], zero where a pair touches
         self._ranks: _Ranks | None = None  # of the distances found, until one of them changes
         counts = ~np.isin(np.arange(count), left_out)
@@ -72,19 +80,23 @@ class Survey:
         self._watched = {kind: counts & (kinds == kind) for kind in ClearanceClass}
         self._keeps = {kind: self._keeps_any & (kinds == kind) for kind in ClearanceClass}
 
-    def rows(self, kind: ClearanceClass) -> list[int]:
-        """Pairs of a class that are to keep the distance that the cell demands."""
-        return np.flatnonzero(self._keeps[kind]).tolist()
+    def rows(self, kind: ClearanceClass) -> Rows:
+        """Pairs of a class that are to keep the distance that the cell demands, shape (M,), ascending."""
+        return np.flatnonzero(self._keeps[kind])
 
-    def watched(self, kind: ClearanceClass) -> list[int]:
-        """Pairs of a class that must not touch, whatever else is asked of them."""
-        return np.flatnonzero(self._watched[kind]).tolist()
+    def watched(self, kind: ClearanceClass) -> Rows:
+        """Pairs of a class that must not touch, whatever else is asked of them, shape (M,), ascending."""
+        return np.flatnonzero(self._watched[kind])
+
+    def known(self) -> list[int]:
+        """Pairs that are to keep the distance that the cell demands and were found to touch or measured."""
+        return np.flatnonzero(self._keeps_any & np.isfinite(self._nearest)).tolist()
 
     def distance(self, row: int) -> float:
         """Smallest distance of a pair that was found in [m]: zero when it touches, inf when it was not measured."""
         return 0.0 if self.found[row].touches else self.found[row].distance
 
-    def lowest(self, rows: Sequence[int]) -> Array:
+    def lowest(self, rows: Rows) -> Array:
         """Smallest bound of some pairs in each block in [m], shape (K,)."""
         lowest = np.full(self.low.shape[1], np.inf)
         for first in range(0, len(rows), ROWS_AT_ONCE):
@@ -140,14 +152,9 @@ class Survey:
         self.low[row, first:last] = np.where(np.isinf(known) | (low == 0.0), low, np.maximum(known, low))
         self.remember(row)
 
-    def nearest_points(self, row: int, ends: Pair | None) -> tuple[Array, Array] | None:
-        """Points of a pair where it is nearest, in the world in [m]; None when it touches or was not measured.
-
-        Args:
-            row: The pair.
-            ends: The engine's bodies; None for a pair with a half-space.
-        """
-        found, scene = self.found[row], self.scene
+    def nearest_points(self, row: int) -> tuple[Array, Array] | None:
+        """Points of a pair where it is nearest, in the world in [m]; None when it touches or was not measured."""
+        found, scene, ends = self.found[row], self.scene, self.solid_ends.get(row)
         if found.touches or not np.isfinite(found.distance):
             return None
         before = min(int(found.at), len(self.q) - 2)

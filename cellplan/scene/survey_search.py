@@ -1,6 +1,6 @@
 """The work of a survey: stretch by stretch through the program, pair by pair, the nearest first."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -8,7 +8,6 @@ import numpy as np
 from cellplan.collision.at_surface import surface_span
 from cellplan.collision.certify import SolidSearch
 from cellplan.collision.measure import Reading, measure
-from cellplan.collision.travel import Pair
 from cellplan.geometry.transforms import Array
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import ClearanceClass
@@ -39,22 +38,15 @@ def survey(
     """
     found = Survey(scene, q, left_out=left_out)
     arms = LeverArms(scene, q)
-    ends = solid_ends(scene)
     for first, last in _stretches(found):
         motion = StraightMotion.of_cell(scene, arms, q[found.edges[first] : found.edges[last] + 1])
-        stretch = _Stretch(found, motion, first, last, solid=ends)
+        stretch = _Stretch(found, motion, first, last)
         stretch.search_all()
         for kind in ClearanceClass:
             stretch.raise_curve(kind)
         stretch.note_work()
         progress(stage, 0.9 * last / (len(found.edges) - 1))
     return found
-
-
-def solid_ends(scene: Scene) -> dict[int, Pair]:
-    """The engine's bodies of each pair of solids that is watched, by the pair."""
-    pairs = zip(scene.solid_rows.tolist(), scene.solid_pairs.tolist(), strict=True)
-    return {row: (first, second) for row, (first, second) in pairs}
 
 
 def _stretches(found: Survey) -> Iterator[tuple[int, int]]:
@@ -71,12 +63,10 @@ def _stretches(found: Survey) -> Iterator[tuple[int, int]]:
 class _Stretch:
     """Some blocks of the program."""
 
-    def __init__(
-        self, found: Survey, motion: StraightMotion, first: int, last: int, *, solid: Mapping[int, Pair]
-    ) -> None:
+    def __init__(self, found: Survey, motion: StraightMotion, first: int, last: int) -> None:
         """Bound all pairs over the stretch by the cheapest means."""
         self._found, self._motion, self._first, self._last = found, motion, first, last
-        self._scene, self._solid = found.scene, solid
+        self._scene, self._solid = found.scene, found.solid_ends
         self._edges = found.edges[first : last + 1] - found.edges[first]
         self._bound_solids()
         self._grounds: dict[int, GroundSearch] = {}
@@ -88,8 +78,8 @@ class _Stretch:
 
     def search_all(self) -> None:
         """Search every pair as far as it matters."""
-        looks = {row: look for kind in ClearanceClass for row, look in self._first_looks(kind)}
         lowest = self._low().min(axis=1, initial=np.inf)
+        looks = {row: look for kind in ClearanceClass for row, look in self._first_looks(kind, lowest)}
         for row in np.argsort(lowest, kind="stable").tolist():
             if lowest[row] >= self._found.largest_cutoff():
                 break  # and so are all that follow
@@ -98,11 +88,11 @@ class _Stretch:
     def raise_curve(self, kind: ClearanceClass) -> None:
         """Raise the bounds of a class in every block so far that the smallest of them says something."""
         rows = self._found.rows(kind)
-        if not rows:
+        if not len(rows):
             return
         low = self._low()[rows]
         refiner = CurveRefiner(self._scene.engine, self._motion, self._edges)
-        refiner.raise_bounds(low, [self._solid.get(row) for row in rows])
+        refiner.raise_bounds(low, [self._solid.get(row) for row in rows.tolist()])
         self._low()[rows] = low
 
     def note_work(self) -> None:
@@ -123,22 +113,29 @@ class _Stretch:
         engine, pairs, motion = self._scene.engine, self._scene.solid_pairs, self._motion
         if not len(pairs):
             return
-        centres = np.array([motion.centres[index][self._edges] for index in range(len(engine.bodies))])
+        centres = np.array([motion.centres[index][self._edges].T for index in range(len(engine.bodies))])
         ways = np.empty((len(engine.bodies), self._last - self._first))
         for index in range(len(engine.bodies)):
             way = np.linalg.norm(np.diff(motion.centres[index], axis=0), axis=1) + motion.bend[index] / 3.0
             ways[index] = np.add.reduceat(way, self._edges[:-1])
         for first in range(0, len(pairs), step := max(1, PAIR_WORK // ways.shape[1])):
             a, b = pairs[first : first + step].T
-            gaps = np.linalg.norm(centres[b] - centres[a], axis=2) - (engine.radii[a] + engine.radii[b])[:, None]
+            x, y, z = (centres[b, axis] - centres[a, axis] for axis in range(3))
+            gaps = np.sqrt(x * x + (y * y + z * z)) - (engine.radii[a] + engine.radii[b])[:, None]
             low = 0.5 * (gaps[:, 1:] + gaps[:, :-1] - ways[a] - ways[b])
             self._low()[self._scene.solid_rows[first : first + step]] = low
 
-    def _first_looks(self, kind: ClearanceClass) -> Iterator[tuple[int, tuple[int, Reading]]]:
-        """Measure the pairs of a class that seem nearest once, at an edge of the block where they do."""
-        found, lowest = self._found, self._low().min(axis=1, initial=np.inf)
-        rows = sorted((row for row in found.rows(kind) if row in self._solid), key=lambda row: float(lowest[row]))
-        for row in rows[:FIRST_LOOKS]:
+    def _first_looks(self, kind: ClearanceClass, lowest: Array) -> Iterator[tuple[int, tuple[int, Reading]]]:
+        """Measure the pairs of a class that seem nearest once, at an edge of the block where they do.
+
+        Args:
+            kind: The class.
+            lowest: The lowest bound of each pair in the stretch in [m], shape (pairs,).
+        """
+        found = self._found
+        rows = found.rows(kind)
+        rows = rows[np.isin(rows, self._scene.solid_rows, kind="table")]
+        for row in rows[np.argsort(lowest[rows], kind="stable")][:FIRST_LOOKS].tolist():
             if lowest[row] >= found.best(kind):
                 break
             block = int(np.argmin(self._low()[row]))
@@ -165,7 +162,7 @@ class _Stretch:
         search = SolidSearch(
             self._scene.engine,
             self._solid[row],
-            self._motion.part(begin, end),
+            self._motion.part(self._solid[row], begin, end),
             found=found.found[row],
             begin=float(found.edges[block]),
         )
