@@ -22,7 +22,7 @@ from cellplan.planning.given_starts import part_pose
 from cellplan.planning.inverse_kinematics import reaching_postures, within_limits
 from cellplan.planning.toolpaths import build_toolpath
 
-FEWEST, MOST = 2, 64  # [-] robots, the positioner among them
+FEWEST, MOST = 2, 60  # [-] robots, the positioner among them; the plate of more would be larger than a part may be
 PITCH: Final = 1.1  # [m] between neighbouring bases along the ring
 SMALLEST_RING: Final = 1.8  # [m] radius of the ring: the positioner's foot stands inside it
 REACH: Final = 0.85  # [m] from a robot's base axis to the middle of its patch
@@ -61,7 +61,7 @@ def cell_with(robots: int, *, duration_s: float = 4.0, step_s: float = 0.001, se
     """A cell file with so many robots round one part.
 
     Args:
-        robots: How many robots, the positioner among them, 2 to 64.
+        robots: How many robots, the positioner among them, 2 to 60.
         duration_s: Length of the motion in [s].
         step_s: Time between two samples in [s].
         searches: Whether the start postures of the operators are left to the search of the program.

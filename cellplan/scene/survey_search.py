@@ -16,7 +16,7 @@ from cellplan.scene.ground_search import GroundSearch
 from cellplan.scene.lever_arms import LeverArms
 from cellplan.scene.scene import Scene
 from cellplan.scene.straight_motion import StraightMotion
-from cellplan.scene.survey import Survey
+from cellplan.scene.survey import ROWS_AT_ONCE, Rows, Survey
 
 CHUNK_WORK: Final = 400_000  # [-] bodies times samples worked on at once: 40 MB of poses
 MOST_SAMPLES: Final = 16_384  # [-] samples worked on at once, however few bodies there are
@@ -90,10 +90,38 @@ class _Stretch:
         rows = self._found.rows(kind)
         if not len(rows):
             return
+        rows = self._may_be_nearest(rows)
         low = self._low()[rows]
         refiner = CurveRefiner(self._scene.engine, self._motion, self._edges)
         refiner.raise_bounds(low, [self._solid.get(row) for row in rows.tolist()])
         self._low()[rows] = low
+
+    def _may_be_nearest(self, rows: Rows) -> Rows:
+        """Pairs that some block has a bound of that is no larger than a distance the pairs are known to come to there.
+
+        That distance is the one at the beginning of the block, of the pair with the lowest bound: no larger than the
+        distance of the centres of both spheres and their radii. Larger bounds are never the lowest, however far the
+        others are raised.
+        """
+        if len(rows) <= ROWS_AT_ONCE:
+            return rows
+        low, pieces = self._low(), range(0, len(rows), ROWS_AT_ONCE)
+        reached = np.full(low.shape[1], np.inf)
+        for first in pieces:
+            piece = rows[first : first + ROWS_AT_ONCE]
+            lowest = piece[np.argmin(low[piece], axis=0)]
+            np.minimum(reached, [self._reached(int(row), block) for block, row in enumerate(lowest)], out=reached)
+        near = [np.any(low[rows[first : first + ROWS_AT_ONCE]] <= reached, axis=1) for first in pieces]
+        chosen: Rows = rows[np.concatenate(near)]
+        return chosen
+
+    def _reached(self, row: int, block: int) -> float:
+        """A distance in [m] that a pair does not exceed at the beginning of a block; inf for one with a half-space."""
+        ends = self._solid.get(row)
+        if ends is None:
+            return float(np.inf)
+        first, second = (self._motion.centres[index][self._edges[block]] for index in ends)
+        return float(np.linalg.norm(second - first) + self._scene.engine.radii[list(ends)].sum())
 
     def note_work(self) -> None:
         """Write down from when to when tools at work are at the part, whatever breaks there are."""
