@@ -15,7 +15,7 @@ from cellplan.model.task import Frame
 from cellplan.scene.bodies import Kind
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
-from cellplan.scene.survey import CLOSEST, Survey
+from cellplan.scene.survey import CLOSEST, Survey, lowest_bounds
 from cellplan.scene.survey_search import survey
 
 STAGE: Final = "checking clearance"
@@ -108,7 +108,7 @@ def _minimum(seen: Survey, times: Array, kind: ClearanceClass, *, open_rows: Seq
     row = min(rows.tolist(), key=lambda row: seen.found[row].distance)
     found, points = seen.found[row], seen.nearest_points(row)
     return ClearanceMinimum(
-        minimum=max(0.0, min(found.distance, float(seen.lowest(rows).min()))),
+        minimum=max(0.0, min(found.distance, float(lowest_bounds(seen, rows).min()))),
         pair=seen.scene.names(pairs[row]),
         at_s=float(seconds(times, np.array([found.at]))[0]),
         certified=True,
@@ -153,7 +153,7 @@ def _curves(
         rows = seen.rows(kind)
         if len(rows):
             touched = [row for row in seen.watched(kind) if seen.found[row].touches or seen.found[row].unproved]
-            kept = seen.lowest(np.append(rows, np.array(touched, dtype=np.intp)))
+            kept = lowest_bounds(seen, np.append(rows, np.array(touched, dtype=np.intp)))
             curves[kind] = np.maximum(kept, 0.0)[block]
     return curve_times, curves
 

@@ -96,13 +96,6 @@ class Survey:
         """Smallest distance of a pair that was found in [m]: zero when it touches, inf when it was not measured."""
         return 0.0 if self.found[row].touches else self.found[row].distance
 
-    def lowest(self, rows: Rows) -> Array:
-        """Smallest bound of some pairs in each block in [m], shape (K,)."""
-        lowest = np.full(self.low.shape[1], np.inf)
-        for first in range(0, len(rows), ROWS_AT_ONCE):
-            np.minimum(lowest, self.low[rows[first : first + ROWS_AT_ONCE]].min(axis=0), out=lowest)
-        return lowest
-
     def best(self, kind: ClearanceClass) -> float:
         """Smallest distance of a class found so far in [m]; zero when any pair of it touches."""
         return self._ranked().best[kind]
@@ -167,3 +160,11 @@ class Survey:
         else:
             points = nearest_points(scene.engine, ends, scene.pair_poses(ends, q[None]), sample=0)
         return points.first, points.second
+
+
+def lowest_bounds(seen: Survey, rows: Rows) -> Array:
+    """Smallest bound of some pairs in each block in [m], shape (K,)."""
+    lowest = np.full(seen.low.shape[1], np.inf)
+    for first in range(0, len(rows), ROWS_AT_ONCE):
+        np.minimum(lowest, seen.low[rows[first : first + ROWS_AT_ONCE]].min(axis=0), out=lowest)
+    return lowest
