@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from cellplan import load_cell, solve
-from cellplan.errors import InvalidFileError
 from cellplan.model.report import ClearanceClass, Report
 from cellplan.pipeline.solution import Solution
 
@@ -103,13 +102,3 @@ def test_rings_that_cannot_be_are_refused(robots: int, cell_with: Callable[..., 
 
 def test_the_same_ring_is_written_twice_alike(cell_with: Callable[..., str]) -> None:
     assert cell_with(4) == cell_with(4)
-
-
-def test_sixty_five_robots_are_too_many_for_a_cell(cell_with: Callable[..., str], tmp_path: Path) -> None:
-    text = cell_with(3, searches=True)
-    one = "  r{}: {{model: kuka_kr6}}\n"
-    path = tmp_path / "cell.yaml"
-    path.write_text(text.replace("part:\n", "".join(one.format(k) for k in range(3, 65)) + "part:\n", 1), "utf-8")
-
-    with pytest.raises(InvalidFileError, match="robots: expected at most 64 entries, got 65"):
-        load_cell(path)
