@@ -15,8 +15,8 @@ from cellplan.model.task import Frame
 from cellplan.scene.bodies import Kind
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
-from cellplan.scene.survey import CLOSEST, Survey
-from cellplan.scene.survey_search import solid_ends, survey
+from cellplan.scene.survey import CLOSEST, Survey, lowest_bounds
+from cellplan.scene.survey_search import survey
 
 STAGE: Final = "checking clearance"
 
@@ -103,12 +103,12 @@ def _minimum(seen: Survey, times: Array, kind: ClearanceClass, *, open_rows: Seq
             at_s=float(seconds(times, np.array([at]))[0]),
             certified=bool(touching),
         )
-    if not rows:
+    if not len(rows):
         return ClearanceMinimum(minimum=None, pair=None, at_s=None, certified=False)
-    row = min(rows, key=lambda row: seen.found[row].distance)
-    found, points = seen.found[row], seen.nearest_points(row, solid_ends(seen.scene).get(row))
+    row = min(rows.tolist(), key=lambda row: seen.found[row].distance)
+    found, points = seen.found[row], seen.nearest_points(row)
     return ClearanceMinimum(
-        minimum=max(0.0, min(found.distance, float(seen.low[rows].min()))),
+        minimum=max(0.0, min(found.distance, float(lowest_bounds(seen, rows).min()))),
         pair=seen.scene.names(pairs[row]),
         at_s=float(seconds(times, np.array([found.at]))[0]),
         certified=True,
@@ -124,8 +124,7 @@ def _point(p: Array) -> tuple[float, float, float]:
 def _closest(seen: Survey, times: Array) -> tuple[ClosePair, ...]:
     """The closest pairs of the cell, nearest first; those that touch have the distance 0."""
     pairs = seen.scene.pairs
-    rows = [row for kind in ClearanceClass for row in seen.rows(kind) if np.isfinite(seen.distance(row))]
-    rows = sorted(rows, key=lambda row: (seen.distance(row), row))[:CLOSEST]
+    rows = sorted(seen.known(), key=lambda row: (seen.distance(row), row))[:CLOSEST]
     return tuple(
         ClosePair(
             pair=seen.scene.names(pairs[row]),
@@ -151,10 +150,10 @@ def _curves(
     block = np.clip(np.searchsorted(ends, curve_times, side="right") - 1, 0, len(ends) - 2)
     curves = {}
     for kind in ClearanceClass:
-        rows = seen.watched(kind)
-        if seen.rows(kind):
-            touched = [row for row in rows if seen.found[row].touches or seen.found[row].unproved]
-            kept = seen.low[[*seen.rows(kind), *touched]].min(axis=0)
+        rows = seen.rows(kind)
+        if len(rows):
+            touched = [row for row in seen.watched(kind) if seen.found[row].touches or seen.found[row].unproved]
+            kept = lowest_bounds(seen, np.append(rows, np.array(touched, dtype=np.intp)))
             curves[kind] = np.maximum(kept, 0.0)[block]
     return curve_times, curves
 

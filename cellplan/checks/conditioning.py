@@ -1,6 +1,7 @@
 """How near the motion comes to a singularity: singular values along it, from the screws of all joints."""
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from cellplan.model.motion import Schedule
 from cellplan.model.report import Conditioning
 from cellplan.model.task import Frame
 
-SAMPLES_AT_ONCE = 2000  # keeps the stacked matrices of 16 robots below 100 MB
+MOST_SAMPLES: Final = 2000  # [-] worked on at once, however small the stack is
+STACK_WORK: Final = 4_000_000  # [-] entries of the stacked matrices worked on at once: 32 MB
 
 
 def conditioning(
@@ -45,8 +47,9 @@ def conditioning(
     stack: list[Array] = []
     robots: dict[str, list[Array]] = {}
     relations = _relations(cell, schedule, moving)
-    for first in range(0, count, SAMPLES_AT_ONCE):
-        piece = slice(first, first + SAMPLES_AT_ONCE)
+    most = min(MOST_SAMPLES, max(1, STACK_WORK // (6 * cell.joint_count * max(1, len(relations)))))
+    for first in range(0, count, most):
+        piece = slice(first, first + most)
         positions = {name: values[piece] for name, values in q.items()}
         rows = [
             _blocks(cell, each, chains, positions, X_WP=at_each[piece], R_PT=R_PT[piece]) for each, R_PT in relations

@@ -15,7 +15,7 @@ from cellplan.io.run_folder import MANIFEST, PROGRAMS, REHEARSAL
 from cellplan.model.cell import Cell
 
 SCHEMA: Final = "cellplan.manifest/1"
-SIZE_LIMIT: Final = 5_000_000  # [bytes] of the manifest; two hundred runs of sixteen robots need a tenth
+SIZE_LIMIT: Final = 5_000_000  # [bytes] of the manifest; two hundred runs of sixty-four robots need less than half
 BUNDLED: Final = "bundled:"  # begins the name of an input that comes with the program
 MADE_LATER: Final = frozenset({PROGRAMS, REHEARSAL, "view.html"})  # made from a run after it was written; no part of it
 IGNORED: Final = ".DS_Store"  # put into every folder by the file manager of one system

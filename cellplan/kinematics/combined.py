@@ -1,6 +1,7 @@
 """The door to pinocchio: all robots of a cell as one combined model for the planner."""
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import pinocchio as pin
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.robot import BASE, FollowerJoint, Joint
+
+MOST_AXES: Final = 48  # [-] of the robots that share a pinocchio model: 4 MB of its results; eight arms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,8 +45,32 @@ class LinkState:
     D: Array
 
 
+class _Group:
+    """Some robots in a row as one pinocchio model; the memory of such a model grows with the cube of its axes."""
+
+    def __init__(self, first: int) -> None:
+        """Begin with no axes; ``first`` is the place of the group's first axis among all axes."""
+        self.model = pin.Model()
+        self.first = first
+
+    def close(self) -> None:
+        """Make room for results when all axes are there."""
+        self.data = self.model.createData()
+        self.axes = slice(self.first, self.first + self.model.nv)
+
+    @property
+    def screws(self) -> Array:
+        """Columns of the axes as last computed, shape (6, axes); of a single one pinocchio gives a vector."""
+        screws: Array = self.data.J.copy().reshape(6, self.model.nv)
+        return screws
+
+    def poses(self) -> list[Array]:
+        """Poses of the joint frames as last computed, shape (4, 4) each."""
+        return [self.data.oMi[link].homogeneous for link in range(1, self.model.njoints)]
+
+
 class CombinedModel:
-    """One pinocchio model of all robots; joint columns stand in the order of the stacked joint vector.
+    """All robots in pinocchio; joint columns stand in the order of the stacked joint vector.
 
     Attributes:
         carries_flange: Whether a joint moves a robot's flange, shape (robots, nq).
@@ -53,44 +80,48 @@ class CombinedModel:
 
     def __init__(self, cell: Cell) -> None:
         """Build the model from the joint-axis tables; nothing is read from files here."""
-        self._model = pin.Model()
+        self._groups: list[_Group] = []
         self._leaders: list[int] = []
         self._ratios: list[float] = []
         self._offsets: list[float] = []
         self._is_on_the_way: list[bool] = []
         self.carries_flange = np.zeros((len(cell.robots), cell.joint_count), dtype=bool)
-        self._flange_ids: list[int] = []
+        self._flanges: list[tuple[_Group, int]] = []
         self._X_JT: list[Array] = []
         self.first_link: list[int] = []
         self._points: list[Array] = []
         for index, robot in enumerate(cell.robots):
             self._add_robot(robot, cell.columns(robot.name), self.carries_flange[index])
-        self._data = self._model.createData()
-        self._spread = np.zeros((self._model.nv, cell.joint_count))
-        self._spread[np.arange(self._model.nv), self._leaders] = self._ratios
+        for group in self._groups:
+            group.close()
+        count = len(self._leaders)
+        self._spread = np.zeros((count, cell.joint_count))
+        self._spread[np.arange(count), self._leaders] = self._ratios
         self._spread_to_flange = self._spread * np.array(self._is_on_the_way)[:, None]
         self._offset = np.array(self._offsets)
         self._is_plain = bool(np.array_equal(self._spread, np.eye(cell.joint_count)))
         self._X_WT = np.tile(np.eye(4), (len(cell.robots), 1, 1))
-        self.carries_link = _carriers(self._model)
+        self.carries_link = np.zeros((count, count), dtype=bool)
+        for group in self._groups:
+            self.carries_link[group.axes, group.axes] = _carriers(group.model)
         self._X_JB = np.array([_at(-point) for point in self._points]).reshape(-1, 4, 4)
         self._holder, self._X_TP = _part_carrier(cell)
 
     def state(self, q: Array) -> CellState:
         """Kinematics at the stacked joint vector ``q``, shape (nq,); the result owns its arrays."""
         full = q if self._is_plain else self._spread @ q + self._offset
-        pin.computeJointJacobians(self._model, self._data, full)
+        self._compute(full)
         screws = self._screws() if self._is_plain else self._screws() @ self._spread_to_flange
         X_WT = self._X_WT.copy()
-        for index, (joint_id, X_JT) in enumerate(zip(self._flange_ids, self._X_JT, strict=True)):
-            X_WT[index] = self._data.oMi[joint_id].homogeneous @ X_JT
+        for index, ((group, joint_id), X_JT) in enumerate(zip(self._flanges, self._X_JT, strict=True)):
+            X_WT[index] = group.data.oMi[joint_id].homogeneous @ X_JT
         X_WP = self._X_TP if self._holder is None else X_WT[self._holder] @ self._X_TP
         return CellState(screws, X_WT, X_WP)
 
     def links(self, q: Array) -> LinkState:
         """All links at the stacked joint vector ``q``, shape (nq,); the result owns its arrays."""
-        pin.computeJointJacobians(self._model, self._data, self._spread @ q + self._offset)
-        X_WJ = np.array([self._data.oMi[link].homogeneous for link in range(1, self._model.njoints)])
+        self._compute(self._spread @ q + self._offset)
+        X_WJ = np.array([pose for group in self._groups for pose in group.poses()])
         return LinkState(self._screws(), X_WJ.reshape(-1, 4, 4) @ self._X_JB)
 
     def along_joints(self, per_axis: Array) -> Array:
@@ -103,16 +134,29 @@ class CombinedModel:
         shares: Array = per_joint @ self._spread_to_flange.T
         return shares
 
+    def _compute(self, full: Array) -> None:
+        """Let the engine place all axes at their positions, shape (links,)."""
+        for group in self._groups:
+            pin.computeJointJacobians(group.model, group.data, full[group.axes])
+
     def _screws(self) -> Array:
-        """Columns of all axes as the engine last computed them, shape (6, links); of a single one it gives a vector."""
-        screws: Array = self._data.J.copy().reshape(6, self._model.nv)
-        return screws
+        """Columns of all axes as the engine last computed them, shape (6, links)."""
+        if len(self._groups) == 1:
+            return self._groups[0].screws
+        return np.concatenate([group.screws for group in self._groups], axis=1)
+
+    def _group_for(self, axes: int) -> _Group:
+        """The last group, or a new one when the last has no room for so many axes."""
+        if not self._groups or self._groups[-1].model.nv + axes > MOST_AXES:
+            self._groups.append(_Group(len(self._leaders)))
+        return self._groups[-1]
 
     def _add_robot(self, robot: Robot, columns: slice, carries: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> None:
         """Add one robot's joints; every joint frame is parallel to B at the reference posture."""
         model = robot.model
         axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
         ids: list[int] = []
+        group = self._group_for(len(axes))
         self.first_link.append(len(self._leaders))
         for axis in axes:
             self._points.append(axis.point_B)
@@ -122,7 +166,7 @@ class CombinedModel:
                 parent_id, X_parent = ids[axis.parent], _at(axis.point_B - axes[axis.parent].point_B)
             kind = pin.JointModelRevoluteUnaligned if axis.is_revolute else pin.JointModelPrismaticUnaligned
             placement = pin.SE3(X_parent[:3, :3], X_parent[:3, 3])
-            ids.append(self._model.addJoint(parent_id, kind(axis.axis_B), placement, f"{robot.name}/{axis.name}"))
+            ids.append(group.model.addJoint(parent_id, kind(axis.axis_B), placement, f"{robot.name}/{axis.name}"))
             leader, ratio, offset = len(ids) - 1, 1.0, 0.0
             if isinstance(axis, FollowerJoint):
                 leader, ratio, offset = axis.leader, axis.ratio, axis.offset
@@ -130,7 +174,7 @@ class CombinedModel:
             self._ratios.append(ratio)
             self._offsets.append(offset)
         link = model.flange_link
-        self._flange_ids.append(0 if link == BASE else ids[link])
+        self._flanges.append((group, 0 if link == BASE else ids[link]))
         X_joint = inverse(robot.X_WB) if link == BASE else _at(axes[link].point_B)
         self._X_JT.append(inverse(X_joint) @ model.X_BF @ robot.tool.X_FT)
         on_the_way = [False] * len(axes)

@@ -12,8 +12,9 @@ MOST_LOOKS: Final = 20_000  # partial combinations looked at before the search i
 def best_combinations(scores: Sequence[Sequence[float]], is_ruled_out: Callable[[Picks], bool]) -> Iterator[Picks]:
     """Combinations in the order of their worst score, the best first; equal ones in the order of the lists.
 
-    Partial combinations are grown best first, so the number of all combinations, which grows exponentially with the
-    number of robots, is never worked through. The search ends after ``MOST_LOOKS`` partial combinations.
+    Partial combinations are grown best first, each by the worst score that it cannot do without: that of its own picks
+    and of the best branches of the robots to come. So the number of all combinations, which grows exponentially with
+    the number of robots, is never worked through. The search ends after ``MOST_LOOKS`` partial combinations.
 
     Args:
         scores: Scores of each robot's branches; a larger one is better.
@@ -23,7 +24,9 @@ def best_combinations(scores: Sequence[Sequence[float]], is_ruled_out: Callable[
     Yields:
         The index of the branch for each robot.
     """
-    heap: list[tuple[float, int, Picks]] = [(float("-inf"), 0, ())]
+    least = [min((-score for score in branches), default=float("inf")) for branches in scores]
+    to_come = [max(least[count:], default=float("-inf")) for count in range(len(scores) + 1)]
+    heap: list[tuple[float, int, Picks]] = [(to_come[0], 0, ())]
     for _ in range(MOST_LOOKS):
         if not heap:
             return
@@ -34,4 +37,5 @@ def best_combinations(scores: Sequence[Sequence[float]], is_ruled_out: Callable[
             yield picks
             continue
         for pick, score in enumerate(scores[len(picks)]):
-            heappush(heap, (max(badness, -score), -len(picks) - 1, (*picks, pick)))
+            worst = max(badness, -score, to_come[len(picks) + 1])
+            heappush(heap, (worst, -len(picks) - 1, (*picks, pick)))

@@ -46,7 +46,7 @@ class StartTrials:
             ),  # which joint fails is not known beforehand
             solver=replace(cell.solver, gain=GAIN / step, method=TRIED_WITH),
         )
-        self._alone = replace(self._cell, part=replace(cell.part, held_by=cell.part.held_by[:1]))
+        self._alone: dict[str, Cell] = {}
         self.open_pairs = _open_pairs(scene)
 
     def judge(self, start: Array) -> tuple[float, Array]:
@@ -72,7 +72,7 @@ class StartTrials:
 
         Collisions and the other holders are not looked at.
         """
-        cell = self._alone
+        cell = self._cell_alone(task.robot)
         start = np.concatenate([np.clip(0.0, *finite_limits(robot.model)) for robot in cell.robots])
         start[cell.columns(task.robot)] = posture
         for name in cell.positioners[:1]:
@@ -88,6 +88,19 @@ class StartTrials:
             return -np.inf
         turns = _whole_turns(cell, motions[0])
         return _share_left_free(cell, motions[0] + turns, self._step, only=(*movers, task.robot))
+
+    def _cell_alone(self, robot: str) -> Cell:
+        """The cell with the first holder and one operator; all robots stay where goals may look at them."""
+        if robot not in self._alone:
+            whole = self._cell
+            kept = {robot, *whole.positioners[:1]} if not whole.solver.goals else {each.name for each in whole.robots}
+            self._alone[robot] = replace(
+                whole,
+                robots=tuple(each for each in whole.robots if each.name in kept),
+                tasks=tuple(each for each in whole.tasks if each.robot in kept),
+                part=replace(whole.part, held_by=whole.part.held_by[:1]),
+            )
+        return self._alone[robot]
 
     def _motions(self, cell: Cell, start: Array, plans: Sequence[RunPlan]) -> list[Array]:
         """Joint positions of each run on the coarse clock, shape (N, nq) each."""

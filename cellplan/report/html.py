@@ -1,5 +1,6 @@
 """``report.html``: the verdict of a run and everything behind it, as one page that needs nothing but itself."""
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -52,6 +53,7 @@ OUTCOMES = {
     "diverged": "does not converge: the error grew, or the corrected references cannot be followed",
     "unfinished": "not converged yet: the rounds are used up",
 }
+MANY = 8  # [-] robots; with more, pictures and long lists are folded and each robot has a line of its own
 NARROW = 0.05  # [-] of the half range: a joint whose margin is smaller is marked
 FAST = 0.95  # [-] of the speed limit: likewise
 SMALLEST_SHOWN = 1e-6  # [mm] or [deg]: below it more digits tell nothing
@@ -100,7 +102,7 @@ def rehearsal_html(rehearsal: Rehearsal, *, provenance: Provenance, plots: Mappi
 
 
 def _render(template: str, record: Record, cell: Cell, parts: Mapping[str, object]) -> str:
-    words = {"modes": MODES, "classes": CLASSES, "narrow": NARROW, "fast": FAST}
+    words = {"modes": MODES, "classes": CLASSES, "narrow": NARROW, "fast": FAST, "many": len(cell.robots) > MANY}
     colours = robot_colours(cell)
     return _environment().get_template(template).render(r=record, colours=colours, ink=ROBOTS[-1], **words, **parts)
 
@@ -121,6 +123,7 @@ def _environment() -> Environment:
         "percent": _percent,
         "floored": _floored,
         "range_bar": _range_bar,
+        "worst": _worst,
     }
     return environment
 
@@ -173,6 +176,22 @@ def _range_bar(joint: Record) -> Record | None:
     scale = 100.0 / ((right - left) or 1.0)
     places = {"lower": lower, "upper": upper, "min": joint["min"], "max": joint["max"]}
     return {name: round(scale * (value - left), 2) for name, value in places.items()}
+
+
+def _worst(joints: Record) -> Record:
+    """The joint of a robot with the smallest share of its range left, and the one nearest to its top speed.
+
+    Both carry their name; None stands for a robot without such a joint. A speed without a share is beyond all limits.
+    """
+    named = [{"name": name, **joint} for name, joint in joints.items()]
+    bounded = [joint for joint in named if None not in (joint["margin"], joint["lower"], joint["upper"])]
+    near = min(bounded, key=lambda joint: joint["margin"] / ((joint["upper"] - joint["lower"]) or 1.0), default=None)
+    return {"near": near, "fast": max(named, key=_speed_share, default=None)}
+
+
+def _speed_share(joint: Record) -> float:
+    share = joint["velocity_ratio"]
+    return math.inf if share is None else float(share)
 
 
 def _figures(record: Record) -> list[Record]:

@@ -1,5 +1,8 @@
 """Colours that plots and pages share: one per robot, dark enough to read on white."""
 
+import colorsys
+from typing import Final
+
 from cellplan.model.cell import Cell
 
 INK = "#1d2733"
@@ -11,6 +14,19 @@ AXES = ("#c4472b", "#2a7d53", "#2b5fa6")
 CLASSES = ("#0f7f8c", "#7b4aa6", "#6b6a13", "#4a5568")
 
 
+GOLDEN: Final = 0.6180339887498949  # [-] of the colour circle from one further robot to the next: none comes back
+DARK: Final = (0.26, 0.38)  # [-] lightness of further robots in turn
+FULL: Final = 0.6  # [-] their saturation
+
+
 def robot_colours(cell: Cell) -> dict[str, str]:
     """Colour of each robot, by its place in the cell."""
-    return {robot.name: ROBOTS[index % len(ROBOTS)] for index, robot in enumerate(cell.robots)}
+    return {robot.name: _colour(index) for index, robot in enumerate(cell.robots)}
+
+
+def _colour(index: int) -> str:
+    """A chosen colour for the first robots, then others round the colour circle."""
+    if index < len(ROBOTS):
+        return ROBOTS[index]
+    shares = colorsys.hls_to_rgb(index * GOLDEN % 1.0, DARK[index % 2], FULL)
+    return "#" + "".join(f"{round(255 * share):02x}" for share in shares)

@@ -18,6 +18,7 @@ from cellplan.report.record import rounded_down
 JOINT_COLUMNS = 3
 LEAST_IN_UNIT = 0.5  # [-] of an error in its unit: a larger unit is not chosen below
 LEAST_PLAIN, SMALLEST_DRAWN = 1e-2, 1e-200  # [-] of a manipulability: below, in powers of ten; below, as zero
+LONGEST_TITLE = 29  # [-] letters beside which the whole note has room in one of three columns
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 CLASS_TITLES: Mapping[ClearanceClass, str] = {
     ClearanceClass.ROBOT_ROBOT: "robot to robot",
@@ -241,10 +242,11 @@ def _draw_singularity(report: Report, colours: Mapping[str, str]) -> dict[str, b
         worst = int(np.argmin(values))
         unit, scale = _power_of_ten(float(values.max()))
         at_s, smallest = float(report.times[worst]), scale * float(values[worst])
+        is_long = len(name + unit) > LONGEST_TITLE
         panel = sheet.panel(
             index,
             name + unit,
-            note=f"smallest {smallest:.2g} at {at_s:.2f} s",
+            note=f"{'' if is_long else 'smallest '}{smallest:.2g} at {at_s:.2f} s",
             span=(0.0, scale * float(values.max()) or 1.0),
             is_floored=True,
         )

@@ -1,6 +1,6 @@
 """Scene: a cell made computable, built once: its kinematic chains, its bodies and the pairs that must keep apart."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from cellplan.collision.posture import Flags, PairIndices, first_touching
 from cellplan.collision.self_test import prove_engine
 from cellplan.collision.travel import Pair
 from cellplan.collision.zone import outside_zone
-from cellplan.geometry.shapes import HalfSpace
+from cellplan.geometry.shapes import HalfSpace, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import Cell, Robot
@@ -20,6 +20,8 @@ from cellplan.model.task import Frame
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, scene_bodies
 from cellplan.scene.by_design import apply_design
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
+
+_Outside = dict[tuple[Solid, bytes], tuple[CollisionBody | None, bool]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -152,29 +154,31 @@ class _Watch:
 def _at_work(cell: Cell, bodies: tuple[SceneBody, ...], pairs: list[ScenePair], *, solids: int) -> _Watch:
     """Say what the engine watches of each pair, and give tools at work on the part the rule of the contact zone."""
     watch = _Watch(pairs=[], watched=[], cut=[])
+    at_work = {task.robot for task in cell.tasks if task.relative_to is Frame.PART}
+    outside: _Outside = {}
     for pair in pairs:
-        if _is_tool_at_work(cell, bodies, pair):
-            _watch_tool(watch, cell, bodies, pair=pair, next_index=solids + len(watch.cut))
+        if _is_tool_at_work(bodies, pair, at_work):
+            _watch_tool(watch, cell, bodies, pair=pair, next_index=solids + len(watch.cut), known=outside)
             continue
         watch.pairs.append(pair)
         watch.watched.append(None if is_ground(bodies[pair.second]) else (pair.first, pair.second))
     return watch
 
 
-def _is_tool_at_work(cell: Cell, bodies: tuple[SceneBody, ...], pair: ScenePair) -> bool:
-    """Whether a pair is the tool of a robot that has a task on the part, and the part."""
-    at_work = {task.robot for task in cell.tasks if task.relative_to is Frame.PART}
-    kinds = {bodies[index].kind: bodies[index] for index in (pair.first, pair.second)}
-    return set(kinds) == {Kind.TOOL, Kind.PART} and kinds[Kind.TOOL].robot in at_work
+def _is_tool_at_work(bodies: tuple[SceneBody, ...], pair: ScenePair, at_work: Set[str]) -> bool:
+    """Whether a pair is the part and the tool of one of the robots that have a task on it."""
+    ends = bodies[pair.first], bodies[pair.second]
+    tool, part = ends if ends[1].kind is Kind.PART else ends[::-1]
+    return part.kind is Kind.PART and tool.kind is Kind.TOOL and tool.robot in at_work
 
 
-def _watch_tool(watch: _Watch, cell: Cell, bodies: tuple[SceneBody, ...], *, pair: ScenePair, next_index: int) -> None:
+def _watch_tool(
+    watch: _Watch, cell: Cell, bodies: tuple[SceneBody, ...], *, pair: ScenePair, next_index: int, known: _Outside
+) -> None:
     """Watch what sticks out of the contact zone; a tool body that does not reach into the zone is like any other."""
     tool, part = sorted((pair.first, pair.second), key=lambda index: bodies[index].kind is Kind.PART)
-    body, zone = bodies[tool], cell.checks.contact_zone
-    outside, is_in_zone = None, False
-    if not isinstance(body.shape, HalfSpace):
-        outside, is_in_zone = outside_zone(body.shape, _tip(cell.robot(str(body.robot)), body), zone)
+    zone = cell.checks.contact_zone
+    outside, is_in_zone = _outside_zone(cell, bodies[tool], known)
     if not is_in_zone:
         watch.pairs.append(pair)
         watch.watched.append((tool, part))
@@ -183,7 +187,20 @@ def _watch_tool(watch: _Watch, cell: Cell, bodies: tuple[SceneBody, ...], *, pai
     watch.pairs.append(replace(pair, rule=Rule.PROCESS, reason=reason))
     watch.watched.append(None if outside is None else (next_index, part))
     if outside is not None:
-        watch.cut.append((tool, prepare(body.name, outside)))
+        watch.cut.append((tool, outside))
+
+
+def _outside_zone(cell: Cell, body: SceneBody, known: _Outside) -> tuple[CollisionBody | None, bool]:
+    """What of a tool's solid lies outside its contact zone, and whether any lies inside; equal tools are cut once."""
+    if isinstance(body.shape, HalfSpace):
+        return None, False
+    tip = _tip(cell.robot(str(body.robot)), body)
+    key = (body.shape, tip.tobytes())
+    if key not in known:
+        surface, is_in_zone = outside_zone(body.shape, tip, cell.checks.contact_zone)
+        known[key] = (prepare(body.name, surface) if is_in_zone and surface is not None else None), is_in_zone
+    outside, is_in_zone = known[key]
+    return (None if outside is None else replace(outside, name=body.name)), is_in_zone
 
 
 def _tip(robot: Robot, body: SceneBody) -> Array:

@@ -83,8 +83,8 @@ class StraightMotion:
         low -= (self.bend[first] + self.bend[second]) / 8.0
         return low
 
-    def part(self, first: int, last: int) -> "StraightMotion":
-        """The samples from the first to the last, both included."""
+    def part(self, pair: Pair, first: int, last: int) -> "StraightMotion":
+        """Two bodies at the samples from the first to the last, both included; what the others do is left out."""
         samples, steps = slice(first, last + 1), slice(first, last)
         return StraightMotion(
             scene=self.scene,
@@ -92,8 +92,8 @@ class StraightMotion:
             q=self.q[samples],
             steps=self.steps[steps],
             poses=BodyPoses(self.poses.R[:, samples], self.poses.p[:, samples]),
-            bend={index: bend[steps] for index, bend in self.bend.items()},
-            centres={index: centres[samples] for index, centres in self.centres.items()},
+            bend={index: self.bend[index][steps] for index in pair},
+            centres={index: self.centres[index][samples] for index in pair},
         )
 
     def finer(self, pair: Pair, step: int, *, parts: int) -> "StraightMotion":

@@ -5,10 +5,12 @@ spheres. Pairs are then searched (``survey_search``), the nearest first, as far 
 class or among the nearest of the cell; the others keep the bounds they have.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.collision.certify import SEARCH_ROOM, Found, Search
 from cellplan.collision.measure import SURELY_APART
@@ -19,8 +21,19 @@ from cellplan.model.report import ClearanceClass
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 
+Rows = NDArray[np.intp]  # indices of pairs
+
 BLOCKS: Final = 200  # [-] stretches of the program that have a bound of their own
+ROWS_AT_ONCE: Final = 10_000  # [-] pairs whose bounds are copied at once: 16 MB
 CLOSEST: Final = 10  # [-] pairs that are reported as the closest ones
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Ranks:
+    """Smallest distances in [m]: of one pair more than are reported, ascending, and of each class."""
+
+    closest: Sequence[float]
+    best: Mapping[ClearanceClass, float]
 
 
 class Survey:
@@ -34,6 +47,8 @@ class Survey:
             nothing is proved; inf where nothing of a tool sticks out of its contact zone. May be negative where nobody
             looked: for pairs left out.
         found: What is known of each pair; instants are counted in samples.
+        solid_ends: The engine's bodies of each pair of solids, by the pair.
+        at_work: Pairs of a tool at work and the part.
         at_surface: First and last sample at which a tool at work is at the surface of the part, by pair.
         left_out: Pairs of which contacts are looked for at the samples only.
     """
@@ -52,20 +67,30 @@ class Survey:
         self.low = np.full((count, len(self.edges) - 1), np.inf)
         self.found = [Found(most_cuts=0) if row in self.left_out else Found() for row in range(count)]
         self.at_surface: dict[int, tuple[int, int]] = {}
+        pairs = zip(scene.solid_rows.tolist(), scene.solid_pairs.tolist(), strict=True)
+        self.solid_ends: dict[int, Pair] = {row: (first, second) for row, (first, second) in pairs}
+        self.at_work = [
+            row for row, pair in enumerate(scene.pairs) if pair.rule is Rule.PROCESS and row not in left_out
+        ]
         self._nearest = np.full(count, np.inf)  # smallest distance found in [m], zero where a pair touches
+        self._ranks: _Ranks | None = None  # of the distances found, until one of them changes
         counts = ~np.isin(np.arange(count), left_out)
         kinds = np.array([pair.clearance_class for pair in scene.pairs])
         self._keeps_any = counts & np.array([pair.rule is Rule.CLEARANCE for pair in scene.pairs], dtype=bool)
         self._watched = {kind: counts & (kinds == kind) for kind in ClearanceClass}
         self._keeps = {kind: self._keeps_any & (kinds == kind) for kind in ClearanceClass}
 
-    def rows(self, kind: ClearanceClass) -> list[int]:
-        """Pairs of a class that are to keep the distance that the cell demands."""
-        return np.flatnonzero(self._keeps[kind]).tolist()
+    def rows(self, kind: ClearanceClass) -> Rows:
+        """Pairs of a class that are to keep the distance that the cell demands, shape (M,), ascending."""
+        return np.flatnonzero(self._keeps[kind])
 
-    def watched(self, kind: ClearanceClass) -> list[int]:
-        """Pairs of a class that must not touch, whatever else is asked of them."""
-        return np.flatnonzero(self._watched[kind]).tolist()
+    def watched(self, kind: ClearanceClass) -> Rows:
+        """Pairs of a class that must not touch, whatever else is asked of them, shape (M,), ascending."""
+        return np.flatnonzero(self._watched[kind])
+
+    def known(self) -> list[int]:
+        """Pairs that are to keep the distance that the cell demands and were found to touch or measured."""
+        return np.flatnonzero(self._keeps_any & np.isfinite(self._nearest)).tolist()
 
     def distance(self, row: int) -> float:
         """Smallest distance of a pair that was found in [m]: zero when it touches, inf when it was not measured."""
@@ -73,24 +98,43 @@ class Survey:
 
     def best(self, kind: ClearanceClass) -> float:
         """Smallest distance of a class found so far in [m]; zero when any pair of it touches."""
-        return float(self._nearest[self._watched[kind]].min(initial=np.inf))
+        return self._ranked().best[kind]
 
     def cutoff(self, row: int) -> float:
         """Distance in [m] from which on a pair is neither the nearest of its class nor among the closest of all."""
         kind = self.scene.pairs[row].clearance_class
         if not self._keeps[kind][row]:
             return SURELY_APART
-        others = np.delete(self._nearest[self._keeps_any], np.count_nonzero(self._keeps_any[:row]))
-        last = np.partition(others, CLOSEST - 1)[CLOSEST - 1] if len(others) >= CLOSEST else np.inf
-        return float(max(SURELY_APART, max(self.best(kind), last) - SEARCH_ROOM))
+        ranks = self._ranked()
+        is_among = self._nearest[row] <= ranks.closest[CLOSEST - 1]
+        last = ranks.closest[CLOSEST if is_among else CLOSEST - 1]  # of the others
+        return max(SURELY_APART, max(ranks.best[kind], last) - SEARCH_ROOM)
+
+    def largest_cutoff(self) -> float:
+        """No pair has a larger cutoff in [m], now or later: distances that are found only become smaller."""
+        ranks = self._ranked()
+        kept = [ranks.best[kind] for kind in ClearanceClass if self._keeps[kind].any()]
+        return max(SURELY_APART, max([ranks.closest[CLOSEST], *kept]) - SEARCH_ROOM)
 
     def remember(self, row: int) -> None:
         """Keep the smallest distance of a pair at hand; of pairs that only must not touch only the touch counts."""
-        found = self.found[row]
+        found, known = self.found[row], float(self._nearest[row])
         if found.touches:
             self._nearest[row] = 0.0
         elif self._keeps_any[row]:
             self._nearest[row] = found.distance
+        if self._nearest[row] != known:
+            self._ranks = None
+
+    def _ranked(self) -> "_Ranks":
+        """The smallest distances found so far."""
+        if self._ranks is None:
+            kept = self._nearest[self._keeps_any]
+            few = np.partition(kept, CLOSEST)[: CLOSEST + 1] if len(kept) > CLOSEST else kept
+            closest = np.append(np.sort(few), np.full(CLOSEST + 1 - len(few), np.inf))
+            best = {kind: float(self._nearest[self._watched[kind]].min(initial=np.inf)) for kind in ClearanceClass}
+            self._ranks = _Ranks(closest=closest.tolist(), best=best)
+        return self._ranks
 
     def lift(self, row: int, search: Search, first: int) -> None:
         """Raise the bounds of a pair by those of a search that begins where a block does."""
@@ -101,14 +145,9 @@ class Survey:
         self.low[row, first:last] = np.where(np.isinf(known) | (low == 0.0), low, np.maximum(known, low))
         self.remember(row)
 
-    def nearest_points(self, row: int, ends: Pair | None) -> tuple[Array, Array] | None:
-        """Points of a pair where it is nearest, in the world in [m]; None when it touches or was not measured.
-
-        Args:
-            row: The pair.
-            ends: The engine's bodies; None for a pair with a half-space.
-        """
-        found, scene = self.found[row], self.scene
+    def nearest_points(self, row: int) -> tuple[Array, Array] | None:
+        """Points of a pair where it is nearest, in the world in [m]; None when it touches or was not measured."""
+        found, scene, ends = self.found[row], self.scene, self.solid_ends.get(row)
         if found.touches or not np.isfinite(found.distance):
             return None
         before = min(int(found.at), len(self.q) - 2)
@@ -121,3 +160,11 @@ class Survey:
         else:
             points = nearest_points(scene.engine, ends, scene.pair_poses(ends, q[None]), sample=0)
         return points.first, points.second
+
+
+def lowest_bounds(seen: Survey, rows: Rows) -> Array:
+    """Smallest bound of some pairs in each block in [m], shape (K,)."""
+    lowest = np.full(seen.low.shape[1], np.inf)
+    for first in range(0, len(rows), ROWS_AT_ONCE):
+        np.minimum(lowest, seen.low[rows[first : first + ROWS_AT_ONCE]].min(axis=0), out=lowest)
+    return lowest

@@ -8,20 +8,19 @@ import numpy as np
 from cellplan.collision.at_surface import surface_span
 from cellplan.collision.certify import SolidSearch
 from cellplan.collision.measure import Reading, measure
-from cellplan.collision.travel import Pair
 from cellplan.geometry.transforms import Array
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import ClearanceClass
 from cellplan.scene.curves import CurveRefiner
 from cellplan.scene.ground_search import GroundSearch
 from cellplan.scene.lever_arms import LeverArms
-from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 from cellplan.scene.straight_motion import StraightMotion
-from cellplan.scene.survey import Survey
+from cellplan.scene.survey import ROWS_AT_ONCE, Rows, Survey
 
 CHUNK_WORK: Final = 400_000  # [-] bodies times samples worked on at once: 40 MB of poses
 MOST_SAMPLES: Final = 16_384  # [-] samples worked on at once, however few bodies there are
+PAIR_WORK: Final = 2_000_000  # [-] pairs times blocks bounded at once: 100 MB
 FIRST_LOOKS: Final = 12  # [-] pairs of each class measured once before any search: a small distance saves much later
 
 
@@ -50,12 +49,6 @@ def survey(
     return found
 
 
-def solid_ends(scene: Scene) -> dict[int, Pair]:
-    """The engine's bodies of each pair of solids that is watched, by the pair."""
-    pairs = zip(scene.solid_rows.tolist(), scene.solid_pairs.tolist(), strict=True)
-    return {row: (first, second) for row, (first, second) in pairs}
-
-
 def _stretches(found: Survey) -> Iterator[tuple[int, int]]:
     """Runs of blocks small enough to be worked on at once: the first block, and the first one after the last."""
     most = min(MOST_SAMPLES, max(512, CHUNK_WORK // max(1, len(found.scene.engine.bodies))))
@@ -73,7 +66,7 @@ class _Stretch:
     def __init__(self, found: Survey, motion: StraightMotion, first: int, last: int) -> None:
         """Bound all pairs over the stretch by the cheapest means."""
         self._found, self._motion, self._first, self._last = found, motion, first, last
-        self._scene, self._solid = found.scene, solid_ends(found.scene)
+        self._scene, self._solid = found.scene, found.solid_ends
         self._edges = found.edges[first : last + 1] - found.edges[first]
         self._bound_solids()
         self._grounds: dict[int, GroundSearch] = {}
@@ -85,26 +78,56 @@ class _Stretch:
 
     def search_all(self) -> None:
         """Search every pair as far as it matters."""
-        looks = {row: look for kind in ClearanceClass for row, look in self._first_looks(kind)}
-        for row in np.argsort(self._low().min(axis=1, initial=np.inf), kind="stable").tolist():
+        lowest = self._low().min(axis=1, initial=np.inf)
+        looks = {row: look for kind in ClearanceClass for row, look in self._first_looks(kind, lowest)}
+        for row in np.argsort(lowest, kind="stable").tolist():
+            if lowest[row] >= self._found.largest_cutoff():
+                break  # and so are all that follow
             self._search(row, looks.get(row))
 
     def raise_curve(self, kind: ClearanceClass) -> None:
         """Raise the bounds of a class in every block so far that the smallest of them says something."""
         rows = self._found.rows(kind)
-        if not rows:
+        if not len(rows):
             return
+        rows = self._may_be_nearest(rows)
         low = self._low()[rows]
         refiner = CurveRefiner(self._scene.engine, self._motion, self._edges)
-        refiner.raise_bounds(low, [self._solid.get(row) for row in rows])
+        refiner.raise_bounds(low, [self._solid.get(row) for row in rows.tolist()])
         self._low()[rows] = low
+
+    def _may_be_nearest(self, rows: Rows) -> Rows:
+        """Pairs that some block has a bound of that is no larger than a distance the pairs are known to come to there.
+
+        That distance is the one at the beginning of the block, of the pair with the lowest bound: no larger than the
+        distance of the centres of both spheres and their radii. Larger bounds are never the lowest, however far the
+        others are raised.
+        """
+        if len(rows) <= ROWS_AT_ONCE:
+            return rows
+        low, pieces = self._low(), range(0, len(rows), ROWS_AT_ONCE)
+        reached = np.full(low.shape[1], np.inf)
+        for first in pieces:
+            piece = rows[first : first + ROWS_AT_ONCE]
+            lowest = piece[np.argmin(low[piece], axis=0)]
+            np.minimum(reached, [self._reached(int(row), block) for block, row in enumerate(lowest)], out=reached)
+        near = [np.any(low[rows[first : first + ROWS_AT_ONCE]] <= reached, axis=1) for first in pieces]
+        chosen: Rows = rows[np.concatenate(near)]
+        return chosen
+
+    def _reached(self, row: int, block: int) -> float:
+        """A distance in [m] that a pair does not exceed at the beginning of a block; inf for one with a half-space."""
+        ends = self._solid.get(row)
+        if ends is None:
+            return float(np.inf)
+        first, second = (self._motion.centres[index][self._edges[block]] for index in ends)
+        return float(np.linalg.norm(second - first) + self._scene.engine.radii[list(ends)].sum())
 
     def note_work(self) -> None:
         """Write down from when to when tools at work are at the part, whatever breaks there are."""
         begin, spans = int(self._found.edges[self._first]), self._found.at_surface
-        for row, pair in enumerate(self._scene.pairs):
-            if pair.rule is not Rule.PROCESS or row in self._found.left_out:
-                continue
+        for row in self._found.at_work:
+            pair = self._scene.pairs[row]
             span = surface_span(self._scene.engine, (pair.first, pair.second), self._motion)
             if span is not None:
                 spans[row] = spans.get(row, (begin + span[0], 0))[0], begin + span[1]
@@ -118,20 +141,29 @@ class _Stretch:
         engine, pairs, motion = self._scene.engine, self._scene.solid_pairs, self._motion
         if not len(pairs):
             return
-        centres = np.array([motion.centres[index][self._edges] for index in range(len(engine.bodies))])
+        centres = np.array([motion.centres[index][self._edges].T for index in range(len(engine.bodies))])
         ways = np.empty((len(engine.bodies), self._last - self._first))
         for index in range(len(engine.bodies)):
             way = np.linalg.norm(np.diff(motion.centres[index], axis=0), axis=1) + motion.bend[index] / 3.0
             ways[index] = np.add.reduceat(way, self._edges[:-1])
-        a, b = pairs.T
-        gaps = np.linalg.norm(centres[b] - centres[a], axis=2) - (engine.radii[a] + engine.radii[b])[:, None]
-        self._low()[self._scene.solid_rows] = 0.5 * (gaps[:, 1:] + gaps[:, :-1] - ways[a] - ways[b])
+        for first in range(0, len(pairs), step := max(1, PAIR_WORK // ways.shape[1])):
+            a, b = pairs[first : first + step].T
+            x, y, z = (centres[b, axis] - centres[a, axis] for axis in range(3))
+            gaps = np.sqrt(x * x + (y * y + z * z)) - (engine.radii[a] + engine.radii[b])[:, None]
+            low = 0.5 * (gaps[:, 1:] + gaps[:, :-1] - ways[a] - ways[b])
+            self._low()[self._scene.solid_rows[first : first + step]] = low
 
-    def _first_looks(self, kind: ClearanceClass) -> Iterator[tuple[int, tuple[int, Reading]]]:
-        """Measure the pairs of a class that seem nearest once, at an edge of the block where they do."""
-        found, lowest = self._found, self._low().min(axis=1, initial=np.inf)
-        rows = sorted((row for row in found.rows(kind) if row in self._solid), key=lambda row: float(lowest[row]))
-        for row in rows[:FIRST_LOOKS]:
+    def _first_looks(self, kind: ClearanceClass, lowest: Array) -> Iterator[tuple[int, tuple[int, Reading]]]:
+        """Measure the pairs of a class that seem nearest once, at an edge of the block where they do.
+
+        Args:
+            kind: The class.
+            lowest: The lowest bound of each pair in the stretch in [m], shape (pairs,).
+        """
+        found = self._found
+        rows = found.rows(kind)
+        rows = rows[np.isin(rows, self._scene.solid_rows, kind="table")]
+        for row in rows[np.argsort(lowest[rows], kind="stable")][:FIRST_LOOKS].tolist():
             if lowest[row] >= found.best(kind):
                 break
             block = int(np.argmin(self._low()[row]))
@@ -158,7 +190,7 @@ class _Stretch:
         search = SolidSearch(
             self._scene.engine,
             self._solid[row],
-            self._motion.part(begin, end),
+            self._motion.part(self._solid[row], begin, end),
             found=found.found[row],
             begin=float(found.edges[block]),
         )

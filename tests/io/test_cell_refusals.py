@@ -246,9 +246,9 @@ def test_a_flood_of_complaints_is_cut_short(refuse: Refuse) -> None:
 
 
 def test_the_robot_limit_is_named(refuse: Refuse) -> None:
-    more = "".join(f"  r{k}: {{model: kuka_kr6}}\n" for k in range(15))
+    more = "".join(f"  r{k}: {{model: kuka_kr6}}\n" for k in range(63))
 
-    assert refuse(("robots:\n", "robots:\n" + more)) == ["c:3: robots: expected at most 16 entries, got 17"]
+    assert refuse(("robots:\n", "robots:\n" + more)) == ["c:3: robots: expected at most 64 entries, got 65"]
 
 
 def test_complaints_about_a_robot_table_follow_those_about_the_cell(refuse: Refuse, tmp_path: Path) -> None:

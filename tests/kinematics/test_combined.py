@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from random_cells import random_cell
 
-from cellplan.kinematics.combined import CombinedModel
+from cellplan.kinematics.combined import MOST_AXES, CombinedModel
 from cellplan.kinematics.screws import ScrewChain
 
 ROUNDING = 1e-12  # [-] products of a dozen matrices of order one
@@ -53,3 +53,25 @@ def test_a_cell_of_one_single_joint_has_one_column() -> None:
     model = CombinedModel(cell)
     assert model.state(q).screws_W.shape == model.links(q).screws_W.shape == (6, 1)
     assert np.array_equal(model.state(q).screws_W, model.links(q).screws_W)
+
+
+@pytest.mark.parametrize("with_follower", [False, True], ids=["plain", "follower"])
+def test_more_robots_than_one_model_takes_stand_where_successive_screws_put_them(with_follower: bool) -> None:
+    cell = random_cell(5, operators=11, with_follower=with_follower)
+    assert cell.joint_count > MOST_AXES
+    q = np.random.default_rng(5).uniform(-1.5, 1.5, cell.joint_count)
+    chains = [ScrewChain(robot) for robot in cell.robots]
+    own = [q[None, cell.columns(robot.name)] for robot in cell.robots]
+    model = CombinedModel(cell)
+
+    state, links = model.state(q), model.links(q)
+
+    tools = np.concatenate([chain.tool_poses(each) for chain, each in zip(chains, own, strict=True)])
+    np.testing.assert_allclose(state.X_WT, tools, atol=100 * ROUNDING)
+    screws = np.concatenate([chain.flange_screws(each)[0] for chain, each in zip(chains, own, strict=True)], axis=1)
+    np.testing.assert_allclose(state.screws_W, screws, atol=100 * ROUNDING)
+    D = np.concatenate([chain.link_displacements(each)[0, 1:] for chain, each in zip(chains, own, strict=True)])
+    np.testing.assert_allclose(links.D, D, atol=100 * ROUNDING)
+    owner = np.repeat(np.arange(12), [len(r.model.joints) + len(r.model.followers) for r in cell.robots])
+    assert not model.carries_link[owner[:, None] != owner[None, :]].any()
+    assert model.carries_link.diagonal().all()

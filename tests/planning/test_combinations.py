@@ -37,3 +37,12 @@ def test_fifteen_robots_with_four_branches_each_do_not_explode():
 def test_a_search_without_a_way_out_ends():
     scores = [[0.9, 0.8, 0.7, 0.6]] * 15
     assert not list(best_combinations(scores, lambda picks: len(picks) == 15))
+
+
+def test_one_poor_robot_at_the_end_does_not_make_the_others_be_tried_in_all_ways():
+    scores = [[0.9, 0.8, 0.7, 0.6]] * 30 + [[0.1]]
+    assert next(best_combinations(scores, lambda picks: False)) == (0,) * 31
+
+
+def test_a_robot_without_branches_has_no_combination():
+    assert not list(best_combinations([[0.9, 0.8], []], lambda picks: False))

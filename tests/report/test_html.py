@@ -10,6 +10,7 @@ import pytest
 
 from cellplan.model.cell import LockedJoint
 from cellplan.model.report import Check, JointDrift, Repeatability
+from cellplan.report import html
 from cellplan.report.html import overview_html, report_html
 from cellplan.report.plots import draw_plots
 
@@ -242,3 +243,38 @@ def test_a_failed_joint_is_told_in_plain_words(passed_run: Any) -> None:
 
     assert "Joint kuka/B2 fails at 2.000 s and stays at " in page
     assert "the other joints take over, and every task is kept." in page
+
+
+def test_with_many_robots_pictures_are_folded_and_each_robot_has_a_line(
+    passed_run: Any, failed_run: Any, rail_run: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(html, "MANY", 3)
+    for run in (passed_run, failed_run, rail_run):
+        page = Page(page_of(run))
+        assert page.wrong == []
+        assert page.open == []
+        assert len(page.ids) == len(set(page.ids))
+        assert {link[1:] for link in page.links} <= set(page.ids)
+        assert page.tags.count("details") == page.tags.count("summary")
+        assert page.tags.count("figure") - page.tags.count("details") <= 1  # of clearance
+        assert "The joint of each robot with the least room and the fastest one" in page.text
+        assert {f"joints-{robot}" for robot in run.report.q} <= set(page.ids)
+
+
+def test_with_few_robots_nothing_is_folded(passed_run: Any) -> None:
+    assert "details" not in Page(page_of(passed_run)).tags
+
+
+def test_the_line_of_a_robot_names_its_worst_joints(failed_run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(html, "MANY", 3)
+    text = Page(page_of(failed_run, plots={})).text
+    overview = text[text.index("The joint of each robot") :]
+
+    for robot in failed_run.report.q:
+        uses = [use for use in failed_run.report.joints if use.robot == robot]
+        near = min(uses, key=lambda use: use.margin / (use.upper - use.lower))
+        fast = max(uses, key=lambda use: use.peak_velocity / use.velocity_limit)
+        line = overview[overview.index(f" {robot} ") :].split(" % ", 1)[0]
+        assert line.split()[:2] == [robot, near.joint]
+        assert fast.joint in line
+        assert ("outside by" in line) == (near.margin < 0.0)

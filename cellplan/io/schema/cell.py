@@ -19,7 +19,7 @@ from cellplan.io.schema.task import (
 )
 
 SCHEMA_VERSION: Final = 1
-ROBOT_LIMIT: Final = 16
+ROBOT_LIMIT: Final = 64
 TASK_LIMIT: Final = 200
 OBSTACLE_LIMIT: Final = 500
 SAMPLE_LIMIT: Final = 2_000_000  # tables longer than this fill disks, not controllers
