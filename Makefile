@@ -1,6 +1,6 @@
 # Every target works on a bare machine: Python 3.11 or newer with venv, make and a package index are all it takes.
 # PYTHON=/path/to/python picks the interpreter that `.venv` is made from; WORKERS=n picks the number of test processes.
-# ROUNDS=n says how often a benchmark runs.
+# ROUNDS=n says how often a benchmark runs; each has a number of its own otherwise.
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -10,7 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= auto
-ROUNDS ?= 3
+ROUND_OPTION := $(if $(ROUNDS),--rounds $(ROUNDS))
 USABLE := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 comma := ,
 
@@ -21,7 +21,7 @@ help:
 	@echo "make test      formatter, linter, types, import rules, sizes and all quick tests"
 	@echo "make test-all  the same with the slow tests"
 	@echo "make lint      everything but the tests"
-	@echo "make bench     time whole commands, beside a baseline of the same run, and the check of clearance"
+	@echo "make bench     measure speed, beside other libraries and brute force, and write docs/benchmarks.md"
 	@echo "make reproduce solve the cells of the three papers and write docs/reproduction.md, about six minutes"
 	@echo "make bench-methods  run every method on the same cells (a quarter of an hour); writes docs/guides/which-method.md"
 	@echo "make format    put the code into shape"
@@ -74,15 +74,15 @@ demo: $(STAMP)
 	@echo "open outputs/four-robots/report.html in a browser"
 
 bench: $(STAMP)
-	$(BIN)/python benchmarks/commands.py --rounds $(ROUNDS)
-	$(BIN)/python benchmarks/clearance.py
+	$(BIN)/python benchmarks/peer_setup.py
+	$(BIN)/python benchmarks/page.py $(ROUND_OPTION)
 
 reproduce: $(STAMP)
 	$(BIN)/python docs/make_reproduction.py
 
 bench-methods: $(STAMP)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/methods.py --rounds $(ROUNDS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/methods.py $(ROUND_OPTION)
 
 clean:
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist outputs/*/
+	rm -rf $(VENV) .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist outputs/*/
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,31 @@
+"""cellplan in its accurate mode; start posture and toolpaths given."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from job import Array, Job
+
+from cellplan import load_cell
+from cellplan.model.solver import Integrator
+from cellplan.planning.resolve import resolve
+from cellplan.planning.schedule import sample, time_tasks
+from cellplan.planning.toolpaths import build_toolpath
+
+
+def prepare(job: Job, *, accuracy_m: float) -> Callable[[], Array]:
+    """Read the cell and set the clock; a run builds the planner's model, resolves the motion and samples it.
+
+    The targets of the nodes, which are not those of the samples, are computed within the run.
+    """
+    cell = load_cell(Path(job.cell))
+    solver = replace(cell.solver, integrator=Integrator.ACCURATE, accuracy=accuracy_m)
+    cell = replace(cell, solver=solver)
+    timed = time_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    schedule = sample(timed)
+    moving = [robot.name for robot in cell.robots]
+
+    def run() -> Array:
+        return resolve(cell, timed, schedule, start=job.start, moving=moving).q
+
+    return run

@@ -1,0 +1,23 @@
+"""cellplan with Euler's steps, as the papers have it; start posture and wanted poses given."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from job import Array, Job
+
+from cellplan import load_cell
+from cellplan.planning.follow import follow
+from cellplan.planning.schedule import schedule_tasks
+from cellplan.planning.toolpaths import build_toolpath
+
+
+def prepare(job: Job) -> Callable[[], Array]:
+    """Read the cell and set the clock; a run builds the planner's model and goes from sample to sample."""
+    cell = load_cell(Path(job.cell))
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    moving = [robot.name for robot in cell.robots]
+
+    def run() -> Array:
+        return follow(cell, schedule, start=job.start, moving=moving).q
+
+    return run

@@ -1,0 +1,28 @@
+"""No cell takes more work than it used to: counts, which are the same on a slow day."""
+
+import json
+from pathlib import Path
+
+import counts
+import pytest
+
+
+@pytest.mark.parametrize("case", counts.CASES, ids=lambda case: case.name)
+def test_solving_a_cell_takes_no_more_work_than_it_used_to(case: counts.Case) -> None:
+    assert counts.grown(case, counts.counted(case)) == []
+
+
+def test_a_count_that_grew_is_named_with_the_cure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = tmp_path / "counts.json"
+    kept.write_text(json.dumps({"arm": {"distance queries": 100, "contact queries": 100, "gone": 7}}))
+    monkeypatch.setattr(counts, "KEPT", kept)
+
+    told = counts.grown(
+        counts.Case(name="arm", step_s=0.01), {"distance queries": 115, "contact queries": 116, "sweeps": 6}
+    )
+
+    cure = "find out why, or keep the new count by: python benchmarks/counts.py --write"
+    assert told == [
+        f"arm: contact queries grew from 100 to 116, at most 115 expected; {cure}",
+        f"arm: sweeps grew from 0 to 6, at most 5 expected; {cure}",
+    ]
