@@ -1,10 +1,11 @@
 """Verification: everything that is said about a run is computed here, from the joint tables that were read back."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from cellplan.checks.clearance import check_clearance
+from cellplan.checks.clearance import UNKNOWN, check_clearance
 from cellplan.checks.closure import check_closure, closure_accuracy
 from cellplan.checks.conditioning import conditioning
 from cellplan.checks.limits import check_joints, joint_uses
@@ -28,6 +29,7 @@ def verify(
     *,
     moving: Sequence[str],
     progress: Progress = silent,
+    preview: Callable[[Report], None] | None = None,
 ) -> Report:
     """Check tool errors, closed grasps, joint limits and clearance of a run.
 
@@ -39,6 +41,7 @@ def verify(
         tables: One joint table per robot, parsed from its text.
         moving: Names of the robots that may move; the others must stand still.
         progress: Who wants to know how far it is.
+        preview: Who wants the report as soon as all of it is known but the clearance.
 
     Raises:
         InputError: A table is missing, or does not fit the cell or the clock.
@@ -60,16 +63,14 @@ def verify(
     drift = repeatability(cell, schedule, q)
     checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
     checks += check_locked(cell, schedule.times, q)
-    stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
-    clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
-    return Report(
+    report = Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
         tasks=tuple(scheduled.task.name for scheduled in schedule.tasks),
-        checks=(*checks, *clearance_checks),
+        checks=tuple(checks),
         accuracy=accuracy,
         joints=tuple(uses),
-        clearance=clearance,
+        clearance=UNKNOWN,
         conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving),
         motion_share=_motion_share(uses),
         speeds={
@@ -82,6 +83,11 @@ def verify(
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
         closures=closures,
     )
+    if preview is not None:
+        preview(report)
+    stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
+    clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
+    return replace(report, checks=(*checks, *clearance_checks), clearance=clearance)
 
 
 def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccuracy]) -> list[Check]:

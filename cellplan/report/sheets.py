@@ -187,6 +187,13 @@ def pictures(sheets: Mapping[str, Sheet]) -> dict[str, bytes]:
     return paint(sheets)
 
 
+def get_ready() -> None:
+    """Import the plotting library and let it find its letters, before there is anything to paint."""
+    sheet = Sheet("", rows=1, columns=1, times=np.array([0.0, 1.0]))
+    sheet.panel(0, "0", span=(0.0, 1.0))
+    pictures({"": sheet})
+
+
 def peaks_kept(values: Array, points: int = CURVE_POINTS) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     """Indices of about ``points`` samples, among them the first, the last, and the extremes of every stretch."""
     n = len(values)
