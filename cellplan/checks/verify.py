@@ -55,11 +55,8 @@ def verify(
     )
     closures = closure_accuracy(cell, scene.chains, q, X_WP)
     checks = [*_accuracy_checks(cell, schedule, accuracy), *check_closure(cell, schedule.times, closures)]
-    uses: list[JointUse] = []
-    for robot in cell.robots:
-        own = joint_uses(robot, schedule.times, q[robot.name])
-        uses += own
-        checks += check_joints(robot, own, schedule.times, q[robot.name])
+    uses, joint_checks = _joints(cell, schedule.times, q)
+    checks += joint_checks
     drift = repeatability(cell, schedule, q)
     checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
     checks += check_locked(cell, schedule.times, q)
@@ -97,6 +94,17 @@ def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccu
         own, tolerance = check_accuracy(schedule, errors, scheduled.task), scheduled.task.tolerance
         checks += told_with_failures(own, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
     return checks
+
+
+def _joints(cell: Cell, times: Array, q: Mapping[str, Array]) -> tuple[list[JointUse], list[Check]]:
+    """How all joints are used, and whether they stay within their limits."""
+    uses: list[JointUse] = []
+    checks: list[Check] = []
+    for robot in cell.robots:
+        own = joint_uses(robot, times, q[robot.name])
+        uses += own
+        checks += check_joints(robot, own, times, q[robot.name])
+    return uses, checks
 
 
 def _positions(cell: Cell, schedule: Schedule, tables: Sequence[JointTable]) -> Mapping[str, Array]:
