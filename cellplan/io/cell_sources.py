@@ -174,7 +174,7 @@ class Sources:
             locked=dict(_locked_in_si(entry)),
         )
         try:
-            robot = self._read_urdf(entry.model, place, options)
+            robot = _read_urdf(self._urdfs, entry.model, place, options=options)
             self.inputs[entry.model] = digest_of_file(place, file=entry.model)
             for mesh in robot.mesh_files:
                 if not self._folders.holds(mesh):
@@ -189,14 +189,6 @@ class Sources:
             return None
         return robot.model
 
-    def _read_urdf(self, written: str, place: Path, options: UrdfOptions) -> UrdfRobot:
-        """Robot of a URDF; robots that say the same of the same file share one."""
-        key = (written, place, options.flange, options.package_dirs, *map(_items, (options.limits, options.locked)))
-        if key not in self._urdfs:
-            guard = Guard(file=written, worker="the URDF reader")
-            self._urdfs[key] = in_child(load_urdf, place, options, guard=guard)
-        return self._urdfs[key]
-
     def _package_dirs(self, name: str, entry: RobotEntry) -> tuple[Path, ...] | None:
         """Folders for ``package://``; None after a complaint."""
         found: list[Path] = []
@@ -207,6 +199,14 @@ class Sources:
                 path = ("robots", name, "package_dirs", index)
                 self.complaints.append(self._document.complaint(path, str(error)))
         return tuple(found) if len(found) == len(entry.package_dirs) else None
+
+
+def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, options: UrdfOptions) -> UrdfRobot:
+    """Robot of a URDF; robots that say the same of the same file share one."""
+    key = (written, place, options.flange, options.package_dirs, _items(options.limits), _items(options.locked))
+    if key not in known:
+        known[key] = in_child(load_urdf, place, options, guard=Guard(file=written, worker="the URDF reader"))
+    return known[key]
 
 
 def _items(table: Mapping[str, Hashable]) -> Hashable:
