@@ -21,7 +21,7 @@ help:
 	@echo "make test      formatter, linter, types, import rules, sizes and all quick tests"
 	@echo "make test-all  the same with the slow tests"
 	@echo "make lint      everything but the tests"
-	@echo "make bench     time whole commands, beside a baseline of the same run, and the check of clearance"
+	@echo "make bench     time whole commands, beside a baseline of the same run, their stages, and the check of clearance"
 	@echo "make reproduce solve the cells of the three papers and write docs/reproduction.md, about six minutes"
 	@echo "make bench-methods  run every method on the same cells (a quarter of an hour); writes docs/guides/which-method.md"
 	@echo "make format    put the code into shape"
@@ -49,6 +49,7 @@ $(STAMP): pyproject.toml
 	fi; \
 	echo "installing cellplan and its tools into $(VENV)"; \
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'; \
+	$(BIN)/python -m compileall -q cellplan; \
 	printf '%s' '$(CURDIR)' >$@
 
 install: $(STAMP)
@@ -75,6 +76,7 @@ demo: $(STAMP)
 
 bench: $(STAMP)
 	$(BIN)/python benchmarks/commands.py --rounds $(ROUNDS)
+	$(BIN)/python benchmarks/profile.py --rounds $(ROUNDS)
 	$(BIN)/python benchmarks/clearance.py
 
 reproduce: $(STAMP)
