@@ -1,8 +1,9 @@
 """Time whole commands as a user waits for them: ``make bench``, or ``python benchmarks/commands.py --help``.
 
 Every command runs several times as a child process of its own. The table shows medians of processor time, waiting time
-and peak memory, that of the processes it starts included, each also as a multiple of a baseline that is measured in the same run: a Python that imports the big
-libraries and does nothing. Multiples can be compared between machines, seconds cannot.
+and peak memory, that of the processes it starts included, each also as a multiple of a baseline that is measured in the
+same run: a Python that imports the big libraries and does nothing. Multiples can be compared between machines, seconds
+cannot.
 """
 
 import argparse

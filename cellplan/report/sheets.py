@@ -17,6 +17,9 @@ from cellplan.report.palette import FORBIDDEN, GREY, INK, LIMIT
 GRID: Final = "#e3e7ec"
 FRAME: Final = "#aeb7c2"
 
+FONTS: Final = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
+FONT_SIZE: Final = 8.0  # [point] where a text says nothing else
+
 CURVE_POINTS: Final = 600  # [-] about one point per printed dot: more would only make the files larger
 
 WIDTH: Final = 10.0  # [inch] of a sheet; the lengths below are in inches as well
@@ -182,9 +185,15 @@ class Sheet:
 
 def pictures(sheets: Mapping[str, Sheet]) -> dict[str, bytes]:
     """Every sheet as SVG and PNG, by file name; the plotting library is imported when it is needed."""
-    from cellplan.report.plots_canvas import paint
+    from cellplan.report.plots_canvas import png, style
+    from cellplan.report.svg import svg
 
-    return paint(sheets)
+    files: dict[str, bytes] = {}
+    with style():
+        for name, sheet in sheets.items():
+            files[f"{name}.svg"] = svg(sheet)
+            files[f"{name}.png"] = png(sheet)
+    return files
 
 
 def get_ready() -> None:
