@@ -68,7 +68,7 @@ def test_lines_run_where_the_plotting_library_draws_them() -> None:
     assert (path.get("stroke"), path.get("stroke-width")) == ("#123456", "1.3")
     same = corners(path.get("d", ""))
     assert same == pytest.approx(np.stack([72.0 * x, 72.0 * (sheet.height - y)], axis=1), abs=0.0051)  # a hundredth
-    # which leaves out points that would move the line by less than a ninth of a pixel, of which there are 72 to the inch
+    # which leaves out points that would move the line by less than a ninth of a pixel: 72 of them make an inch
     ends = [corners(other)[[0, -1]] for other in drawn if "L" in other]
     assert any(np.allclose(other, same[[0, -1]], atol=0.12) for other in ends)
 
