@@ -30,13 +30,15 @@ STARTING, IMPORTS, REST = "starting Python", "importing libraries", "the rest"
 STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     "reading the cell and its robots": {"cellplan.io.cell_file": ("load_cell",)},
     "bodies, hulls and pairs": {"cellplan.scene.scene": ("Scene.from_cell",)},
-    "planning": {
+    "paths and times of the tools": {
         "cellplan.planning.toolpaths": ("build_toolpath",),
-        "cellplan.planning.schedule": ("schedule_tasks", "examine_times"),
+        "cellplan.planning.schedule": ("time_tasks", "sample", "examine_times"),
+    },
+    "start postures": {
         "cellplan.planning.given_starts": ("examine_given_starts",),
         "cellplan.planning.start_search": ("find_start",),
-        "cellplan.planning.follow": ("follow",),
     },
+    "joint motion": {"cellplan.planning.resolve": ("resolve",)},
     "writing and reading back the tables": {"cellplan.io.tables": ("render_table", "parse_table", "replace_header")},
     "verifying tools, joints, conditioning": {"cellplan.checks.verify": ("verify",)},
     "certifying the clearance": {"cellplan.checks.clearance": ("check_clearance",)},
@@ -54,14 +56,22 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
 }
 
 
+Seconds = tuple[float, float]  # waited, and worked by the processor
+
+
+def now() -> Seconds:
+    """What a clock on the wall shows, and what this process has worked so far."""
+    return time.perf_counter(), time.process_time()
+
+
 class Clock:
     """Adds up the time of each stage, without that of the stages within it."""
 
     def __init__(self) -> None:
         """Start with the rest."""
-        self.spent: dict[str, float] = {}
+        self.spent: dict[str, Seconds] = {}
         self._stages = [REST]
-        self._since = time.perf_counter()
+        self._since = now()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -76,9 +86,10 @@ class Clock:
 
     def _turn(self) -> None:
         """Count what has gone by for the stage that was on."""
-        now = time.perf_counter()
-        self.spent[self._stages[-1]] = self.spent.get(self._stages[-1], 0.0) + now - self._since
-        self._since = now
+        wall, cpu = self.spent.get(self._stages[-1], (0.0, 0.0))
+        at = now()
+        self.spent[self._stages[-1]] = wall + at[0] - self._since[0], cpu + at[1] - self._since[1]
+        self._since = at
 
     def timed(self, function: Callable[..., Any], name: str) -> Callable[..., Any]:
         """The function, timed."""
@@ -125,11 +136,11 @@ class Timing:
         return spec
 
 
-def solve_timed(cell: str, folder: str) -> dict[str, float]:
+def solve_timed(cell: str, folder: str) -> dict[str, Seconds]:
     """Seconds of each stage of one solve in this process, which has done nothing else so far."""
     import builtins
 
-    started = time.time() - float(os.environ[BEGUN])
+    started = time.time() - float(os.environ[BEGUN]), time.process_time()
     clock = Clock()
     sys.meta_path.insert(0, Timing(clock))  # type: ignore[arg-type]
     load = builtins.__import__
@@ -155,9 +166,9 @@ def solve_timed(cell: str, folder: str) -> dict[str, float]:
         return {STARTING: started, **clock.spent}
 
 
-def measured(cell: str, rounds: int) -> tuple[dict[str, float], float]:
+def measured(cell: str, rounds: int) -> tuple[dict[str, Seconds], float]:
     """Median seconds of each stage, and of the whole command with its end."""
-    found: list[dict[str, float]] = []
+    found: list[dict[str, Seconds]] = []
     whole = []
     for _ in range(rounds):
         with tempfile.TemporaryDirectory(prefix="cellplan-profile-") as folder:
@@ -173,21 +184,29 @@ def measured(cell: str, rounds: int) -> tuple[dict[str, float], float]:
         if run.returncode != 0:
             sys.exit(run.stderr)
         found.append(json.loads(run.stdout.splitlines()[-1]))
-    names = [STARTING, IMPORTS, *STAGES, REST]
-    return {name: statistics.median(each.get(name, 0.0) for each in found) for name in names}, statistics.median(whole)
+    medians = {}
+    for name in (STARTING, IMPORTS, *STAGES, REST):
+        walls, cpus = zip(*(each.get(name, (0.0, 0.0)) for each in found), strict=True)
+        medians[name] = statistics.median(walls), statistics.median(cpus)
+    return medians, statistics.median(whole)
 
 
-def page(spent: dict[str, float], whole_s: float, *, cell: str, rounds: int) -> str:
+def page(spent: dict[str, Seconds], whole_s: float, *, cell: str, rounds: int) -> str:
     """The table as Markdown."""
-    total = sum(spent.values())
-    rows = [f"| {name} | {1000.0 * seconds:.0f} | {100.0 * seconds / total:.0f} % |" for name, seconds in spent.items()]
+    worked = sum(cpu for _, cpu in spent.values())
+    rows = [
+        f"| {name} | {1000.0 * cpu:.0f} | {100.0 * cpu / worked:.0f} % | {1000.0 * wall:.0f} |"
+        for name, (wall, cpu) in spent.items()
+    ]
     return "\n".join(
         [
-            f"Stages of `cellplan solve {cell}`, medians of {rounds} runs, whole command {whole_s:.2f} s; {machine()}.",
+            f"Stages of `cellplan solve {cell}`, medians of {rounds} runs; the whole command took {whole_s:.2f} s.",
+            f"{machine()}.",
             "",
-            "| stage | ms | share |",
-            "|---|---:|---:|",
+            "| stage | processor, ms | share | clock, ms |",
+            "|---|---:|---:|---:|",
             *rows,
+            f"| together | {1000.0 * worked:.0f} | 100 % | {1000.0 * sum(wall for wall, _ in spent.values()):.0f} |",
             "",
         ]
     )
