@@ -39,14 +39,14 @@ def convex_hull(mesh: Mesh) -> Mesh:
         hull = None if _is_flat(chosen) else _hull(chosen, mesh.source)
         if hull is None or len(hull.vertices) > MAX_CORNERS:
             continue
-        if not holds(hull, points):
+        if not _holds(hull, points):
             hull = _blown_up(hull, points)
-        if hull is not None and holds(hull, points):
+        if hull is not None and _holds(hull, points):
             return hull
     raise InputError(f"{mesh.source}: expected a mesh with a convex hull, got one too ill-shaped for it")
 
 
-def holds(hull: Mesh, points: Array) -> bool:
+def _holds(hull: Mesh, points: Array) -> bool:
     """Whether all points, shape (N, 3), lie behind every face of a hull, up to 1e-7 of their extent."""
     return _sticking_out(hull, points) <= HULL_ROOM * float(np.ptp(points, axis=0).max())
 

