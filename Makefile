@@ -49,6 +49,7 @@ $(STAMP): pyproject.toml
 	fi; \
 	echo "installing cellplan and its tools into $(VENV)"; \
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'; \
+	$(BIN)/python -m compileall -q cellplan; \
 	printf '%s' '$(CURDIR)' >$@
 
 install: $(STAMP)
@@ -76,6 +77,7 @@ demo: $(STAMP)
 bench: $(STAMP)
 	$(BIN)/python benchmarks/peer_setup.py
 	$(BIN)/python benchmarks/page.py $(ROUND_OPTION)
+	$(BIN)/python benchmarks/stages.py --write $(ROUND_OPTION)
 
 reproduce: $(STAMP)
 	$(BIN)/python docs/make_reproduction.py

@@ -1,18 +1,21 @@
 """Time whole commands as a user waits for them: ``python benchmarks/commands.py --help``.
 
 Every command runs several times as a child process of its own. The table shows medians of processor time, waiting time
-and peak memory, each also as a multiple of a baseline that is measured in the same run: a Python that imports the big
-libraries and does nothing. Multiples can be compared between machines, seconds cannot. This script itself imports next
-to nothing: a child is charged with the memory that its parent holds when it starts.
+and peak memory, that of the processes it starts included, each also as a multiple of a baseline that is measured in the
+same run: a Python that imports the big libraries and does nothing. Multiples can be compared between machines, seconds
+cannot. This script itself imports next to nothing: a child is charged with the memory that its parent holds when it
+starts.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import shutil
 import statistics
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -64,6 +67,41 @@ COMMANDS = (
 )
 
 
+class Watch:
+    """Looks again and again how much memory a process and those it has started hold together; on Linux only."""
+
+    def __init__(self, process: int) -> None:
+        """Begin to look."""
+        self._process, self._peak, self._is_over = process, 0, threading.Event()
+        self._looking = threading.Thread(target=self._look, daemon=True)
+        self._looking.start()
+
+    def end(self) -> int:
+        """The most that was seen in [bytes]; what the processes share is counted for each of them."""
+        self._is_over.set()
+        self._looking.join()
+        return self._peak
+
+    def _look(self) -> None:
+        while not self._is_over.wait(0.03):
+            self._peak = max(self._peak, sum(map(held, [self._process, *started_by(self._process)])))
+
+
+def started_by(process: int) -> list[int]:
+    """Processes that a process has started."""
+    with contextlib.suppress(OSError):
+        text = "".join(path.read_text() for path in Path(f"/proc/{process}/task").glob("*/children"))
+        return [int(number) for number in text.split()]
+    return []
+
+
+def held(process: int) -> int:
+    """Memory that a process holds in [bytes]; 0 where the system does not tell."""
+    with contextlib.suppress(OSError, IndexError):
+        return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    return 0
+
+
 def run_once(command: Command) -> Cost:
     """Cost of one run in a child process; the program ends when the command fails."""
     folder = Path(tempfile.mkdtemp(prefix="cellplan-bench-"))
@@ -80,13 +118,15 @@ def run_once(command: Command) -> Cost:
                 (os.POSIX_SPAWN_DUP2, 1, 2),
             ],
         )
+        watch = Watch(child)
         _, status, usage = os.wait4(child, 0)
         wall_s = time.perf_counter() - begin
+        peak = max(watch.end(), usage.ru_maxrss * MAXRSS_UNIT)
         if os.waitstatus_to_exitcode(status) != 0:
             sys.exit(f"benchmark: '{command.name}' failed:\n{log.read_text(encoding='utf-8', errors='replace')}")
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-    return Cost(cpu_s=usage.ru_utime + usage.ru_stime, wall_s=wall_s, peak_mb=usage.ru_maxrss * MAXRSS_UNIT / MB)
+    return Cost(cpu_s=usage.ru_utime + usage.ru_stime, wall_s=wall_s, peak_mb=peak / MB)
 
 
 def measure(commands: Sequence[Command], rounds: int) -> dict[str, Cost]:

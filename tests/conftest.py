@@ -1,8 +1,11 @@
 """Fixtures that every test may use."""
 
+import os
 from pathlib import Path
 
 import pytest
+
+os.environ["CELLPLAN_CACHE"] = "off"  # tests neither use nor fill the cache of whoever runs them
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -76,3 +76,10 @@ def ignores_interruption() -> bool:
 def same(value: object) -> object:
     """Give back what was given."""
     return value
+
+
+def leave_unless_in(home: int) -> str:
+    """End the process without an answer, but not that one."""
+    if os.getpid() != home:
+        os._exit(7)
+    return "done at home"

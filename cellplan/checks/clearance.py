@@ -19,6 +19,9 @@ from cellplan.scene.survey import CLOSEST, Survey, lowest_bounds
 from cellplan.scene.survey_search import survey
 
 STAGE: Final = "checking clearance"
+UNKNOWN: Final = ClearanceReport(
+    minima={}, contacts=(), exclusions=(), pair_count=0, curve_times=np.empty(0), curves={}
+)  # before anything was checked
 
 
 def check_clearance(

@@ -1,10 +1,11 @@
 """Verification: everything that is said about a run is computed here, from the joint tables that were read back."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from cellplan.checks.clearance import check_clearance
+from cellplan.checks.clearance import UNKNOWN, check_clearance
 from cellplan.checks.closure import check_closure, closure_accuracy
 from cellplan.checks.conditioning import conditioning
 from cellplan.checks.limits import check_joints, joint_uses
@@ -28,6 +29,7 @@ def verify(
     *,
     moving: Sequence[str],
     progress: Progress = silent,
+    preview: Callable[[Report], None] | None = None,
 ) -> Report:
     """Check tool errors, closed grasps, joint limits and clearance of a run.
 
@@ -39,6 +41,7 @@ def verify(
         tables: One joint table per robot, parsed from its text.
         moving: Names of the robots that may move; the others must stand still.
         progress: Who wants to know how far it is.
+        preview: Who wants the report as soon as all of it is known but the clearance.
 
     Raises:
         InputError: A table is missing, or does not fit the cell or the clock.
@@ -52,24 +55,19 @@ def verify(
     )
     closures = closure_accuracy(cell, scene.chains, q, X_WP)
     checks = [*_accuracy_checks(cell, schedule, accuracy), *check_closure(cell, schedule.times, closures)]
-    uses: list[JointUse] = []
-    for robot in cell.robots:
-        own = joint_uses(robot, schedule.times, q[robot.name])
-        uses += own
-        checks += check_joints(robot, own, schedule.times, q[robot.name])
+    uses, joint_checks = _joints(cell, schedule.times, q)
+    checks += joint_checks
     drift = repeatability(cell, schedule, q)
     checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
     checks += check_locked(cell, schedule.times, q)
-    stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
-    clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
-    return Report(
+    report = Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
         tasks=tuple(scheduled.task.name for scheduled in schedule.tasks),
-        checks=(*checks, *clearance_checks),
+        checks=tuple(checks),
         accuracy=accuracy,
         joints=tuple(uses),
-        clearance=clearance,
+        clearance=UNKNOWN,
         conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving),
         motion_share=_motion_share(uses),
         speeds={
@@ -82,6 +80,11 @@ def verify(
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
         closures=closures,
     )
+    if preview is not None:
+        preview(report)
+    stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
+    clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
+    return replace(report, checks=(*checks, *clearance_checks), clearance=clearance)
 
 
 def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccuracy]) -> list[Check]:
@@ -91,6 +94,17 @@ def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccu
         own, tolerance = check_accuracy(schedule, errors, scheduled.task), scheduled.task.tolerance
         checks += told_with_failures(own, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
     return checks
+
+
+def _joints(cell: Cell, times: Array, q: Mapping[str, Array]) -> tuple[list[JointUse], list[Check]]:
+    """How all joints are used, and whether they stay within their limits."""
+    uses: list[JointUse] = []
+    checks: list[Check] = []
+    for robot in cell.robots:
+        own = joint_uses(robot, times, q[robot.name])
+        uses += own
+        checks += check_joints(robot, own, times, q[robot.name])
+    return uses, checks
 
 
 def _positions(cell: Cell, schedule: Schedule, tables: Sequence[JointTable]) -> Mapping[str, Array]:

@@ -55,7 +55,12 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     The tables are written only when every check passes. Exit status: 0 passed, 1 a check failed, 2 bad input,
     3 no solution, 4 internal error.
     """
-    with json_failure(SCHEMA, wanted=as_json):
+    from cellplan.guard import Aside
+
+    with json_failure(SCHEMA, wanted=as_json), Aside() as aside:
+        from cellplan.pipeline.drawing import Drawing
+
+        drawing = Drawing(aside)  # the child imports what it paints with while this process imports the rest
         from cellplan.cli.summary import read_record, summary_lines
         from cellplan.io.cell_file import load_cell
         from cellplan.io.run_folder import refuse_unless_replaceable
@@ -71,8 +76,8 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         folder = output or Path("outputs") / asked.name
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:
-            solution = solve_cell(asked, task=task, progress=progress)
-            write_run(solution, folder, keep_rejected=keep_rejected)
+            solution = solve_cell(asked, task=task, progress=progress, drawing=drawing)
+            write_run(solution, folder, keep_rejected=keep_rejected, drawing=drawing)
         record = read_record(folder)
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
     if as_json:

@@ -6,13 +6,12 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.collision.hulls import convex_hull
+from cellplan.collision.kept_hulls import hull_of
 from cellplan.errors import CellplanError, InputError, OverrunError
 from cellplan.geometry.mesh_topology import components
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, bounding_sphere
 from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import Array, is_rigid, pose_from
-from cellplan.guard import Guard, in_child
 
 POINT_SIZE: Final = 1e-7  # [m] size given to a point or a line, so that the engine sees a triangle: far below 0.1 mm
 SURFACE_TOLERANCE: Final = 2e-5  # [m] a tessellated cylinder lies outside the true one by no more than this
@@ -108,7 +107,7 @@ def _hull(shape: Solid) -> tuple[Solid, bool]:
     if not isinstance(shape, Mesh) or _is_convex(shape):
         return shape, True
     try:
-        return in_child(convex_hull, shape, guard=Guard(file=shape.source, worker="the search for the hull")), False
+        return hull_of(shape), False
     except OverrunError:
         raise
     except InputError:  # flat or ill-shaped

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from typing import Final
 
-import coal
 import numpy as np
 
 from cellplan.errors import InputError
@@ -34,18 +33,22 @@ def convex_hull(mesh: Mesh) -> Mesh:
     if _is_flat(points):
         raise InputError(f"{mesh.source}: expected a body with a volume, got a flat one")
     extent = float(np.ptp(points, axis=0).max())
-    room = HULL_ROOM * extent
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     snapped = np.unique(np.round((points - middle) / (GRID * extent)), axis=0) * (GRID * extent) + middle
     for chosen in _choices(snapped):
         hull = None if _is_flat(chosen) else _hull(chosen, mesh.source)
         if hull is None or len(hull.vertices) > MAX_CORNERS:
             continue
-        if _sticking_out(hull, points) > room:
+        if not _holds(hull, points):
             hull = _blown_up(hull, points)
-        if hull is not None and _sticking_out(hull, points) <= room:
+        if hull is not None and _holds(hull, points):
             return hull
     raise InputError(f"{mesh.source}: expected a mesh with a convex hull, got one too ill-shaped for it")
+
+
+def _holds(hull: Mesh, points: Array) -> bool:
+    """Whether all points, shape (N, 3), lie behind every face of a hull, up to 1e-7 of their extent."""
+    return _sticking_out(hull, points) <= HULL_ROOM * float(np.ptp(points, axis=0).max())
 
 
 def _is_flat(points: Array) -> bool:
@@ -71,6 +74,8 @@ def _choices(points: Array) -> Iterator[Array]:
 
 def _hull(points: Array, source: str) -> Mesh | None:
     """Convex hull of points that are not flat; None where coal finds none."""
+    import coal
+
     given = coal.StdVec_Vec3s()
     given.extend(list(points))
     try:

@@ -7,7 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cellplan.cache import key_of
 from cellplan.errors import InputError
+from cellplan.geometry.kept_meshes import keep_mesh, recall_mesh
 from cellplan.geometry.mesh_files import FORMATS, parse_mesh, require_likely_count
 from cellplan.geometry.mesh_rays import RayHits, ray_hits
 from cellplan.geometry.mesh_topology import components, count_edges, make_mesh, mesh_volume, winding_numbers
@@ -39,6 +41,8 @@ CREASE: Final = np.radians(30.0)  # [rad] sharper edges stay edges when normals 
 def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
     """Read an STL, OBJ or PLY file and check that nothing of it got lost.
 
+    What was read once is found again by the bytes of the file, as long as they and the reading code are the same.
+
     Args:
         path: The file; its suffix tells the format.
         scale: Metres per unit of the file, one number or one for each axis; negative ones mirror.
@@ -49,18 +53,30 @@ def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
     Raises:
         InputError: The file cannot be read, is damaged, too large, not finite or of an unlikely size.
     """
-    vertices, faces = parse_mesh(_read_bytes(path), path.name)
-    require_likely_count(len(faces), path.name)
+    data = _read_bytes(path)
+    key = key_of("mesh", data, path.suffix.lower().encode(), np.asarray(scale, dtype=float).tobytes())
+    kept = recall_mesh(key, source=path.name)
+    if kept is not None:
+        return kept
+    mesh = _checked_mesh(data, path.name, scale=scale)
+    keep_mesh(key, mesh)
+    return mesh
+
+
+def _checked_mesh(data: bytes, name: str, *, scale: float | ArrayLike) -> Mesh:
+    """Mesh in [m] from the bytes of a file."""
+    vertices, faces = parse_mesh(data, name)
+    require_likely_count(len(faces), name)
     if not np.all(np.isfinite(vertices)):
-        raise InputError(f"{path.name}: expected finite coordinates, got {int(np.sum(~np.isfinite(vertices)))} others")
+        raise InputError(f"{name}: expected finite coordinates, got {int(np.sum(~np.isfinite(vertices)))} others")
     factors = np.broadcast_to(np.asarray(scale, dtype=float), (3,))
     if not np.all(np.isfinite(factors)) or np.any(factors == 0.0):
-        raise InputError(f"{path.name}: expected scale factors that are finite and not zero, got {factors.tolist()}")
+        raise InputError(f"{name}: expected scale factors that are finite and not zero, got {factors.tolist()}")
     with np.errstate(over="ignore"):
         vertices = vertices * factors
-    _require_likely_size(vertices[np.unique(faces)], path.name)
+    _require_likely_size(vertices[np.unique(faces)], name)
     outward = faces if np.prod(np.sign(factors)) > 0.0 else faces[:, ::-1]
-    return make_mesh(vertices, outward, source=path.name)
+    return make_mesh(vertices, outward, source=name)
 
 
 def require_solid(mesh: Mesh) -> None:

@@ -1,5 +1,10 @@
-"""Guard: work on foreign files that could take a program down is done in a child process, within limits."""
+"""Guard: work on foreign files that could take a program down is done in a child process, within limits.
 
-from cellplan.guard.door import Guard, in_child
+The same way of working is open to work of our own that can be done aside.
+"""
 
-__all__ = ["Guard", "in_child"]
+from cellplan.guard.aside import Aside
+from cellplan.guard.door import in_child
+from cellplan.guard.process import Guard
+
+__all__ = ["Aside", "Guard", "in_child"]

@@ -2,7 +2,7 @@
 
 import os
 import posixpath
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator, Mapping
 from functools import partial
 from pathlib import Path, PurePosixPath
 
@@ -21,7 +21,7 @@ from cellplan.io.robot_table import MESH_UNITS, RobotTable, load_robot_table
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import CsvEntry
 from cellplan.io.toolpath_csv import read_toolpath_csv
-from cellplan.io.urdf import UrdfOptions, load_urdf
+from cellplan.io.urdf import UrdfOptions, UrdfRobot, load_urdf
 from cellplan.io.yaml_reader import YamlDocument
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import SampledPath, TimedPath
@@ -44,6 +44,7 @@ class Sources:
         self._document = document
         self._folders = folders
         self._meshes: dict[tuple[str, str], Mesh | None] = {}
+        self._urdfs: dict[Hashable, UrdfRobot] = {}
         self.inputs: dict[str, str] = {}
         self.complaints: list[Complaint] = []
         self.errors: list[InputError] = []
@@ -173,7 +174,7 @@ class Sources:
             locked=dict(_locked_in_si(entry)),
         )
         try:
-            robot = in_child(load_urdf, place, options, guard=Guard(file=entry.model, worker="the URDF reader"))
+            robot = _read_urdf(self._urdfs, entry.model, place, options=options)
             self.inputs[entry.model] = digest_of_file(place, file=entry.model)
             for mesh in robot.mesh_files:
                 if not self._folders.holds(mesh):
@@ -198,6 +199,19 @@ class Sources:
                 path = ("robots", name, "package_dirs", index)
                 self.complaints.append(self._document.complaint(path, str(error)))
         return tuple(found) if len(found) == len(entry.package_dirs) else None
+
+
+def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, options: UrdfOptions) -> UrdfRobot:
+    """Robot of a URDF; robots that say the same of the same file share one."""
+    key = (written, place, options.flange, options.package_dirs, _items(options.limits), _items(options.locked))
+    if key not in known:
+        known[key] = in_child(load_urdf, place, options, guard=Guard(file=written, worker="the URDF reader"))
+    return known[key]
+
+
+def _items(table: Mapping[str, Hashable]) -> Hashable:
+    """What a table says, as part of a key."""
+    return tuple(sorted(table.items(), key=lambda item: item[0]))
 
 
 def _locked_in_si(entry: RobotEntry) -> Iterator[tuple[str, float]]:

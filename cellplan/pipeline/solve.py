@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import PurePath
 from typing import Final
 
@@ -16,6 +17,7 @@ from cellplan.model.motion import Motion, Program
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.model.toolpath import Toolpath
+from cellplan.pipeline.drawing import Drawing
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.modes import RunPlan, plan_runs
@@ -28,7 +30,9 @@ from cellplan.scene.scene import Scene
 START_DECIMALS: Final = 12  # of a degree or a metre, as in the tables: below the noise of the arithmetic
 
 
-def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -> Solution:
+def solve(
+    cell: Cell, *, task: str | None = None, progress: Progress = silent, drawing: Drawing | None = None
+) -> Solution:
     """Plan the motion of all robots, render their joint tables, read these back and verify them.
 
     A run that breaks a limit or collides is returned like any other: its report says by how much, where and when.
@@ -37,6 +41,7 @@ def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -
         cell: The cell, as ``load_cell`` gives it.
         task: Name of the only task to work on; the other operators stand still at their start posture.
         progress: Who wants to know how far it is.
+        drawing: Who paints the plots, and may begin while the clearance is checked.
 
     Raises:
         InputError: The cell cannot be worked with: a path misses the part, a given start is off its task.
@@ -48,11 +53,22 @@ def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -
     examine_given_starts(cell, toolpaths)
     solved = with_start(cell, find_start(scene, toolpaths, progress=progress))
     start = np.concatenate([robot.start for robot in solved.robots if robot.start is not None])
-    runs = tuple(_run(scene, toolpaths, plan, start=start, progress=progress) for plan in plan_runs(cell, only=task))
+    runs = tuple(
+        _run(scene, toolpaths, plan, start=start, progress=progress, drawing=drawing)
+        for plan in plan_runs(cell, only=task)
+    )
     return Solution(cell=solved, runs=runs)
 
 
-def _run(scene: Scene, toolpaths: Mapping[str, Toolpath], plan: RunPlan, *, start: Array, progress: Progress) -> Run:
+def _run(
+    scene: Scene,
+    toolpaths: Mapping[str, Toolpath],
+    plan: RunPlan,
+    *,
+    start: Array,
+    progress: Progress,
+    drawing: Drawing | None,
+) -> Run:
     """Follow the tasks of one run and verify what would be written."""
     cell = scene.cell
     timed = time_tasks(cell, [toolpaths[name] for name in plan.tasks])
@@ -60,7 +76,8 @@ def _run(scene: Scene, toolpaths: Mapping[str, Toolpath], plan: RunPlan, *, star
     motion = resolve(cell, timed, schedule, start=start, moving=plan.moving, progress=progress)
     program = render_program(cell, motion)
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
-    report = verify(scene, schedule, tables, moving=plan.moving, progress=progress)
+    preview = None if drawing is None else partial(drawing.begin, cell=cell)
+    report = verify(scene, schedule, tables, moving=plan.moving, progress=progress, preview=preview)
     return Run(
         name=plan.name,
         moving=plan.moving,

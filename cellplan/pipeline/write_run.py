@@ -12,10 +12,10 @@ from cellplan.io.run_folder import MANIFEST, RunFolder
 from cellplan.io.tables import parse_header, program_digest, replace_header
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.drawing import Drawing
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.report.html import overview_html, report_html
 from cellplan.report.json_report import report_json, summary_json
-from cellplan.report.plots import draw_plots
 from cellplan.report.record import Provenance
 
 ENGINES: Final = (
@@ -28,7 +28,14 @@ ENGINES: Final = (
 )  # packages whose arithmetic the result rests on
 
 
-def write_run(solution: Solution, folder: Path, *, keep_rejected: bool = False, progress: Progress = silent) -> None:
+def write_run(
+    solution: Solution,
+    folder: Path,
+    *,
+    keep_rejected: bool = False,
+    progress: Progress = silent,
+    drawing: Drawing | None = None,
+) -> None:
     """Write a run folder; it appears whole or not at all.
 
     Every run has ``report.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only when the whole
@@ -40,14 +47,16 @@ def write_run(solution: Solution, folder: Path, *, keep_rejected: bool = False, 
         folder: The run folder; an older run there is replaced.
         keep_rejected: Write the tables of a failed solution too, under ``rejected/``, marked in every header.
         progress: Who wants to know how far it is.
+        drawing: Who paints the plots, and may have begun.
 
     Raises:
         InputError: The folder cannot be written, or holds something else than a run.
     """
+    painter = drawing or Drawing()
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            _write_one(target, solution.cell, run)
+            _write_one(target, solution.cell, run, painter)
             if solution.passed:
                 _write_tables(target, run, "tables")
             elif keep_rejected:
@@ -73,17 +82,18 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _write_one(target: RunFolder, cell: Cell, run: Run) -> None:
+def _write_one(target: RunFolder, cell: Cell, run: Run, drawing: Drawing) -> None:
     """Report, plots and resolved cell of one run."""
     place = _place(run)
     provenance = Provenance(versions=versions(), digests={"program": program_digest(run.program.tables)})
-    plots = draw_plots(run.report, cell=cell)
+    painting = drawing.pictures(run.report, cell=cell)
+    record = report_json(run.report, cell=cell, provenance=provenance, motion=run.motion)
+    target.write_text(f"{place}report.json", record)
+    plots = painting()
     for name, picture in plots.items():
         target.write_bytes(f"{place}plots/{name}", picture)
     page = report_html(run.report, cell=cell, provenance=provenance, plots=plots, motion=run.motion)
     target.write_text(f"{place}report.html", page)
-    record = report_json(run.report, cell=cell, provenance=provenance, motion=run.motion)
-    target.write_text(f"{place}report.json", record)
     target.write_text(f"{place}cell.yaml", render_cell(cell))
 
 

@@ -1,9 +1,10 @@
 """Colours that plots and pages share: one per robot, dark enough to read on white."""
 
 import colorsys
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from cellplan.model.cell import Cell
+if TYPE_CHECKING:  # whoever only paints needs no cells
+    from cellplan.model.cell import Cell
 
 INK = "#1d2733"
 GREY = "#5f6b79"
@@ -19,7 +20,7 @@ DARK: Final = (0.26, 0.38)  # [-] lightness of further robots in turn
 FULL: Final = 0.6  # [-] their saturation
 
 
-def robot_colours(cell: Cell) -> dict[str, str]:
+def robot_colours(cell: "Cell") -> dict[str, str]:
     """Colour of each robot, by its place in the cell."""
     return {robot.name: _colour(index) for index, robot in enumerate(cell.robots)}
 

@@ -12,8 +12,8 @@ from cellplan.model.report import ClearanceClass, ClosureAccuracy, JointUse, Rep
 from cellplan.model.task import Frame
 from cellplan.report import palette
 from cellplan.report.palette import INK, LIMIT
-from cellplan.report.plots_canvas import Sheet, pictures, style
 from cellplan.report.record import rounded_down
+from cellplan.report.sheets import Sheet, pictures
 
 JOINT_COLUMNS = 3
 LEAST_IN_UNIT = 0.5  # [-] of an error in its unit: a larger unit is not chosen below
@@ -56,39 +56,47 @@ def draw_plots(report: Report, *, cell: Cell) -> dict[str, bytes]:
         report: What is drawn.
         cell: Where tolerances, the required clearance and the order of the robots come from.
     """
-    files: dict[str, bytes] = {}
+    return pictures(motion_sheets(report, cell=cell) | clearance_sheets(report, cell=cell))
+
+
+def motion_sheets(report: Report, *, cell: Cell) -> dict[str, Sheet]:
+    """All plots of one run but that of the clearance, which is known last, by name."""
+    sheets: dict[str, Sheet] = {}
     colours = palette.robot_colours(cell)
-    with style():
-        for accuracy in report.accuracy:
-            files |= _draw_task(accuracy, report.times, cell)
-        for closure in report.closures:
-            files |= _draw_closure(closure, report.times, cell)
-        for robot in report.q:
-            uses = [use for use in report.joints if use.robot == robot]
-            files |= _draw_positions(robot, uses, report, colours[robot])
-            files |= _draw_velocities(robot, uses, report, colours[robot])
-        files |= _draw_clearance(report, cell.checks.clearance)
-        files |= _draw_singularity(report, colours)
-    return files
+    for accuracy in report.accuracy:
+        sheets[f"task_{accuracy.task}"] = _task_sheet(accuracy, report.times, cell)
+    for closure in report.closures:
+        sheets[f"closure_{closure.robot}"] = _closure_sheet(closure, report.times, cell)
+    for robot in report.q:
+        uses = [use for use in report.joints if use.robot == robot]
+        sheets[f"positions_{robot}"] = _positions_sheet(robot, uses, report, colours[robot])
+        sheets[f"velocities_{robot}"] = _velocities_sheet(robot, uses, report, colours[robot])
+    sheets["singularity"] = _singularity_sheet(report, colours)
+    return sheets
 
 
-def _draw_task(accuracy: TaskAccuracy, times: Array, cell: Cell) -> dict[str, bytes]:
+def clearance_sheets(report: Report, *, cell: Cell) -> dict[str, Sheet]:
+    """The plot of the clearance over time, by name."""
+    return {"clearance": _clearance_sheet(report, cell.checks.clearance)}
+
+
+def _task_sheet(accuracy: TaskAccuracy, times: Array, cell: Cell) -> Sheet:
     """Total and per-axis error of position and orientation."""
     tolerance = cell.task(accuracy.task).tolerance
     place = "on the part" if cell.task(accuracy.task).relative_to is Frame.PART else "in the world"
     sheet = Sheet(f"{accuracy.task} ({accuracy.robot}): tool error {place}", rows=2, columns=2, times=times)
     draw_error(sheet, 0, accuracy.position_error, allowed=tolerance.position, kind=POSITION)
     draw_error(sheet, 1, accuracy.orientation_error, allowed=tolerance.orientation, kind=ORIENTATION)
-    return pictures(sheet, f"task_{accuracy.task}")
+    return sheet
 
 
-def _draw_closure(closure: ClosureAccuracy, times: Array, cell: Cell) -> dict[str, bytes]:
+def _closure_sheet(closure: ClosureAccuracy, times: Array, cell: Cell) -> Sheet:
     """Total and per-axis error of the tool of a further holder on its grasp."""
     checks = cell.checks
     sheet = Sheet(f"{closure.robot}: tool error on its grasp", rows=2, columns=2, times=times)
     draw_error(sheet, 0, closure.position_error, allowed=checks.closure_position, kind=POSITION)
     draw_error(sheet, 1, closure.orientation_error, allowed=checks.closure_orientation, kind=ORIENTATION)
-    return pictures(sheet, f"closure_{closure.robot}")
+    return sheet
 
 
 def draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: ErrorKind) -> None:
@@ -127,7 +135,7 @@ def readable_unit(largest: float, units: tuple[tuple[str, float], ...]) -> tuple
     return next((unit for unit in units if largest * unit[1] >= LEAST_IN_UNIT), units[-1])
 
 
-def _draw_positions(robot: str, uses: list[JointUse], report: Report, colour: str) -> dict[str, bytes]:
+def _positions_sheet(robot: str, uses: list[JointUse], report: Report, colour: str) -> Sheet:
     """Joint positions between their limits; a dot where the margin is smallest."""
     sheet = _joint_sheet(f"{robot}: joint positions", len(uses), report.times)
     for i, use in enumerate(uses):
@@ -141,7 +149,7 @@ def _draw_positions(robot: str, uses: list[JointUse], report: Report, colour: st
             upper=scale * use.upper,
         )
         _draw_joint(sheet, i, curve, colour=colour, worst_at_s=use.margin_at_s if math.isfinite(use.margin) else None)
-    return pictures(sheet, f"positions_{robot}")
+    return sheet
 
 
 def _margin_note(use: JointUse, scale: float) -> str:
@@ -153,7 +161,7 @@ def _margin_note(use: JointUse, scale: float) -> str:
     return f"{near} at {use.margin_at_s:.2f} s"
 
 
-def _draw_velocities(robot: str, uses: list[JointUse], report: Report, colour: str) -> dict[str, bytes]:
+def _velocities_sheet(robot: str, uses: list[JointUse], report: Report, colour: str) -> Sheet:
     """Joint speeds between their limits; a dot where the speed is largest."""
     sheet = _joint_sheet(f"{robot}: joint velocities", len(uses), report.times)
     for i, use in enumerate(uses):
@@ -167,7 +175,7 @@ def _draw_velocities(robot: str, uses: list[JointUse], report: Report, colour: s
             upper=scale * use.velocity_limit,
         )
         _draw_joint(sheet, i, curve, colour=colour, worst_at_s=use.peak_velocity_at_s)
-    return pictures(sheet, f"velocities_{robot}")
+    return sheet
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -202,7 +210,7 @@ def _draw_joint(sheet: Sheet, index: int, curve: _JointCurve, *, colour: str, wo
         sheet.dot(panel, float(curve.times[worst]), value, colour=LIMIT if is_outside else INK)
 
 
-def _draw_clearance(report: Report, required: float) -> dict[str, bytes]:
+def _clearance_sheet(report: Report, required: float) -> Sheet:
     """Distance that each class keeps over time, certified between the samples, with the required clearance."""
     sheet = Sheet("clearance over time", rows=2, columns=2, times=report.times)
     for index, (kind, title) in enumerate(CLASS_TITLES.items()):
@@ -223,10 +231,10 @@ def _draw_clearance(report: Report, required: float) -> dict[str, bytes]:
         sheet.limit(panel, 1e3 * required, is_upper=False)
         sheet.curve(panel, report.clearance.curve_times[known], curve[known], colour=palette.CLASSES[index])
         sheet.dot(panel, minimum.at_s, smallest, colour=LIMIT if smallest < 1e3 * required else INK)
-    return pictures(sheet, "clearance")
+    return sheet
 
 
-def _draw_singularity(report: Report, colours: Mapping[str, str]) -> dict[str, bytes]:
+def _singularity_sheet(report: Report, colours: Mapping[str, str]) -> Sheet:
     """Singular values, condition and manipulability of the whole stack, then the smallest value of each robot."""
     conditioning = report.conditioning
     series = {
@@ -252,7 +260,7 @@ def _draw_singularity(report: Report, colours: Mapping[str, str]) -> dict[str, b
         )
         sheet.curve(panel, report.times, scale * values, colour=colours.get(name, INK))
         sheet.dot(panel, at_s, smallest)
-    return pictures(sheet, "singularity")
+    return sheet
 
 
 def _power_of_ten(largest: float) -> tuple[str, float]:

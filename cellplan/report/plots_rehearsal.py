@@ -11,8 +11,8 @@ from cellplan.model.rehearsal import Rehearsal, RunRehearsal
 from cellplan.model.report import TaskAccuracy
 from cellplan.report.palette import CLASSES, INK, LIMIT, ROBOTS
 from cellplan.report.plots import ORIENTATION, POSITION, ErrorKind, draw_error, readable_unit
-from cellplan.report.plots_canvas import Sheet, pictures, style
 from cellplan.report.rehearsal_record import EXECUTIONS, Pick
+from cellplan.report.sheets import Sheet, pictures
 
 TITLES = {"before": "as solved", "after": "corrected from pass to pass", "in_pass": "corrected within the pass"}
 SMALLEST_MM = 1e-12  # errors below it are drawn there: a logarithm needs a floor
@@ -20,17 +20,16 @@ SMALLEST_MM = 1e-12  # errors below it are drawn there: a logarithm needs a floo
 
 def draw_rehearsal(rehearsal: Rehearsal) -> dict[str, bytes]:
     """All plots as SVG and PNG, by file name (``before_<task>``, ``after_<task>``, ``rounds_<task>``, …)."""
-    files: dict[str, bytes] = {}
-    with style():
-        for run in rehearsal.runs:
-            for place, errors in enumerate(run.trials[0].before):
-                for name, pick in EXECUTIONS.items():
-                    files |= _draw_execution(rehearsal.cell, run, place, name=name, pick=pick)
-                files |= _draw_rounds(rehearsal.cell, run, errors.task)
-    return files
+    sheets: dict[str, Sheet] = {}
+    for run in rehearsal.runs:
+        for place, errors in enumerate(run.trials[0].before):
+            for name, pick in EXECUTIONS.items():
+                sheets |= _execution_sheets(rehearsal.cell, run, place, name=name, pick=pick)
+            sheets |= _round_sheets(rehearsal.cell, run, errors.task)
+    return pictures(sheets)
 
 
-def _draw_execution(cell: Cell, run: RunRehearsal, place: int, *, name: str, pick: Pick) -> dict[str, bytes]:
+def _execution_sheets(cell: Cell, run: RunRehearsal, place: int, *, name: str, pick: Pick) -> dict[str, Sheet]:
     """True errors of one task over time in its worst trial, and the envelope of all trials."""
     found = [(trial, errors[place]) for trial in run.trials if (errors := pick(trial)) is not None]
     if not found:
@@ -44,13 +43,13 @@ def _draw_execution(cell: Cell, run: RunRehearsal, place: int, *, name: str, pic
     sheet = Sheet(title, rows=2, columns=2, times=run.times)
     draw_error(sheet, 0, worst[1].position_error, allowed=task.tolerance.position, kind=POSITION)
     draw_error(sheet, 1, worst[1].orientation_error, allowed=task.tolerance.orientation, kind=ORIENTATION)
-    files = pictures(sheet, f"{name}_{task.name}")
+    sheets = {f"{name}_{task.name}": sheet}
     if len(found) > 1:
-        files |= _draw_envelope(run, [errors for _, errors in found], name=name)
-    return files
+        sheets |= _envelope_sheets(run, [errors for _, errors in found], name=name)
+    return sheets
 
 
-def _draw_envelope(run: RunRehearsal, found: Sequence[TaskAccuracy], *, name: str) -> dict[str, bytes]:
+def _envelope_sheets(run: RunRehearsal, found: Sequence[TaskAccuracy], *, name: str) -> dict[str, Sheet]:
     """Largest, mean and smallest error of all trials over time."""
     title = f"{found[0].task}: largest, mean and smallest true error of {len(found)} trials, {TITLES[name]}"
     sheet = Sheet(title, rows=1, columns=2, times=run.times)
@@ -58,7 +57,7 @@ def _draw_envelope(run: RunRehearsal, found: Sequence[TaskAccuracy], *, name: st
     orientation = np.stack([np.linalg.norm(errors.orientation_error, axis=1) for errors in found])
     _draw_band(sheet, 0, position, kind=POSITION)
     _draw_band(sheet, 1, orientation, kind=ORIENTATION)
-    return pictures(sheet, f"envelope_{name}_{found[0].task}")
+    return {f"envelope_{name}_{found[0].task}": sheet}
 
 
 def _draw_band(sheet: Sheet, index: int, lengths: Array, *, kind: ErrorKind) -> None:
@@ -70,7 +69,7 @@ def _draw_band(sheet: Sheet, index: int, lengths: Array, *, kind: ErrorKind) -> 
         sheet.curve(panel, sheet.times, scale * curve, colour=colour)
 
 
-def _draw_rounds(cell: Cell, run: RunRehearsal, task: str) -> dict[str, bytes]:
+def _round_sheets(cell: Cell, run: RunRehearsal, task: str) -> dict[str, Sheet]:
     """Largest true error of one task in each round, on a logarithmic scale, one curve per trial."""
     corrections = [trial.correction for trial in run.trials if trial.correction is not None]
     longest = max((len(correction.rounds) for correction in corrections), default=0)
@@ -84,7 +83,7 @@ def _draw_rounds(cell: Cell, run: RunRehearsal, task: str) -> dict[str, bytes]:
     orientation = [[math.degrees(made.orientation[task]) for made in correction.rounds] for correction in corrections]
     _draw_decades(sheet, 0, position, title="position error in mm", allowed=1e3 * tolerance.position)
     _draw_decades(sheet, 1, orientation, title="orientation error in deg", allowed=math.degrees(tolerance.orientation))
-    return pictures(sheet, f"rounds_{task}")
+    return {f"rounds_{task}": sheet}
 
 
 def _draw_decades(sheet: Sheet, index: int, curves: Sequence[Sequence[float]], *, title: str, allowed: float) -> None:

@@ -1,5 +1,6 @@
 """The program as a shell sees it: streams and exit statuses."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -86,6 +87,7 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Pa
         preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # noqa: PLW1509 - background jobs inherit SIG_IGN
     )
     time.sleep(4.0)  # the motion of a minute takes longer than that, the imports do not
+    helpers = children(process.pid)
     process.send_signal(number)
     out, err = process.communicate(timeout=10)
 
@@ -93,6 +95,40 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Pa
     assert out == ""
     assert err.splitlines()[-1] == "interrupted: no half-written run is left behind"
     assert list(tmp_path.iterdir()) == []
+    assert not any(lives(helper) for helper in helpers)
+
+
+def test_a_program_that_is_killed_leaves_no_process_behind(cells: Path, tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [*PROGRAM, "solve", str(cells / "four_robots.yaml"), "-q", "-o", str(tmp_path / "run"), "--duration", "60"]
+    )
+    time.sleep(2.0)
+    helpers = children(process.pid)
+    process.kill()
+    process.wait()
+
+    patience = time.monotonic() + 20.0  # a helper ends its work first
+    while any(lives(helper) for helper in helpers) and time.monotonic() < patience:
+        time.sleep(0.1)
+    assert not any(lives(helper) for helper in helpers)
+
+
+def children(process: int) -> list[int]:
+    """Processes that a process has started, where the system tells; no other system is asked."""
+    processes = [int(folder.name) for folder in Path("/proc").glob("[0-9]*")]
+    return [number for number in processes if state(number)[1:2] == [str(process)]]
+
+
+def lives(process: int) -> bool:
+    """Whether a process runs; one that is dead and not yet taken note of does not."""
+    return state(process)[:1] not in ([], ["Z"], ["X"])
+
+
+def state(process: int) -> list[str]:
+    """What the system tells of a process: its state and its parent first; nothing when it is gone."""
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+    return []
 
 
 def test_a_folder_that_does_not_exist_cannot_be_allowed(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:

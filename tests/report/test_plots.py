@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 
 from cellplan.model.report import Conditioning
 from cellplan.report.plots import draw_plots
-from cellplan.report.plots_canvas import nice_ticks, peaks_kept
+from cellplan.report.sheets import nice_ticks, peaks_kept
 
 
 def text_of(svg: bytes) -> list[str]:

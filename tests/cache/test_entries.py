@@ -1,0 +1,171 @@
+"""What is kept comes back whole or not at all, and costs nothing but time when it does not."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cellplan.cache import entries, keep, key_of, recall
+from cellplan.cache.entries import forget
+
+ARRAYS = (np.arange(12.0).reshape(4, 3), np.array([[0, 1, 2]]), np.array(True))
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("CELLPLAN_CACHE", str(tmp_path / "cache"))
+    forget()
+    yield tmp_path / "cache"
+    forget()
+
+
+def only_entry(folder: Path) -> Path:
+    (path,) = folder.iterdir()
+    return path
+
+
+def assert_same(found: tuple[np.ndarray, ...] | None) -> None:
+    assert found is not None
+    for one, other in zip(found, ARRAYS, strict=True):
+        assert (one.dtype, one.shape) == (other.dtype, other.shape)
+        assert np.array_equal(one, other)
+        assert not one.flags.writeable
+
+
+def test_arrays_come_back_in_this_process_and_in_the_next() -> None:
+    key = key_of("thing", b"content")
+    assert recall(key) is None
+
+    keep(key, ARRAYS)
+
+    assert_same(recall(key))
+    forget()
+    assert_same(recall(key))
+
+
+def test_odd_numbers_come_back_bit_for_bit() -> None:
+    odd = np.array([-0.0, np.nan, np.inf, 5e-324, 0.1])
+    keep(key_of("thing", b"odd"), (odd,))
+    forget()
+
+    found = recall(key_of("thing", b"odd"))
+
+    assert found is not None
+    assert found[0].tobytes() == odd.tobytes()
+
+
+@pytest.mark.parametrize("contents", [(b"b", b"a"), (b"ab",), (b"", b"ab"), (b"a", b"b", b"")])
+def test_other_contents_have_other_keys(contents: tuple[bytes, ...]) -> None:
+    assert key_of("thing", *contents) != key_of("thing", b"a", b"b")
+    assert key_of("thing", b"a", b"b") != key_of("other", b"a", b"b")
+
+
+def test_every_damage_to_an_entry_makes_it_useless_and_nothing_else(folder: Path) -> None:
+    key = key_of("thing", b"content")
+    keep(key, ARRAYS)
+    path = only_entry(folder)
+    whole = path.read_bytes()
+    injuries = [b"", whole[:-1], whole[: len(whole) // 2], whole + b"x", b"\0" * len(whole)]
+    injuries += [whole[:k] + bytes([whole[k] ^ 1]) + whole[k + 1 :] for k in range(0, len(whole), 7)]
+
+    for injured in injuries:
+        path.write_bytes(injured)
+        forget()
+        assert recall(key) is None
+
+    keep(key, ARRAYS)
+    forget()
+    assert_same(recall(key))
+
+
+def test_objects_are_neither_kept_nor_brought_to_life(folder: Path) -> None:
+    """An array of objects would be a pickle, which can run anything; a right digest does not make it welcome."""
+    key = key_of("thing", b"content")
+    keep(key, (np.array([{"a": 1}], dtype=object),))
+    assert recall(key) is None
+    assert not folder.exists() or not list(folder.iterdir())
+
+    import hashlib
+    import io
+
+    body = io.BytesIO()
+    np.lib.format.write_array(body, np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    keep(key, ARRAYS)
+    only_entry(folder).write_bytes(entries.FORMAT + hashlib.sha256(body.getvalue()).digest() + body.getvalue())
+    forget()
+    assert recall(key) is None
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="needs files that its user may not read")
+def test_an_entry_that_cannot_be_read_is_none(folder: Path) -> None:
+    key = key_of("thing", b"content")
+    keep(key, ARRAYS)
+    only_entry(folder).chmod(0)
+    forget()
+
+    assert recall(key) is None
+
+
+def test_an_entry_that_is_a_folder_is_none(folder: Path) -> None:
+    key = key_of("thing", b"content")
+    keep(key, ARRAYS)
+    path = only_entry(folder)
+    path.unlink()
+    path.mkdir()
+    forget()
+
+    assert recall(key) is None
+    keep(key, ARRAYS)
+    assert [path.suffix for path in folder.iterdir()] == [".entry"]
+
+
+def test_the_folder_stays_within_its_bounds_and_loses_what_was_not_used_for_longest(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(entries, "MAX_FOLDER", 5500)
+    keys = [key_of("thing", bytes([number])) for number in range(4)]
+    for age, key in enumerate(keys[:3]):
+        keep(key, (np.full(200, float(age)),))  # 1.6 kB and a head
+    for age, key in enumerate(keys[:3]):
+        os.utime(folder / f"thing-{key.digest}.entry", (1000.0 + age, 1000.0 + age))
+    forget()
+    recall(keys[0])  # the oldest, but of use just now
+
+    keep(keys[3], (np.full(200, 3.0),))
+
+    forget()
+    assert [recall(key) is not None for key in keys] == [True, False, True, True]
+
+
+def test_what_is_too_large_is_not_written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(entries, "MAX_ENTRY", 100)
+    keep(key_of("thing", b"content"), ARRAYS)
+
+    assert not folder.exists() or not list(folder.iterdir())
+
+
+def test_a_process_holds_no_more_than_its_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CELLPLAN_CACHE", "off")
+    monkeypatch.setattr(entries, "MAX_RECENT", 100)
+    keep(key_of("thing", b"1"), (np.zeros(10),))
+    keep(key_of("thing", b"2"), (np.ones(10),))
+    keep(key_of("thing", b"3"), (np.ones(100),))
+
+    assert [recall(key_of("thing", name)) is None for name in (b"1", b"2", b"3")] == [True, True, True]
+
+
+def test_two_processes_that_write_the_same_entry_do_not_disturb_each_other(folder: Path) -> None:
+    code = (
+        "import numpy as np; from cellplan.cache import *; from cellplan.cache.entries import forget\n"
+        "for n in range(200):\n"
+        "    key = key_of('thing', bytes([n % 5])); keep(key, (np.full(5000, float(n % 5)),)); forget()\n"
+        "    found = recall(key); assert found is not None and np.all(found[0] == n % 5)"
+    )
+    processes = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(2)]
+
+    assert [process.wait() for process in processes] == [0, 0]
+    assert sorted(path.suffix for path in folder.iterdir()) == [".entry"] * 5
