@@ -17,9 +17,6 @@ from cellplan.report.palette import FORBIDDEN, GREY, INK, LIMIT
 GRID: Final = "#e3e7ec"
 FRAME: Final = "#aeb7c2"
 
-FONTS: Final = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
-FONT_SIZE: Final = 8.0  # [point] where a text says nothing else
-
 CURVE_POINTS: Final = 600  # [-] about one point per printed dot: more would only make the files larger
 
 WIDTH: Final = 10.0  # [inch] of a sheet; the lengths below are in inches as well
@@ -185,15 +182,9 @@ class Sheet:
 
 def pictures(sheets: Mapping[str, Sheet]) -> dict[str, bytes]:
     """Every sheet as SVG and PNG, by file name; the plotting library is imported when it is needed."""
-    from cellplan.report.plots_canvas import png, style
-    from cellplan.report.svg import svg
+    from cellplan.report.plots_canvas import paint
 
-    files: dict[str, bytes] = {}
-    with style():
-        for name, sheet in sheets.items():
-            files[f"{name}.svg"] = svg(sheet)
-            files[f"{name}.png"] = png(sheet)
-    return files
+    return paint(sheets)
 
 
 def get_ready() -> None:
