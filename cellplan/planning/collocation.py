@@ -26,6 +26,7 @@ from cellplan.planning.windows import Window
 Indices = NDArray[np.intp]
 Record = Callable[[Window, Indices, Array, Array], None]  # window, cells, q (nq, cells, nodes), errors (cells,)
 
+AT_ONCE: Final = 200  # windows whose targets are looked up together: some 20 000 instants
 MOST_PASSES: Final = 20  # over a window; where passes help, about eight do
 SLOW: Final = 0.7  # a pass that leaves more than this share of the change before does not lead to a solution
 FREE_PASSES: Final = 3  # before a pass is judged by that
@@ -54,11 +55,13 @@ class Collocation:
     Attributes:
         sweeps: Passes over windows so far.
         solves: Systems of equations solved so far: nodes of all passes.
-        is_lost: Which cells could not be carried on, shape (cells,).
+        mobile: 1 for joints that are not locked, shape (nq,).
+        drift: Joint speeds that are asked for in the null space of the tasks, shape (nq,); None for none.
+        shortest: Length in [s] below which no panel is made by halving.
     """
 
     def __init__(self, tasks: LaneTasks, targets: LaneTargets, placement: Placement, *, accuracy: float) -> None:
-        """Begin with no cell lost.
+        """Begin with all joints free.
 
         Args:
             tasks: The tasks of the run.
@@ -81,10 +84,12 @@ class Collocation:
             cells: Indices of the cells to carry.
             record: Is told of every window that cells passed, in order for each of them.
         """
-        for window, wanted in zip(windows, self._targets.in_windows(windows), strict=True):
-            if not len(cells):
-                break
-            cells = self._carry_on(window, wanted, q, cells, record=record)
+        for first in range(0, len(windows), AT_ONCE):
+            batch = windows[first : first + AT_ONCE]
+            for window, wanted in zip(batch, self._targets.in_windows(batch), strict=True):
+                if not len(cells):
+                    return cells
+                cells = self._carry_on(window, wanted, q, cells, record=record)
         return cells
 
     def _carry_on(self, window: Window, wanted: Wanted, q: Array, cells: Indices, *, record: Record) -> Indices:
@@ -96,12 +101,13 @@ class Collocation:
             q[:, through] = attempt.q[:, is_exact, -1]
             record(window, through, attempt.q[:, is_exact], attempt.errors[:, is_exact].max(axis=0))
         is_rough = attempt.is_settled & ~is_exact
-        finer: list[tuple[NDArray[np.bool_], tuple[Window, ...]]] = [(~attempt.is_settled, window.halves())]
+        finer = [(~attempt.is_settled, window.halves(shortest=self.shortest))]
         if is_rough.any():
-            finer.append((is_rough, window.refined(np.any(attempt.errors[:, is_rough] > self._accuracy, axis=1))))
+            places = np.any(attempt.errors[:, is_rough] > self._accuracy, axis=1)
+            finer.append((is_rough, window.refined(places.tolist(), shortest=self.shortest)))
         arrived = [through]
         for which, windows in finer:
-            if which.any() and all(panel.length >= self.shortest for each in windows for panel in each.panels):
+            if which.any() and windows:
                 arrived.append(self.carry(windows, q, cells[which], record))
         return np.sort(np.concatenate(arrived))
 

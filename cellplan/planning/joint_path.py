@@ -51,6 +51,7 @@ class JointPath:
         for panel, nodes, last in zip(self.panels, self.nodes, cuts.tolist(), strict=True):
             if last > first:
                 share = np.clip((times[first:last] - panel.begin) / panel.length, 0.0, 1.0)
-                q[first:last] = chebyshev(panel.degree).values(share) @ nodes.T
+                begin = nodes[:, :1]  # what is added to it is exactly zero for joints that stand still
+                q[first:last] = (begin + (nodes - begin) @ chebyshev(panel.degree).values(share).T).T
             first = last
         return q

@@ -115,20 +115,23 @@ class Window:
         counts = [panel.degree + 1 for panel in self.panels] + [panel.degree for panel in self.panels]
         return np.repeat(np.tile(np.arange(len(self.panels)), 2), counts)
 
-    def refined(self, is_rough: Sequence[bool]) -> "tuple[Window, ...]":
-        """Windows in which rough panels are replaced by finer ones."""
+    def refined(self, is_rough: Sequence[bool], *, shortest: float) -> "tuple[Window, ...]":
+        """Windows in which rough panels are replaced by finer ones; none where one would be shorter than allowed."""
         panels: list[Panel] = []
         for panel, rough in zip(self.panels, is_rough, strict=True):
-            panels += panel.refined() if rough else (panel,)
+            finer = panel.refined() if rough else (panel,)
+            if len(finer) > 1 and finer[0].length < shortest:
+                return ()
+            panels += finer
         return grouped(panels, longest=np.inf)
 
-    def halves(self) -> "tuple[Window, Window]":
-        """The window in two."""
+    def halves(self, *, shortest: float) -> "tuple[Window, ...]":
+        """The window in two; none where panels would become shorter than allowed."""
         if len(self.panels) > 1:
             middle = len(self.panels) // 2
             return Window(self.panels[:middle]), Window(self.panels[middle:])
         first, second = self.panels[0].halves()
-        return Window((first,)), Window((second,))
+        return () if first.length < shortest else (Window((first,)), Window((second,)))
 
 
 def windows_between(breaks: Array, *, whole: float) -> tuple[Window, ...]:
