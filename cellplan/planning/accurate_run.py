@@ -10,6 +10,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import INSTANT_ROOM
+from cellplan.planning.closing import SAME_POSE
 from cellplan.planning.closures import closures
 from cellplan.planning.collocation import Collocation, Indices
 from cellplan.planning.joint_path import JointPath
@@ -21,6 +22,7 @@ from cellplan.planning.timing import TimedTasks, distinct
 from cellplan.planning.windows import Panel, Window, windows_between
 
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
+TO_CLOSE: Final = 1e-7  # [m] and [rad]: what no tool is back to brings no joint back
 ONLY: Final = np.zeros(1, dtype=np.intp)  # the one cell among all of a collocation
 
 
@@ -29,7 +31,6 @@ class AccurateRun:
 
     Attributes:
         end: End of the run in [s].
-        worst: Largest tool error so far at the nodes and between them, in [m] or [rad].
         collocation: What resolves it, and counts how much that takes.
     """
 
@@ -45,7 +46,8 @@ class AccurateRun:
             moving: Names of the robots that may move.
             progress: Who wants to know how far it is.
         """
-        grasps, accuracy = closures(cell, moving), cell.solver.accuracy
+        grasps = closures(cell, moving)
+        accuracy = min(cell.solver.accuracy, TO_CLOSE) if cell.motion.cyclic else cell.solver.accuracy
         tasks = LaneTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
         targets, placement = LaneTargets(timed, grasps), tasks.chains.placement(cell)
         until, first = _settled(cell, timed, len(grasps)), timed.breaks[:2]
@@ -53,8 +55,8 @@ class AccurateRun:
         targets.offset = start_offset(tasks, wanted, placement, start=start, until=until, accuracy=accuracy)
         self.collocation = Collocation(tasks, targets, placement, accuracy=accuracy)
         self.collocation.shortest = cell.motion.step
-        self.end, self.worst = float(timed.times[-1]), 0.0
-        self._locked_since, self._progress = locked_since(cell), progress
+        self.end = float(timed.times[-1])
+        self._targets, self._locked_since, self._progress = targets, locked_since(cell), progress
         inner = np.concatenate([timed.breaks, self._locked_since, *([] if targets.offset is None else [until])])
         self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
 
@@ -69,11 +71,12 @@ class AccurateRun:
         """
         panels: list[Panel] = []
         nodes: list[Array] = []
+        errors = [0.0]
 
-        def record(window: Window, _cells: Indices, q: Array, errors: Array) -> None:
+        def record(window: Window, _cells: Indices, q: Array, worst: Array) -> None:
             panels.extend(window.panels)
             nodes.extend(q[:, 0, place] for place in window.places)
-            self.worst = max(self.worst, float(errors[0]))
+            errors.append(float(worst[0]))
             self._progress("planning", window.panels[-1].end / self.end)
 
         self.collocation.drift = drift
@@ -82,10 +85,29 @@ class AccurateRun:
             self.collocation.mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
             if not len(self.collocation.carry(windows_between(breaks, whole=self.end), at, ONLY, record)):
                 break
-        return JointPath(q, begin, panels, nodes)
+        return JointPath(q, begin, panels, nodes, max(errors))
+
+    def gaps(self, begin: float, end: float) -> Array:
+        """How far each tool is wanted at one instant from where it is wanted at a later one, in pose entries."""
+        inside = np.array([begin, end - INSTANT_ROOM])
+        wanted = self._targets.on_path(np.array([begin, end]), inside, inside + INSTANT_ROOM)
+        turned = np.abs(np.diff(wanted.R))[..., 0].max(axis=(0, 1))
+        farthest: Array = np.maximum(turned, np.abs(np.diff(wanted.p))[..., 0].max(axis=0))
+        return farthest
+
+    def repeated(self, cycle: JointPath, *, begin: float) -> JointPath | None:
+        """The motion of a cycle once more from another instant on; None where its tasks ask for something else."""
+        again = cycle.shifted(begin - cycle.begin)
+        if np.any((self._locked_since > cycle.begin) & (self._locked_since < again.end)):
+            return None
+        here, there = (self._targets.in_windows([Window(tuple(path.panels))])[0] for path in (cycle, again))
+        gap = max(float(np.abs(here.R - there.R).max()), float(np.abs(here.p - there.p).max()))
+        return again if gap <= SAME_POSE else None
 
     def _stretches(self, begin: float, end: float) -> list[Array]:
-        """Breaks between two instants, cut where a joint fails."""
+        """Breaks between two instants, cut where a joint fails; none when there is no time between them."""
+        if end - begin <= INSTANT_ROOM:
+            return []
         inner = self._breaks[(self._breaks > begin + INSTANT_ROOM) & (self._breaks < end - INSTANT_ROOM)]
         breaks = np.concatenate([[begin], inner, [end]])
         is_lock = np.min(np.abs(breaks[:, None] - self._locked_since), axis=1) <= INSTANT_ROOM

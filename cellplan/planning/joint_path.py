@@ -20,12 +20,14 @@ class JointPath:
         begin: First instant in [s].
         panels: Stretches of time, one after the other; none where no way leads on from the start.
         nodes: Stacked joint vectors at the nodes of each panel, shape (nq, degree + 1).
+        worst: Largest tool error at the nodes and between them, in [m] or [rad].
     """
 
     start: Array
     begin: float
     panels: Sequence[Panel]
     nodes: Sequence[Array]
+    worst: float = 0.0
 
     @property
     def end(self) -> float:
@@ -55,3 +57,14 @@ class JointPath:
                 q[first:last] = (begin + (nodes - begin) @ chebyshev(panel.degree).values(share).T).T
             first = last
         return q
+
+    def shifted(self, by: float) -> "JointPath":
+        """The same motion so many seconds later."""
+        panels = [Panel(panel.begin + by, panel.end + by, panel.degree) for panel in self.panels]
+        return JointPath(self.start, self.begin + by, panels, self.nodes, self.worst)
+
+
+def joined(first: JointPath, second: JointPath) -> JointPath:
+    """One motion, then another that begins where and when it ends."""
+    panels, nodes = [*first.panels, *second.panels], [*first.nodes, *second.nodes]
+    return JointPath(first.start, first.begin, panels, nodes, max(first.worst, second.worst))

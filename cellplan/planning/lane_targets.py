@@ -35,6 +35,13 @@ class LaneTargets:
 
     def at(self, times: Array, begins: Array, ends: Array) -> Wanted:
         """Targets at instants in [s], each between two breaks, shape (N,) each."""
+        wanted = self.on_path(times, begins, ends)
+        if self.offset is None:
+            return wanted
+        return Wanted(*self.offset.applied(times, wanted.R, wanted.p, wanted.twists))
+
+    def on_path(self, times: Array, begins: Array, ends: Array) -> Wanted:
+        """The same, as if all tools stood on their paths at the start."""
         count = len(self._timed.paths)
         X = np.empty((4, 4, count + len(self._grasps), len(times)))
         twists = np.zeros((6, X.shape[2], X.shape[3]))
@@ -43,5 +50,4 @@ class LaneTargets:
             X[:, :, index], twists[:, index] = np.moveaxis(X_PT, 0, -1), V_PT_P.T
         for index, grasp in enumerate(self._grasps, start=count):
             X[:, :, index] = grasp.X_PT[:, :, None]
-        R, p = X[:3, :3], X[:3, 3]
-        return Wanted(R, p, twists) if self.offset is None else Wanted(*self.offset.applied(times, R, p, twists))
+        return Wanted(X[:3, :3], X[:3, 3], twists)

@@ -1,6 +1,6 @@
 """Resolve a run: from timed tasks to the motion of all joints, by the integrator that the cell asks for."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.solver import Integrator
 from cellplan.model.task import INSTANT_ROOM
 from cellplan.planning.accurate_run import AccurateRun
-from cellplan.planning.closing import closing_drift, first_cycle
+from cellplan.planning.closed_path import closed_path
 from cellplan.planning.follow import carry, follow
 from cellplan.planning.joint_path import JointPath
 from cellplan.planning.timing import TimedTasks
@@ -49,47 +49,43 @@ def resolve(
         motion = follow(cell, schedule, start=start, moving=moving, progress=progress)
         return replace(motion, resolution=_steps(len(motion.times) - 1))
     run = AccurateRun(cell, timed, start=start, moving=moving, progress=progress)
-    if cell.motion.cyclic:
-        path = _closed(run, TrackingProblem(cell, schedule, moving, start=start), schedule, start=start)
-    else:
+    if not cell.motion.cyclic:
         path = run.path(start, begin=0.0, end=run.end)
-    return _sampled(run, path, TrackingProblem(cell, schedule, moving, start=start), start=start, progress=progress)
-
-
-def _closed(run: AccurateRun, problem: TrackingProblem, schedule: Schedule, *, start: Array) -> JointPath:
-    """A path that closes after the first cycle; later cycles repeat it."""
-    begin, end = (float(schedule.times[k]) for k in first_cycle(problem.cell, schedule))
-
-    def moved(drift: Array) -> Array:
-        at = run.path(start, begin=0.0, end=begin, drift=drift).last if begin > 0.0 else start
-        round_trip: Array = run.path(at, begin=begin, end=end, drift=drift).last - at
-        return round_trip
-
-    drift = closing_drift(problem, start, moved, duration=end)
-    return run.path(start, begin=0.0, end=run.end, drift=drift)
+        return _sampled(run, path, lambda: TrackingProblem(cell, schedule, moving, start=start), timed.times, progress)
+    problem = TrackingProblem(cell, schedule, moving, start=start)
+    closed = closed_path(run, problem, schedule, start=start)
+    if closed is None:
+        motion = follow(cell, schedule, start=start, moving=moving, progress=progress)
+        return replace(motion, resolution=_resolution(run, JointPath(start, 0.0, (), ()), euler_from=0.0))
+    return _sampled(run, closed, lambda: problem, timed.times, progress)
 
 
 def _sampled(
-    run: AccurateRun, path: JointPath, problem: TrackingProblem, *, start: Array, progress: Progress
+    run: AccurateRun, path: JointPath, problem: Callable[[], TrackingProblem], times: Array, progress: Progress
 ) -> Motion:
     """The path at the instants of the clock; from where it ends, Euler's steps."""
-    times, last = problem.times, len(problem.times) - 1
+    last = len(times) - 1
     reached = int(np.searchsorted(times, path.end + INSTANT_ROOM, side="right")) - 1
     q = path.at(times[: reached + 1])
-    q[0] = start
+    q[0] = path.start
     if reached < last:
-        stepped = carry(problem, q[-1], first=reached, last=last, progress=progress)
+        stepped = carry(problem(), q[-1], first=reached, last=last, progress=progress)
         q = np.concatenate([q, stepped.q[reached + 1 :]])
-    resolution = Resolution(
+    euler_from = float(times[reached]) if reached < last else None
+    return Motion(times=times, q=q, resolution=_resolution(run, path, euler_from=euler_from))
+
+
+def _resolution(run: AccurateRun, path: JointPath, *, euler_from: float | None) -> Resolution:
+    """What the run took in all, and the path that came of it."""
+    return Resolution(
         integrator=Integrator.ACCURATE,
         panels=len(path.panels),
         nodes=path.node_count,
         sweeps=run.collocation.sweeps,
         solves=run.collocation.solves,
-        error_between=run.worst if path.panels else None,
-        euler_from=float(times[reached]) if reached < last else None,
+        error_between=path.worst if path.panels else None,
+        euler_from=euler_from,
     )
-    return Motion(times=times, q=q, resolution=resolution)
 
 
 def _steps(count: int) -> Resolution:
