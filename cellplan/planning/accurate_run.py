@@ -22,6 +22,9 @@ from cellplan.planning.timing import TimedTasks, distinct
 from cellplan.planning.windows import Panel, Window, windows_between
 
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
+SHORTEST_SHARE: Final = (
+    1.0 / 4096.0
+)  # of the motion: panels may be as short as that where steps of the clock are longer
 TO_CLOSE: Final = 1e-7  # [m] and [rad]: what no tool is back to brings no joint back
 ONLY: Final = np.zeros(1, dtype=np.intp)  # the one cell among all of a collocation
 
@@ -54,8 +57,8 @@ class AccurateRun:
         wanted = targets.at(first[:1], first[:1], first[1:])
         targets.offset = start_offset(tasks, wanted, placement, start=start, until=until, accuracy=accuracy)
         self.collocation = Collocation(tasks, targets, placement, accuracy=accuracy)
-        self.collocation.shortest = cell.motion.step
         self.end = float(timed.times[-1])
+        self.collocation.shortest = min(cell.motion.step, SHORTEST_SHARE * self.end)
         self._targets, self._locked_since, self._progress = targets, locked_since(cell), progress
         inner = np.concatenate([timed.breaks, self._locked_since, *([] if targets.offset is None else [until])])
         self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])

@@ -111,6 +111,7 @@ class Collocation:
                 arrived.append(self.carry(windows, q, cells[which], record))
         return np.sort(np.concatenate(arrived))
 
+    @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # what is not a number does not settle
     def attempt(self, window: Window, wanted: Wanted, q0: Array, placement: Placement) -> Attempt:
         """Resolve one window from start postures, shape (nq, cells)."""
         cells, nodes = q0.shape[1], window.count

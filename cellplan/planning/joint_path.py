@@ -53,8 +53,8 @@ class JointPath:
         for panel, nodes, last in zip(self.panels, self.nodes, cuts.tolist(), strict=True):
             if last > first:
                 share = np.clip((times[first:last] - panel.begin) / panel.length, 0.0, 1.0)
-                begin = nodes[:, :1]  # what is added to it is exactly zero for joints that stand still
-                q[first:last] = (begin + (nodes - begin) @ chebyshev(panel.degree).values(share).T).T
+                end = nodes[:, -1:]  # what is added to it is exactly zero at the end and for joints that stand still
+                q[first:last] = (end + (nodes - end) @ chebyshev(panel.degree).values(share).T).T
             first = last
         return q
 
