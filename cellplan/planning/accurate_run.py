@@ -26,6 +26,7 @@ SHORTEST_SHARE: Final = (
     1.0 / 4096.0
 )  # of the motion: panels may be as short as that where steps of the clock are longer
 TO_CLOSE: Final = 1e-7  # [m] and [rad]: what no tool is back to brings no joint back
+STEADY: Final = 1e-10  # [rad] and [m]: postures this near to their limit depend smoothly on a drift, as a search asks
 ONLY: Final = np.zeros(1, dtype=np.intp)  # the one cell among all of a collocation
 
 
@@ -58,6 +59,8 @@ class AccurateRun:
         targets.offset = start_offset(tasks, wanted, placement, start=start, until=until, accuracy=accuracy)
         self.collocation = Collocation(tasks, targets, placement, accuracy=accuracy)
         self.end = float(timed.times[-1])
+        if cell.motion.cyclic:
+            self.collocation.posture_room = STEADY
         self.collocation.shortest = min(cell.motion.step, SHORTEST_SHARE * self.end)
         self._targets, self._locked_since, self._progress = targets, locked_since(cell), progress
         inner = np.concatenate([timed.breaks, self._locked_since, *([] if targets.offset is None else [until])])

@@ -31,6 +31,7 @@ MOST_PASSES: Final = 20  # over a window; where passes help, about eight do
 SLOW: Final = 0.7  # a pass that leaves more than this share of the change before does not lead to a solution
 FREE_PASSES: Final = 3  # before a pass is judged by that
 LONGEST_MOVE: Final = np.pi  # [rad] or [m]: a pass that moves a joint farther has lost its way
+TOOL_SHARE: Final = 0.5  # of the accuracy: tool errors at the nodes that passes may leave
 POSTURE_SHARE: Final = 10.0  # postures may be this many times as far from their limit as tools, in [rad] for [m]
 
 
@@ -57,6 +58,7 @@ class Collocation:
         solves: Systems of equations solved so far: nodes of all passes.
         mobile: 1 for joints that are not locked, shape (nq,).
         drift: Joint speeds that are asked for in the null space of the tasks, shape (nq,); None for none.
+        posture_room: How far postures may be from the limit of the passes, in [rad] and [m].
         shortest: Length in [s] below which no panel is made by halving.
     """
 
@@ -73,7 +75,7 @@ class Collocation:
         self.sweeps = self.solves = 0
         self.mobile: Array = np.ones(tasks.joint_count)
         self.drift: Array | None = None
-        self.shortest = 0.0
+        self.shortest, self.posture_room = 0.0, POSTURE_SHARE * accuracy
 
     def carry(self, windows: tuple[Window, ...], q: Array, cells: Indices, record: Record) -> Indices:
         """Carry cells through windows, refined where that is needed; returns those that came to the end.
@@ -120,20 +122,23 @@ class Collocation:
         is_settled, is_open = np.zeros(cells, dtype=bool), np.ones(cells, dtype=bool)
         before = np.full(cells, np.inf)
         for number in range(MOST_PASSES):
-            moved = self._pass(window, at_nodes, q, spread, q0=q0)
+            moved, errors = self._pass(window, at_nodes, q, spread, q0=q0)
             q += moved
             change = np.abs(moved).max(axis=(0, 2))
             ratio = change / before if number else np.full(cells, SLOW)
             left = change * ratio / np.maximum(1.0 - ratio, 1.0 - SLOW)
-            is_settled |= is_open & (left <= POSTURE_SHARE * self._accuracy)
+            is_near = errors * ratio <= TOOL_SHARE * self._accuracy  # where blocks are nearly singular, Newton is slow
+            is_settled |= is_open & is_near & (left <= self.posture_room)
             is_open &= ~is_settled & (change < LONGEST_MOVE) & ((ratio <= SLOW) | (number < FREE_PASSES))
             before = change
             if not is_open.any():
                 break
         return Attempt(q, is_settled, self._errors(window, wanted.repeated(cells), q, placement))
 
-    def _pass(self, window: Window, wanted: Wanted, q: Array, placement: Placement, *, q0: Array) -> Array:
-        """What one pass adds to the postures at the nodes, shape (nq, cells, nodes)."""
+    def _pass(
+        self, window: Window, wanted: Wanted, q: Array, placement: Placement, *, q0: Array
+    ) -> tuple[Array, Array]:
+        """What one pass adds to the postures at the nodes, (nq, cells, nodes), and tool errors before it, (cells,)."""
         self.sweeps += 1
         self.solves += q.shape[1] * q.shape[2]
         look = self._tasks.look(q.reshape(len(q), -1), wanted, placement, mobile=self.mobile)
@@ -141,7 +146,7 @@ class Collocation:
         picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
         moved: Array = (picard + look.correction(picard)).reshape(q.shape)
         moved[:, :, 0] = 0.0
-        return moved
+        return moved, np.abs(look.errors).max(axis=(0, 1)).reshape(q.shape[1:]).max(axis=1)
 
     def _errors(self, window: Window, wanted: Wanted, q: Array, placement: Placement) -> Array:
         """Largest tool errors at the nodes and between them, by panel, shape (panels, cells)."""
