@@ -54,7 +54,8 @@ class AccurateRun:
         accuracy = min(cell.solver.accuracy, TO_CLOSE) if cell.motion.cyclic else cell.solver.accuracy
         tasks = LaneTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
         targets, placement = LaneTargets(timed, grasps), tasks.chains.placement(cell)
-        until, first = _settled(cell, timed, len(grasps)), timed.breaks[:2]
+        breaks, jumps = timed.breaks, timed.jumps
+        until, first = _settled(cell, timed, len(grasps)), breaks[:2]
         wanted = targets.at(first[:1], first[:1], first[1:])
         targets.offset = start_offset(tasks, wanted, placement, start=start, until=until, accuracy=accuracy)
         self.collocation = Collocation(tasks, targets, placement, accuracy=accuracy)
@@ -63,8 +64,9 @@ class AccurateRun:
             self.collocation.posture_room = STEADY
         self.collocation.shortest = min(cell.motion.step, SHORTEST_SHARE * self.end)
         self._targets, self._locked_since, self._progress = targets, locked_since(cell), progress
-        inner = np.concatenate([timed.breaks, self._locked_since, *([] if targets.offset is None else [until])])
+        inner = np.concatenate([jumps, self._locked_since, *([] if targets.offset is None else [until])])
         self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
+        self._knots = breaks
 
     def path(self, q: Array, *, begin: float, end: float, drift: Array | None = None) -> JointPath:
         """Motion from a posture at ``begin``, shape (nq,), up to ``end``, or as far as a way leads.
@@ -89,7 +91,9 @@ class AccurateRun:
         at = q[:, None].copy()
         for breaks in self._stretches(begin, end):
             self.collocation.mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
-            if not len(self.collocation.carry(windows_between(breaks, whole=self.end), at, ONLY, record)):
+            if not len(
+                self.collocation.carry(windows_between(breaks, whole=self.end, knots=self._knots), at, ONLY, record)
+            ):
                 break
         return JointPath(q, begin, panels, nodes, max(errors))
 

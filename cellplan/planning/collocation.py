@@ -31,6 +31,7 @@ MOST_PASSES: Final = 20  # over a window; where passes help, about eight do
 SLOW: Final = 0.7  # a pass that leaves more than this share of the change before does not lead to a solution
 FREE_PASSES: Final = 3  # before a pass is judged by that
 LONGEST_MOVE: Final = np.pi  # [rad] or [m]: a pass that moves a joint farther has lost its way
+LOOK_SHARE: Final = 0.8  # of the accuracy: errors looked at; elsewhere they were found to be an eighth larger at most
 TOOL_SHARE: Final = 0.5  # of the accuracy: tool errors at the nodes that passes may leave
 POSTURE_SHARE: Final = 10.0  # postures may be this many times as far from their limit as tools, in [rad] for [m]
 
@@ -97,7 +98,7 @@ class Collocation:
     def _carry_on(self, window: Window, wanted: Wanted, q: Array, cells: Indices, *, record: Record) -> Indices:
         """Carry cells through one window; those for which it is too coarse go through finer ones."""
         attempt = self.attempt(window, wanted, q[:, cells], self._placement.of(cells))
-        is_exact = attempt.is_settled & np.all(attempt.errors <= self._accuracy, axis=0)
+        is_exact = attempt.is_settled & np.all(attempt.errors <= LOOK_SHARE * self._accuracy, axis=0)
         through = cells[is_exact]
         if len(through):
             q[:, through] = attempt.q[:, is_exact, -1]
@@ -105,7 +106,7 @@ class Collocation:
         is_rough = attempt.is_settled & ~is_exact
         finer = [(~attempt.is_settled, window.halves(shortest=self.shortest))]
         if is_rough.any():
-            places = np.any(attempt.errors[:, is_rough] > self._accuracy, axis=1)
+            places = np.any(attempt.errors[:, is_rough] > LOOK_SHARE * self._accuracy, axis=1)
             finer.append((is_rough, window.refined(places.tolist(), shortest=self.shortest)))
         arrived = [through]
         for which, windows in finer:

@@ -60,7 +60,7 @@ class JointPath:
 
     def shifted(self, by: float) -> "JointPath":
         """The same motion so many seconds later."""
-        panels = [Panel(panel.begin + by, panel.end + by, panel.degree) for panel in self.panels]
+        panels = [panel.shifted(by) for panel in self.panels]
         return JointPath(self.start, self.begin + by, panels, self.nodes, self.worst)
 
 

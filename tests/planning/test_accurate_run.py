@@ -5,9 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lane_cells import CELLS
+from lane_cells import CELLS, seen_poses
+from roller_paths import sampled
 from timed_cells import Case, between_samples, case_of, largest_error, shipped, slowly_clocked, triangles
 
+from cellplan.geometry.shapes import Cylinder
+from cellplan.geometry.tessellation import tessellate
 from cellplan.model.cell import Cell, LockedJoint, Mode
 from cellplan.model.task import StraightMove, TimeLaw, TimeLawKind
 from cellplan.planning.accurate_run import SETTLING_STEPS, AccurateRun
@@ -147,6 +150,38 @@ def test_the_same_motion_may_take_any_time(factor: float) -> None:
     other = case_of(replace(case.cell, motion=motion))
     t = np.linspace(0.0, 1.0, 11)
     np.testing.assert_allclose(other.path().at(t * factor), case.path().at(t), atol=POSTURES)
+
+
+@pytest.mark.parametrize("rows", [30, 400])
+def test_files_of_many_points_are_followed_over_their_knots(rows: int) -> None:
+    """A smooth curve through so many points, and one through as many noisy ones: each knot is a break of the third
+    derivative, and panels reach over many of them where the noise lets them."""
+    case = triangles(CELLS["mixed"])
+    rng, u = np.random.default_rng(rows), np.linspace(0.0, 1.0, rows)
+    bow = 0.05 * np.stack([u, np.sin(3.0 * u), np.cos(2.0 * u) - 1.0], axis=1)
+    tasks = []
+    for index, (task, X) in enumerate(zip(case.cell.tasks, seen_poses(case.cell, case.start[None])[0], strict=True)):
+        noise = (index % 2) * 1e-5 * rng.normal(size=bow.shape) * (u[:, None] > 0.0)
+        path = sampled(X[:3, 3] + bow + noise, is_smooth=True)
+        tasks.append(replace(task, path=path))
+    many = case_of(replace(case.cell, tasks=tuple(tasks)))
+
+    assert_on_tasks(many, count=2)
+    panels = many.path().panels
+    assert rows < 100 or len(panels) < 4 * (rows - 1)  # of as many knots in each of four files
+    assert rows < 100 or any(panel.knots for panel in panels)
+
+
+def test_a_path_on_a_mesh_takes_fewer_panels_than_rays() -> None:
+    cell = shipped("four_robots")
+    meshed = case_of(replace(cell, part=replace(cell.part, shape=tessellate(Cylinder(0.25, 0.5)))))
+    meshed = replace(meshed, cell=replace(meshed.cell, motion=replace(cell.motion, step=0.01)))
+    path = meshed.path()
+    assert len(path.panels) < 0.05 * len(meshed.timed.breaks)
+    assert path.end == 4.0
+    settled = SETTLING_STEPS * 0.01  # the start posture is that on the cylinder itself
+    times = np.linspace(settled, 4.0, 40_001)[1:-1]
+    assert largest_error(meshed, path, times) <= ACCURACY + SAME
 
 
 def test_stretches_are_cut_where_joints_fail() -> None:

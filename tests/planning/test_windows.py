@@ -5,7 +5,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cellplan.planning.windows import DEGREES, MOST_NODES, SHARE_OF_MOTION, Panel, Window, grouped, windows_between
+from cellplan.planning.windows import (
+    DEGREES,
+    FEWEST_KNOTS,
+    MOST_KNOTS,
+    MOST_NODES,
+    SHARE_OF_MOTION,
+    Panel,
+    Window,
+    grouped,
+    windows_between,
+)
 
 WINDOW = Window((Panel(0.0, 0.3, 6), Panel(0.3, 1.1, 12), Panel(1.1, 1.2, 6)))
 
@@ -97,3 +107,58 @@ def test_halves_of_a_window_are_the_window() -> None:
 def test_panels_with_many_nodes_stay_alone() -> None:
     panels = [Panel(k, k + 1.0, 60) for k in range(3)]
     assert [window.panels for window in grouped(panels, longest=10.0)] == [(panel,) for panel in panels]
+
+
+CLOSE = np.linspace(0.0, 4.0, 1261)
+
+
+def test_panels_reach_over_knots_that_follow_each_other_closely() -> None:
+    panels = panels_of(windows_between(np.array([0.0, 1.0, 4.0]), whole=4.0, knots=CLOSE))
+
+    assert (panels[0].begin, panels[-1].end) == (0.0, 4.0)
+    assert all(one.end == other.begin for one, other in pairwise(panels))
+    assert 1.0 in {panel.end for panel in panels}
+    assert all(len(panel.knots) <= MOST_KNOTS for panel in panels)
+    assert len(panels) < 1261 / MOST_KNOTS + 2 * FEWEST_KNOTS
+    seen = {0.0, 1.0, 4.0}.union(*((panel.begin, *panel.knots) for panel in panels))
+    assert seen == {0.0, 1.0, 4.0}.union(CLOSE.tolist())
+
+
+def test_knots_far_apart_and_few_knots_end_panels() -> None:
+    far = panels_of(windows_between(np.array([0.0, 4.0]), whole=4.0, knots=np.array([0.5, 1.0, 3.0])))
+    assert not any(panel.knots for panel in far)
+    assert {0.5, 1.0, 3.0} <= {panel.end for panel in far}
+    few = panels_of(windows_between(np.array([0.0, 0.03]), whole=4.0, knots=np.array([0.01, 0.02])))
+    assert few == [Panel(0.0, 0.01, DEGREES[0]), Panel(0.01, 0.02, DEGREES[0]), Panel(0.02, 0.03, DEGREES[0])]
+
+
+def test_knots_that_are_breaks_too_count_once() -> None:
+    panels = panels_of(windows_between(np.array([0.0, 2.0, 4.0]), whole=4.0, knots=np.array([0.0, 2.0 + 1e-10, 4.0])))
+    assert 2.0 in {panel.end for panel in panels}
+    assert min(panel.length for panel in panels) > 0.5
+
+
+def test_panels_over_knots_are_halved_at_a_knot_down_to_one_panel_for_each_stretch() -> None:
+    knots = tuple((0.1 * np.arange(1, 20)).tolist())
+    left = [Panel(0.0, 2.0, DEGREES[-1], knots)]
+    for _ in range(6):
+        left = [half for panel in left for half in (panel.halves() if panel.knots else (panel,))]
+    assert [panel.end for panel in left] == [*knots, 2.0]
+    assert {panel.degree for panel in left} == {DEGREES[0]}
+    assert len(Window((Panel(0.0, 2.0, DEGREES[-1], knots),)).halves(shortest=9.0)) == 2  # stretches that are there
+
+
+def test_the_error_is_looked_at_in_every_knot() -> None:
+    knots = (0.11, 0.2, 0.35, 0.5, 0.6)
+    window = Window((Panel(0.0, 0.1, 6), Panel(0.1, 0.7, 24, knots), Panel(0.7, 1.0, 6)))
+    begins, _ = window.stretches
+    t, count = window.instants, window.count
+    assert all(np.abs(t[count:] - knot).min() < 1e-15 for knot in knots)
+    np.testing.assert_allclose(
+        window.between @ cubics(t[:count], begins[:count]), cubics(t[count:], begins[count:]), atol=1e-14
+    )
+    assert window.between.shape == (len(t) - count, count)
+
+
+def test_a_shifted_panel_takes_its_knots_along() -> None:
+    assert Panel(0.0, 1.0, 24, (0.25, 0.5)).shifted(2.0) == Panel(2.0, 3.0, 24, (2.25, 2.5))
