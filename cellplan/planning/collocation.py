@@ -104,7 +104,7 @@ class Collocation:
             q[:, through] = attempt.q[:, is_exact, -1]
             record(window, through, attempt.q[:, is_exact], attempt.errors[:, is_exact].max(axis=0))
         is_rough = attempt.is_settled & ~is_exact
-        finer = [(~attempt.is_settled, window.halves(shortest=self.shortest))]
+        finer = [(~attempt.is_settled, window.parts(shortest=self.shortest))]
         if is_rough.any():
             places = np.any(attempt.errors[:, is_rough] > LOOK_SHARE * self._accuracy, axis=1)
             finer.append((is_rough, window.refined(places.tolist(), shortest=self.shortest)))

@@ -24,6 +24,7 @@ SHARE_OF_MOTION: Final = 0.3  # longest window, of the whole motion: it takes mo
 MOST_KNOTS: Final = (
     48  # inside one panel to begin with: of paths on meshes, half of the panels can have about that many
 )
+PARTS: Final = 4  # of a panel over knots that is not exact enough: fewer take more tries
 FEWEST_KNOTS: Final = 4  # fewer take more nodes in one panel than in one each
 FINE_SHARES: Final = (1.0 / 128.0, 1.0 / 32.0)  # of the motion: a stretch below these begins with a lower degree
 
@@ -54,16 +55,16 @@ class Panel:
         """What takes its place when it is not exact enough."""
         if self.degree < DEGREES[-1]:
             return (Panel(self.begin, self.end, DEGREES[DEGREES.index(self.degree) + 1], self.knots),)
-        return self.halves()
+        return self.parts()
 
-    def halves(self) -> "tuple[Panel, ...]":
-        """Its two halves; where it has knots, they meet at one, and few knots are taken apart at once."""
+    def parts(self) -> "tuple[Panel, ...]":
+        """Its two halves; where it has knots, four parts that meet at knots, and few knots are taken apart at once."""
         if not self.knots:
             middle = 0.5 * (self.begin + self.end)
             return Panel(self.begin, middle, self.degree), Panel(middle, self.end, self.degree)
-        middle = len(self.knots) // 2
-        low, high = (self.begin, *self.knots[: middle + 1]), (*self.knots[middle:], self.end)
-        return *_over(low), *_over(high)
+        ends = (self.begin, *self.knots, self.end)
+        cuts = np.linspace(0, len(ends) - 1, PARTS + 1).astype(int).tolist()
+        return tuple(panel for low, high in pairwise(cuts) for panel in _over(ends[low : high + 1]))
 
     def shifted(self, by: float) -> "Panel":
         """The same so many seconds later."""
@@ -148,14 +149,14 @@ class Window:
             panels += finer
         return grouped(panels, longest=np.inf)
 
-    def halves(self, *, shortest: float) -> "tuple[Window, ...]":
-        """The window in two; none where panels would become shorter than allowed."""
+    def parts(self, *, shortest: float) -> "tuple[Window, ...]":
+        """The window in two, or one panel in its parts; none where panels would become shorter than allowed."""
         if len(self.panels) > 1:
             middle = len(self.panels) // 2
             return Window(self.panels[:middle]), Window(self.panels[middle:])
         (panel,) = self.panels
-        halves = panel.halves()
-        return () if not panel.knots and halves[0].length < shortest else tuple(Window((half,)) for half in halves)
+        parts = panel.parts()
+        return () if not panel.knots and parts[0].length < shortest else tuple(Window((part,)) for part in parts)
 
 
 def windows_between(breaks: Array, *, whole: float, knots: Array = NONE) -> tuple[Window, ...]:

@@ -95,13 +95,13 @@ def test_no_panel_is_halved_below_the_shortest_length() -> None:
     top = Window((Panel(0.0, 1e-6, 6), Panel(1e-6, 1.0, DEGREES[-1])))
     assert top.refined([False, True], shortest=0.6) == ()
     assert len(panels_of(top.refined([True, True], shortest=0.4))) == 3  # a tiny one may still get a higher degree
-    assert len(top.halves(shortest=0.6)) == 2  # panels that are there already may be tiny
-    assert Window((Panel(0.0, 1.0, 6),)).halves(shortest=0.6) == ()
-    assert panels_of(Window((Panel(0.0, 1.0, 6),)).halves(shortest=0.4)) == [Panel(0.0, 0.5, 6), Panel(0.5, 1.0, 6)]
+    assert len(top.parts(shortest=0.6)) == 2  # panels that are there already may be tiny
+    assert Window((Panel(0.0, 1.0, 6),)).parts(shortest=0.6) == ()
+    assert panels_of(Window((Panel(0.0, 1.0, 6),)).parts(shortest=0.4)) == [Panel(0.0, 0.5, 6), Panel(0.5, 1.0, 6)]
 
 
 def test_halves_of_a_window_are_the_window() -> None:
-    assert tuple(panels_of(WINDOW.halves(shortest=0.0))) == WINDOW.panels
+    assert tuple(panels_of(WINDOW.parts(shortest=0.0))) == WINDOW.panels
 
 
 def test_panels_with_many_nodes_stay_alone() -> None:
@@ -138,14 +138,14 @@ def test_knots_that_are_breaks_too_count_once() -> None:
     assert min(panel.length for panel in panels) > 0.5
 
 
-def test_panels_over_knots_are_halved_at_a_knot_down_to_one_panel_for_each_stretch() -> None:
+def test_panels_over_knots_are_cut_at_knots_down_to_one_panel_for_each_stretch() -> None:
     knots = tuple((0.1 * np.arange(1, 20)).tolist())
     left = [Panel(0.0, 2.0, DEGREES[-1], knots)]
-    for _ in range(6):
-        left = [half for panel in left for half in (panel.halves() if panel.knots else (panel,))]
+    for _ in range(3):
+        left = [part for panel in left for part in (panel.parts() if panel.knots else (panel,))]
     assert [panel.end for panel in left] == [*knots, 2.0]
     assert {panel.degree for panel in left} == {DEGREES[0]}
-    assert len(Window((Panel(0.0, 2.0, DEGREES[-1], knots),)).halves(shortest=9.0)) == 2  # stretches that are there
+    assert len(Window((Panel(0.0, 2.0, DEGREES[-1], knots),)).parts(shortest=9.0)) == 4  # stretches that are there
 
 
 def test_the_error_is_looked_at_in_every_knot() -> None:
