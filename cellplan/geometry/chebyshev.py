@@ -1,10 +1,13 @@
 """Polynomials through Chebyshev points: integrated, differentiated and evaluated anywhere by matrices."""
 
 from functools import cache
+from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+
+SAME: Final = float(np.finfo(float).tiny)  # nearer to a node than this, the quotient would overflow
 
 
 class ChebyshevBasis:
@@ -36,7 +39,7 @@ class ChebyshevBasis:
     def values(self, x: Array) -> Array:
         """Matrix that gives the values at points of 0..1, shape (m,), by the barycentric formula."""
         away = x[:, None] - self.nodes
-        hit = away == 0.0
+        hit = np.abs(away) <= SAME
         terms = self._signs / np.where(hit, 1.0, away)
         matrix = np.where(hit.any(axis=1, keepdims=True), hit.astype(float), terms)
         matrix /= matrix.sum(axis=1, keepdims=True)

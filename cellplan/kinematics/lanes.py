@@ -107,8 +107,13 @@ class LaneChains:
         plain = np.eye(self.levels, self.joints)[:, :, None] * own
         self.is_plain = bool(self.levels == self.joints and np.array_equal(self.to_joints, plain))
 
-    def placement(self, X_WB: Array, X_FT: Array) -> Placement:
-        """Robots with bases and tool tips at these places: of one cell, for all lanes, or of one cell per lane.
+    def placement(self, cell: Cell) -> Placement:
+        """Where the robots of a cell like this one stand, and their tools: one for all lanes."""
+        X_WB, X_FT = ([robot.X_WB for robot in cell.robots], [robot.tool.X_FT for robot in cell.robots])
+        return self.placements(np.array([X_WB]), np.array([X_FT]))
+
+    def placements(self, X_WB: Array, X_FT: Array) -> Placement:
+        """Bases and tool tips of many cells like this one, a lane each.
 
         Args:
             X_WB: Bases in the world, shape (cells, robots, 4, 4).

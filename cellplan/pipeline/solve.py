@@ -19,9 +19,9 @@ from cellplan.model.report import Report
 from cellplan.model.toolpath import Toolpath
 from cellplan.pipeline.drawing import Drawing
 from cellplan.pipeline.solution import Run, Solution
+from cellplan.planning.closer_look import resolve_closely
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.modes import RunPlan, plan_runs
-from cellplan.planning.resolve import resolve
 from cellplan.planning.schedule import examine_times, sample, time_tasks
 from cellplan.planning.start_search import find_start
 from cellplan.planning.toolpaths import build_toolpath
@@ -73,7 +73,7 @@ def _run(
     cell = scene.cell
     timed = time_tasks(cell, [toolpaths[name] for name in plan.tasks])
     schedule = sample(timed)
-    motion = resolve(cell, timed, schedule, start=start, moving=plan.moving, progress=progress)
+    motion = resolve_closely(cell, timed, schedule, start=start, moving=plan.moving, progress=progress)
     program = render_program(cell, motion)
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
     preview = None if drawing is None else partial(drawing.begin, cell=cell)

@@ -11,6 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import INSTANT_ROOM
+from cellplan.planning.closing import SAME_POSE
 from cellplan.planning.closures import closures
 from cellplan.planning.collocation import Collocation, Indices, largest
 from cellplan.planning.joint_path import JointPath
@@ -22,7 +23,10 @@ from cellplan.planning.timing import TimedTasks, distinct
 from cellplan.planning.windows import Panel, Window, windows_between
 
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
+SHORTEST_SHARE: Final = 1.0 / 4096.0  # of the motion: panels may be that short where steps of the clock are longer
 AT_ONCE: Final = 512  # [samples] looked at together: their arrays stay in the cache
+TO_CLOSE: Final = 1e-7  # [m] and [rad]: what no tool is back to brings no joint back
+STEADY: Final = 1e-10  # [rad] and [m]: postures this near to their limit depend smoothly on a drift, as a search asks
 ONLY: Final = np.zeros(1, dtype=np.intp)  # the one cell among all of a collocation
 
 
@@ -31,8 +35,6 @@ class AccurateRun:
 
     Attributes:
         end: End of the run in [s].
-        accuracy: Largest tool error that is let pass, in [m] and [rad].
-        worst: Largest tool error so far at the nodes and between them, in [m] or [rad].
         collocation: What resolves it, and counts how much that takes.
     """
 
@@ -48,23 +50,24 @@ class AccurateRun:
             moving: Names of the robots that may move.
             progress: Who wants to know how far it is.
         """
-        grasps, self.accuracy = closures(cell, moving), cell.solver.accuracy
+        grasps = closures(cell, moving)
+        accuracy = min(cell.solver.accuracy, TO_CLOSE) if cell.motion.cyclic else cell.solver.accuracy
         tasks = LaneTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
-        breaks = timed.breaks
-        targets = LaneTargets(timed, grasps)
-        X_WB = np.array([[robot.X_WB for robot in cell.robots]])
-        X_FT = np.array([[robot.tool.X_FT for robot in cell.robots]])
-        placement = tasks.chains.placement(X_WB, X_FT)
-        until = _settled(cell, timed, len(grasps))
-        wanted = targets.at(breaks[:1], breaks[:1], breaks[1:2])
-        targets.offset = start_offset(tasks, wanted, placement, start=start, until=until, accuracy=self.accuracy)
-        self.collocation = Collocation(tasks, targets, placement, accuracy=self.accuracy)
-        self.collocation.shortest = cell.motion.step
-        self.end, self.worst = float(timed.times[-1]), 0.0
-        self._locked_since, self._progress = locked_since(cell), progress
-        inner = np.concatenate([breaks, self._locked_since, *([] if targets.offset is None else [until])])
-        self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
+        targets, placement = LaneTargets(timed, grasps), tasks.chains.placement(cell)
+        breaks, jumps = timed.breaks, timed.jumps
+        until, first = _settled(cell, timed, len(grasps)), breaks[:2]
+        wanted = targets.at(first[:1], first[:1], first[1:])
+        targets.offset = start_offset(tasks, wanted, placement, start=start, until=until, accuracy=accuracy)
+        self.collocation = Collocation(tasks, targets, placement, accuracy=accuracy)
+        self.end = float(timed.times[-1])
+        if cell.motion.cyclic:
+            self.collocation.posture_room = STEADY
+        self.collocation.shortest = min(cell.motion.step, SHORTEST_SHARE * self.end)
         self._tasks, self._targets, self._placement = tasks, targets, placement
+        self._locked_since, self._progress = locked_since(cell), progress
+        inner = np.concatenate([jumps, self._locked_since, *([] if targets.offset is None else [until])])
+        self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
+        self._knots = breaks
 
     def path(self, q: Array, *, begin: float, end: float, drift: Array | None = None) -> JointPath:
         """Motion from a posture at ``begin``, shape (nq,), up to ``end``, or as far as a way leads.
@@ -77,23 +80,34 @@ class AccurateRun:
         """
         panels: list[Panel] = []
         nodes: list[Array] = []
+        errors = [0.0]
 
-        def record(window: Window, _cells: Indices, q: Array, errors: Array) -> None:
+        def record(window: Window, _cells: Indices, q: Array, worst: Array) -> None:
             panels.extend(window.panels)
             nodes.extend(q[:, 0, place] for place in window.places)
-            self.worst = max(self.worst, float(errors[0]))
+            errors.append(float(worst[0]))
             self._progress("planning", window.panels[-1].end / self.end)
 
         self.collocation.drift = drift
         at = q[:, None].copy()
         for breaks in self._stretches(begin, end):
             self.collocation.mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
-            if not len(self.collocation.carry(windows_between(breaks, whole=self.end), at, ONLY, record)):
+            if not len(
+                self.collocation.carry(windows_between(breaks, whole=self.end, knots=self._knots), at, ONLY, record)
+            ):
                 break
-        return JointPath(q, begin, panels, nodes)
+        return JointPath(q, begin, panels, nodes, max(errors))
+
+    def gaps(self, begin: float, end: float) -> Array:
+        """How far each tool is wanted at one instant from where it is wanted at a later one, in pose entries."""
+        inside = np.array([begin, end - INSTANT_ROOM])
+        wanted = self._targets.on_path(np.array([begin, end]), inside, inside + INSTANT_ROOM)
+        turned = np.abs(np.diff(wanted.R))[..., 0].max(axis=(0, 1))
+        farthest: Array = np.maximum(turned, np.abs(np.diff(wanted.p))[..., 0].max(axis=0))
+        return farthest
 
     def errors(self, schedule: Schedule, q: Array) -> Array:
-        """Largest tool error at each instant of the clock in [m] or [rad], shape (N,), at postures, shape (N, nq)."""
+        """Largest tool errors in [m] or [rad] at the first N instants of the clock, at postures, shape (N, nq)."""
         worst = np.empty(len(q))
         for first in range(0, len(q), AT_ONCE):
             some = slice(first, min(first + AT_ONCE, len(q)))
@@ -101,23 +115,19 @@ class AccurateRun:
             worst[some] = largest(self._tasks.errors(q[some].T, wanted, self._placement))
         return worst
 
-    def look_closer(self, path: JointPath, times: Array, errors: Array) -> None:
-        """Cut panels in which an instant of the clock has too large an error, at the worst, for the next path.
-
-        Args:
-            path: The path that was found.
-            times: Instants in [s], shape (N,).
-            errors: Errors at them, shape (N,).
-        """
-        ends = np.array([panel.end for panel in path.panels])
-        panel = np.searchsorted(ends, times)
-        is_rough = errors > self.accuracy
-        worst = [int(np.argmax(np.where(panel == number, errors, -1.0))) for number in np.unique(panel[is_rough])]
-        self._breaks = distinct(np.concatenate([self._breaks, times[worst]]))
-        self.worst = 0.0
+    def repeated(self, cycle: JointPath, *, begin: float) -> JointPath | None:
+        """The motion of a cycle once more from another instant on; None where its tasks ask for something else."""
+        again = cycle.shifted(begin - cycle.begin)
+        if np.any((self._locked_since > cycle.begin) & (self._locked_since < again.end)):
+            return None
+        here, there = (self._targets.in_windows([Window(tuple(path.panels))])[0] for path in (cycle, again))
+        gap = max(float(np.abs(here.R - there.R).max()), float(np.abs(here.p - there.p).max()))
+        return again if gap <= SAME_POSE else None
 
     def _stretches(self, begin: float, end: float) -> list[Array]:
-        """Breaks between two instants, cut where a joint fails."""
+        """Breaks between two instants, cut where a joint fails; none when there is no time between them."""
+        if end - begin <= INSTANT_ROOM:
+            return []
         inner = self._breaks[(self._breaks > begin + INSTANT_ROOM) & (self._breaks < end - INSTANT_ROOM)]
         breaks = np.concatenate([[begin], inner, [end]])
         is_lock = np.min(np.abs(breaks[:, None] - self._locked_since), axis=1) <= INSTANT_ROOM

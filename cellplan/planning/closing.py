@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, Grasp, Relation
 from cellplan.model.motion import Schedule
 from cellplan.planning.tracking_problem import TrackingProblem
 
@@ -57,7 +57,9 @@ def close(problem: TrackingProblem, schedule: Schedule, start: Array, carry: Cal
     problem.drift = held
 
 
-def closing_drift(problem: TrackingProblem, start: Array, moved: Callable[[Array], Array], *, duration: float) -> Array:
+def closing_drift(
+    problem: TrackingProblem, start: Array, moved: Callable[[Array], Array], *, duration: float, instant: int = 0
+) -> Array:
     r"""Joint speeds that, added in the null space at all times, close the joint motion over one cycle.
 
     The drift of one cycle lies in the null space ``N`` of the tasks at the start, as the tools come back. Its ``r``
@@ -66,20 +68,19 @@ def closing_drift(problem: TrackingProblem, start: Array, moved: Callable[[Array
 
     Args:
         problem: The tasks.
-        start: Stacked start posture, shape (nq,).
+        start: Stacked posture at the beginning of the cycle, shape (nq,).
         moved: How far the joints are from where they began after one cycle under a constant drift, shape (nq,).
         duration: Time ``T`` of the motion in [s].
+        instant: Number of the instant of the clock at which the cycle begins.
 
     Returns:
-        Speeds in [rad/s] or [m/s], shape (nq,).
+        Speeds in [rad/s] or [m/s], shape (nq,); ``moved`` was asked about them last.
 
     Raises:
         NoSolutionError: The cycle does not close.
     """
-    N = _null_space(problem, start)
+    N = _null_space(problem, instant, start)
     u = np.zeros(N.shape[1])
-    if not len(u):
-        return N @ u
     B = np.eye(len(u)) / duration  # inverse of the derivative
 
     def gap(u: Array) -> Array:
@@ -88,7 +89,7 @@ def closing_drift(problem: TrackingProblem, start: Array, moved: Callable[[Array
 
     drift = gap(u)
     for _ in range(ROUNDS):
-        if np.max(np.abs(drift)) <= CLOSED:
+        if np.max(np.abs(drift), initial=0.0) <= CLOSED:
             return N @ u
         change = -B @ drift
         found = gap(u + change)
@@ -108,26 +109,37 @@ def first_cycle(cell: Cell, schedule: Schedule) -> tuple[int, int]:
     Raises:
         InputError: The tools are not back at its end.
     """
-    place = cell.origin.at("motion.cyclic")
     first, last = 0, len(schedule.times) - 1
-    cycles = {(task.task.start, *task.cycle_ends) for task in schedule.tasks}
-    ends = np.array(cycles.pop())
-    if not cycles and len(ends) > 1 and np.ptp(np.diff(ends)) <= SAME_PERIOD:
-        first, last = np.searchsorted(schedule.times[:-1], ends[:2] - 0.5 * schedule.step).tolist()
+    bounds = common_cycles(schedule)
+    if bounds is not None and np.ptp(np.diff(bounds)) <= SAME_PERIOD:
+        first, last = np.searchsorted(schedule.times[:-1], bounds[:2] - 0.5 * schedule.step).tolist()
     for task in schedule.tasks:
         gap = float(np.max(np.abs(task.X_PT[last] - task.X_PT[first])))
         if gap > SAME_POSE:
-            raise InputError(
-                f"{place}: expected closed paths whose cycles end on a multiple of motion.step_s, but the tool of task "
-                f"'{task.task.name}' is not back at its start at {schedule.times[last]:g} s"
-            )
+            raise InputError(not_back(cell, task.task, float(schedule.times[last])))
     return first, last
 
 
-def _null_space(problem: TrackingProblem, start: Array) -> Array:
-    """Orthonormal joint directions that move no task at the start, shape (nq, r)."""
-    J = problem.first_order(0, start).J
-    free = np.flatnonzero(np.any(problem.signs != 0.0, axis=0) & (problem.mobile(0) > 0.0))
+def common_cycles(schedule: Schedule) -> Array | None:
+    """Instants in [s] between which the cycles of all tasks lie, shape (cycles + 1,); None when they differ."""
+    every = [np.array([each.task.start, *each.cycle_ends]) for each in schedule.tasks]
+    same = all(len(each) == len(every[0]) and np.max(np.abs(each - every[0])) <= SAME_PERIOD for each in every)
+    return every[0] if same and len(every[0]) > 1 else None
+
+
+def not_back(cell: Cell, task: Relation, end: float) -> str:
+    """What to say of a tool that is not back at the end of a cycle, an instant in [s]."""
+    name = task.robot if isinstance(task, Grasp) else task.name
+    return (
+        f"{cell.origin.at('motion.cyclic')}: expected closed paths whose cycles end on a multiple of motion.step_s, "
+        f"but the tool of task '{name}' is not back at its start at {end:g} s"
+    )
+
+
+def _null_space(problem: TrackingProblem, instant: int, start: Array) -> Array:
+    """Orthonormal joint directions that move no task at the beginning, shape (nq, r)."""
+    J = problem.first_order(instant, start).J
+    free = np.flatnonzero(np.any(problem.signs != 0.0, axis=0) & (problem.mobile(instant) > 0.0))
     _, s, Vt = np.linalg.svd(J[:, free])
     rank = int(np.sum(s > SINGULAR * s.max(initial=0.0)))
     N = np.zeros((len(start), len(free) - rank))

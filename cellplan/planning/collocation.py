@@ -26,10 +26,13 @@ from cellplan.planning.windows import Window
 Indices = NDArray[np.intp]
 Record = Callable[[Window, Indices, Array, Array], None]  # window, cells, q (nq, cells, nodes), errors (cells,)
 
+AT_ONCE: Final = 200  # windows whose targets are looked up together: some 20 000 instants
 MOST_PASSES: Final = 20  # over a window; where passes help, about eight do
 SLOW: Final = 0.7  # a pass that leaves more than this share of the change before does not lead to a solution
 FREE_PASSES: Final = 3  # before a pass is judged by that
 LONGEST_MOVE: Final = np.pi  # [rad] or [m]: a pass that moves a joint farther has lost its way
+LOOK_SHARE: Final = 0.8  # of the accuracy: errors looked at; elsewhere they were found to be an eighth larger at most
+TOOL_SHARE: Final = 0.5  # of the accuracy: tool errors at the nodes that passes may leave
 POSTURE_SHARE: Final = 10.0  # postures may be this many times as far from their limit as tools, in [rad] for [m]
 
 
@@ -54,11 +57,14 @@ class Collocation:
     Attributes:
         sweeps: Passes over windows so far.
         solves: Systems of equations solved so far: nodes of all passes.
-        is_lost: Which cells could not be carried on, shape (cells,).
+        mobile: 1 for joints that are not locked, shape (nq,).
+        drift: Joint speeds that are asked for in the null space of the tasks, shape (nq,); None for none.
+        posture_room: How far postures may be from the limit of the passes, in [rad] and [m].
+        shortest: Length in [s] below which no panel is made by halving.
     """
 
     def __init__(self, tasks: LaneTasks, targets: LaneTargets, placement: Placement, *, accuracy: float) -> None:
-        """Begin with no cell lost.
+        """Begin with all joints free.
 
         Args:
             tasks: The tasks of the run.
@@ -70,7 +76,7 @@ class Collocation:
         self.sweeps = self.solves = 0
         self.mobile: Array = np.ones(tasks.joint_count)
         self.drift: Array | None = None
-        self.shortest = 0.0
+        self.shortest, self.posture_room = 0.0, POSTURE_SHARE * accuracy
 
     def carry(self, windows: tuple[Window, ...], q: Array, cells: Indices, record: Record) -> Indices:
         """Carry cells through windows, refined where that is needed; returns those that came to the end.
@@ -81,60 +87,61 @@ class Collocation:
             cells: Indices of the cells to carry.
             record: Is told of every window that cells passed, in order for each of them.
         """
-        for window, wanted in zip(windows, self._targets.in_windows(windows), strict=True):
-            if not len(cells):
-                break
-            cells = self._carry_on(window, wanted, q, cells, record=record)
+        for first in range(0, len(windows), AT_ONCE):
+            batch = windows[first : first + AT_ONCE]
+            for window, wanted in zip(batch, self._targets.in_windows(batch), strict=True):
+                if not len(cells):
+                    return cells
+                cells = self._carry_on(window, wanted, q, cells, record=record)
         return cells
 
     def _carry_on(self, window: Window, wanted: Wanted, q: Array, cells: Indices, *, record: Record) -> Indices:
         """Carry cells through one window; those for which it is too coarse go through finer ones."""
         attempt = self.attempt(window, wanted, q[:, cells], self._placement.of(cells))
-        is_exact = attempt.is_settled & np.all(attempt.errors <= self._accuracy, axis=0)
+        is_exact = attempt.is_settled & np.all(attempt.errors <= LOOK_SHARE * self._accuracy, axis=0)
         through = cells[is_exact]
         if len(through):
             q[:, through] = attempt.q[:, is_exact, -1]
             record(window, through, attempt.q[:, is_exact], attempt.errors[:, is_exact].max(axis=0))
         is_rough = attempt.is_settled & ~is_exact
-        finer: list[tuple[NDArray[np.bool_], tuple[Window, ...]]] = [(~attempt.is_settled, window.halves())]
+        finer = [(~attempt.is_settled, window.parts(shortest=self.shortest))]
         if is_rough.any():
-            finer.append((is_rough, window.refined(np.any(attempt.errors[:, is_rough] > self._accuracy, axis=1))))
+            places = np.any(attempt.errors[:, is_rough] > LOOK_SHARE * self._accuracy, axis=1)
+            finer.append((is_rough, window.refined(places.tolist(), shortest=self.shortest)))
         arrived = [through]
         for which, windows in finer:
-            if which.any() and all(panel.length >= self.shortest for each in windows for panel in each.panels):
+            if which.any() and windows:
                 arrived.append(self.carry(windows, q, cells[which], record))
         return np.sort(np.concatenate(arrived))
 
+    @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # what is not a number does not settle
     def attempt(self, window: Window, wanted: Wanted, q0: Array, placement: Placement) -> Attempt:
         """Resolve one window from start postures, shape (nq, cells)."""
         cells, nodes = q0.shape[1], window.count
-        wanted_there = wanted.between(0, nodes)
         q = np.repeat(q0[:, :, None], nodes, axis=2)
         is_settled, before = np.zeros(cells, dtype=bool), np.full(cells, np.inf)
         going = np.arange(cells)
         for number in range(MOST_PASSES):
-            moved = self._pass(
-                window,
-                wanted_there.repeated(len(going)),
-                q[:, going],
-                placement.of(going).repeated(nodes),
-                q0=q0[:, going],
-            )
+            at_nodes, spread = wanted.between(0, nodes).repeated(len(going)), placement.of(going).repeated(nodes)
+            moved, errors = self._pass(window, at_nodes, q[:, going], spread, q0=q0[:, going])
             q[:, going] += moved
             change = np.abs(moved).max(axis=(0, 2))
             ratio = change / before[going] if number else np.full(cells, SLOW)
             left = change * ratio / np.maximum(1.0 - ratio, 1.0 - SLOW)
-            is_there = left <= POSTURE_SHARE * self._accuracy
+            is_near = errors * ratio <= TOOL_SHARE * self._accuracy  # where blocks are nearly singular, Newton is slow
+            is_there = is_near & (left <= self.posture_room)
+            is_lost = ~(change < LONGEST_MOVE) | ((ratio > SLOW) & (number >= FREE_PASSES))
             is_settled[going[is_there]] = True
             before[going] = change
-            is_lost = ~(change < LONGEST_MOVE) | ((ratio > SLOW) & (number >= FREE_PASSES))
             going = going[~is_there & ~is_lost]
             if not len(going):
                 break
         return Attempt(q, is_settled, self._errors(window, wanted.repeated(cells), q, placement))
 
-    def _pass(self, window: Window, wanted: Wanted, q: Array, placement: Placement, *, q0: Array) -> Array:
-        """What one pass adds to the postures at the nodes, shape (nq, cells, nodes)."""
+    def _pass(
+        self, window: Window, wanted: Wanted, q: Array, placement: Placement, *, q0: Array
+    ) -> tuple[Array, Array]:
+        """What one pass adds to the postures at the nodes, (nq, cells, nodes), and tool errors before it, (cells,)."""
         self.sweeps += 1
         self.solves += q.shape[1] * q.shape[2]
         look = self._tasks.look(q.reshape(len(q), -1), wanted, placement, mobile=self.mobile)
@@ -142,7 +149,7 @@ class Collocation:
         picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
         moved: Array = (picard + look.correction(picard)).reshape(q.shape)
         moved[:, :, 0] = 0.0
-        return moved
+        return moved, np.abs(look.errors).max(axis=(0, 1)).reshape(q.shape[1:]).max(axis=1)
 
     def _errors(self, window: Window, wanted: Wanted, q: Array, placement: Placement) -> Array:
         """Largest tool errors at the nodes and between them, by panel, shape (panels, cells)."""

@@ -107,9 +107,16 @@ def pose_errors(X_PT_wanted: Array, X_PT: Array, is_spin_free: Sequence[bool]) -
 
 
 def _tilts(z: Array, z_wanted: Array) -> Array:
-    """Smallest rotation vectors that turn unit vectors ``z`` onto ``z_wanted``, shape (n, 3)."""
+    """Smallest rotation vectors that turn unit vectors ``z`` onto ``z_wanted``, shape (n, 3).
+
+    Opposite vectors are a half turn apart about any axis across them.
+    """
     across = np.cross(z, z_wanted)
     sine = np.linalg.norm(across, axis=1, keepdims=True)
-    angle = np.arctan2(sine, np.sum(z * z_wanted, axis=1, keepdims=True))
+    cosine = np.sum(z * z_wanted, axis=1, keepdims=True)
+    angle = np.arctan2(sine, cosine)
     tilts: Array = across * np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 1.0)
+    opposite = ((sine == 0.0) & (cosine < 0.0))[:, 0]
+    any_across = np.cross(z[opposite], np.eye(3)[np.argmin(np.abs(z[opposite]), axis=1)])
+    tilts[opposite] = np.pi * any_across / np.linalg.norm(any_across, axis=1, keepdims=True)
     return tilts

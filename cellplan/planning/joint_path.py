@@ -20,12 +20,14 @@ class JointPath:
         begin: First instant in [s].
         panels: Stretches of time, one after the other; none where no way leads on from the start.
         nodes: Stacked joint vectors at the nodes of each panel, shape (nq, degree + 1).
+        worst: Largest tool error at the nodes and between them, in [m] or [rad].
     """
 
     start: Array
     begin: float
     panels: Sequence[Panel]
     nodes: Sequence[Array]
+    worst: float = 0.0
 
     @property
     def end(self) -> float:
@@ -51,6 +53,18 @@ class JointPath:
         for panel, nodes, last in zip(self.panels, self.nodes, cuts.tolist(), strict=True):
             if last > first:
                 share = np.clip((times[first:last] - panel.begin) / panel.length, 0.0, 1.0)
-                q[first:last] = chebyshev(panel.degree).values(share) @ nodes.T
+                end = nodes[:, -1:]  # what is added to it is exactly zero at the end and for joints that stand still
+                q[first:last] = (end + (nodes - end) @ chebyshev(panel.degree).values(share).T).T
             first = last
         return q
+
+    def shifted(self, by: float) -> "JointPath":
+        """The same motion so many seconds later."""
+        panels = [panel.shifted(by) for panel in self.panels]
+        return JointPath(self.start, self.begin + by, panels, self.nodes, self.worst)
+
+
+def joined(first: JointPath, second: JointPath) -> JointPath:
+    """One motion, then another that begins where and when it ends."""
+    panels, nodes = [*first.panels, *second.panels], [*first.nodes, *second.nodes]
+    return JointPath(first.start, first.begin, panels, nodes, max(first.worst, second.worst))

@@ -36,20 +36,29 @@ class LaneTargets:
 
     def at(self, times: Array, begins: Array, ends: Array) -> Wanted:
         """Targets at instants in [s], each between two breaks, shape (N,) each."""
-        return self._wanted(times, [path.at(times, (begins, ends)) for path in self._timed.paths])
+        return self._from_start(times, self.on_path(times, begins, ends))
+
+    def on_path(self, times: Array, begins: Array, ends: Array) -> Wanted:
+        """The same, as if all tools stood on their paths at the start."""
+        return self._wanted([path.at(times, (begins, ends)) for path in self._timed.paths])
 
     def sampled(self, schedule: Schedule, instants: slice) -> Wanted:
         """Targets at some instants of the clock, from the sampled tasks."""
         poses = [(task.X_PT[instants], task.V_PT_P[instants]) for task in schedule.tasks]
-        return self._wanted(schedule.times[instants], poses)
+        return self._from_start(schedule.times[instants], self._wanted(poses))
 
-    def _wanted(self, times: Array, tasks: Sequence[tuple[Array, Array]]) -> Wanted:
+    def _from_start(self, times: Array, wanted: Wanted) -> Wanted:
+        """Targets moved so that they begin where the tools are."""
+        if self.offset is None:
+            return wanted
+        return Wanted(*self.offset.applied(times, wanted.R, wanted.p, wanted.twists))
+
+    def _wanted(self, tasks: Sequence[tuple[Array, Array]]) -> Wanted:
         """Poses and twists of the tasks, and the grasps beside them, as lanes."""
-        X = np.empty((4, 4, len(tasks) + len(self._grasps), len(times)))
+        X = np.empty((4, 4, len(tasks) + len(self._grasps), len(tasks[0][0])))
         twists = np.zeros((6, X.shape[2], X.shape[3]))
         for index, (X_PT, V_PT_P) in enumerate(tasks):
             X[:, :, index], twists[:, index] = np.moveaxis(X_PT, 0, -1), V_PT_P.T
         for index, grasp in enumerate(self._grasps, start=len(tasks)):
             X[:, :, index] = grasp.X_PT[:, :, None]
-        R, p = X[:3, :3], X[:3, 3]
-        return Wanted(R, p, twists) if self.offset is None else Wanted(*self.offset.applied(times, R, p, twists))
+        return Wanted(X[:3, :3], X[:3, 3], twists)

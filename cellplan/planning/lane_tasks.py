@@ -160,8 +160,8 @@ class LaneTasks:
         if self._is_spin_free.any():
             free = self._is_spin_free
             z, goal = seen.R[:, 2, free], wanted.R[:, 2, free]
-            tilt = _rotation(_cross(z, goal), np.einsum("itb,itb->tb", z, goal))
-            errors[3:, free] = np.einsum("jitb,jtb->itb", wanted.R[:, :, free], tilt)
+            across_tool = np.einsum("jitb,jtb->itb", wanted.R[:, :, free], _cross(z, goal))
+            errors[3:, free] = _rotation(across_tool, np.einsum("itb,itb->tb", z, goal))
         return errors if self._is_whole else errors * self._kept
 
     def _twists(self, wanted: Wanted) -> Array:
@@ -263,11 +263,15 @@ def _kept(task: Relation) -> Array:
 
 
 def _rotation(sine_axis: Array, cosine: Array) -> Array:
-    """Rotation vectors from axis times sine, shape (3, ...), and cosine of the angle, shape (...)."""
+    """Rotation vectors from axis times sine, shape (3, ...), and cosine of the angle, shape (...).
+
+    Of a half turn the axis is not known; it is given as one about x, so that it does not look like none.
+    """
     sine = np.sqrt(np.einsum("i...,i...->...", sine_axis, sine_axis))
     is_small = sine <= SMALL_ANGLE
     scale = np.where(is_small, 1.0, np.arctan2(sine, cosine) / np.where(is_small, 1.0, sine))
     vector: Array = sine_axis * scale
+    vector[0] += np.pi * (is_small & (cosine < 0.0))
     return vector
 
 

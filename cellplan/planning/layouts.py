@@ -156,9 +156,9 @@ class _Screen:
         grasps = closures(cell, moving)
         self._tasks = LaneTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
         self._targets, self._accuracy, self._shortest = LaneTargets(timed, grasps), accuracy, cell.motion.step
-        breaks = timed.breaks
+        breaks, jumps = timed.breaks, timed.jumps
         self._at_start = self._targets.at(breaks[:1], breaks[:1], breaks[1:2])
-        self._windows = windows_between(breaks, whole=float(breaks[-1]), highest=FIRST_DEGREE)
+        self._windows = windows_between(jumps, whole=float(breaks[-1]), knots=breaks, highest=FIRST_DEGREE)
         at_rest = cell.positioners[:1] if all(path.task.relative_to is Frame.PART for path in timed.paths) else ()
         self._settling = np.concatenate([np.full(len(r.model.joints), r.name not in at_rest) for r in cell.robots])
         joints = [joint for robot in cell.robots for joint in robot.model.joints]
@@ -168,7 +168,7 @@ class _Screen:
 
     def of(self, X_WB: Array, X_FT: Array, start: Array) -> Screening:
         """Figures of one group of candidates; see `Candidates`."""
-        placement = self._tasks.chains.placement(X_WB, X_FT)
+        placement = self._tasks.chains.placements(X_WB, X_FT)
         q, arrived = self._settled(start.T.copy(), placement)
         found = Screening.unknown(q.T.copy())
         found.lost_at[arrived] = 0.0

@@ -1,8 +1,7 @@
 """Resolve a run: from timed tasks to the motion of all joints, by the integrator that the cell asks for."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -13,13 +12,11 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.solver import Integrator
 from cellplan.model.task import INSTANT_ROOM
 from cellplan.planning.accurate_run import AccurateRun
-from cellplan.planning.closing import closing_drift, first_cycle
+from cellplan.planning.closed_path import closed_path
 from cellplan.planning.follow import carry, follow
 from cellplan.planning.joint_path import JointPath
 from cellplan.planning.timing import TimedTasks
 from cellplan.planning.tracking_problem import TrackingProblem
-
-CLOSER_LOOKS: Final = 3  # paths found again because the instants of the clock showed a larger error than the nodes
 
 
 def resolve(
@@ -52,56 +49,43 @@ def resolve(
         motion = follow(cell, schedule, start=start, moving=moving, progress=progress)
         return replace(motion, resolution=_steps(len(motion.times) - 1))
     run = AccurateRun(cell, timed, start=start, moving=moving, progress=progress)
-    path, q, worst = _path(run, cell, schedule, start=start, moving=moving)
-    reached, last = len(q) - 1, len(schedule.times) - 1
+    if not cell.motion.cyclic:
+        path = run.path(start, begin=0.0, end=run.end)
+        return _sampled(run, path, lambda: TrackingProblem(cell, schedule, moving, start=start), timed.times, progress)
+    problem = TrackingProblem(cell, schedule, moving, start=start)
+    closed = closed_path(run, problem, schedule, start=start)
+    if closed is None:
+        motion = follow(cell, schedule, start=start, moving=moving, progress=progress)
+        return replace(motion, resolution=_resolution(run, JointPath(start, 0.0, (), ()), euler_from=0.0))
+    return _sampled(run, closed, lambda: problem, timed.times, progress)
+
+
+def _sampled(
+    run: AccurateRun, path: JointPath, problem: Callable[[], TrackingProblem], times: Array, progress: Progress
+) -> Motion:
+    """The path at the instants of the clock; from where it ends, Euler's steps."""
+    last = len(times) - 1
+    reached = int(np.searchsorted(times, path.end + INSTANT_ROOM, side="right")) - 1
+    q = path.at(times[: reached + 1])
+    q[0] = path.start
     if reached < last:
-        problem = TrackingProblem(cell, schedule, moving, start=start)
-        stepped = carry(problem, q[-1], first=reached, last=last, progress=progress)
+        stepped = carry(problem(), q[-1], first=reached, last=last, progress=progress)
         q = np.concatenate([q, stepped.q[reached + 1 :]])
-    resolution = Resolution(
+    euler_from = float(times[reached]) if reached < last else None
+    return Motion(times=times, q=q, resolution=_resolution(run, path, euler_from=euler_from))
+
+
+def _resolution(run: AccurateRun, path: JointPath, *, euler_from: float | None) -> Resolution:
+    """What the run took in all, and the path that came of it."""
+    return Resolution(
         integrator=Integrator.ACCURATE,
         panels=len(path.panels),
         nodes=path.node_count,
         sweeps=run.collocation.sweeps,
         solves=run.collocation.solves,
-        error_between=worst if path.panels else None,
-        euler_from=float(schedule.times[reached]) if reached < last else None,
+        error_between=path.worst if path.panels else None,
+        euler_from=euler_from,
     )
-    return Motion(times=schedule.times, q=q, resolution=resolution)
-
-
-def _path(
-    run: AccurateRun, cell: Cell, schedule: Schedule, *, start: Array, moving: Sequence[str]
-) -> tuple[JointPath, Array, float]:
-    """The path, the postures at the instants of the clock that it reaches, and the largest tool error anywhere.
-
-    The error is looked at at the nodes, between them, and at every instant of the clock; where one of these shows more
-    than the others did, the panels are cut there and the path is found again.
-    """
-    problem = TrackingProblem(cell, schedule, moving, start=start) if cell.motion.cyclic else None
-    for closer in range(CLOSER_LOOKS + 1):
-        path = run.path(start, begin=0.0, end=run.end) if problem is None else _closed(run, problem, schedule, start)
-        reached = int(np.searchsorted(schedule.times, path.end + INSTANT_ROOM, side="right"))
-        q = path.at(schedule.times[:reached])
-        q[0] = start
-        errors = run.errors(schedule, q)
-        if errors.max() <= run.accuracy or not path.panels or closer == CLOSER_LOOKS:
-            break
-        run.look_closer(path, schedule.times[:reached], errors)
-    return path, q, max(run.worst, float(errors.max()))
-
-
-def _closed(run: AccurateRun, problem: TrackingProblem, schedule: Schedule, start: Array) -> JointPath:
-    """A path that closes after the first cycle; later cycles repeat it."""
-    begin, end = (float(schedule.times[k]) for k in first_cycle(problem.cell, schedule))
-
-    def moved(drift: Array) -> Array:
-        at = run.path(start, begin=0.0, end=begin, drift=drift).last if begin > 0.0 else start
-        round_trip: Array = run.path(at, begin=begin, end=end, drift=drift).last - at
-        return round_trip
-
-    drift = closing_drift(problem, start, moved, duration=end)
-    return run.path(start, begin=0.0, end=run.end, drift=drift)
 
 
 def _steps(count: int) -> Resolution:

@@ -1,6 +1,7 @@
 """Timing: when each tool is where on its path, at any instant, and at which instants its motion is not smooth."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -75,10 +76,14 @@ class ClockedPath:
                 f"{self.where}: expected at most {MOST_BREAKS} knots of the path in all cycles, got {len(knots)} in "
                 f"each of {self.task.repeat}; repeat it less often, or write solver.integrator: euler"
             )
-        found = [self.corners, self._instants(knots)]
+        return distinct(np.concatenate([self.jumps, self._instants(knots)]))
+
+    @property
+    def jumps(self) -> Array:
+        """The breaks that do not come from knots of the path, in [s], increasing, shape (J,)."""
+        found = [self.corners, np.array([self.over])]
         if self.task.approach is not None:
             found.append(np.array([self.start - self.task.approach.duration]))
-        found.append(np.array([self.over]))
         if self.task.time_law.kind is TimeLawKind.TRAPEZOID and not isinstance(self.toolpath, Trajectory):
             ramp = self.task.time_law.ramp * np.diff(self.corners)
             found += [self.corners[:-1] + ramp, self.corners[1:] - ramp]
@@ -199,17 +204,28 @@ class TimedTasks:
     Attributes:
         times: Instants of the clock in [s], evenly spaced from 0, shape (N,).
         paths: The paths of the tasks that are worked on.
+        looked_at: Further instants in [s] that count as jumps, because somebody wants a closer look, shape (K,).
     """
 
     times: Array
     paths: tuple[ClockedPath, ...]
+    looked_at: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def breaks(self) -> Array:
         """Instants in [s], from zero to the end of the clock, between which the motion of all tools is smooth."""
+        return self._within([path.breaks for path in self.paths])
+
+    @property
+    def jumps(self) -> Array:
+        """Those of them that do not come from knots of the paths, which join pieces smoothly."""
+        return self._within([path.jumps for path in self.paths])
+
+    def _within(self, found: Sequence[Array]) -> Array:
+        """Instants of all paths within the clock, and its ends."""
         end = float(self.times[-1])
-        found = np.concatenate([np.zeros(0), *(path.breaks for path in self.paths)])
-        inner = distinct(found[(found > INSTANT_ROOM) & (found < end - INSTANT_ROOM)])
+        every = np.concatenate([self.looked_at, *found])
+        inner = distinct(every[(every > INSTANT_ROOM) & (every < end - INSTANT_ROOM)])
         return np.concatenate([[0.0], inner, [end]])
 
 

@@ -184,3 +184,17 @@ def test_constraint_rows_pick_named_axes_and_leave_the_spin():
     about_tool_axis = np.concatenate([np.zeros(3), X_PT[0, :3, 2]])
     np.testing.assert_allclose(spinning @ about_tool_axis, 0.0, atol=1e-15)
     assert np.linalg.matrix_rank(spinning) == 5
+
+
+@pytest.mark.parametrize("z", [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -0.6, 0.8]])
+def test_a_tool_that_points_the_other_way_is_half_a_turn_off(z):
+    """Also where it points exactly backwards, so that the cross product of both axes says nothing."""
+    x = np.cross(z, [0.1, 0.2, 0.3])
+    x /= np.linalg.norm(x)
+    R = np.column_stack([x, np.cross(z, x), z])
+    reversed_ = R * [1.0, -1.0, -1.0]
+
+    error = pose_errors(pose_from(R, np.zeros(3))[None], pose_from(reversed_, np.zeros(3))[None], [True])[0, 3:]
+
+    assert np.linalg.norm(error) == pytest.approx(np.pi, abs=1e-15)
+    np.testing.assert_allclose(rotation_exp(error) @ reversed_[:, 2], z, atol=1e-15)

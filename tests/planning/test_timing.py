@@ -283,3 +283,18 @@ def test_knots_that_nobody_counts_are_refused() -> None:
         "cell.yaml:14: tasks.ring.path: expected at most 2000000 knots of the path in all cycles, got 14 in each of "
         "200000; repeat it less often, or write solver.integrator: euler"
     )
+
+
+def test_jumps_are_the_breaks_that_no_knot_of_the_path_makes() -> None:
+    """Corners, ramps, coming and leaving are; a smooth file and a mesh have none inside."""
+    for name in ("circle on a mesh", "smooth file"):
+        task, part = PATHS[name]
+        cell = replace(clocked(task, duration=2.0), part=part)
+        timed_tasks = time_tasks(cell, [build_toolpath(task, part, cell.origin)])
+        assert timed_tasks.jumps.tolist() == [0.0, 2.0]
+        assert len(timed_tasks.breaks) > 5
+    task = replace(ON_ROLLER["rectangle"], time_law=LAWS["trapezoid"], **MOVES)
+    cell = clocked(replace(task, start=0.3), duration=4.0)
+    timed_tasks = time_tasks(cell, [build_toolpath(cell.tasks[0], ROLLER, cell.origin)])
+    assert set(timed_tasks.jumps) <= set(timed_tasks.breaks)
+    assert np.array_equal(timed_tasks.jumps, timed_tasks.breaks)  # its sides meet at stops
