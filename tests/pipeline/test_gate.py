@@ -221,7 +221,7 @@ def test_runs_of_single_tasks_are_verified_one_by_one(sound: Path, tmp_path: Pat
 
     message = refusal(tmp_path / "run", sound / "cell" / "small.yaml")
     assert message.startswith(
-        f"{tmp_path / 'run' / 'report.json'}: tasks.path.mean_position_error_mm: 0 stands there, "
+        f"{tmp_path / 'run' / 'report.json'}: tasks.path.mean_position_error_mm: 0.001 stands there, "
     )
 
 
