@@ -109,7 +109,10 @@ def test_what_is_in_the_way_of_the_accurate_mode_is_told_line_by_line(
         ("integrator: rk4", "c:22: solver.integrator: expected accurate or euler, got 'rk4'"),
         ("integrator: eulr", "c:22: solver.integrator: expected accurate or euler, got 'eulr', did you mean 'euler'?"),
         ("accuracy_mm: 0", "c:22: solver.accuracy_mm: expected a positive number of millimetres, got 0"),
-        ("accuracy_mm: -1e-4", "c:22: solver.accuracy_mm: expected a positive number of millimetres, got -0.0001"),
+        (
+            "accuracy_mm: 1e-10",
+            "c:22: solver.accuracy_mm: expected a number of millimetres of at least 1e-09, got 1e-10",
+        ),
         ("accuracy_mm: 1.5", "c:22: solver.accuracy_mm: expected a number of millimetres of at most 1, got 1.5"),
     ],
 )

@@ -215,13 +215,13 @@ def test_runs_of_single_tasks_are_verified_one_by_one(sound: Path, tmp_path: Pat
     assert [motion.name for motion in run.motions] == ["path"]
 
     edit_json(
-        tmp_path / "run" / "report.json", lambda record: record["tasks"]["path"].update(mean_position_error_mm=0.0)
+        tmp_path / "run" / "report.json", lambda record: record["tasks"]["path"].update(mean_position_error_mm=0.001)
     )
     seal_again(tmp_path / "run")
 
     message = refusal(tmp_path / "run", sound / "cell" / "small.yaml")
     assert message.startswith(
-        f"{tmp_path / 'run' / 'report.json'}: tasks.path.mean_position_error_mm: 0 stands there, "
+        f"{tmp_path / 'run' / 'report.json'}: tasks.path.mean_position_error_mm: 0.001 stands there, "
     )
 
 

@@ -154,7 +154,7 @@ class SolverEntry(Entry):
         "weighted_pseudo_inverse, without secondary goals, near_limits and load. When absent: accurate where it goes, "
         "else euler; gain_per_s and damping do not count in this.",
     )
-    accuracy_mm: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
+    accuracy_mm: Annotated[float, Field(ge=1e-9, le=1.0)] = Field(
         default=1e-4,
         description="Largest tool error between the nodes of the accurate mode; for angles the same number in "
         "milliradians. euler does not use it.",
