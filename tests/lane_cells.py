@@ -11,7 +11,7 @@ from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import Cell, Relation
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import Frame
-from cellplan.planning.lane_tasks import Wanted
+from cellplan.planning.accurate.lane_tasks import Wanted
 
 
 def side_arm(model: RobotModel) -> RobotModel:

@@ -16,9 +16,9 @@ from cellplan.model.cell import Cell, Grasp
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.solver import Integrator
 from cellplan.model.task import SpacePolylinePath
-from cellplan.planning.accurate_run import AccurateRun
+from cellplan.planning.accurate.accurate_run import AccurateRun
+from cellplan.planning.accurate.joint_path import JointPath
 from cellplan.planning.closures import closures
-from cellplan.planning.joint_path import JointPath
 from cellplan.planning.resolve import resolve
 from cellplan.planning.schedule import sample, time_tasks
 from cellplan.planning.timing import TimedTasks, distinct

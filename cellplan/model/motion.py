@@ -62,7 +62,8 @@ class Resolution:
         nodes: Instants at which the joints were solved for.
         sweeps: Passes over all nodes of a panel, added up.
         solves: Systems of equations that were solved.
-        error_between: Largest tool error between the nodes in [m]; None when nobody looked, as with Euler's steps.
+        error_between: Bound of the tool error at the nodes and between them, in [m] or [rad]; None when nobody looked,
+            as with Euler's steps.
         euler_from: Instant in [s] from which on Euler's steps had to be taken; None when they never had to.
     """
 

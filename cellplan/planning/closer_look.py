@@ -11,7 +11,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.planning.accurate_run import AccurateRun
+from cellplan.planning.accurate.accurate_run import AccurateRun
 from cellplan.planning.resolve import resolve
 from cellplan.planning.timing import TimedTasks, distinct
 

@@ -11,12 +11,12 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.lanes import Placement
 from cellplan.model.cell import Cell
 from cellplan.model.task import Frame
+from cellplan.planning.accurate.collocation import Collocation, Indices
+from cellplan.planning.accurate.lane_targets import LaneTargets
+from cellplan.planning.accurate.lane_tasks import LaneTasks
+from cellplan.planning.accurate.windows import Window, windows_between
 from cellplan.planning.closures import closures
-from cellplan.planning.collocation import Collocation, Indices
-from cellplan.planning.lane_targets import LaneTargets
-from cellplan.planning.lane_tasks import LaneTasks
 from cellplan.planning.timing import TimedTasks
-from cellplan.planning.windows import Window, windows_between
 
 AT_ONCE: Final = 32  # candidates that are resolved together: enough for NumPy, and their arrays stay in the cache
 FIRST_DEGREE: Final = 12  # of the polynomials: enough for most windows at the accuracy of a screening
@@ -69,7 +69,7 @@ class Screening:
         start: Start postures with the tools on their paths, shape (K, nq).
         lost_at: Instant in [s] at which a tool could not follow; -inf where it did not even come to its start, inf for
             candidates that did the whole job, shape (K,).
-        error: Largest tool error at the nodes and between them, in [m] or [rad], shape (K,).
+        error: Bound of the tool error at the nodes and between them, in [m] or [rad], shape (K,).
         margins: Smallest distance of each joint from its limits in [rad] or [m], negative beyond, shape (K, nq).
         speed_ratios: Largest speed of each joint as a share of its limit, shape (K, nq).
     """

@@ -11,10 +11,10 @@ from cellplan.model.motion import Motion, Resolution, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.solver import Integrator
 from cellplan.model.task import INSTANT_ROOM
-from cellplan.planning.accurate_run import AccurateRun
-from cellplan.planning.closed_path import closed_path
+from cellplan.planning.accurate.accurate_run import AccurateRun
+from cellplan.planning.accurate.closed_path import closed_path
+from cellplan.planning.accurate.joint_path import JointPath
 from cellplan.planning.follow import carry, follow
-from cellplan.planning.joint_path import JointPath
 from cellplan.planning.timing import TimedTasks
 from cellplan.planning.tracking_problem import TrackingProblem
 

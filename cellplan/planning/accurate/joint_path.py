@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.chebyshev import chebyshev
 from cellplan.geometry.transforms import Array
 from cellplan.model.task import INSTANT_ROOM
-from cellplan.planning.windows import Panel
+from cellplan.planning.accurate.windows import Panel
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,11 +11,11 @@ from timed_cells import Case, triangles
 from cellplan.geometry.transforms import Array, pose_from, rotation_exp
 from cellplan.kinematics.lanes import Placement
 from cellplan.model.cell import Cell
+from cellplan.planning.accurate.collocation import Collocation
+from cellplan.planning.accurate.lane_targets import LaneTargets
+from cellplan.planning.accurate.lane_tasks import LaneTasks, Wanted
+from cellplan.planning.accurate.windows import Panel, Window, windows_between
 from cellplan.planning.closures import closures
-from cellplan.planning.collocation import Collocation
-from cellplan.planning.lane_targets import LaneTargets
-from cellplan.planning.lane_tasks import LaneTasks, Wanted
-from cellplan.planning.windows import Panel, Window, windows_between
 
 ACCURACY = 1e-7
 CELL = triangles(CELLS["mixed"])

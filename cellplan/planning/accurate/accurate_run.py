@@ -11,16 +11,16 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import INSTANT_ROOM
+from cellplan.planning.accurate.collocation import Collocation, Indices, largest
+from cellplan.planning.accurate.joint_path import JointPath
+from cellplan.planning.accurate.lane_targets import LaneTargets
+from cellplan.planning.accurate.lane_tasks import LaneTasks
+from cellplan.planning.accurate.start_offset import start_offset
+from cellplan.planning.accurate.windows import Panel, Window, windows_between
 from cellplan.planning.closing import SAME_POSE
 from cellplan.planning.closures import closures
-from cellplan.planning.collocation import Collocation, Indices, largest
-from cellplan.planning.joint_path import JointPath
-from cellplan.planning.lane_targets import LaneTargets
-from cellplan.planning.lane_tasks import LaneTasks
 from cellplan.planning.locked_joints import locked_since
-from cellplan.planning.start_offset import start_offset
 from cellplan.planning.timing import TimedTasks, distinct
-from cellplan.planning.windows import Panel, Window, windows_between
 
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
 SHORTEST_SHARE: Final = 1.0 / 4096.0  # of the motion: panels may be that short where steps of the clock are longer

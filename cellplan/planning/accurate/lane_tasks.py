@@ -9,7 +9,7 @@ from cellplan.geometry.transforms import SMALL_ANGLE, Array, inverse
 from cellplan.kinematics.lanes import LaneChains, LaneState, Placement
 from cellplan.model.cell import Cell, Relation
 from cellplan.model.task import Frame
-from cellplan.planning.arrow import ArrowInverse
+from cellplan.planning.accurate.arrow import ArrowInverse
 
 
 @dataclass(frozen=True, slots=True, eq=False)

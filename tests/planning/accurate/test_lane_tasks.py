@@ -10,6 +10,7 @@ from lane_cells import CELLS, everyone, postures, random_wanted, relations, seen
 from cellplan.geometry.transforms import Array, inverse, rotation_exp, rotation_vector
 from cellplan.kinematics.combined import CombinedModel
 from cellplan.model.cell import Cell
+from cellplan.planning.accurate.lane_tasks import LaneTasks, Look, Wanted
 from cellplan.planning.cooperation import (
     column_signs,
     constraint_rows,
@@ -17,7 +18,6 @@ from cellplan.planning.cooperation import (
     pose_errors,
     reference_frames,
 )
-from cellplan.planning.lane_tasks import LaneTasks, Look, Wanted
 from cellplan.planning.weighted_inverse import WeightedInverse
 
 LANES = 3

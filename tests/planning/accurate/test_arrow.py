@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.arrow import ArrowInverse, eliminated
+from cellplan.planning.accurate.arrow import ArrowInverse, eliminated
 
 LANES = 4
 

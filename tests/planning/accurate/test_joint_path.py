@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cellplan.geometry.chebyshev import chebyshev
-from cellplan.planning.joint_path import JointPath, joined
-from cellplan.planning.windows import Panel
+from cellplan.planning.accurate.joint_path import JointPath, joined
+from cellplan.planning.accurate.windows import Panel
 
 PANELS = (Panel(1.0, 1.5, 6), Panel(1.5, 3.0, 12), Panel(3.0, 3.25, 6))
 

@@ -14,9 +14,9 @@ from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import LockedJoint
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, PlaneName, StraightMove, TimeLaw, TimeLawKind
-from cellplan.planning.accurate_run import AccurateRun
-from cellplan.planning.closed_path import PERIODIC, closed_path
-from cellplan.planning.joint_path import JointPath
+from cellplan.planning.accurate.accurate_run import AccurateRun
+from cellplan.planning.accurate.closed_path import PERIODIC, closed_path
+from cellplan.planning.accurate.joint_path import JointPath
 from cellplan.planning.tracking_problem import TrackingProblem
 
 CONSTANT = TimeLaw(kind=TimeLawKind.CONSTANT)

@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, rotation_exp
 from cellplan.kinematics.lanes import Placement
-from cellplan.planning.lane_tasks import LaneTasks, Wanted
+from cellplan.planning.accurate.lane_tasks import LaneTasks, Wanted
 from cellplan.planning.stand_off import REST_TO_REST
 from cellplan.planning.time_laws import advance
 

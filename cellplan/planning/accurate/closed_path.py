@@ -9,9 +9,9 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.motion import Schedule
 from cellplan.model.task import INSTANT_ROOM
-from cellplan.planning.accurate_run import AccurateRun
+from cellplan.planning.accurate.accurate_run import AccurateRun
+from cellplan.planning.accurate.joint_path import JointPath, joined
 from cellplan.planning.closing import SAME_POSE, closing_drift, common_cycles, not_back
-from cellplan.planning.joint_path import JointPath, joined
 from cellplan.planning.tracking_problem import TrackingProblem
 
 PERIODIC: Final = 3e-9  # [rad] or [m] by which joints may be off after a cycle that is repeated: they would jump by it

@@ -13,7 +13,7 @@ from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.tessellation import tessellate
 from cellplan.model.cell import Cell, LockedJoint, Mode
 from cellplan.model.task import StraightMove, TimeLaw, TimeLawKind
-from cellplan.planning.accurate_run import SETTLING_STEPS, AccurateRun
+from cellplan.planning.accurate.accurate_run import SETTLING_STEPS, AccurateRun
 from cellplan.planning.modes import plan_runs
 
 ACCURACY = 1e-7  # [m], [rad] asked for by default

@@ -8,10 +8,10 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Grasp
 from cellplan.model.motion import Schedule
-from cellplan.planning.lane_tasks import Wanted
-from cellplan.planning.start_offset import StartOffset
+from cellplan.planning.accurate.lane_tasks import Wanted
+from cellplan.planning.accurate.start_offset import StartOffset
+from cellplan.planning.accurate.windows import Window
 from cellplan.planning.timing import TimedTasks
-from cellplan.planning.windows import Window
 
 
 class LaneTargets:

@@ -7,8 +7,8 @@ import pytest
 from lane_cells import CELLS, everyone, postures, relations, seen_poses
 
 from cellplan.geometry.transforms import rotation_exp, rotation_vector
-from cellplan.planning.lane_tasks import LaneTasks, Wanted
-from cellplan.planning.start_offset import StartOffset, start_offset
+from cellplan.planning.accurate.lane_tasks import LaneTasks, Wanted
+from cellplan.planning.accurate.start_offset import StartOffset, start_offset
 
 ACCURACY = 1e-7
 H = 1e-5  # [s]

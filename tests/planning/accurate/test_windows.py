@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cellplan.planning.windows import (
+from cellplan.planning.accurate.windows import (
     DEGREES,
     FEWEST_KNOTS,
     MOST_KNOTS,

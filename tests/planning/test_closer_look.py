@@ -1,0 +1,67 @@
+"""A closer look at a resolved motion: errors at every instant of the clock, as an independent kinematics sees them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from timed_cells import Case, case_of, shipped
+
+from cellplan.checks.tracking import part_poses, task_accuracy
+from cellplan.geometry.transforms import Array
+from cellplan.kinematics.screws import ScrewChain
+from cellplan.model.motion import Motion
+from cellplan.planning.accurate.accurate_run import AccurateRun
+from cellplan.planning.closer_look import resolve_closely
+from cellplan.planning.schedule import sample
+
+NOISE = 1e-13  # [m] rounding of chains of about ten metres
+
+
+def closely(case: Case) -> Motion:
+    return resolve_closely(case.cell, case.timed, sample(case.timed), start=case.start, moving=case.moving)
+
+
+def seen_by_the_checks(case: Case, q: Array) -> Array:
+    """Largest position or orientation error of all tools at each instant, by successive screw displacements."""
+    chains = {robot.name: ScrewChain(robot) for robot in case.cell.robots}
+    positions = {robot.name: q[:, case.cell.columns(robot.name)] for robot in case.cell.robots}
+    X_WP = part_poses(case.cell, chains, positions)
+    worst = np.zeros(len(q))
+    for task in sample(case.timed).tasks:
+        found = task_accuracy(task, chains[task.task.robot], q=positions[task.task.robot], X_WP=X_WP)
+        for error in (found.position_error, found.orientation_error):
+            worst = np.maximum(worst, np.linalg.norm(error, axis=1))
+    return worst
+
+
+def test_errors_at_the_clock_s_instants_are_those_of_the_checks() -> None:
+    case = case_of(shipped("four_robots"))
+    q = closely(case).q + 1e-5 * np.random.default_rng(0).normal(size=(len(case.timed.times), case.cell.joint_count))
+
+    errors = AccurateRun(case.cell, case.timed, start=case.start, moving=case.moving).errors(sample(case.timed), q)
+
+    np.testing.assert_allclose(errors, seen_by_the_checks(case, q), rtol=1e-6, atol=NOISE)
+
+
+@pytest.mark.parametrize("name", ["four_robots", "four_robots_initial"])
+def test_no_instant_of_the_clock_is_farther_off_than_the_motion_says(name: str) -> None:
+    case = case_of(shipped(name))
+
+    motion = closely(case)
+
+    assert motion.resolution is not None
+    assert motion.resolution.error_between is not None
+    assert seen_by_the_checks(case, motion.q).max() <= motion.resolution.error_between + NOISE
+    assert motion.resolution.error_between <= case.cell.solver.accuracy
+
+
+def test_an_instant_that_is_looked_at_becomes_a_node() -> None:
+    cell = shipped("four_robots")
+    case = case_of(replace(cell, solver=replace(cell.solver, accuracy=1e-4)))  # [m] so coarse that nodes stand out
+    before = seen_by_the_checks(case, case.resolved().q)
+    worst = int(np.argmax(before))
+
+    closer = replace(case, timed=replace(case.timed, looked_at=case.timed.times[[worst]]))
+
+    assert before[worst] > 1e-7
+    assert seen_by_the_checks(case, closer.resolved().q)[worst] < 0.1 * before[worst]
