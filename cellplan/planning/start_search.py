@@ -259,8 +259,8 @@ def _why_nothing(search: _Search, holder_count: int) -> str:
     if search.touching:
         first, second = max(search.touching, key=lambda pair: search.touching[pair])
         return (
-            f"{cell.origin.at('robots')}: every start posture that reaches the tasks collides, most often "
-            f"'{first}' with '{second}' ({tried} tried): move the bases apart or change a tool"
+            f"{cell.origin.at('robots')}: found no start postures that reach the tasks without a collision, most "
+            f"often of '{first}' with '{second}' ({tried} tried): move the bases apart or change a tool"
         )
     name = max(
         search.unreached, key=lambda robot: search.unreached[robot], default=(*cell.positioners, cell.robots[0].name)[0]

@@ -156,7 +156,7 @@ def test_arms_that_cannot_help_do_not_multiply_a_search_without_hope(tmp_path):
     scene, toolpaths = Scene.from_cell(cell), toolpaths_of(cell)
 
     began = time.process_time()
-    with pytest.raises(StartNotFoundError, match=r"collides, most often 'r0/.*' with 'wall'"):
+    with pytest.raises(StartNotFoundError, match=r"without a collision, most often of 'r0/.*' with 'wall'"):
         find_start(scene, toolpaths)
 
     assert time.process_time() - began < 20.0  # some 3 s; looking at every combination takes minutes
