@@ -16,6 +16,7 @@ from cellplan import load_cell, solve
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAPERS = ROOT / "cells" / "papers"
 RECORD = ROOT / "docs" / "reproduction" / "measured.json"
+SEARCHED_TO = 1e-7  # [m] errors that the searches let pass
 FAILS_AS_PUBLISHED = {"ribeiro_mode_3", "ribeiro_first_layout"}
 
 
@@ -43,6 +44,8 @@ def assert_same_figures(measured: object, recorded: object) -> None:
         assert isinstance(measured, dict)
         assert measured.keys() == recorded.keys()
         for name, value in recorded.items():
+            if name == "error_at_s" and recorded["error_m"] <= SEARCHED_TO:
+                continue  # chance says where an error is largest that is small enough everywhere
             assert_same_figures(measured[name], value)
     elif isinstance(recorded, list):
         assert isinstance(measured, list)
