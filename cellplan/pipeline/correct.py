@@ -15,6 +15,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.rehearsal import Correction, Outcome, Round
 from cellplan.model.report import TaskAccuracy
+from cellplan.planning.accurate.at_instants import brought_onto_tasks
 from cellplan.planning.feedback import corrected_references, follow_measured, measured_start, settled_start
 from cellplan.planning.follow import follow
 
@@ -88,7 +89,7 @@ def correct_from_pass_to_pass(
         references = corrected_references(job.schedule, last.references, last.measured)
         try:
             start = settled_start(job.cell, references, start=last.q[0], moving=job.moving)
-            q = follow(job.cell, references, start=start, moving=job.moving).q
+            q = _planned(job, references, start)
         except NoSolutionError:
             outcome = Outcome.DIVERGED
             break
@@ -123,6 +124,12 @@ def correct_within_the_pass(
     except NoSolutionError:
         return None
     return real.accuracy(job.schedule, motion.q)
+
+
+def _planned(job: Pass, references: Schedule, start: Array) -> Array:
+    """Motion on new references, which are known at the instants of the clock only: by steps, then put right there."""
+    q = follow(job.cell, references, start=start, moving=job.moving).q
+    return brought_onto_tasks(job.cell, references, q, moving=job.moving) if job.cell.solver.is_accurate else q
 
 
 class _Executions:

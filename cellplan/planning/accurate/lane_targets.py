@@ -40,12 +40,11 @@ class LaneTargets:
 
     def on_path(self, times: Array, begins: Array, ends: Array) -> Wanted:
         """The same, as if all tools stood on their paths at the start."""
-        return self._wanted([path.at(times, (begins, ends)) for path in self._timed.paths])
+        return _in_lanes([path.at(times, (begins, ends)) for path in self._timed.paths], self._grasps)
 
     def sampled(self, schedule: Schedule, instants: slice) -> Wanted:
         """Targets at some instants of the clock, from the sampled tasks."""
-        poses = [(task.X_PT[instants], task.V_PT_P[instants]) for task in schedule.tasks]
-        return self._from_start(schedule.times[instants], self._wanted(poses))
+        return self._from_start(schedule.times[instants], sampled(schedule, instants, self._grasps))
 
     def _from_start(self, times: Array, wanted: Wanted) -> Wanted:
         """Targets moved so that they begin where the tools are."""
@@ -53,12 +52,18 @@ class LaneTargets:
             return wanted
         return Wanted(*self.offset.applied(times, wanted.R, wanted.p, wanted.twists))
 
-    def _wanted(self, tasks: Sequence[tuple[Array, Array]]) -> Wanted:
-        """Poses and twists of the tasks, and the grasps beside them, as lanes."""
-        X = np.empty((4, 4, len(tasks) + len(self._grasps), len(tasks[0][0])))
-        twists = np.zeros((6, X.shape[2], X.shape[3]))
-        for index, (X_PT, V_PT_P) in enumerate(tasks):
-            X[:, :, index], twists[:, index] = np.moveaxis(X_PT, 0, -1), V_PT_P.T
-        for index, grasp in enumerate(self._grasps, start=len(tasks)):
-            X[:, :, index] = grasp.X_PT[:, :, None]
-        return Wanted(X[:3, :3], X[:3, 3], twists)
+
+def sampled(schedule: Schedule, instants: slice, grasps: Sequence[Grasp]) -> Wanted:
+    """Where tools are wanted at some instants of the clock: those of scheduled tasks, then those of further holders."""
+    return _in_lanes([(task.X_PT[instants], task.V_PT_P[instants]) for task in schedule.tasks], grasps)
+
+
+def _in_lanes(tasks: Sequence[tuple[Array, Array]], grasps: Sequence[Grasp]) -> Wanted:
+    """Poses and twists of the tasks, and the grasps beside them, as lanes."""
+    X = np.empty((4, 4, len(tasks) + len(grasps), len(tasks[0][0])))
+    twists = np.zeros((6, X.shape[2], X.shape[3]))
+    for index, (X_PT, V_PT_P) in enumerate(tasks):
+        X[:, :, index], twists[:, index] = np.moveaxis(X_PT, 0, -1), V_PT_P.T
+    for index, grasp in enumerate(grasps, start=len(tasks)):
+        X[:, :, index] = grasp.X_PT[:, :, None]
+    return Wanted(X[:3, :3], X[:3, 3], twists)
