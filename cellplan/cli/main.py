@@ -2,8 +2,9 @@
 
 import signal
 import sys
+import threading
 from collections.abc import Sequence
-from typing import Annotated, NoReturn
+from typing import Annotated, Final, NoReturn
 
 import typer
 
@@ -19,6 +20,8 @@ from cellplan.cli.schema import schema
 from cellplan.cli.solve import solve
 from cellplan.cli.verify import verify
 from cellplan.errors import ExitStatus
+
+AGAIN_S: Final = 0.02  # [s] by then Python is out of the callback in which it lost an interruption
 
 app = typer.Typer(
     add_completion=False,
@@ -84,4 +87,17 @@ def main() -> NoReturn:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) == signal.SIG_DFL:  # nohup keeps its way
             signal.signal(number, signal.default_int_handler)
+    sys.unraisablehook = _say_again
     sys.exit(run())
+
+
+def _say_again(lost: "sys.UnraisableHookArgs") -> None:
+    """Repeat an interruption a moment later that came while Python was in a callback, where it loses exceptions."""
+    if lost.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(lost)
+        return
+    again = threading.Timer(AGAIN_S, signal.raise_signal, [signal.SIGINT])
+    if hasattr(signal, "pthread_kill"):  # wakes the program where it waits
+        again = threading.Timer(AGAIN_S, signal.pthread_kill, [threading.main_thread().ident, signal.SIGINT])
+    again.daemon = True
+    again.start()

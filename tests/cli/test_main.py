@@ -136,3 +136,30 @@ def test_a_folder_that_does_not_exist_cannot_be_allowed(cells: Path, capsys: pyt
 
     assert status == 2
     assert "'absent' does not exist" in capsys.readouterr().err
+
+
+LOSING = """
+import sys, time, weakref
+from cellplan.cli import main
+
+class Thing:
+    pass
+
+def interrupted(_):
+    raise KeyboardInterrupt
+
+sys.unraisablehook = main._say_again
+thing = Thing()
+callback = weakref.ref(thing, interrupted)
+del thing
+try:
+    time.sleep(20)
+except KeyboardInterrupt:
+    print("heard")
+"""
+
+
+def test_an_interruption_that_python_loses_in_a_callback_is_repeated() -> None:
+    run = subprocess.run([sys.executable, "-c", LOSING], check=False, capture_output=True, text=True, timeout=15)
+
+    assert (run.stdout.strip(), run.stderr) == ("heard", "")
