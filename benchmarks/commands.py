@@ -7,7 +7,6 @@ cannot. This script itself imports next to nothing: a child is charged with the 
 starts.
 """
 
-import argparse
 import contextlib
 import json
 import os
@@ -21,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from asked import asked
 from sections import Goal, Section, digits, table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -188,12 +188,7 @@ def goals(command: Command, cost: Cost) -> list[Goal]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description="Time whole commands of cellplan as child processes.")
-    parser.add_argument("--rounds", type=int, default=3, help="runs of each command; medians are shown (default: 3)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
-    options = parser.parse_args()
-    if options.rounds < 1:
-        parser.error("--rounds: expected at least 1")
+    options = asked("Time whole commands of cellplan as child processes.", what="runs of each command", rounds=3)
     if options.json:
         costs = measure((BASELINE, *COMMANDS), options.rounds)
         print(json.dumps({name: asdict(cost) for name, cost in costs.items()}, indent=1))

@@ -5,7 +5,6 @@ between the engines, so that a slow minute hits all alike. Processor time is tha
 built beforehand. Peers that are not installed are left out, with a word on why.
 """
 
-import argparse
 import json
 import statistics
 import sys
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from asked import asked
 from engines import ENGINES, PEERS
 from job import Job
 from reference_job import BETWEEN, Errors, Judge, reference_job
@@ -176,12 +176,7 @@ def _row(name: str, result: Result, results: Mapping[str, Result], *, steps: int
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description="Resolve the reference job by cellplan and its peers.")
-    parser.add_argument("--rounds", type=int, default=5, help="runs of each engine; medians are shown (default: 5)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
-    options = parser.parse_args()
-    if options.rounds < 1:
-        parser.error("--rounds: expected at least 1")
+    options = asked("Resolve the reference job by cellplan and its peers.", what="runs of each engine", rounds=5)
     if options.json:
         results, left_out = measure(reference_job(), options.rounds)
         found = {name: asdict(result) for name, result in results.items()}

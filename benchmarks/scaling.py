@@ -5,7 +5,6 @@ between the cells. Processor time per node is that of the run alone, the model o
 beside it stands the same per robot, which does not grow as long as the cost grows no faster than the cell.
 """
 
-import argparse
 import json
 import statistics
 import sys
@@ -17,6 +16,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from asked import asked
 from generated_cells import cell_with
 from sections import Goal, Section, digits, table
 
@@ -128,12 +128,7 @@ def section(costs: Sequence[Cost], rounds: int) -> Section:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description="Resolve generated cells with more and more robots.")
-    parser.add_argument("--rounds", type=int, default=5, help="runs of each cell; medians are shown (default: 5)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
-    options = parser.parse_args()
-    if options.rounds < 1:
-        parser.error("--rounds: expected at least 1")
+    options = asked("Resolve generated cells with more and more robots.", what="runs of each cell", rounds=5)
     costs = measure(options.rounds)
     print(
         json.dumps([asdict(cost) for cost in costs], indent=1)

@@ -5,7 +5,6 @@ brought to its path. They are resolved in batches, by one process and by one for
 one.
 """
 
-import argparse
 import json
 import os
 import statistics
@@ -19,6 +18,7 @@ from multiprocessing import get_context
 from typing import Final
 
 import numpy as np
+from asked import asked
 from reference_job import CELL
 from sections import Goal, Section, digits, table
 
@@ -153,12 +153,7 @@ def section(figures: Figures, rounds: int) -> Section:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description="Screen many candidate layouts of the reference cell.")
-    parser.add_argument("--rounds", type=int, default=5, help="screenings; medians are shown (default: 5)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
-    options = parser.parse_args()
-    if options.rounds < 1:
-        parser.error("--rounds: expected at least 1")
+    options = asked("Screen many candidate layouts of the reference cell.", what="screenings", rounds=5)
     figures = measure(options.rounds)
     print(json.dumps(asdict(figures), indent=1) if options.json else section(figures, options.rounds).text())
 

@@ -1,6 +1,7 @@
 """Fixtures that every test may use."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,17 @@ def shared_robots() -> Path:
     if not folder.is_dir():
         pytest.skip("the real robot descriptions (../shared/robots) are not on this machine")
     return folder
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Folder of a cache that only this test uses, empty at first."""
+    from cellplan.cache.entries import forget
+
+    monkeypatch.setenv("CELLPLAN_CACHE", str(tmp_path / "cache"))
+    forget()
+    yield tmp_path / "cache"
+    forget()
 
 
 @pytest.fixture(scope="session")

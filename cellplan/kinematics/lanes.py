@@ -5,6 +5,7 @@ filled up to the longest chain with axes that do nothing. Lanes may differ in ba
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from cellplan.geometry.transforms import Array, skew
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.robot import BASE, FollowerJoint, Joint
+
+IN_CACHE: Final = 512  # lanes whose arrays stay in the processor's cache: more at once are slower
 
 
 @dataclass(frozen=True, slots=True, eq=False)

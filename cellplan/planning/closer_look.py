@@ -29,9 +29,9 @@ def resolve_closely(
 ) -> Motion:
     """Resolve a run as `resolve` does, and look at the tool errors at every instant of the clock.
 
-    The error between nodes is the largest at points between them, where that of a polynomial is largest. Should an
-    instant of the clock show more than is allowed, it becomes an end of panels, and the run is resolved again. What the
-    motion says of the error between its nodes holds for these instants as well.
+    What `resolve` knows of the error between nodes follows from points between them. Should an instant of the clock
+    show more than is allowed, it becomes an end of panels, and the run is resolved again. What the motion says of the
+    error between its nodes holds for these instants as well.
 
     The arguments and errors are those of `resolve`.
     """

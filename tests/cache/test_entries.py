@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +13,7 @@ from cellplan.cache.entries import forget
 
 ARRAYS = (np.arange(12.0).reshape(4, 3), np.array([[0, 1, 2]]), np.array(True))
 
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    monkeypatch.setenv("CELLPLAN_CACHE", str(tmp_path / "cache"))
-    forget()
-    yield tmp_path / "cache"
-    forget()
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def only_entry(folder: Path) -> Path:
@@ -64,10 +57,10 @@ def test_other_contents_have_other_keys(contents: tuple[bytes, ...]) -> None:
     assert key_of("thing", b"a", b"b") != key_of("other", b"a", b"b")
 
 
-def test_every_damage_to_an_entry_makes_it_useless_and_nothing_else(folder: Path) -> None:
+def test_every_damage_to_an_entry_makes_it_useless_and_nothing_else(own_cache: Path) -> None:
     key = key_of("thing", b"content")
     keep(key, ARRAYS)
-    path = only_entry(folder)
+    path = only_entry(own_cache)
     whole = path.read_bytes()
     injuries = [b"", whole[:-1], whole[: len(whole) // 2], whole + b"x", b"\0" * len(whole)]
     injuries += [whole[:k] + bytes([whole[k] ^ 1]) + whole[k + 1 :] for k in range(0, len(whole), 7)]
@@ -82,12 +75,12 @@ def test_every_damage_to_an_entry_makes_it_useless_and_nothing_else(folder: Path
     assert_same(recall(key))
 
 
-def test_objects_are_neither_kept_nor_brought_to_life(folder: Path) -> None:
+def test_objects_are_neither_kept_nor_brought_to_life(own_cache: Path) -> None:
     """An array of objects would be a pickle, which can run anything; a right digest does not make it welcome."""
     key = key_of("thing", b"content")
     keep(key, (np.array([{"a": 1}], dtype=object),))
     assert recall(key) is None
-    assert not folder.exists() or not list(folder.iterdir())
+    assert not own_cache.exists() or not list(own_cache.iterdir())
 
     import hashlib
     import io
@@ -95,43 +88,43 @@ def test_objects_are_neither_kept_nor_brought_to_life(folder: Path) -> None:
     body = io.BytesIO()
     np.lib.format.write_array(body, np.array([{"a": 1}], dtype=object), allow_pickle=True)
     keep(key, ARRAYS)
-    only_entry(folder).write_bytes(entries.FORMAT + hashlib.sha256(body.getvalue()).digest() + body.getvalue())
+    only_entry(own_cache).write_bytes(entries.FORMAT + hashlib.sha256(body.getvalue()).digest() + body.getvalue())
     forget()
     assert recall(key) is None
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="needs files that its user may not read")
-def test_an_entry_that_cannot_be_read_is_none(folder: Path) -> None:
+def test_an_entry_that_cannot_be_read_is_none(own_cache: Path) -> None:
     key = key_of("thing", b"content")
     keep(key, ARRAYS)
-    only_entry(folder).chmod(0)
+    only_entry(own_cache).chmod(0)
     forget()
 
     assert recall(key) is None
 
 
-def test_an_entry_that_is_a_folder_is_none(folder: Path) -> None:
+def test_an_entry_that_is_a_folder_is_none(own_cache: Path) -> None:
     key = key_of("thing", b"content")
     keep(key, ARRAYS)
-    path = only_entry(folder)
+    path = only_entry(own_cache)
     path.unlink()
     path.mkdir()
     forget()
 
     assert recall(key) is None
     keep(key, ARRAYS)
-    assert [path.suffix for path in folder.iterdir()] == [".entry"]
+    assert [path.suffix for path in own_cache.iterdir()] == [".entry"]
 
 
 def test_the_folder_stays_within_its_bounds_and_loses_what_was_not_used_for_longest(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
+    own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(entries, "MAX_FOLDER", 5500)
     keys = [key_of("thing", bytes([number])) for number in range(4)]
     for age, key in enumerate(keys[:3]):
         keep(key, (np.full(200, float(age)),))  # 1.6 kB and a head
     for age, key in enumerate(keys[:3]):
-        os.utime(folder / f"thing-{key.digest}.entry", (1000.0 + age, 1000.0 + age))
+        os.utime(own_cache / f"thing-{key.digest}.entry", (1000.0 + age, 1000.0 + age))
     forget()
     recall(keys[0])  # the oldest, but of use just now
 
@@ -141,11 +134,11 @@ def test_the_folder_stays_within_its_bounds_and_loses_what_was_not_used_for_long
     assert [recall(key) is not None for key in keys] == [True, False, True, True]
 
 
-def test_what_is_too_large_is_not_written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_too_large_is_not_written(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(entries, "MAX_ENTRY", 100)
     keep(key_of("thing", b"content"), ARRAYS)
 
-    assert not folder.exists() or not list(folder.iterdir())
+    assert not own_cache.exists() or not list(own_cache.iterdir())
 
 
 def test_a_process_holds_no_more_than_its_share(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,7 +151,7 @@ def test_a_process_holds_no_more_than_its_share(monkeypatch: pytest.MonkeyPatch)
     assert [recall(key_of("thing", name)) is None for name in (b"1", b"2", b"3")] == [True, True, True]
 
 
-def test_two_processes_that_write_the_same_entry_do_not_disturb_each_other(folder: Path) -> None:
+def test_two_processes_that_write_the_same_entry_do_not_disturb_each_other(own_cache: Path) -> None:
     code = (
         "import numpy as np; from cellplan.cache import *; from cellplan.cache.entries import forget\n"
         "for n in range(200):\n"
@@ -168,4 +161,4 @@ def test_two_processes_that_write_the_same_entry_do_not_disturb_each_other(folde
     processes = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(2)]
 
     assert [process.wait() for process in processes] == [0, 0]
-    assert sorted(path.suffix for path in folder.iterdir()) == [".entry"] * 5
+    assert sorted(path.suffix for path in own_cache.iterdir()) == [".entry"] * 5

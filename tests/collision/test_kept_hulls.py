@@ -1,6 +1,5 @@
 """A hull that was kept is the hull that was found."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,13 +14,7 @@ from cellplan.errors import InputError
 from cellplan.geometry.kept_meshes import keep_mesh
 from cellplan.geometry.shapes import Mesh
 
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    monkeypatch.setenv("CELLPLAN_CACHE", str(tmp_path / "cache"))
-    forget()
-    yield tmp_path / "cache"
-    forget()
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def cloud(points: np.ndarray, source: str = "cloud") -> Mesh:
@@ -37,12 +30,12 @@ def assert_same(one: Mesh, other: Mesh) -> None:
         assert (first.dtype, first.shape, first.strides) == (second.dtype, second.shape, second.strides)
 
 
-def test_a_kept_hull_is_the_one_that_was_found(folder: Path) -> None:
+def test_a_kept_hull_is_the_one_that_was_found(own_cache: Path) -> None:
     found = hull_of(cloud(POINTS))
     forget()
     again = hull_of(cloud(POINTS, "another name"))
 
-    assert len(list(folder.iterdir())) == 1
+    assert len(list(own_cache.iterdir())) == 1
     assert again.source == "another name"
     assert_same(found, again)
     assert_same(found, convex_hull(cloud(POINTS)))
@@ -60,10 +53,10 @@ def test_other_points_have_another_hull() -> None:
     assert_same(hull_of(cloud(2.0 * POINTS)), convex_hull(cloud(2.0 * POINTS)))
 
 
-def test_a_flat_mesh_is_refused_each_time(folder: Path) -> None:
+def test_a_flat_mesh_is_refused_each_time(own_cache: Path) -> None:
     flat = POINTS * np.array([1.0, 1.0, 0.0])
 
     for _ in range(2):
         with pytest.raises(InputError, match="expected a body with a volume, got a flat one"):
             hull_of(cloud(flat))
-    assert not folder.exists() or not list(folder.iterdir())
+    assert not own_cache.exists() or not list(own_cache.iterdir())

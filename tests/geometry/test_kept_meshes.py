@@ -1,6 +1,5 @@
 """A mesh that was kept is the mesh that was read, and a file that is refused is refused again."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +13,7 @@ from cellplan.geometry.kept_meshes import recall_mesh
 from cellplan.geometry.meshes import read_mesh
 from cellplan.geometry.shapes import Mesh
 
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    monkeypatch.setenv("CELLPLAN_CACHE", str(tmp_path / "cache"))
-    forget()
-    yield tmp_path / "cache"
-    forget()
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def fresh(path: Path, **options: object) -> Mesh:
@@ -38,16 +31,16 @@ def assert_same(one: Mesh, other: Mesh) -> None:
 
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply"])
 @pytest.mark.parametrize("scale", [1.0, 0.001, (0.5, -0.5, 0.25)])
-def test_a_mesh_is_the_same_when_it_was_kept(tmp_path: Path, folder: Path, suffix: str, scale: object) -> None:
+def test_a_mesh_is_the_same_when_it_was_kept(tmp_path: Path, own_cache: Path, suffix: str, scale: object) -> None:
     path = tmp_path / f"part.{suffix}"
     trimesh.creation.annulus(1.1, 2.3, 3.7).export(path)
 
     read = fresh(path, scale=scale)
-    entries = list(folder.iterdir())
+    entries = list(own_cache.iterdir())
     kept = fresh(path, scale=scale)
 
     assert len(entries) == 1
-    assert list(folder.iterdir()) == entries
+    assert list(own_cache.iterdir()) == entries
     assert_same(read, kept)
 
 
@@ -73,7 +66,7 @@ def test_a_file_that_was_changed_is_read_anew(tmp_path: Path) -> None:
     assert np.ptp(fresh(path).vertices[:, 2]) == pytest.approx(2.0, abs=1e-12)
 
 
-def test_a_refused_file_is_refused_again_and_leaves_nothing(tmp_path: Path, folder: Path) -> None:
+def test_a_refused_file_is_refused_again_and_leaves_nothing(tmp_path: Path, own_cache: Path) -> None:
     path = tmp_path / "part.stl"
     trimesh.creation.box((1.0, 1.0, 1.0)).export(path)
     path.write_bytes(path.read_bytes()[:-3])
@@ -85,14 +78,14 @@ def test_a_refused_file_is_refused_again_and_leaves_nothing(tmp_path: Path, fold
         messages.append(str(caught.value))
 
     assert messages[0] == messages[1]
-    assert not folder.exists() or not list(folder.iterdir())
+    assert not own_cache.exists() or not list(own_cache.iterdir())
 
 
-def test_an_entry_that_is_damaged_is_made_again(tmp_path: Path, folder: Path) -> None:
+def test_an_entry_that_is_damaged_is_made_again(tmp_path: Path, own_cache: Path) -> None:
     path = tmp_path / "part.stl"
     trimesh.creation.box((1.0, 2.0, 3.0)).export(path)
     read = fresh(path)
-    (entry,) = folder.iterdir()
+    (entry,) = own_cache.iterdir()
     whole = entry.read_bytes()
     entry.write_bytes(whole[:200])
 

@@ -1,12 +1,13 @@
 """A closer look at a resolved motion: errors at every instant of the clock, as an independent kinematics sees them."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from timed_cells import Case, case_of, shipped
 
 from cellplan.checks.tracking import part_poses, task_accuracy
+from cellplan.geometry.curves import Curve, Interval
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.motion import Motion
@@ -14,7 +15,26 @@ from cellplan.planning.accurate.accurate_run import AccurateRun
 from cellplan.planning.closer_look import resolve_closely
 from cellplan.planning.schedule import sample
 
+DENT = 2e-5  # [m] depth
+DENT_AT, DENT_WIDTH = 2.9, 0.004  # [rad] along a circle of 0.1 m: narrower than the distance of two nodes
 NOISE = 1e-13  # [m] rounding of chains of about ten metres
+
+
+@dataclass(frozen=True)
+class Dented:
+    """A curve with a narrow dent of which its knots say nothing."""
+
+    smooth: Curve
+
+    @property
+    def knots(self) -> Array:
+        return self.smooth.knots
+
+    def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:
+        p, dp = self.smooth.evaluate(u, interval)
+        share = (u - DENT_AT) / DENT_WIDTH
+        depth = DENT * np.exp(-(share**2))[:, None] * np.array([0.0, 0.0, 1.0])
+        return p + depth, dp - 2.0 / DENT_WIDTH * share[:, None] * depth
 
 
 def closely(case: Case) -> Motion:
@@ -64,3 +84,18 @@ def test_an_instant_that_is_looked_at_becomes_an_end_of_panels() -> None:
     assert looked_at not in [panel.end for panel in case.path().panels]
     assert looked_at in [panel.end for panel in closer.path().panels]
     assert np.abs(closer.resolved().q - case.resolved().q).max() <= 1e-5  # [rad] ten times the accuracy, at most
+
+
+def test_what_the_nodes_and_the_points_between_them_miss_is_found_and_resolved() -> None:
+    case = case_of(shipped("four_robots"))
+    circle, *others = case.timed.paths
+    dented = replace(circle, toolpath=replace(circle.toolpath, tip=Dented(circle.toolpath.tip)))
+    case = replace(case, timed=replace(case.timed, paths=(dented, *others)))
+    allowed = case.cell.solver.accuracy
+
+    missed, found = case.resolved(), closely(case)
+
+    assert missed.resolution is not None
+    assert missed.resolution.error_between is not None
+    assert missed.resolution.error_between <= allowed < 0.5 * DENT < seen_by_the_checks(case, missed.q).max()
+    assert seen_by_the_checks(case, found.q).max() <= allowed

@@ -7,7 +7,6 @@ from pydantic import ConfigDict, Field, Tag, model_validator
 from cellplan.io.schema.common import Entry, Name, by_kind, one_of_keys, require_one
 from cellplan.io.schema.solver import LARGEST_SEED
 
-ERRORS_VERSION: Final = 1
 LARGEST_SHIFT_MM: Final = 1_000.0  # an error of a metre is a slip of the unit
 LARGEST_TURN_ERROR_DEG: Final = 45.0  # likewise an eighth of a turn
 TRIAL_LIMIT: Final = 10_000

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.kinematics.lanes import IN_CACHE
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
@@ -24,7 +25,6 @@ from cellplan.planning.timing import TimedTasks, distinct
 
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
 SHORTEST_SHARE: Final = 1.0 / 4096.0  # of the motion: panels may be that short where steps of the clock are longer
-AT_ONCE: Final = 512  # [samples] looked at together: their arrays stay in the cache
 TO_CLOSE: Final = 1e-7  # [m] and [rad]: what no tool is back to brings no joint back
 STEADY: Final = 1e-10  # [rad] and [m]: postures this near to their limit depend smoothly on a drift, as a search asks
 ONLY: Final = np.zeros(1, dtype=np.intp)  # the one cell among all of a collocation
@@ -109,8 +109,8 @@ class AccurateRun:
     def errors(self, schedule: Schedule, q: Array) -> Array:
         """Largest tool errors in [m] or [rad] at the first N instants of the clock, at postures, shape (N, nq)."""
         worst = np.empty(len(q))
-        for first in range(0, len(q), AT_ONCE):
-            some = slice(first, min(first + AT_ONCE, len(q)))
+        for first in range(0, len(q), IN_CACHE):
+            some = slice(first, min(first + IN_CACHE, len(q)))
             wanted = self._targets.sampled(schedule, some)
             worst[some] = largest(self._tasks.errors(q[some].T, wanted, self._placement))
         return worst

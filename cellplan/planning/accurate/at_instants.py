@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.kinematics.lanes import IN_CACHE
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.planning.accurate.collocation import largest
@@ -13,7 +14,6 @@ from cellplan.planning.accurate.lane_targets import sampled
 from cellplan.planning.accurate.lane_tasks import LaneTasks
 from cellplan.planning.closures import closures
 
-AT_ONCE: Final = 512  # [samples] corrected together: their arrays stay in the cache
 STEPS: Final = 2  # of Newton's method: from a thousandth of a millimetre the first one goes nearly all the way
 SMALL: Final = 1e-3  # [rad] and [m] of such a step: a larger one is no correction any more
 
@@ -37,8 +37,8 @@ def brought_onto_tasks(cell: Cell, schedule: Schedule, q: Array, *, moving: Sequ
     tasks = LaneTasks(cell, [*(each.task for each in schedule.tasks), *grasps], moving)
     placement, everything = tasks.chains.placement(cell), np.ones(cell.joint_count)
     brought = q.copy()
-    for first in range(0, len(q), AT_ONCE):
-        some = slice(first, first + AT_ONCE)
+    for first in range(0, len(q), IN_CACHE):
+        some = slice(first, first + IN_CACHE)
         wanted, at = sampled(schedule, some, grasps), q[some].T
         still, before = np.zeros_like(at), largest(tasks.errors(at, wanted, placement))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # what is not a number is left out below

@@ -24,7 +24,7 @@ from cellplan.planning.accurate.lane_tasks import LaneTasks, Wanted
 from cellplan.planning.accurate.windows import Window
 
 Indices = NDArray[np.intp]
-Record = Callable[[Window, Indices, Array, Array], None]  # window, cells, q (nq, cells, nodes), errors (cells,)
+Record = Callable[[Window, Indices, Array, Array], None]  # window, cells, q (nq, cells, nodes), bounds (cells,)
 
 AT_ONCE: Final = 200  # windows whose targets are looked up together: some 20 000 instants
 MOST_PASSES: Final = 20  # over a window; where passes help, about eight do

@@ -75,11 +75,6 @@ class Window:
 
     panels: tuple[Panel, ...]
 
-    @property
-    def begin(self) -> float:
-        """Its first instant in [s]."""
-        return self.panels[0].begin
-
     @cached_property
     def places(self) -> list[slice]:
         """Where the nodes of each panel stand among all."""
