@@ -21,6 +21,9 @@ from cellplan.cli.solve import solve
 from cellplan.cli.verify import verify
 from cellplan.errors import ExitStatus
 
+INTERRUPTIONS: Final = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]  # a background job ignores the first of them
 AGAIN_S: Final = 0.02  # [s] by then Python is out of the callback in which it lost an interruption
 
 app = typer.Typer(
@@ -83,9 +86,8 @@ def _usage_status(error: BaseException) -> int | None:
 
 def main() -> NoReturn:
     """Enter from the console; whoever ends the program or closes its terminal interrupts it, as Ctrl-C does."""
-    for name in ("SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) == signal.SIG_DFL:  # nohup keeps its way
+    for number in INTERRUPTIONS:
+        if signal.getsignal(number) == signal.SIG_DFL:  # nohup keeps its way
             signal.signal(number, signal.default_int_handler)
     sys.unraisablehook = _say_again
     sys.exit(run())
@@ -96,8 +98,11 @@ def _say_again(lost: "sys.UnraisableHookArgs") -> None:
     if lost.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(lost)
         return
-    again = threading.Timer(AGAIN_S, signal.raise_signal, [signal.SIGINT])
+    heard = [number for number in INTERRUPTIONS if signal.getsignal(number) == signal.default_int_handler]
+    if not heard:
+        return
+    again = threading.Timer(AGAIN_S, signal.raise_signal, heard[:1])
     if hasattr(signal, "pthread_kill"):  # wakes the program where it waits
-        again = threading.Timer(AGAIN_S, signal.pthread_kill, [threading.main_thread().ident, signal.SIGINT])
+        again = threading.Timer(AGAIN_S, signal.pthread_kill, [threading.main_thread().ident, heard[0]])
     again.daemon = True
     again.start()

@@ -139,8 +139,11 @@ def test_a_folder_that_does_not_exist_cannot_be_allowed(cells: Path, capsys: pyt
 
 
 LOSING = """
-import sys, time, weakref
+import signal, sys, time, weakref
 from cellplan.cli import main
+
+signal.signal(signal.SIGINT, signal.{sigint})
+signal.signal(signal.SIGTERM, signal.{sigterm})
 
 class Thing:
     pass
@@ -159,7 +162,12 @@ except KeyboardInterrupt:
 """
 
 
-def test_an_interruption_that_python_loses_in_a_callback_is_repeated() -> None:
-    run = subprocess.run([sys.executable, "-c", LOSING], check=False, capture_output=True, text=True, timeout=15)
+@pytest.mark.parametrize(
+    ("sigint", "sigterm"), [("default_int_handler", "SIG_DFL"), ("SIG_IGN", "default_int_handler")]
+)
+def test_an_interruption_that_python_loses_in_a_callback_is_repeated(sigint: str, sigterm: str) -> None:
+    """Also in a background job, which ignores the interruptions of the terminal."""
+    script = LOSING.format(sigint=sigint, sigterm=sigterm)
+    run = subprocess.run([sys.executable, "-c", script], check=False, capture_output=True, text=True, timeout=15)
 
     assert (run.stdout.strip(), run.stderr) == ("heard", "")
