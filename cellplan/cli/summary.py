@@ -30,7 +30,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
 def figure_lines(record: Record) -> list[str]:
     """The worst figures of a run."""
     return [
-        f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_method_word(record['solver'])}",
+        f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_clock_word(record)}{_method_word(record['solver'])}",
         *_task_lines(record["tasks"]),
         *_closure_lines(record.get("closure", {})),
         *_margin_lines(record["joints"]),
@@ -40,6 +40,11 @@ def figure_lines(record: Record) -> list[str]:
         *_slack_lines(record["solver"]["slack"]),
         *_fallback_lines(record["solver"]),
     ]
+
+
+def _clock_word(record: Record) -> str:
+    """What decides the length of the clock, unless the cell file states it."""
+    return " (no motion.duration_s: the clock ends with the last task)" if record["clock_from"] == "tasks" else ""
 
 
 def _method_word(solver: Record) -> str:

@@ -110,7 +110,6 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
     path = _path(name, entry.path, read_targets)
-    has_own_time = entry.duration_s is not None or entry.feed_mm_s is not None or isinstance(path, TimedPath)
     law = entry.time_law or motion.time_law
     corners = entry.corners or motion.corners
     return Task(
@@ -128,7 +127,7 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
             position=entry.tolerance.position_mm / MM, orientation=float(np.deg2rad(entry.tolerance.orientation_deg))
         ),
         start=entry.begins_s,
-        duration=entry.duration_s if has_own_time else motion.duration_s - entry.begins_s - entry.leaving_s,
+        duration=entry.duration_s,
         feed=None if entry.feed_mm_s is None else entry.feed_mm_s / MM,
         time_law=_time_law(law),
         blend=corners.blend_mm / MM if isinstance(corners, BlendEntry) else None,
@@ -188,17 +187,15 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         timed: Names of the tasks whose path brings its own clock.
     """
     values = document.model_dump(exclude_none=True)
-    motion, dumped_motion = document.motion, values["motion"]
+    motion = values["motion"]
     for name, task in document.tasks.items():
         entry = values["tasks"][name]
         tool_axis, entry["tool_x"] = tool_directions(task)
         entry["start_s"] = task.begins_s
         entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
         if name not in timed:
-            entry.setdefault("time_law", dumped_motion["time_law"])
-            entry.setdefault("corners", dumped_motion["corners"])
-            if task.duration_s is None and task.feed_mm_s is None:
-                entry["duration_s"] = motion.duration_s - task.begins_s - task.leaving_s
+            entry.setdefault("time_law", motion["time_law"])
+            entry.setdefault("corners", motion["corners"])
         if task.path.is_planar and task.path.project is None:
             entry["path"].setdefault("offset_mm", 0.0)
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}

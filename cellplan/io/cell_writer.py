@@ -7,6 +7,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, pose, rpy_from_rotation
 from cellplan.io.robot_rules import start_keys
+from cellplan.io.schema.cell import MotionEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml_writer import yaml_text
 from cellplan.model.cell import Cell, CheckSettings, Part, Robot
@@ -95,7 +96,7 @@ def _part(entry: Mapping[str, Any], part: Part) -> dict[str, Any]:
 
 
 def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
-    """A task with its times as they are now."""
+    """A task with its start as it is now; one without a time of its own goes on filling the clock."""
     written = {**entry, "start_s": task.start}
     if task.duration is not None:
         written["duration_s"] = task.duration
@@ -125,14 +126,10 @@ def _checks(entry: Mapping[str, Any], checks: CheckSettings) -> dict[str, Any]:
 
 
 def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:
-    """The motion; its clock holds all tasks, also those with a time of their own that is longer."""
-    ends = []
-    for task in cell.tasks:
-        own = task.repeat * task.path.duration if isinstance(task.path, TimedPath) else task.duration
-        leaving = task.retract.duration if task.retract else 0.0
-        ends += [] if own is None else [task.start + own + leaving]
-    duration = max([cell.motion.duration, *ends])
-    return {**entry, "mode": str(cell.motion.mode), "duration_s": duration, "step_s": cell.motion.step}
+    """The motion with the mode and clock of the cell; a clock that ends with the last task has no length."""
+    written = {**entry, "mode": str(cell.motion.mode), "step_s": cell.motion.step}
+    written["duration_s"] = cell.motion.duration
+    return {key: written[key] for key in MotionEntry.model_fields if written.get(key) is not None}
 
 
 def _pose(entry: Mapping[str, Any], X: Array) -> dict[str, Any]:

@@ -159,14 +159,14 @@ class MotionSettings:
 
     Attributes:
         mode: Who moves.
-        duration: Length of the common clock in [s].
+        duration: Length of the common clock in [s]; None when it ends with the last task.
         step: Time between two instants in [s].
         cyclic: Whether all joints are to end where they started.
         locked: Joints that fail on the way.
     """
 
     mode: Mode
-    duration: float
+    duration: float | None
     step: float
     cyclic: bool = False
     locked: tuple[LockedJoint, ...] = ()

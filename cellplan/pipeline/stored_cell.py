@@ -23,7 +23,6 @@ ASKED: Final = (  # what the command line may have chosen instead of the cell fi
     ("motion", "duration_s"),
     METHOD,
     INTEGRATOR,
-    ("tasks", ANY, "duration_s"),
 )
 
 

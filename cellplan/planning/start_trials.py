@@ -35,7 +35,9 @@ class StartTrials:
 
     def __init__(self, scene: Scene, toolpaths: Mapping[str, Toolpath]) -> None:
         """Choose a step that makes few samples of the whole motion, of which every path is gone through once."""
-        cell = replace(scene.cell, tasks=tuple(_first_cycle(task) for task in scene.cell.tasks))
+        motion = scene.cell.motion
+        tasks = tuple(_first_cycle(task, motion.duration) for task in scene.cell.tasks)
+        cell = replace(scene.cell, tasks=tasks, motion=replace(motion, duration=None))
         schedule = schedule_tasks(cell, [toolpaths[task.name] for task in cell.tasks])
         step = float(max(cell.motion.step, schedule.times[-1] / SAMPLES))
         self._scene, self._toolpaths, self._step = scene, toolpaths, step
@@ -111,10 +113,10 @@ class StartTrials:
         return motions
 
 
-def _first_cycle(task: Task) -> Task:
+def _first_cycle(task: Task, clock: float | None) -> Task:
     """A task that goes through its path once, as fast as it does on the whole."""
-    duration = None if task.duration is None else task.duration / task.repeat
-    return replace(task, repeat=1, duration=duration)
+    duration = task.time_for_path(clock)
+    return replace(task, repeat=1, duration=None if duration is None else duration / task.repeat)
 
 
 def _open_pairs(scene: Scene) -> NDArray[np.bool_]:

@@ -194,13 +194,18 @@ def _speed_share(joint: Record) -> float:
     return math.inf if share is None else float(share)
 
 
+def _clock_word(record: Record) -> str:
+    """What decides the length of the clock, unless the cell file states it."""
+    return "; the clock ends with the last task" if record["clock_from"] == "tasks" else ""
+
+
 def _figures(record: Record) -> list[Record]:
     """The key figures: what is worst, where and when."""
     cycle = {
         "label": "Cycle time",
         "value": _fixed(record["cycle_time_s"], 2),
         "unit": "s",
-        "detail": f"{record['samples']} samples, {_small(1e3 * record['step_s'])} ms apart"
+        "detail": f"{record['samples']} samples, {_small(1e3 * record['step_s'])} ms apart{_clock_word(record)}"
         if "samples" in record
         else f"{len(record['runs'])} runs, one after another",
     }

@@ -46,6 +46,11 @@ class Provenance:
     digests: Mapping[str, str]
 
 
+def clock_from(cell: Cell) -> str:
+    """What decides the length of the common clock: the cell file, or the last task to end."""
+    return "tasks" if cell.motion.duration is None else "motion.duration_s"
+
+
 def report_record(report: Report, *, cell: Cell, provenance: Provenance) -> Record:
     """Everything that is known about one run."""
     return {
@@ -54,6 +59,7 @@ def report_record(report: Report, *, cell: Cell, provenance: Provenance) -> Reco
         "status": status(report),
         "mode": report.mode,
         "cycle_time_s": number(report.cycle_time),
+        "clock_from": clock_from(cell),
         "samples": len(report.times),
         "step_s": number(report.cycle_time / (len(report.times) - 1)),
         "tasks": tasks_record(report, cell),

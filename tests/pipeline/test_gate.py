@@ -154,7 +154,6 @@ def test_what_the_command_line_chose_is_told(sound: Path, tmp_path: Path) -> Non
     assert sorted(remarks) == [
         "motion.duration_s: 1.5 was chosen on the command line; the cell file has 1",
         "motion.mode: 'part_at_rest' was chosen on the command line; the cell file has 'simultaneous'",
-        "tasks.path.duration_s: 1.5 was chosen on the command line; the cell file has 1",
     ]
 
 
