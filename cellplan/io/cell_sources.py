@@ -8,6 +8,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
+from cellplan.cache import as_here
 from cellplan.errors import InputError
 from cellplan.geometry.meshes import read_mesh, require_solid
 from cellplan.geometry.shapes import Mesh
@@ -113,7 +114,7 @@ class Sources:
             return None
         try:
             guard = Guard(file=written, worker="the mesh reader")
-            mesh = in_child(partial(read_mesh, scale=MESH_UNITS[unit]), place, guard=guard)
+            mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), place, guard=guard)
             self.inputs[written] = digest_of_file(place, file=written)
         except InputError as error:
             self.complaints.append(self._document.complaint(path, str(error)))
@@ -205,7 +206,8 @@ def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, o
     """Robot of a URDF; robots that say the same of the same file share one."""
     key = (written, place, options.flange, options.package_dirs, _items(options.limits), _items(options.locked))
     if key not in known:
-        known[key] = in_child(load_urdf, place, options, guard=Guard(file=written, worker="the URDF reader"))
+        guard = Guard(file=written, worker="the URDF reader")
+        known[key] = in_child(as_here(load_urdf), place, options, guard=guard)
     return known[key]
 
 

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.cache import as_here
 from cellplan.errors import InputError
 from cellplan.geometry.meshes import read_mesh
 from cellplan.geometry.shapes import Mesh
@@ -114,7 +115,7 @@ class _Meshes:
             return None
         try:
             guard = Guard(file=written, worker="the mesh reader")
-            mesh = in_child(partial(read_mesh, scale=MESH_UNITS[unit]), path, guard=guard)
+            mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), path, guard=guard)
         except InputError as error:
             self.complaints.append(self._document.complaint(("bodies", index, "mesh", "file"), str(error)))
             return None

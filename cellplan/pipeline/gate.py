@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.cache import nothing_kept
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.io.complaints import listed, shown
@@ -50,6 +51,12 @@ def open_gate(
         InputError: The folder is not a whole, unchanged run, or an input has changed.
         NotVerifiedError: The run failed, or a check fails now.
     """
+    with nothing_kept():  # a proof rests on the files themselves
+        return _opened(folder, cell=cell, allow_dirs=allow_dirs, progress=progress)
+
+
+def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], progress: Progress) -> VerifiedRun:
+    """The run, once everything in it was found to be true."""
     stored = read_stored_run(folder)
     _refuse_failed(stored)
     source = load_stored_cell(stored, cell=cell, allow_dirs=allow_dirs)

@@ -12,7 +12,9 @@ from run_edits import edit_json
 from stored_cells import write_cell
 
 from cellplan import load_cell, open_gate, solve, write_run
+from cellplan.cache import entries
 from cellplan.errors import InputError, NotVerifiedError
+from cellplan.guard import door
 from cellplan.model.motion import Resolution
 from cellplan.model.solver import Integrator
 from cellplan.model.verified_run import SEAL, VerifiedRun
@@ -235,3 +237,19 @@ def seal_again(run: Path) -> None:
             record["files"][name] = {"bytes": len(data), "sha256": digest(data)}
 
     edit_json(run / "manifest.json", change)
+
+
+def test_a_forged_cache_entry_moves_nothing_that_is_verified(copy: Path, own_cache: Path) -> None:
+    cell = copy / "cell" / "small.yaml"
+    door._end_child()  # the next one knows this cache
+    load_cell(cell)
+    for path in own_cache.iterdir():
+        vertices, *others = entries._unpacked(path.read_bytes())
+        path.write_bytes(entries._packed((vertices + 6.0, *others)))
+    entries.forget()
+    door._end_child()  # the child has read what is in the files
+    forged = load_cell(cell)
+    assert forged.obstacles[1].shape.vertices.min() > 5.0
+    write_run(solve(forged), copy / "run")
+
+    assert "closest_pairs" in refusal(copy / "run", cell)
