@@ -22,7 +22,7 @@ from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, raise_compl
 from cellplan.io.robot_rules import robot_complaints
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.pieces import Pieces, read_pieces
-from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry, ToolBodyEntry, ToolShapeEntry
+from cellplan.io.schema.shapes import ObstacleEntry, ToolBodyEntry, ToolShapeEntry
 from cellplan.io.solver_build import build_solver
 from cellplan.io.solver_rules import solver_complaints
 from cellplan.io.target_rules import Targets, target_complaints
@@ -128,7 +128,7 @@ def _part_extent(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
         yield document.complaint(("part", "geometry"), text)
 
 
-Meshed = PartShapeEntry | ToolShapeEntry | ToolBodyEntry | ObstacleEntry
+Meshed = ToolShapeEntry | ToolBodyEntry | ObstacleEntry
 
 
 def _read_meshes(pieces: Pieces, sources: Sources) -> None:
@@ -142,7 +142,8 @@ def _read_meshes(pieces: Pieces, sources: Sources) -> None:
         sources.solid_mesh(pieces.part.geometry.mesh, pieces.part.geometry.unit, ("part", "geometry", "mesh"))
     for path, shape in shapes:
         if shape.mesh is not None and shape.unit is not None:
-            sources.mesh(shape.mesh, shape.unit, (*path, "mesh"))
+            read = sources.mesh if shape.open else sources.enclosing_mesh
+            read(shape.mesh, shape.unit, (*path, "mesh"))
 
 
 def _cell(

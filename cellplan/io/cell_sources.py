@@ -2,7 +2,7 @@
 
 import os
 import posixpath
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from functools import partial
 from pathlib import Path, PurePosixPath
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
-from cellplan.geometry.meshes import read_mesh, require_solid
+from cellplan.geometry.meshes import read_mesh, require_enclosing, require_solid
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.allowed_folders import AllowedFolders
@@ -58,14 +58,11 @@ class Sources:
 
     def solid_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
         """Closed mesh with a volume, in [m]; None after a complaint."""
-        mesh = self.mesh(written, unit, path)
-        try:
-            if mesh is not None:
-                require_solid(mesh)
-        except InputError as error:
-            self.complaints.append(self._document.complaint(path, str(error)))
-            return None
-        return mesh
+        return self._required(require_solid, self.mesh(written, unit, path), path)
+
+    def enclosing_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
+        """Mesh that has an inside, in [m]; None after a complaint."""
+        return self._required(require_enclosing, self.mesh(written, unit, path), path)
 
     def targets(self, entry: str | CsvEntry, path: KeyPath) -> SampledPath | TimedPath | None:
         """Tool targets of a task; None after a complaint."""
@@ -116,6 +113,16 @@ class Sources:
             guard = Guard(file=written, worker="the mesh reader")
             mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), place, guard=guard)
             self.inputs[written] = digest_of_file(place, file=written)
+        except InputError as error:
+            self.complaints.append(self._document.complaint(path, str(error)))
+            return None
+        return mesh
+
+    def _required(self, demand: Callable[[Mesh], None], mesh: Mesh | None, path: KeyPath) -> Mesh | None:
+        """A mesh that is as it must be; None after a complaint."""
+        try:
+            if mesh is not None:
+                demand(mesh)
         except InputError as error:
             self.complaints.append(self._document.complaint(path, str(error)))
             return None

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -120,8 +120,8 @@ class _Meshes:
             self.complaints.append(self._document.complaint(("bodies", index, "mesh", "file"), str(error)))
             return None
         self.files[written] = path
-        self._read[written, unit] = mesh
-        return mesh
+        self._read[written, unit] = replace(mesh, is_leaky=not mesh.is_closed)
+        return self._read[written, unit]
 
     def known(self, written: str, unit: str, *, index: int) -> Mesh:
         """A mesh that was read before."""

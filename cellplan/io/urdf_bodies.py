@@ -1,6 +1,6 @@
 """Link bodies of a URDF: mesh files looked up and read, every collision element turned into one body."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 from urllib.parse import unquote
@@ -44,7 +44,7 @@ class MeshShelf:
             mesh = read_mesh(path, scale=wanted.scale)
             if is_flat(mesh):
                 raise InputError(f"{path.name}: expected a body with a volume, got a flat one")
-            self._read[key] = mesh
+            self._read[key] = replace(mesh, is_leaky=not mesh.is_closed)
             if path not in self.files:
                 self.files.append(path)
         return self._read[key]
