@@ -13,6 +13,7 @@ from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Check, Report
 from cellplan.report.json_report import run_record, summary_record
 from cellplan.report.method import method_lines
+from cellplan.report.open_surfaces import open_surface_lines
 from cellplan.report.palette import ROBOTS, robot_colours
 from cellplan.report.record import Provenance, Record, rounded_down
 from cellplan.report.rehearsal_record import rehearsal_record
@@ -82,6 +83,7 @@ def report_html(
             "check_groups": _check_groups(report.checks),
             "shares": _shares(record),
             "excluded": _by_reason(record["exclusions"]),
+            "open_surfaces": [line for _, line in open_surface_lines(record["open_surfaces"])],
             "method": list(method_lines(record["solver"], record["step_s"])),
             "plots": _inline_plots(plots),
         },
