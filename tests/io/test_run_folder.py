@@ -378,7 +378,8 @@ def test_an_older_run_that_was_replaced_is_removed_unless_it_holds_something_for
 def test_a_killed_process_leaves_nothing_for_long(tmp_path: Path) -> None:
     program = (
         "import os, signal, sys; from pathlib import Path; from cellplan.io.run_folder import RunFolder\n"
-        "with RunFolder(Path(sys.argv[1])) as run:\n run.write_text('report.json', '')\n os.kill(os.getpid(), signal.SIGKILL)"
+        "with RunFolder(Path(sys.argv[1])) as run:\n"
+        "    run.write_text('report.json', ''), os.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", program, str(tmp_path / "bench")], check=False)
     assert [name.endswith(".partial") for name in names_in(tmp_path)] == [True]
