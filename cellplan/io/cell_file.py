@@ -26,6 +26,7 @@ from cellplan.io.schema.shapes import ObstacleEntry, ToolBodyEntry, ToolShapeEnt
 from cellplan.io.solver_build import build_solver
 from cellplan.io.solver_rules import solver_complaints
 from cellplan.io.target_rules import Targets, target_complaints
+from cellplan.io.user_folders import user_folders
 from cellplan.io.yaml_reader import YamlDocument, read_yaml
 from cellplan.model.cell import Cell, Origin
 from cellplan.model.robot import RobotModel
@@ -39,7 +40,8 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
 
     Args:
         path: The cell file.
-        allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+        allow_dirs: Folders, beside the cell's own and those that the user allows for every cell, that the files it
+            names may lie in.
         folder: The folder that its names start from; None for the one it lies in.
 
     Raises:
@@ -54,9 +56,9 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
     if pieces.is_too_large:
         raise_complaints(file, complaints)
     complaints += rule_complaints(pieces, document)
-    sources = Sources(
-        document, AllowedFolders(folder=folder or path.parent, allowed=tuple(Path(allowed) for allowed in allow_dirs))
-    )
+    start = folder or path.parent
+    allowed = (*(Path(each) for each in allow_dirs), *user_folders(start))
+    sources = Sources(document, AllowedFolders(folder=start, allowed=allowed))
     sources.inputs[path.name] = document.digest
     models = _models(pieces, document, sources)
     for name, model in models.items():

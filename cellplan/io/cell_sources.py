@@ -180,6 +180,7 @@ class Sources:
             package_dirs=folders,
             limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items()},
             locked=dict(_locked_in_si(entry)),
+            within=self._folders,
         )
         try:
             robot = _read_urdf(self._urdfs, entry.model, place, options=options)
