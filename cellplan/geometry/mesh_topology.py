@@ -73,6 +73,8 @@ def _weld(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
     grid = WELD_SHARE * float(np.ptp(points, axis=0).max())
     for shift in GRID_SHIFTS:  # two vertices that one grid tells apart lie in one cell of another
         near, joined = _merge(points, corners, key=np.round(points / grid + shift))
+        if len(near) == len(points):
+            break  # no two vertices are that near: the file is not one that rounds
         if not count_edges(joined[_has_three_corners(joined)]).open:
             return near, joined
     return points, corners
