@@ -41,8 +41,10 @@ def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_d
 
 def _record(result: CellCheck) -> dict[str, Any]:
     """What was found, in printed units."""
+    from cellplan.report.open_surfaces import open_surface_lines, open_surfaces_record
     from cellplan.report.record import check_record, number
 
+    open_surfaces = open_surfaces_record(result.cell)
     return {
         "cell": result.cell.name,
         "status": "passed" if result.passed else "failed",
@@ -50,6 +52,8 @@ def _record(result: CellCheck) -> dict[str, Any]:
         "start_found": list(result.found),
         "path_length_mm": {name: number(1e3 * length) for name, length in result.path_lengths.items()},
         "checks": [check_record(each) for each in result.checks],
+        "open_surfaces": open_surfaces,
+        "remarks": [f"{result.cell.origin.at(key)}: {line}" for key, line in open_surface_lines(open_surfaces)],
     }
 
 
@@ -74,4 +78,5 @@ def _lines(record: dict[str, Any]) -> list[str]:
         posture = ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
         lines.append(f"  start of {robot} ({'found' if robot in record['start_found'] else 'given'}): {posture}")
     lines += [f"  task {name}: path of {length:.4g} mm" for name, length in record["path_length_mm"].items()]
+    lines += [f"  note: {remark}" for remark in record["remarks"]]
     return lines + [f"  {'' if each['passed'] else 'FAILED '}{each['message']}" for each in record["checks"]]

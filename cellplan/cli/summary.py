@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from cellplan.report.method import USUAL_METHOD
+from cellplan.report.open_surfaces import open_surface_lines
 
 Record = dict[str, Any]
 
@@ -39,6 +40,7 @@ def figure_lines(record: Record) -> list[str]:
         *_clearance_lines(record["clearance"]["whole"]),
         *_slack_lines(record["solver"]["slack"]),
         *_fallback_lines(record["solver"]),
+        *(f"  note: {line}" for _, line in open_surface_lines(record.get("open_surfaces", []))),
     ]
 
 

@@ -11,6 +11,7 @@ from cellplan.io.yaml_reader import YamlDocument
 
 TIME_ROOM: Final = 1e-9  # [-] of the duration: rounding of start_s + duration_s
 ORIENTATION_AXES: Final = frozenset({"rx", "ry", "rz"})
+MEANS_ELSE: Final = {"part": "the workpiece", "world": "the frame that everything stands in"}
 ANGLE_RANGES: Final = ("base", "start_deg", "start")
 
 
@@ -36,6 +37,10 @@ def _clashing_names(pieces: Pieces, document: YamlDocument) -> Iterator[Complain
             if other != name:
                 text = f"expected a name that differs from '{other}' by more than upper and lower case"
                 yield document.key_complaint((section, name), text)
+    for name in pieces.names["robots"]:
+        if name.lower() in MEANS_ELSE:
+            text = f"expected another name, '{name.lower()}' means {MEANS_ELSE[name.lower()]}"
+            yield document.key_complaint(("robots", name), text)
     if "part" in pieces.names["environment"]:
         yield document.key_complaint(("environment", "part"), "expected another name, 'part' means the workpiece")
 

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.cache import nothing_kept
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.io.complaints import listed, shown
@@ -17,6 +18,7 @@ from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.model.verified_run import SEAL, VerifiedMotion, VerifiedRun
+from cellplan.pipeline.compare_page import other_pictures, page_complaints
 from cellplan.pipeline.compare_record import differences
 from cellplan.pipeline.stored_cell import load_stored_cell
 from cellplan.pipeline.write_run import versions
@@ -50,6 +52,12 @@ def open_gate(
         InputError: The folder is not a whole, unchanged run, or an input has changed.
         NotVerifiedError: The run failed, or a check fails now.
     """
+    with nothing_kept():  # a proof rests on the files themselves
+        return _opened(folder, cell=cell, allow_dirs=allow_dirs, progress=progress)
+
+
+def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], progress: Progress) -> VerifiedRun:
+    """The run, once everything in it was found to be true."""
     stored = read_stored_run(folder)
     _refuse_failed(stored)
     source = load_stored_cell(stored, cell=cell, allow_dirs=allow_dirs)
@@ -59,6 +67,7 @@ def open_gate(
     for motion in motions:
         _refuse_other_start(stored, motion.name or "", source.cell, tables=motion.tables)
     _refuse_other_report(stored, source.cell, motions)
+    of_pages = _refuse_other_pages(stored, source.cell, motions)
     return VerifiedRun(
         folder=folder,
         digest=stored.digest,
@@ -66,7 +75,7 @@ def open_gate(
         motions=motions,
         file_count=len(stored.manifest.files),
         inputs_compared=source.compared,
-        remarks=(*source.remarks, *_other_versions(stored)),
+        remarks=(*source.remarks, *_other_versions(stored), *of_pages),
         seal=SEAL,
     )
 
@@ -215,16 +224,38 @@ def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[Verifi
         said[""] = stored.record
         reports = {str(motion.name): motion.report for motion in motions}
         found[""] = summary_record(reports, cell=cell, provenance=provenance)
-    is_same = stored.manifest.versions.get("cellplan") == versions()["cellplan"]
+    is_same = _is_of_this_version(stored)
     complaints = []
     for place, record in said.items():
         complaints += [
             f"{stored.file(place, 'report.json')}: {key}: {shown(old)} stands there, {shown(new)} was found"
             for key, old, new in differences(record, found[place], same_program=is_same)
         ]
+    _refuse_because(stored, complaints)
+
+
+def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> tuple[str, ...]:
+    """Refuse pages that say something else than was found; remarks about what may be rounding or another version."""
+    if not _is_of_this_version(stored):
+        return ("the page and the words of the report were not compared: another version of cellplan wrote them",)
+    _refuse_because(stored, list(page_complaints(stored, cell, motions)))
+    other = list(other_pictures(stored, cell, motions))
+    told = f"drawn here, some pictures look different, by rounding or by hand: {listed(other)}"
+    return (told,) if other else ()
+
+
+def _is_of_this_version(stored: StoredRun) -> bool:
+    """Whether this version of cellplan says of itself that it made the run."""
+    return stored.manifest.versions.get("cellplan") == versions()["cellplan"]
+
+
+def _refuse_because(stored: StoredRun, complaints: Sequence[str]) -> None:
+    """Refuse a run when there are complaints about its files, of which the first are told."""
     if complaints:
         more = len(complaints) - MOST_DIFFERENCES
-        told = complaints[:MOST_DIFFERENCES] + ([f"{stored.folder}: and {more} more differences"] if more > 0 else [])
+        told = list(complaints[:MOST_DIFFERENCES]) + (
+            [f"{stored.folder}: and {more} more differences"] if more > 0 else []
+        )
         raise InvalidFileError([InputError(complaint) for complaint in told])
 
 

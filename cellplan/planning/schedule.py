@@ -11,6 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.task import INSTANT_ROOM, Task
 from cellplan.model.toolpath import Toolpath, Trajectory
+from cellplan.planning.sample_room import require_room
 from cellplan.planning.stand_off import stand_off
 from cellplan.planning.time_laws import reached_at
 from cellplan.planning.timing import MOST_SAMPLES, ClockedPath, TimedTasks, clock_path
@@ -98,6 +99,7 @@ def _step_count(cell: Cell, paths: Sequence[ClockedPath]) -> int:
             f"{cell.origin.at('motion.step_s')}: expected a step that makes at most {MOST_SAMPLES} samples, "
             f"got {cell.motion.step:g} s for a cycle of {cycle:g} s; make the step longer"
         )
+    require_room(cell, int(steps) + 1)
     return max(int(steps), 1)
 
 

@@ -13,6 +13,7 @@ from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Check, Report
 from cellplan.report.json_report import run_record, summary_record
 from cellplan.report.method import method_lines
+from cellplan.report.open_surfaces import open_surface_lines
 from cellplan.report.palette import ROBOTS, robot_colours
 from cellplan.report.record import Provenance, Record, rounded_down
 from cellplan.report.rehearsal_record import rehearsal_record
@@ -72,16 +73,23 @@ def report_html(
         plots: SVG pictures by file name, as ``draw_plots`` returns them; others are ignored.
         motion: The motion as it was planned, for what its steps took; None when it is not at hand.
     """
-    record = run_record(report, cell=cell, provenance=provenance, motion=motion)
+    return report_page(
+        run_record(report, cell=cell, provenance=provenance, motion=motion), report.checks, cell=cell, plots=plots
+    )
+
+
+def report_page(record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes]) -> str:
+    """The page of a run whose record, as ``run_record`` gives it, and checks are at hand; see ``report_html``."""
     return _render(
         "report.html",
         record,
         cell,
         {
             "figures": _figures(record),
-            "check_groups": _check_groups(report.checks),
+            "check_groups": _check_groups(checks),
             "shares": _shares(record),
             "excluded": _by_reason(record["exclusions"]),
+            "open_surfaces": [line for _, line in open_surface_lines(record["open_surfaces"])],
             "method": list(method_lines(record["solver"], record["step_s"])),
             "plots": _inline_plots(plots),
         },
@@ -90,7 +98,11 @@ def report_html(
 
 def overview_html(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> str:
     """The page of a job done in several runs, with a link to the page of each; see ``summary_record``."""
-    record = summary_record(reports, cell=cell, provenance=provenance)
+    return overview_page(summary_record(reports, cell=cell, provenance=provenance), cell=cell)
+
+
+def overview_page(record: Record, *, cell: Cell) -> str:
+    """The page of a job of several runs whose record is at hand; see ``overview_html``."""
     return _render("overview.html", record, cell, {"figures": _figures(record)})
 
 

@@ -11,6 +11,7 @@ from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, Joi
 from cellplan.report.clearance_record import clearance_proof_record, closest_pairs_record
 from cellplan.report.closure_record import closures_record, worst_closures_record
 from cellplan.report.method import solver_record
+from cellplan.report.open_surfaces import open_surfaces_record
 from cellplan.report.record import (
     SCHEMA,
     Provenance,
@@ -50,6 +51,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
     return record | {
         "closest_pairs": closest_pairs_record(report.clearance),
         "clearance_proof": clearance_proof_record(report.clearance),
+        "open_surfaces": open_surfaces_record(cell),
         "closure": closures_record(report, cell),
         "solver": solver_record(cell.solver, motion),
     }
@@ -82,6 +84,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "clock_from": clock_from(cell),
         "runs": {name: _run_record(name, report, cell) for name, report in reports.items()},
         "tasks": {name: record for report in runs for name, record in tasks_record(report, cell).items()},
+        "open_surfaces": open_surfaces_record(cell),
         "closure": worst_closures_record(runs, cell),
         "joints": joints_record(merge_joint_uses(use for report in runs for use in report.joints)),
         "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},

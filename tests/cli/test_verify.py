@@ -91,6 +91,22 @@ def test_programs_are_written_into_the_run(copy: Copy, capsys: pytest.CaptureFix
     assert run(["verify", str(copy.run), "--cell", str(copy.cell)]) == 0
 
 
+def test_an_export_without_the_cell_must_be_asked_for_by_name(
+    copy: Copy, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    words = ["export", str(copy.run), "--format", "csv", "-o", str(tmp_path / "programs")]
+
+    assert run(words) == 2
+    err = capsys.readouterr().err
+    assert "--cell: expected the cell file that was solved" in err
+    assert "--without-cell" in err
+    assert run([*words, "--cell", str(copy.cell), "--without-cell"]) == 2
+    assert capsys.readouterr().err == "error: --without-cell: unexpected option beside --cell\n"
+    assert run([*words, "--without-cell"]) == 2  # files beside the cell cannot be found without it
+    assert "name the cell file 'small.yaml' with --cell" in capsys.readouterr().err
+    assert not (tmp_path / "programs").exists()
+
+
 @pytest.mark.parametrize("name", ["krl", "rapid", "CSV", ""])
 def test_other_formats_are_refused_by_name(copy: Copy, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["export", str(copy.run), "--cell", str(copy.cell), "--format", name])

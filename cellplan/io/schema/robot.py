@@ -131,9 +131,14 @@ class RobotEntry(Entry):
         """The start posture is given at most once; locked joints name their unit."""
         if self.start_deg is not None and self.start is not None:
             raise rule("expected either start_deg or start, got both", "start")
+        joints: set[str] = set()
         for key in self.locked:
-            if not key.endswith(("_deg", "_mm")):
+            joint, _, unit = key.rpartition("_")
+            if unit not in {"deg", "mm"}:
                 raise rule("expected a joint name with its unit, such as finger_mm or flap_deg", f"locked.{key}")
+            if joint in joints:
+                raise rule(f"expected each joint once, got '{joint}' in deg and in mm", f"locked.{key}")
+            joints.add(joint)
         return self
 
     @property
