@@ -78,14 +78,22 @@ def holder_postures(search: StartSearch) -> list[Array | None]:
     holder = cell.robot(cell.positioners[0])
     if holder.start is not None:
         return [holder.start]
+    found = _postures_of_holder(search, holder)
+    search.failures.reached(holder.name, found, None)
+    return list(found)
+
+
+def _postures_of_holder(search: StartSearch, holder: Robot) -> Array:
+    """Configurations of a positioner whose start is to be found, best first, shape (K, n)."""
+    cell = search.cell
     for relation in cell.relations:
         if relation.robot == holder.name:
-            return list(_postures_at(search, holder, relation, search.X_PT_start(relation)))
+            return _postures_at(search, holder, relation, search.X_PT_start(relation))
     for relation in cell.relations:
         operator = cell.robot(relation.robot)
         if operator.start is not None and relation.relative_to is Frame.PART:
-            return list(_postures_meeting(search, relation, operator.start))
-    return list(_promising_postures(search, holder))
+            return _postures_meeting(search, relation, operator.start)
+    return _promising_postures(search, holder)
 
 
 def branches_of(search: StartSearch, robot: Robot, holder_posture: Array | None) -> list[Branch]:
@@ -98,7 +106,9 @@ def branches_of(search: StartSearch, robot: Robot, holder_posture: Array | None)
         is_off = relation is not None and _is_off(search, robot, relation, holder_posture)
         return [] if is_off else [(np.inf, robot.start)]
     if relation is None:
-        return [(np.inf, np.clip(np.zeros(len(robot.model.joints)), *finite_limits(robot.model)))]
+        neutral = np.clip(np.zeros(len(robot.model.joints)), *finite_limits(robot.model))
+        search.failures.reached(robot.name, neutral[None], holder_posture)
+        return [(np.inf, neutral)]
     scored = _scored_branches(search, robot, relation, holder_posture)
     if search.is_holder_open or isinstance(relation, Grasp):
         return scored[:BRANCHES]

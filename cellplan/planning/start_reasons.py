@@ -132,9 +132,6 @@ def _goal_words(search: StartSearch, name: str) -> str:
 
 def _shortfall(search: StartSearch, robot: Robot) -> str:
     """By how much a robot fails to come where it is wanted, and the cure."""
-    outside = search.failures.beyond.get(robot.name, [])
-    if outside:
-        return _beyond_words(robot, np.array(outside))
     goals = search.failures.missed.get(robot.name, [])
     if not goals:
         return "move its base or change its tool"
@@ -143,31 +140,39 @@ def _shortfall(search: StartSearch, robot: Robot) -> str:
         nearest_reach(robot, goal.relation, goal.X_PT, X_WP=goal.X_WP, seeds=seeds, tip_only=True) for goal in goals
     ]
     distance, best = min((each[0], index) for index, each in enumerate(left))
+    outside = search.failures.beyond.get(robot.name, [])
+    if outside:
+        return _beyond_words(robot, np.array(outside), distance)
     if distance > ARRIVED:
         return (
-            f"out of reach, its tool tip comes no nearer than {1e3 * distance:.1f} mm in the best of these attempts: "
-            "move its base or the part, or change its tool"
+            f"out of reach, the best attempt leaves its tool tip {1e3 * distance:.1f} mm away; move its base or the "
+            "part, or change its tool"
         )
     goal = goals[best]
     tip, angle = nearest_reach(robot, goal.relation, goal.X_PT, X_WP=goal.X_WP, seeds=seeds, tip_only=False)
     return (
-        f"its tool tip gets there, but not with the wanted direction; the best of these attempts leaves "
-        f"{1e3 * tip:.1f} mm and {np.degrees(angle):.1f} deg: turn the tool or its axis, free an axis, or move its base"
+        f"its tool tip gets there, but not with the wanted direction, the best attempt leaves "
+        f"{1e3 * tip:.1f} mm and {np.degrees(angle):.1f} deg; turn the tool or its axis, free an axis, or move its base"
     )
 
 
-def _beyond_words(robot: Robot, q: Array) -> str:
-    """The joint that is in the way of configurations, shape (K, n), which reach the goal outside the limits."""
+def _beyond_words(robot: Robot, q: Array, distance: float) -> str:
+    """The joint that is in the way of configurations, shape (K, n), which reach the goal outside the limits.
+
+    The distance in [m] is what is left of the way within them.
+    """
     model = robot.model
     turned = on_nearest_turns(model, q)
     beyond = np.maximum(np.maximum(model.lower - turned, turned - model.upper), 0.0)
     nearest = int(np.argmin(np.round(beyond.max(axis=1), 9)))
     worst = int(np.argmax(beyond[nearest]))
     joint = model.joints[worst]
+    within = f", and within the limits its tip stays {1e3 * distance:.1f} mm away" if distance > ARRIVED else ""
     return (
         f"it gets there only beyond a limit, at best with joint '{joint.name}' at "
         f"{_shown(joint, turned[nearest, worst])}, {_shown(joint, beyond[nearest, worst])} outside "
-        f"{_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}: move its base, change its tool or free an axis"
+        f"{_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}{within}; "
+        "move its base, change its tool or free an axis"
     )
 
 

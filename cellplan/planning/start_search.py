@@ -53,6 +53,11 @@ class StartChoice:
             return f"start chosen: {among}; on trial {kept}"
         return f"start chosen: {among}, but no trial was without fault: {_fault(self.trial)}; the checks will say where"
 
+    @property
+    def warning(self) -> str | None:
+        """The same words where no trial was without fault; None otherwise."""
+        return None if self.trial is None or self.trial.is_sound else self.words
+
 
 def find_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: Progress = silent) -> Array:
     """Stacked start configuration of the whole cell: see `choose_start`."""
