@@ -32,31 +32,44 @@ def why_nothing(search: StartSearch, holder_count: int) -> str:
     """
     if search.failures.touching:
         unavoidable = _unavoidable(search)
-        return _unavoidable_words(search, unavoidable) if unavoidable else _frequent_words(search)
+        return _unavoidable_words(search, *unavoidable) if unavoidable else _frequent_words(search)
     return _unreached_words(search, holder_count)
 
 
-def _unavoidable(search: StartSearch) -> Contact | None:
-    """A contact in every configuration of some robot: one that is there wherever the robot is before any other."""
+def _unavoidable(search: StartSearch) -> list[Contact]:
+    """Contacts in every configuration of some robot, one for each robot.
+
+    Those that are there wherever the robot is come first, and of these what stands in the surroundings.
+    """
     found: list[Contact] = []
     for robot in search.cell.robots:
         tried = search.failures.arrived.get(robot.name, [])
         if robot.start is not None or not tried:
             continue
-        everywhere = [each for each in contacts_of(search.trials, search.cell, robot, tried) if each.is_in_all]
-        found += [replace(each, is_everywhere=_is_everywhere(search, each)) for each in everywhere[:SHOWN]]
-    return min(found, key=lambda each: not each.is_everywhere, default=None)
+        in_all = [each for each in contacts_of(search.trials, search.cell, robot, tried) if each.is_in_all]
+        own = sorted((replace(each, is_everywhere=_is_everywhere(search, each)) for each in in_all), key=_urgency)
+        found += own[:1]
+    return sorted(found, key=_urgency)
 
 
-def _unavoidable_words(search: StartSearch, contact: Contact) -> str:
-    """What to say of a contact that no configuration of a robot avoids."""
+def _urgency(contact: Contact) -> tuple[bool, bool]:
+    """What decides which contact is named first."""
+    return not contact.is_everywhere, contact.bodies[1].robot is not None
+
+
+def _unavoidable_words(search: StartSearch, contact: Contact, *others: Contact) -> str:
+    """What to say of a contact that no configuration of a robot avoids, and of the same of other robots."""
     cell, (own, other) = search.cell, contact.bodies
     also = ", and wherever else its joints may be" if contact.is_everywhere else ""
     which = "the only one" if contact.of == 1 else f"all {contact.of}"
+    besides = [
+        f"'{each.bodies[0].name}' touches '{each.bodies[1].name}' in all {each.of} of its own" for each in others
+    ]
+    more = f"; besides, {', '.join(besides[: SHOWN - 1])}" if besides else ""
     return (
         f"{start_place(cell, cell.robot(contact.robot))}: no start configuration of '{contact.robot}' is free of "
         f"contact: '{own.name}' touches '{other.name}' in {which} that {_arrives(search, contact.robot)}{also}: "
-        f"{_cure(contact)}"
+        f"{_cure(contact)}{more}"
     )
 
 

@@ -27,6 +27,7 @@ GAIN: Final = 0.5  # feedback gain times step of the coarse motion
 TOUCH_INSTANTS: Final = 12  # instants of the coarse motion that are looked at for collisions
 TRIED_WITH: Final = "weighted_pseudo_inverse"  # fast, and it shows how far a posture would go beyond its limits
 CLOSE_ENOUGH: Final = 1e-4  # [m] and [rad] tool error of the closer look: it is about joints
+MOST_BREAKS: Final = 500  # of the wanted motion up to which a closer look costs some tenths of a second
 LOST: Final = -1e6  # stands for the share that a motion leaves free which loses its path
 
 
@@ -137,16 +138,19 @@ class StartTrials:
         cell = self._once
         if len(trials) < 2 or not cell.solver.is_accurate:
             return list(trials)
+        timed = [time_tasks(cell, self._paths(cell, run.tasks)) for run in plan_runs(cell)]
+        if max(len(each.breaks) for each in timed) > MOST_BREAKS:
+            return list(trials)
         candidates = Candidates.of([cell] * len(trials), np.array([trial.start for trial in trials]))
         runs = [
             screen_layouts(
                 cell,
-                time_tasks(cell, self._paths(cell, run.tasks)),
+                clocked,
                 candidates,
                 moving=run.moving,
                 accuracy=CLOSE_ENOUGH,
             )
-            for run in plan_runs(cell)
+            for run, clocked in zip(plan_runs(cell), timed, strict=True)
         ]
         found = reduce(Screening.worst, runs)
         ranges = _range_shares(cell, found.margins)

@@ -23,22 +23,22 @@ name: three-arms
 robots:
   {robots}
 part:
-  geometry: {{box: {{size_mm: [300, 60, 20]}}}}
-  held_by:
-    - {{robot: left, at: {{xyz_mm: [-150, 0, 0]}}}}
+  geometry: {{box: {{size_mm: [340, 300, 10]}}}}
+  held_by: [{{robot: left, at: {{xyz_mm: [-120, 0, 5], rpy_deg: [180, 0, 0]}}}}]
 tasks:
   {tasks}
 motion: {{mode: simultaneous, duration_s: 2, step_s: 0.02, time_law: quintic}}
 solver: {{method: {method}}}
 """
 ARMS = {
-    "left": "{model: planar_3r, start_deg: [50, -85, 35]}",
-    "right": "{model: planar_3r, base: {xyz_mm: [1500, 0, 0], rpy_deg: [0, 0, 180]}, start_deg: auto}",
-    "upper": "{model: planar_3r, base: {xyz_mm: [900, 900, 300], rpy_deg: [0, 0, -90]}, start_deg: auto}",
+    "left": "{model: planar_3r, base: {xyz_mm: [0, 0, 500]}, tool: {xyz_mm: [0, 0, 40]}, start_deg: [50, -85, 35]}",
+    "right": "{model: planar_3r, base: {xyz_mm: [1900, 300, 500], rpy_deg: [0, 0, 180]}, tool: {xyz_mm: [0, 0, 40]}}",
+    "upper": "{model: planar_3r, base: {xyz_mm: [900, 950, 800], rpy_deg: [0, 0, -90]}, tool: {xyz_mm: [0, 0, 340]}}",
 }
+ON_PLATE = "project: +z}, tool_axis: normal, tool_x: -x, axes: [x, y, rz]}"
 TASKS = {
-    "circle": "circle: {robot: right, path: {circle: {radius_mm: 40, plane: xy}}, axes: [x, y, rz]}",
-    "line": "line: {robot: upper, path: {polyline: {points_mm: [[0, 0, 0], [60, 20, 0]]}}, axes: [x, y, rz]}",
+    "circle": f"circle: {{robot: right, path: {{circle: {{radius_mm: 60, center_mm: [80, -60], plane: xy}}, {ON_PLATE}",
+    "line": f"line: {{robot: upper, path: {{polyline: {{points_mm: [[0, 100, 0], [60, 120, 0]]}}, {ON_PLATE}",
 }
 
 
