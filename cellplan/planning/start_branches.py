@@ -27,7 +27,7 @@ from cellplan.planning.start_trials import StartTrials
 SEEDS: Final = 48  # random starts of the inverse kinematics per robot and place; finds all 8 branches of a 6-axis arm
 SEEDS_PER_HOLDER: Final = 16  # the same when many configurations of the positioner are to be tried
 HOLDER_DRAWS: Final = 1500  # configurations of the positioner that are drawn when its start is to be found as well
-HOLDER_POSTURES: Final = 60  # the most promising of these, which are tried
+HOLDER_POSTURES: Final = 120  # the most promising of these, which are tried
 HOLDER_RANGE: Final = 0.7  # share of each joint range that they are drawn from, so that room is left to move
 TRIED_ALONE: Final = 8  # branches of each operator that are tried out without the other operators
 BRANCHES: Final = 4  # the best of these, which are combined
