@@ -50,6 +50,7 @@ def _record(result: CellCheck) -> dict[str, Any]:
         "status": "passed" if result.passed else "failed",
         "start": {robot.name: _start(robot) for robot in result.cell.robots},
         "start_found": list(result.found),
+        "start_choice": result.choice,
         "path_length_mm": {name: number(1e3 * length) for name, length in result.path_lengths.items()},
         "checks": [check_record(each) for each in result.checks],
         "open_surfaces": open_surfaces,
@@ -77,6 +78,7 @@ def _lines(record: dict[str, Any]) -> list[str]:
     for robot, start in record["start"].items():
         posture = ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
         lines.append(f"  start of {robot} ({'found' if robot in record['start_found'] else 'given'}): {posture}")
+    lines += [f"  {record['start_choice']}"] if record["start_choice"] else []
     lines += [f"  task {name}: path of {length:.4g} mm" for name, length in record["path_length_mm"].items()]
     lines += [f"  note: {remark}" for remark in record["remarks"]]
     return lines + [f"  {'' if each['passed'] else 'FAILED '}{each['message']}" for each in record["checks"]]

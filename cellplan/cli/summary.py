@@ -123,7 +123,9 @@ def _fallback_lines(solver: Record) -> Iterator[str]:
     """Where the accurate mode found no way on."""
     resolution = solver.get("resolution")
     if resolution and solver["integrator"] == "accurate" and resolution["euler_from_s"] is not None:
-        yield f"  no accurate way on: Euler steps from {resolution['euler_from_s']:.3f} s"
+        lost = resolution.get("lost")
+        reason = f"; {lost['message']}" if lost else ""
+        yield f"  no accurate way on: Euler steps from {resolution['euler_from_s']:.3f} s{reason}"
 
 
 def _failure_lines(checks: list[Record]) -> Iterator[str]:

@@ -260,6 +260,11 @@ class Cell:
             first = last
         raise KeyError(robot)
 
+    def joint_at(self, column: int) -> tuple[str, str]:
+        """Names of the robot and of its joint at a place in the stacked joint vector."""
+        names = [(robot.name, joint) for robot in self.robots for joint in robot.model.joint_names]
+        return names[column]
+
     @property
     def joint_count(self) -> int:
         """Length of the stacked joint vector."""

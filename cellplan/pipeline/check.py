@@ -9,7 +9,7 @@ from cellplan.model.report import Check
 from cellplan.pipeline.solve import with_start
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.schedule import examine_times
-from cellplan.planning.start_search import find_start
+from cellplan.planning.start_search import choose_start
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.scene import Scene
 
@@ -21,12 +21,14 @@ class CellCheck:
     Attributes:
         cell: The cell with every start posture filled in.
         found: Names of the robots whose start posture was searched for.
+        choice: How the start was chosen, in words; None when all of it was given.
         path_lengths: Length of each task's path on the surface in [m].
         checks: The verified statements.
     """
 
     cell: Cell
     found: tuple[str, ...]
+    choice: str | None
     path_lengths: Mapping[str, float]
     checks: tuple[Check, ...]
 
@@ -47,7 +49,8 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
     examine_times(cell, tuple(toolpaths.values()))
     examine_given_starts(cell, toolpaths)
-    start = find_start(scene, toolpaths, progress=progress)
+    choice = choose_start(scene, toolpaths, progress=progress)
+    start = choice.start
     pair = scene.touching(start)
     found = tuple(robot.name for robot in cell.robots if robot.start is None)
     words = "nothing touches at the start" if pair is None else f"'{pair[0]}' touches '{pair[1]}' at the start"
@@ -64,6 +67,7 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
     return CellCheck(
         cell=with_start(cell, start),
         found=found,
+        choice=choice.words,
         path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
         checks=(at_start,),
     )

@@ -23,7 +23,7 @@ from cellplan.planning.closer_look import resolve_closely
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.modes import RunPlan, plan_runs
 from cellplan.planning.schedule import examine_times, sample, time_tasks
-from cellplan.planning.start_search import find_start
+from cellplan.planning.start_search import choose_start
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.scene import Scene
 
@@ -51,13 +51,14 @@ def solve(
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
     examine_times(cell, tuple(toolpaths.values()))
     examine_given_starts(cell, toolpaths)
-    solved = with_start(cell, find_start(scene, toolpaths, progress=progress))
+    choice = choose_start(scene, toolpaths, progress=progress)
+    solved = with_start(cell, choice.start)
     start = np.concatenate([robot.start for robot in solved.robots if robot.start is not None])
     runs = tuple(
         _run(scene, toolpaths, plan, start=start, progress=progress, drawing=drawing)
         for plan in plan_runs(cell, only=task)
     )
-    return Solution(cell=solved, runs=runs)
+    return Solution(cell=solved, runs=runs, remark=choice.warning)
 
 
 def _run(
