@@ -223,7 +223,8 @@ def _branches(search: _Search, robot: Robot, holder_posture: Array | None) -> li
         return [(np.inf, robot.start)]
     task = next((relation for relation in cell.relations if relation.robot == robot.name), None)
     if task is None:
-        return [(np.inf, np.clip(np.zeros(len(robot.model.joints)), *finite_limits(robot.model)))]
+        anywhere = np.clip(np.zeros(len(robot.model.joints)), *finite_limits(robot.model))
+        return [(np.inf, anywhere if robot.home is None else robot.home)]
     scored = _scored_branches(search, robot, task, holder_posture)
     if search.is_holder_open or isinstance(task, Grasp):
         return scored[:BRANCHES]

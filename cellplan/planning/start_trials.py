@@ -14,7 +14,8 @@ from cellplan.model.task import Task
 from cellplan.model.toolpath import Toolpath
 from cellplan.planning.follow import follow
 from cellplan.planning.inverse_kinematics import finite_limits, margin_shares
-from cellplan.planning.modes import RunPlan, plan_runs
+from cellplan.planning.modes import RunPlan, plan_runs, standing
+from cellplan.planning.run_pairs import present_pairs
 from cellplan.planning.schedule import schedule_tasks
 from cellplan.scene.scene import Scene
 
@@ -29,8 +30,8 @@ class StartTrials:
     """The coarse clock of one cell, on which start postures are tried.
 
     Attributes:
-        open_pairs: Pairs of bodies that a choice of the search moves, shape (pairs,); what given postures make collide
-            is for the report to say.
+        open_pairs: Pairs of bodies that a choice of the search moves and that meet in some run, shape (pairs,); what
+            given postures make collide is for the report to say.
     """
 
     def __init__(self, scene: Scene, toolpaths: Mapping[str, Toolpath]) -> None:
@@ -47,7 +48,9 @@ class StartTrials:
             solver=replace(cell.solver, gain=GAIN / step, method=TRIED_WITH),
         )
         self._alone: dict[str, Cell] = {}
-        self.open_pairs = _open_pairs(scene)
+        self._plans = plan_runs(self._cell)
+        is_present = np.any([present_pairs(scene, plan) for plan in self._plans], axis=0)
+        self.open_pairs = _open_pairs(scene) & is_present
 
     def judge(self, start: Array) -> tuple[float, Array]:
         """Quality of a start posture of the whole cell, and the posture on the turns that leave its joints most room.
@@ -56,14 +59,15 @@ class StartTrials:
         when a tool loses its path.
         """
         try:
-            motions = self._motions(self._cell, start, plan_runs(self._cell))
+            motions = self._motions(self._cell, start, self._plans)
         except NoSolutionError:
             return -np.inf, start
         turns = _whole_turns(self._cell, np.concatenate(motions))
         quality = min(_share_left_free(self._cell, q + turns, self._step) for q in motions)
-        for q in motions:
+        for plan, q in zip(self._plans, motions, strict=True):
             instants = np.linspace(0, len(q) - 1, TOUCH_INSTANTS).astype(int)
-            if any(self._scene.touching(q[k], among=self.open_pairs) is not None for k in instants):
+            placed, among = standing(self._cell, plan, q[instants]), self.open_pairs & present_pairs(self._scene, plan)
+            if any(self._scene.touching(posture, among=among) is not None for posture in placed):
                 quality = min(quality, 1.0) - TOUCHING
         return quality, start + turns
 
