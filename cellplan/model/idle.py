@@ -17,8 +17,12 @@ def idle_robots(cell: Cell, tasks: Collection[str]) -> tuple[str, ...]:
 
 
 def not_in_program(cell: Cell, tasks: Collection[str]) -> str:
-    """One line on the idle robots of a run and on the moves that it leaves out; empty when everybody is at work."""
-    idle = idle_robots(cell, tasks)
+    """One line on moves that a run leaves out: those of robots with a task, which is not the run's, to and from home.
+
+    Empty when there are none; a robot that has nothing to do in the whole cell never leaves its home.
+    """
+    workers = {task.robot for task in cell.tasks}
+    idle = [name for name in idle_robots(cell, tasks) if name in workers]
     if not idle:
         return ""
     stand = "stands at its home" if len(idle) == 1 else "stand at their homes"
