@@ -182,7 +182,7 @@ class _Search:
             failed = _first_failed(check_clearance(idle.scene, idle.run.schedule, q)[1])
             if failed is not None:
                 self._failed[failed.message] += 1
-                self._trials.add(place, q[int(np.searchsorted(idle.run.schedule.times, failed.at_s or 0.0))])
+                self._trials.add(place, _at(idle.run.schedule.times, q, failed.at_s or 0.0))
                 return False
         return True
 
@@ -197,3 +197,8 @@ def _idle_run(scene: Scene, run: PlannedRun, robot: str) -> _IdleRun:
 
 def _first_failed(checks: Sequence[Check]) -> Check | None:
     return next((check for check in checks if not check.passed), None)
+
+
+def _at(times: Array, q: Array, at_s: float) -> Array:
+    """Stacked configuration at an instant, every joint moving evenly from row to row, shape (nq,)."""
+    return np.array([np.interp(at_s, times, column) for column in q.T])
