@@ -10,6 +10,7 @@ import numpy as np
 from cellplan.checks.clearance import check_clearance
 from cellplan.errors import HomeNotFoundError
 from cellplan.geometry.transforms import Array
+from cellplan.io.complaints import listed
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.idle import idle_robots
 from cellplan.model.progress import Progress, silent
@@ -152,7 +153,8 @@ class _Search:
     def why_nothing(self) -> str:
         """One line on what stood in the way most often."""
         name, cell = self._robot.name, self._cell
-        runs = ", ".join(f"'{task}'" for run in self._runs for task in run.run.plan.tasks)
+        tasks = [f"'{task}'" for run in self._runs for task in run.run.plan.tasks]
+        while_worked = f"{listed(tasks)} {'is' if len(tasks) == 1 else 'are'} worked on"
         often = ""
         if self._trials.refused:
             first, second = self._trials.refused.most_common(1)[0][0]
@@ -160,8 +162,8 @@ class _Search:
         elif self._failed:
             often = f", most often because of this: {self._failed.most_common(1)[0][0]}"
         return (
-            f"{home_place(cell, self._robot)}: found no home near the start for '{name}', which is idle while {runs} "
-            f"is worked on, that keeps {1e3 * cell.checks.clearance:g} mm from everything{often} "
+            f"{home_place(cell, self._robot)}: found no home near the start for '{name}', which is idle "
+            f"while {while_worked}, that keeps {1e3 * cell.checks.clearance:g} mm from everything{often} "
             f"(some hundred configurations tried): give {home_key(self._robot)} or move the base"
         )
 

@@ -220,9 +220,7 @@ def test_idle_robots_stand_at_homes_that_are_free_of_the_part(cells, tmp_path):
     assert record["status"] == "passed"
     assert "before_you_run" not in record
     (line,) = record["not_in_program"]
-    assert line.startswith(
-        "rectangle: idle in this run: kuka, abb stand at their homes; moves to and from home are not"
-    )
+    assert line.startswith("rectangle: idle in this run: kuka, abb stand at their homes; moves to and from home")
     homes = [check.subject for check in solution.runs[0].report.checks if check.name == "home" and check.passed]
     assert homes == ["kuka", "abb"]
     for name in homes:
