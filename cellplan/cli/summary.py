@@ -23,7 +23,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
         f"{record['cell']}: {record['status']}",
         *figure_lines(record),
         *_failure_lines(record["checks"]),
-        *(f"  before you run it: {line}" for line in record.get("before_you_run", [])),
+        *(f"  {line}" for line in record.get("not_in_program", [])),
         *_place_lines(record, folder),
     ]
 

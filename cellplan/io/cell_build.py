@@ -7,10 +7,10 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.cell_rules import needs_surface
-from cellplan.io.robot_rules import start_posture
+from cellplan.io.robot_rules import home_configuration, start_posture
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry
-from cellplan.io.schema.robot import RobotEntry, ToolEntry
+from cellplan.io.schema.robot import ToolEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.task import (
     BlendEntry,
@@ -57,16 +57,25 @@ PLANE_NORMAL: Final = {"xy": "z", "yz": "x", "xz": "y"}
 TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> its file, read
 
 
-def build_robot(name: str, entry: RobotEntry, model: RobotModel, read_mesh: MeshReader) -> Robot:
-    """A robot placed in the cell."""
+def build_robot(name: str, whole: CellDocument, model: RobotModel, read_mesh: MeshReader) -> Robot:
+    """A robot placed in the cell.
+
+    One that has nothing to do in the cell, and of which nothing but the start is given, stands there: it is its home.
+    """
+    entry = whole.robots[name]
     weights = np.ones(len(model.joints)) if entry.weights is None else np.array(entry.weights)
+    start, home = start_posture(entry, model), home_configuration(entry, model)
+    at_work = {task.robot for task in whole.tasks.values()} | {grasp.robot for grasp in whole.part.held_by}
+    if name not in at_work and entry.home_deg is None and entry.home is None:
+        home = start
     return Robot(
         name=name,
         model=model,
         X_WB=pose_from_entry(entry.base),
         tool=_tool(entry.tool, read_mesh),
-        start=start_posture(entry, model),
+        start=start,
         weights=weights,
+        home=home,
     )
 
 

@@ -168,7 +168,7 @@ def _cell(
     timed = {name for name, path in targets.items() if isinstance(path, TimedPath)}
     return Cell(
         name=whole.name,
-        robots=tuple(build_robot(name, entry, models[name], mesh) for name, entry in whole.robots.items()),
+        robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
         part=build_part(whole.part, mesh),
         tasks=tuple(build_task(name, whole, targets.__getitem__) for name in whole.tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),

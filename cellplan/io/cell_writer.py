@@ -1,4 +1,4 @@
-"""The cell that was solved as a cell file: every default written out, start postures filled in."""
+"""The cell that was solved as a cell file: every default written out, start postures and homes filled in."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -15,6 +15,7 @@ from cellplan.model.robot import RobotModel
 from cellplan.model.solver import Integrator, SolverSettings
 from cellplan.model.task import SampledPath, Task, TimedPath
 
+CONFIGURATIONS: Final = frozenset({"start", "start_deg", "home", "home_deg"})
 NEIGHBOURS: Final = 3  # units in the last place round the quotient in which the written number is sought
 MM: Final = 1000.0  # [mm/m]
 
@@ -68,20 +69,22 @@ def as_written(model: RobotModel, q: Array) -> Array:
 
 
 def _robot(entry: Mapping[str, Any], robot: Robot, found: Array | None) -> dict[str, Any]:
-    """A robot with its weights and start posture written out."""
-    written = {key: value for key, value in entry.items() if key not in {"start", "start_deg", "weights"}}
+    """A robot with its weights, start posture and home written out."""
+    written = {key: value for key, value in entry.items() if key not in CONFIGURATIONS}
     written["base"] = _pose(entry["base"], robot.X_WB)
-    posture = robot.start if robot.start is not None else found
-    as_list = all(joint.is_revolute for joint in robot.model.joints)
-    if posture is None:
-        written["start_deg" if as_list else "start"] = "auto"
-    elif as_list:
-        written["start_deg"] = _in_file_units(robot.model, posture)
-    else:
-        values = _in_file_units(robot.model, posture)
-        written["start"] = dict(zip(start_keys(robot.model), values, strict=True))
+    written |= _configuration("start", robot.model, robot.start if robot.start is not None else found)
+    written |= _configuration("home", robot.model, robot.home)
     written["weights"] = [float(weight) for weight in robot.weights]
     return {key: written[key] for key in RobotEntry.model_fields if key in written}
+
+
+def _configuration(key: str, model: RobotModel, q: Array | None) -> dict[str, Any]:
+    """A start posture or a home under the key that suits the robot's joints."""
+    as_list = all(joint.is_revolute for joint in model.joints)
+    if q is None:
+        return {f"{key}_deg" if as_list else key: "auto"}
+    values = _in_file_units(model, q)
+    return {f"{key}_deg": values} if as_list else {key: dict(zip(start_keys(model), values, strict=True))}
 
 
 def _part(entry: Mapping[str, Any], part: Part) -> dict[str, Any]:

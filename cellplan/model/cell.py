@@ -69,6 +69,7 @@ class Robot:
         tool: What it carries.
         start: Start posture in [rad] or [m], shape (n,); None when it is to be found.
         weights: Joint weights, positive, shape (n,): a larger one moves that joint less.
+        home: Where it stands while it is idle in [rad] or [m], shape (n,); None when that is to be found.
     """
 
     name: str
@@ -77,6 +78,7 @@ class Robot:
     tool: Tool
     start: Array | None
     weights: Array
+    home: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

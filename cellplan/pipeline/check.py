@@ -3,14 +3,18 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
 from cellplan.pipeline.solve import with_start
 from cellplan.planning.given_starts import examine_given_starts
+from cellplan.planning.modes import plan_runs, standing
+from cellplan.planning.run_pairs import present_pairs
 from cellplan.planning.schedule import examine_times
 from cellplan.planning.start_search import choose_start
 from cellplan.planning.toolpaths import build_toolpath
+from cellplan.scene.of_run import scene_of_run
 from cellplan.scene.scene import Scene
 
 
@@ -51,7 +55,7 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
     examine_given_starts(cell, toolpaths)
     choice = choose_start(scene, toolpaths, progress=progress)
     start = choice.start
-    pair = scene.touching(start)
+    pair = _touching_at_start(scene, start)
     found = tuple(robot.name for robot in cell.robots if robot.start is None)
     words = "nothing touches at the start" if pair is None else f"'{pair[0]}' touches '{pair[1]}' at the start"
     at_start = Check(
@@ -71,3 +75,13 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
         path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
         checks=(at_start,),
     )
+
+
+def _touching_at_start(scene: Scene, start: Array) -> tuple[str, str] | None:
+    """The first two bodies that touch at the start of a run; idle robots stand at their homes, as far as known."""
+    for plan in plan_runs(scene.cell):
+        of_run = scene_of_run(scene, plan.tasks)
+        pair = of_run.touching(standing(scene.cell, plan, start), among=present_pairs(of_run, plan))
+        if pair is not None:
+            return pair
+    return None

@@ -11,9 +11,10 @@ from cellplan.cache import nothing_kept
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.io.complaints import listed, shown
-from cellplan.io.stored_run import StoredRun, read_stored_run
+from cellplan.io.stored_run import CELL, StoredRun, read_stored_run
 from cellplan.io.tables import TableHeader, parse_header, parse_table, program_digest, table_body
 from cellplan.model.cell import Cell
+from cellplan.model.idle import not_in_program
 from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
@@ -22,9 +23,10 @@ from cellplan.pipeline.compare_page import other_pictures, page_complaints
 from cellplan.pipeline.compare_record import differences
 from cellplan.pipeline.stored_cell import load_stored_cell
 from cellplan.pipeline.write_run import versions
-from cellplan.planning.modes import RunPlan, plan_runs
+from cellplan.planning.modes import RunPlan, homeless, plan_runs
 from cellplan.planning.schedule import schedule_tasks
 from cellplan.planning.toolpaths import build_toolpath
+from cellplan.report.idle_record import missing_moves
 from cellplan.report.json_report import run_record, summary_record
 from cellplan.report.record import Provenance, Record
 from cellplan.report.series import series
@@ -62,10 +64,11 @@ def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], prog
     _refuse_failed(stored)
     source = load_stored_cell(stored, cell=cell, allow_dirs=allow_dirs)
     scene = Scene.from_cell(source.cell)
-    motions = tuple(_verified(scene, stored, plan, progress=progress) for plan in _plans(source.cell, stored))
+    plans = _plans(source.cell, stored)
+    motions = tuple(_verified(scene, stored, plan, progress=progress) for plan in plans)
     _refuse_failing(stored, motions)
-    for motion in motions:
-        _refuse_other_start(stored, motion.name or "", source.cell, tables=motion.tables)
+    for plan, motion in zip(plans, motions, strict=True):
+        _refuse_other_start(stored, plan, source.cell, tables=motion.tables)
     _refuse_other_report(stored, source.cell, motions)
     of_pages = _refuse_other_pages(stored, source.cell, motions)
     return VerifiedRun(
@@ -75,7 +78,12 @@ def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], prog
         motions=motions,
         file_count=len(stored.manifest.files),
         inputs_compared=source.compared,
-        remarks=(*source.remarks, *_other_versions(stored), *of_pages),
+        remarks=(
+            *source.remarks,
+            *_other_versions(stored),
+            *of_pages,
+            *missing_moves(source.cell, {plan.name: plan.tasks for plan in plans}),
+        ),
         seal=SEAL,
     )
 
@@ -98,6 +106,12 @@ def _plans(cell: Cell, stored: StoredRun) -> tuple[RunPlan, ...]:
     if tasks != every and (len(tasks) != 1 or tasks[0] not in every):
         raise InputError(f"{file}: tasks: expected {listed(every)} or one of them, got {listed(map(str, tasks))}")
     plans = plan_runs(cell, only=None if tasks == every else tasks[0])
+    unknown = sorted({name for plan in plans for name in homeless(cell, plan)})
+    if unknown:
+        raise InputError(
+            f"{stored.file('', CELL)}: robots: expected the home of every idle robot written out, got auto for "
+            f"{listed(unknown)}"
+        )
     places = [plan.name or "" for plan in plans]
     if places != list(stored.records):
         raise InputError(f"{file}: expected the runs of the mode {cell.motion.mode}, got {listed(stored.records)}")
@@ -108,14 +122,15 @@ def _verified(scene: Scene, stored: StoredRun, plan: RunPlan, *, progress: Progr
     """Read the tables of one run back and make all checks again."""
     cell, place = scene.cell, plan.name or ""
     schedule = schedule_tasks(cell, [build_toolpath(cell.task(name), cell.part, cell.origin) for name in plan.tasks])
-    tables = _tables(cell, stored, place)
+    tables = _tables(cell, stored, plan)
     _refuse_other_clock(stored, place, schedule, tables=tables)
     report = verify(scene, schedule, list(tables.values()), moving=plan.moving, progress=progress)
     return VerifiedMotion(name=plan.name, moving=plan.moving, schedule=schedule, tables=tables, report=report)
 
 
-def _tables(cell: Cell, stored: StoredRun, place: str) -> dict[str, JointTable]:
+def _tables(cell: Cell, stored: StoredRun, plan: RunPlan) -> dict[str, JointTable]:
     """The joint tables of one run, each under the header it must have."""
+    place = plan.name or ""
     texts = stored.tables[place]
     names = [robot.name for robot in cell.robots]
     if sorted(texts) != sorted(names):
@@ -129,6 +144,7 @@ def _tables(cell: Cell, stored: StoredRun, place: str) -> dict[str, JointTable]:
         mode=str(cell.motion.mode),
         verdict="passed",
         digests={"cell": manifest.inputs[manifest.cell_file], "program": program},
+        remark=not_in_program(cell, plan.tasks),
     )
     found = {}
     for name, text in texts.items():
@@ -172,11 +188,12 @@ def _refuse_other_clock(stored: StoredRun, place: str, schedule: Schedule, *, ta
             raise InputError(f"{file}:{line}: time_s: expected {wanted!r} as the cell's clock has, got {got!r}")
 
 
-def _refuse_other_start(stored: StoredRun, place: str, cell: Cell, *, tables: Mapping[str, JointTable]) -> None:
-    """Refuse a table that does not begin at the start posture of the cell."""
+def _refuse_other_start(stored: StoredRun, plan: RunPlan, cell: Cell, *, tables: Mapping[str, JointTable]) -> None:
+    """Refuse a table that does not begin at the start posture of the cell; those of idle robots were checked."""
+    place = plan.name or ""
     for robot in cell.robots:
         off = np.abs(tables[robot.name].q[0] - robot.start)
-        if not np.all(off <= START_ROOM):
+        if robot.name not in plan.idle and not np.all(off <= START_ROOM):
             joint = robot.model.joint_names[int(np.argmax(off))]
             file = stored.file(place, f"tables/{robot.name}.csv")
             line = _line(stored.tables[place][robot.name], 0)

@@ -1,10 +1,11 @@
 """Start postures given in the cell are examined before anything is solved: within limits, tool on the task's start."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from cellplan.errors import (
+    HomeOutsideLimitsError,
     InputError,
     InvalidFileError,
     StartOffGraspError,
@@ -26,22 +27,32 @@ def start_place(cell: Cell, robot: Robot) -> str:
     return cell.origin.at(by_joint if by_joint in cell.origin.lines else as_list)
 
 
+def home_key(robot: Robot) -> str:
+    """Key of a robot's home: a list of angles, or a mapping where a joint slides."""
+    return "home_deg" if all(joint.is_revolute for joint in robot.model.joints) else "home"
+
+
+def home_place(cell: Cell, robot: Robot) -> str:
+    """Where a robot's home stands in the cell file, or would stand."""
+    by_joint = f"robots.{robot.name}.home"
+    return cell.origin.at(by_joint if by_joint in cell.origin.lines else f"robots.{robot.name}.{home_key(robot)}")
+
+
 def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
-    """Refuse start postures that no solve could be right with.
+    """Refuse start postures and homes that no solve could be right with.
 
     Args:
-        cell: The cell; starts that are to be found are passed over.
+        cell: The cell; starts and homes that are to be found are passed over.
         toolpaths: Toolpath of every task, by task name.
 
     Raises:
         StartOutsideLimitsError: A joint starts outside its limits.
+        HomeOutsideLimitsError: A joint is outside its limits at home.
         StartOffGraspError: A further holder's tool is not where it holds the part.
         StartOffTaskError: A tool does not start on its task.
         InvalidFileError: More than one of these.
     """
-    complaints: list[InputError] = [
-        complaint for robot in cell.robots if robot.start is not None for complaint in _outside(cell, robot)
-    ]
+    complaints: list[InputError] = [complaint for robot in cell.robots for complaint in _outside(cell, robot)]
     if not complaints:
         complaints += [complaint for grasp in cell.closures for complaint in _off_grasp(cell, grasp)]
         complaints += [complaint for task in cell.tasks for complaint in _off_task(cell, task, toolpaths[task.name])]
@@ -115,18 +126,25 @@ def _allowed(cell: Cell, relation: Relation) -> tuple[float, float]:
 
 
 def _outside(cell: Cell, robot: Robot) -> list[InputError]:
-    """One complaint for each joint that starts outside its limits."""
-    start = robot.start
-    if start is None:
-        return []
-    return [
-        StartOutsideLimitsError(
-            f"{start_place(cell, robot)}: joint '{joint.name}' starts at {_shown(joint, position)}, outside "
-            f"its limits {_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}"
-        )
-        for joint, position in zip(robot.model.joints, start, strict=True)
-        if not joint.lower <= position <= joint.upper
+    """One complaint for each joint that is outside its limits at the start or at home."""
+    found: list[InputError] = [
+        StartOutsideLimitsError(f"{start_place(cell, robot)}: joint '{joint.name}' starts at {words}")
+        for joint, words in _outside_limits(robot, robot.start)
     ]
+    if found and robot.home is not None and np.array_equal(robot.home, np.asarray(robot.start)):
+        return found  # a parked robot, whose start is its home
+    return found + [
+        HomeOutsideLimitsError(f"{home_place(cell, robot)}: joint '{joint.name}' stands at {words}")
+        for joint, words in _outside_limits(robot, robot.home)
+    ]
+
+
+def _outside_limits(robot: Robot, q: Array | None) -> Iterator[tuple[Joint, str]]:
+    """Joints that are outside their limits, each with its position and limits in words."""
+    for joint, position in zip(robot.model.joints, () if q is None else q, strict=q is not None):
+        if not joint.lower <= position <= joint.upper:
+            limits = f"{_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}"
+            yield joint, f"{_shown(joint, position)}, outside its limits {limits}"
 
 
 def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:

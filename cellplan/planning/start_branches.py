@@ -107,6 +107,7 @@ def branches_of(search: StartSearch, robot: Robot, holder_posture: Array | None)
         return [] if is_off else [(np.inf, robot.start)]
     if relation is None:
         neutral = np.clip(np.zeros(len(robot.model.joints)), *finite_limits(robot.model))
+        neutral = neutral if robot.home is None else robot.home
         search.failures.reached(robot.name, neutral[None], holder_posture)
         return [(np.inf, neutral)]
     scored = _scored_branches(search, robot, relation, holder_posture)

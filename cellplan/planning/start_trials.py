@@ -17,8 +17,9 @@ from cellplan.model.toolpath import Toolpath
 from cellplan.planning.follow import follow
 from cellplan.planning.inverse_kinematics import finite_limits
 from cellplan.planning.layouts import Candidates, Screening, screen_layouts
-from cellplan.planning.modes import RunPlan, plan_runs
+from cellplan.planning.modes import RunPlan, plan_runs, standing
 from cellplan.planning.near_ties import ALIKE
+from cellplan.planning.run_pairs import present_pairs
 from cellplan.planning.schedule import schedule_tasks, time_tasks
 from cellplan.scene.scene import Scene
 
@@ -79,8 +80,8 @@ class StartTrials:
         bodies: All solids of the cell.
         pairs: Pairs of them that must keep apart.
         pair_names: The names of these pairs.
-        open_pairs: Pairs of bodies that a choice of the search moves, shape (pairs,); what given postures make collide
-            is for the report to say.
+        open_pairs: Pairs of bodies that a choice of the search moves and that meet in some run, shape (pairs,); what
+            given configurations make collide is for the report to say.
     """
 
     def __init__(self, scene: Scene, toolpaths: Mapping[str, Toolpath]) -> None:
@@ -97,9 +98,11 @@ class StartTrials:
         solver = replace(once.solver, gain=GAIN / self._step, method=TRIED_WITH)
         self._cell = replace(self._once, motion=motion, solver=solver)
         self._alone: dict[str, Cell] = {}
+        self._plans = plan_runs(self._cell)
         self.bodies, self.pairs = scene.bodies, scene.pairs
         self.pair_names = [scene.names(pair) for pair in scene.pairs]
-        self.open_pairs = _open_pairs(scene)
+        is_present = np.any([present_pairs(scene, plan) for plan in self._plans], axis=0)
+        self.open_pairs = _open_pairs(scene) & is_present
 
     def touching(self, q: Array) -> tuple[str, str] | None:
         """Two bodies that a choice of the search moves and that touch, at a configuration in the order of names."""
@@ -117,7 +120,7 @@ class StartTrials:
     def judge(self, start: Array) -> Trial:
         """What follows from a start configuration of the whole cell in the order of names, shape (nq,)."""
         try:
-            motions = self._motions(self._cell, start, plan_runs(self._cell))
+            motions = self._motions(self._cell, start, self._plans)
         except NoSolutionError:
             lost = np.full(len(start), LOST)
             return Trial(start=start, ranges=lost, speeds=lost, is_followed=False)
@@ -127,7 +130,7 @@ class StartTrials:
             start=start + turns,
             ranges=np.min([ranges for ranges, _ in found], axis=0),
             speeds=np.min([speeds for _, speeds in found], axis=0),
-            touches=any(self._touches_on_the_way(q) for q in motions),
+            touches=any(self._touches_on_the_way(plan, q) for plan, q in zip(self._plans, motions, strict=True)),
         )
 
     def looked_at_closely(self, trials: Sequence[Trial]) -> list[Trial]:
@@ -139,7 +142,7 @@ class StartTrials:
         cell = self._once
         if len(trials) < 2 or not cell.solver.is_accurate:
             return list(trials)
-        timed = [time_tasks(cell, self._paths(cell, run.tasks)) for run in plan_runs(cell)]
+        timed = [time_tasks(cell, self._paths(cell, run.tasks)) for run in self._plans]
         if max(len(each.breaks) for each in timed) > MOST_BREAKS:
             return list(trials)
         candidates = Candidates.of([cell] * len(trials), np.array([trial.start for trial in trials]))
@@ -151,7 +154,7 @@ class StartTrials:
                 moving=run.moving,
                 accuracy=CLOSE_ENOUGH,
             )
-            for run, clocked in zip(plan_runs(cell), timed, strict=True)
+            for run, clocked in zip(self._plans, timed, strict=True)
         ]
         found = reduce(Screening.worst, runs)
         ranges = _range_shares(cell, found.margins)
@@ -186,10 +189,12 @@ class StartTrials:
         ranges, speeds = _shares_left_free(cell, motions[0] + turns, self._step)
         return np.sort(np.concatenate([ranges[chosen], speeds[chosen]]))
 
-    def _touches_on_the_way(self, q: Array) -> bool:
-        """Whether something collides in a motion, shape (N, nq), looked at in a few places."""
+    def _touches_on_the_way(self, plan: RunPlan, q: Array) -> bool:
+        """Whether something collides in the motion of a run, shape (N, nq), judged at a few samples."""
         instants = np.linspace(0, len(q) - 1, TOUCH_INSTANTS).astype(int)
-        return any(self.touching(q[k]) is not None for k in instants)
+        placed = self._order.as_listed(standing(self._cell, plan, q[instants]))
+        among = self.open_pairs & present_pairs(self._scene, plan)
+        return any(self._scene.touching(each, among=among) is not None for each in placed)
 
     def _paths(self, cell: Cell, names: Sequence[str] | None = None) -> list[Toolpath]:
         """Toolpaths of some tasks of a cell, or of all, in its order."""

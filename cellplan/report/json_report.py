@@ -10,6 +10,7 @@ from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, JointUse, Report
 from cellplan.report.clearance_record import clearance_proof_record, closest_pairs_record
 from cellplan.report.closure_record import closures_record, worst_closures_record
+from cellplan.report.idle_record import missing_moves
 from cellplan.report.method import solver_record
 from cellplan.report.open_surfaces import open_surfaces_record
 from cellplan.report.record import (
@@ -26,7 +27,6 @@ from cellplan.report.record import (
     report_record,
     status,
     tasks_record,
-    withdrawals,
 )
 from cellplan.report.series import INDENT, series, series_text
 
@@ -91,7 +91,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "clearance": clearance_record(minima),
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
         "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
-        "before_you_run": [f"{name}: {line}" for name, report in reports.items() for line in withdrawals(report, cell)],
+        "not_in_program": missing_moves(cell, {name: report.tasks for name, report in reports.items()}),
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "solver": solver_record(cell.solver),

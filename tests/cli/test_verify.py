@@ -61,11 +61,12 @@ def test_a_check_that_fails_ends_with_one(copy: Copy, capsys: pytest.CaptureFixt
     out, err = capsys.readouterr()
     assert (status, out) == (1, "")
     assert "joint idle/" in err
+    assert "idle robot idle: joint " in err
     assert not (copy.run / "programs").exists()
 
     assert run(["verify", str(copy.run), "--cell", str(copy.cell), "--json"]) == 1
     told = json.loads(capsys.readouterr().out)
-    assert (told["status"], told["exit"], len(told["errors"])) == ("failed", 1, 1)
+    assert (told["status"], told["exit"], len(told["errors"])) == ("failed", 1, 2)
 
 
 def test_a_stale_input_ends_with_two(copy: Copy, capsys: pytest.CaptureFixture[str]) -> None:
