@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from cellplan.report.left_out_record import grips_told, told_left_out
 from cellplan.report.method import USUAL_METHOD
 
 Record = dict[str, Any]
@@ -39,7 +40,14 @@ def figure_lines(record: Record) -> list[str]:
         *_clearance_lines(record["clearance"]["whole"]),
         *_slack_lines(record["solver"]["slack"]),
         *_fallback_lines(record["solver"]),
+        *(f"  grip: {line}" for line in grips_told(record)),
+        *left_out_lines(record),
     ]
+
+
+def left_out_lines(record: Record) -> list[str]:
+    """One line for each kind of pairs that were not judged in full."""
+    return [f"  {line}" for line in told_left_out(record)]
 
 
 def _method_word(solver: Record) -> str:

@@ -3,7 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from cellplan.checks.mounting import check_mounting
 from cellplan.model.cell import Cell
+from cellplan.model.left_out import LeftOut
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
 from cellplan.pipeline.solve import with_start
@@ -23,12 +25,14 @@ class CellCheck:
         found: Names of the robots whose start posture was searched for.
         path_lengths: Length of each task's path on the surface in [m].
         checks: The verified statements.
+        left_out: What was not judged in full, but for two links of one robot's file.
     """
 
     cell: Cell
     found: tuple[str, ...]
     path_lengths: Mapping[str, float]
     checks: tuple[Check, ...]
+    left_out: tuple[LeftOut, ...]
 
     @property
     def passed(self) -> bool:
@@ -65,5 +69,6 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
         cell=with_start(cell, start),
         found=found,
         path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
-        checks=(at_start,),
+        checks=(at_start, *check_mounting(scene, start[None])),
+        left_out=scene.left_out,
     )

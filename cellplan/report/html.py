@@ -12,6 +12,7 @@ from cellplan.model.motion import Motion
 from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Check, Report
 from cellplan.report.json_report import run_record, summary_record
+from cellplan.report.left_out_record import grips_told, told_left_out
 from cellplan.report.method import method_lines
 from cellplan.report.palette import ROBOTS, robot_colours
 from cellplan.report.record import Provenance, Record, rounded_down
@@ -34,6 +35,9 @@ CHECKS = {
     "joint_drift": "joints back where each cycle began",
     "clearance": "required clearance kept",
     "collision": "no collision",
+    "grip_depth": "holders no deeper in the part than their grip",
+    "mount_depth": "tools no deeper in the arm than their mounting",
+    "standing_depth": "what stands no deeper in what carries it than allowed",
 }
 CLASSES = {
     "whole": "whole cell",
@@ -79,6 +83,8 @@ def report_html(
         cell,
         {
             "figures": _figures(record),
+            "left_out": told_left_out(record),
+            "grips": grips_told(record),
             "check_groups": _check_groups(report.checks),
             "shares": _shares(record),
             "excluded": _by_reason(record["exclusions"]),
@@ -91,7 +97,8 @@ def report_html(
 def overview_html(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> str:
     """The page of a job done in several runs, with a link to the page of each; see ``summary_record``."""
     record = summary_record(reports, cell=cell, provenance=provenance)
-    return _render("overview.html", record, cell, {"figures": _figures(record)})
+    parts = {"figures": _figures(record), "left_out": told_left_out(record), "grips": grips_told(record)}
+    return _render("overview.html", record, cell, parts)
 
 
 def rehearsal_html(rehearsal: Rehearsal, *, provenance: Provenance, plots: Mapping[str, bytes]) -> str:

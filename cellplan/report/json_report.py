@@ -10,6 +10,7 @@ from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, JointUse, Report
 from cellplan.report.clearance_record import clearance_proof_record, closest_pairs_record
 from cellplan.report.closure_record import closures_record, worst_closures_record
+from cellplan.report.left_out_record import left_out_record
 from cellplan.report.method import solver_record
 from cellplan.report.record import (
     SCHEMA,
@@ -49,6 +50,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
     return record | {
         "closest_pairs": closest_pairs_record(report.clearance),
         "clearance_proof": clearance_proof_record(report.clearance),
+        "left_out": left_out_record(report.clearance.left_out),
         "closure": closures_record(report, cell),
         "solver": solver_record(cell.solver, motion),
     }
@@ -85,6 +87,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
         "clearance": clearance_record(minima),
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
+        "left_out": left_out_record(dict.fromkeys(each for report in runs for each in report.clearance.left_out)),
         "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
         "before_you_run": [f"{name}: {line}" for name, report in reports.items() for line in withdrawals(report, cell)],
         **origin_record(cell, provenance),

@@ -8,6 +8,7 @@ import numpy as np
 from cellplan.collision.bodies import BodyPoses, CollisionBody, checked_poses, prepare
 from cellplan.collision.certificate import heights
 from cellplan.collision.engine import Engine
+from cellplan.collision.grip_zone import outside_grip
 from cellplan.collision.posture import Flags, PairIndices, first_touching
 from cellplan.collision.self_test import prove_engine
 from cellplan.collision.travel import Pair
@@ -15,11 +16,16 @@ from cellplan.collision.zone import outside_zone
 from cellplan.geometry.shapes import HalfSpace, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screws import ScrewChain
-from cellplan.model.cell import Cell, Robot
+from cellplan.model.cell import Cell, Grasp, Robot
+from cellplan.model.left_out import LeftOut, LeftOutKind
 from cellplan.model.task import Frame
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, scene_bodies
 from cellplan.scene.by_design import apply_design
+from cellplan.scene.left_out import left_out
+from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
+
+GRIP_ROOM = 1e-4  # [m] by which the face of a grip may lie deeper than the grip: where it ends is judged by its depth
 
 _Outside = dict[tuple[Solid, bytes], tuple[CollisionBody | None, bool]]
 
@@ -38,6 +44,8 @@ class Scene:
             what sticks out of the contact zone of a tool at work, and the part.
         ground_rows: Which pairs are a solid and a half-space, shape (G,).
         exclusions: Pairs that are not watched, as (first, second, reason).
+        mounted: Pairs that may touch and of which the depth is judged.
+        left_out: What is not judged in full, but for two links of one robot's file.
         engine: The solid bodies in the order of ``bodies``, then what of tools lies outside their contact zones.
         cut_from: The tool body that each of these last ones is cut from.
     """
@@ -50,6 +58,8 @@ class Scene:
     solid_pairs: PairIndices
     ground_rows: PairIndices
     exclusions: tuple[tuple[str, str, str], ...]
+    mounted: tuple[MountedPair, ...]
+    left_out: tuple[LeftOut, ...]
     engine: Engine
     cut_from: tuple[int, ...]
 
@@ -66,8 +76,9 @@ class Scene:
         bodies = tuple(sorted(scene_bodies(cell), key=is_ground))
         solids = [prepare(body.name, body.shape) for body in bodies if not isinstance(body.shape, HalfSpace)]
         pairs, excluded = sort_pairs(cell, bodies)
-        kept, by_design = apply_design(cell, bodies, pairs, engine=Engine(solids), chains=chains)
-        watch = _at_work(cell, bodies, kept, solids=len(solids))
+        design = apply_design(cell, bodies, pairs, engine=Engine(solids), chains=chains)
+        watch = _at_work(cell, bodies, design.kept, solids=len(solids))
+        excluded += design.excluded
         return cls(
             cell=cell,
             chains=chains,
@@ -78,7 +89,9 @@ class Scene:
             ground_rows=np.array(
                 [row for row, pair in enumerate(watch.pairs) if is_ground(bodies[pair.second])], dtype=np.intp
             ),
-            exclusions=_named(bodies, [*excluded, *by_design]),
+            exclusions=_named(bodies, excluded),
+            mounted=(*_mounted(cell, bodies, excluded, watch.pairs), *design.mounted),
+            left_out=left_out(bodies, watch.pairs, excluded),
             engine=Engine([*solids, *(body for _, body in watch.cut)]),
             cut_from=tuple(tool for tool, _ in watch.cut),
         )
@@ -160,6 +173,10 @@ def _at_work(cell: Cell, bodies: tuple[SceneBody, ...], pairs: list[ScenePair], 
         if _is_tool_at_work(bodies, pair, at_work):
             _watch_tool(watch, cell, bodies, pair=pair, next_index=solids + len(watch.cut), known=outside)
             continue
+        grasp = grasp_of(bodies[pair.first], bodies[pair.second], cell)
+        if grasp is not None:
+            _watch_grip(watch, cell, bodies, pair=pair, grasp=grasp, next_index=solids + len(watch.cut))
+            continue
         watch.pairs.append(pair)
         watch.watched.append(None if is_ground(bodies[pair.second]) else (pair.first, pair.second))
     return watch
@@ -188,6 +205,45 @@ def _watch_tool(
     watch.watched.append(None if outside is None else (next_index, part))
     if outside is not None:
         watch.cut.append((tool, outside))
+
+
+def _watch_grip(
+    watch: _Watch, cell: Cell, bodies: tuple[SceneBody, ...], *, pair: ScenePair, grasp: Grasp, next_index: int
+) -> None:
+    """Watch what of a further holder's flange and tool sticks out of the zone in which it grips, and for contact only.
+
+    The first holder carries the part: of what is rigid with its flange only the depth is judged.
+    """
+    holder, part = sorted((pair.first, pair.second), key=lambda index: bodies[index].kind is Kind.PART)
+    body, robot, zone = bodies[holder], cell.robot(grasp.robot), cell.checks.contact_zone
+    if isinstance(body.shape, HalfSpace):
+        return
+    X_ST = inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT
+    surface, is_in_zone = outside_grip(body.shape, X_ST, radius=zone, layer=grasp.depth + GRIP_ROOM)
+    reason = "checked for contact only: rigid with a flange that holds the part"
+    if not is_in_zone:
+        watch.pairs.append(replace(pair, rule=Rule.CONTACT, reason=reason))
+        watch.watched.append((holder, part))
+        return
+    reason = (
+        f"grips the part: may touch within {1e3 * zone:g} mm of the tool tip and with the face at the tip, at most "
+        f"{1e3 * grasp.depth:g} mm deep; checked for contact behind it"
+    )
+    watch.pairs.append(replace(pair, rule=Rule.GRIP, reason=reason))
+    watch.watched.append(None if surface is None else (next_index, part))
+    if surface is not None:
+        watch.cut.append((holder, prepare(body.name, surface)))
+
+
+def _mounted(
+    cell: Cell, bodies: tuple[SceneBody, ...], excluded: list[Excluded], watched: list[ScenePair]
+) -> list[MountedPair]:
+    """Pairs of which the depth is judged: grips and what stands, unless the user left them out."""
+    kinds = (LeftOutKind.GRIP, LeftOutKind.STANDING)
+    ends = [(pair.first, pair.second) for pair in excluded if pair.kind in kinds]
+    ends += [(pair.first, pair.second) for pair in watched if pair.rule in {Rule.GRIP, Rule.CONTACT}]
+    found = (mounted_pair(bodies[first], bodies[second], (first, second), cell) for first, second in sorted(ends))
+    return [pair for pair in found if pair is not None]
 
 
 def _outside_zone(cell: Cell, body: SceneBody, known: _Outside) -> tuple[CollisionBody | None, bool]:
