@@ -1,11 +1,12 @@
 """Mounting: how deep what holds, carries or stands on something else reaches into it, and whether that may be so."""
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import Check
-from cellplan.scene.bodies import Kind
+from cellplan.scene.bodies import Kind, is_ground
 from cellplan.scene.depths import FoundDepth, mounted_depths
 from cellplan.scene.mounting import Mount
 from cellplan.scene.scene import Scene
@@ -15,8 +16,10 @@ ROUNDING: Final = 1e-6  # [m] poses are worked out to less than that: bodies tha
 CURES: Final = {
     Mount.GRIP: "is the grasp the right way round? If the grip is that deep, say so with depth_mm of the grasp",
     Mount.MOUNT: "does the tool lie in front of the flange? If they may touch, name them under checks.exclude",
-    Mount.STANDING: "a pit? Put the one on the other, or name them under checks.exclude",
+    Mount.STANDING: "does it stand where it should? Put the one on the other, or name them under checks.exclude",
 }
+NOISE: Final = 1e-3  # [-] of 0.01 mm: a depth of 3 mm that is worked out as 3.000000001 is shown as 3
+PIT: Final = "a pit? Put the base on the ground, or name them under checks.exclude"
 
 
 def check_mounting(scene: Scene, q: Array, times: Array | None = None) -> tuple[Check, ...]:
@@ -49,7 +52,7 @@ def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
     at_s = None if times is None or not pair.moves else float(times[found.row])
     instant = "" if at_s is None else f" at {at_s:.3f} s"
     message = f"{inner} is {_shown(depth)} mm deep in {outer}{instant}, at most {limit:g} mm"
-    passed = _passed(found)
+    passed, cure = _passed(found), PIT if is_ground(scene.bodies[pair.second]) else CURES[pair.mount]
     return Check(
         name=str(pair.mount),
         subject=f"{inner} - {outer}",
@@ -58,7 +61,7 @@ def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
         limit=limit,
         unit="mm",
         at_s=at_s,
-        message=message if passed else f"{message}: {CURES[pair.mount]}",
+        message=message if passed else f"{message}: {cure}",
     )
 
 
@@ -77,5 +80,5 @@ def _named(scene: Scene, found: FoundDepth) -> tuple[str, str]:
 
 
 def _shown(depth_mm: float) -> str:
-    """A depth with two decimals, and with none where it is large."""
-    return f"{depth_mm:.0f}" if depth_mm >= 10.0 else f"{depth_mm:.2f}"
+    """A depth rounded up to 0.01 mm, never less than there is; four digits are enough."""
+    return f"{abs(math.ceil(100.0 * depth_mm - NOISE)) / 100.0:.4g}"

@@ -3,11 +3,14 @@
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.collision.zone import outside_zone
 from cellplan.geometry.mesh_topology import make_mesh
 from cellplan.geometry.shapes import Mesh, Solid
 from cellplan.geometry.transforms import Array
+
+Flags = NDArray[np.bool_]
 
 SLIVER: Final = 1e-12  # [m2] twice the area of triangles that are left out: clipping leaves some without any
 
@@ -57,7 +60,7 @@ def _above(triangles: Array, height: Array) -> Array:
     return np.concatenate([whole, tip, near, far])
 
 
-def _turned(triangles: Array, height: Array, flags: Array, *, is_odd: Array) -> tuple[Array, Array]:
+def _turned(triangles: Array, height: Array, flags: Flags, *, is_odd: Flags) -> tuple[Array, Array]:
     """Some triangles and their heights, turned so that the one corner with a flag is the first."""
     first = np.argmax(flags[is_odd], axis=1)
     order = (first[:, None] + np.arange(3)) % 3

@@ -98,7 +98,8 @@ def _depths_in_mesh(host: CollisionBody, mesh: Mesh, points: Array, *, worth: Ar
     depths = np.array([engine.surface_distance(0, 1, poses, sample=k) for k in range(len(points))])
     asked = depths > worth
     votes = np.zeros(np.count_nonzero(asked))
-    normals = np.cross(*(mesh.vertices[mesh.faces[:, k]] - mesh.vertices[mesh.faces[:, 0]] for k in (1, 2)))
+    corner = mesh.vertices[mesh.faces]
+    normals = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     for ray in RAYS if len(votes) else ():
         hits = ray_hits(mesh, points[asked], ray)
         votes += hits.is_hit & (normals[hits.faces] @ ray > 0.0)  # the first triangle is seen from within

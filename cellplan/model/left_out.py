@@ -1,4 +1,4 @@
-"""What was not judged in full: pairs of bodies that were left out or of which less was asked, each kind with a reason."""
+"""What was not judged in full: pairs of bodies that were left out, or of which less was asked, and why."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Pairs that touch, or come near, in every configuration: a robot's own design, or a mistake in what is mounted on it."""
+"""Pairs that touch, or come near, in every configuration: a robot's own design, or a mistake in its mounting."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -8,7 +8,6 @@ import numpy as np
 
 from cellplan.collision.bodies import BodyPoses, checked_poses
 from cellplan.collision.certificate import heights
-from cellplan.collision.depth import ground_depth, overlap_depth
 from cellplan.collision.engine import Engine
 from cellplan.collision.inside import is_inside
 from cellplan.collision.measure import measure
@@ -32,6 +31,7 @@ from cellplan.scene.pairs import Excluded, Rule, ScenePair, near_in_chain, stand
 
 POSTURES: Final = 48  # random postures beside the reference; a pair that is free in one of ten escapes 0.6 % of trials
 HARDLY: Final = 1e-3  # [m] a distance that varies by less over all postures is a matter of mounting, not of motion
+ROUNDING: Final = 1e-6  # [m] poses are worked out to less than that: what stands on a floor may seem to float
 ENDLESS: Final = np.pi  # [rad] or [m] range sampled to either side of zero where a joint has no limit
 
 
@@ -68,9 +68,9 @@ def apply_design(
     - a tool or a held part against a link, at most two joints away, nearer than the demanded clearance in all of them,
       or at a distance that hardly changes between them: checked for contact.
 
-    Where a flange has no body, tool and part may touch the link before it; how deep is judged. A robot whose foot has no
-    body may likewise stand with its first link in the surroundings, if it does so in every posture. The links of each
-    robot that holds the part are looked at as if it were the one that carries it.
+    Where a flange has no body, tool and part may touch the link before it; how deep is judged. A robot whose foot has
+    no body may likewise stand with its first link in the surroundings, if it does so in every posture. The links of
+    each robot that holds the part are looked at as if it were the one that carries it.
     """
     sampled = _Sampled(cell, bodies, engine, chains)
     design, faults = Design(), dict[tuple[int, str | None], list[int]]()
@@ -78,16 +78,18 @@ def apply_design(
         holder = sampled.further_holder(pair)
         a, b = (sampled.views[holder][index] for index in (pair.first, pair.second))
         if stands_on(pair, bodies, cell=cell):
-            is_decided = sampled.always_touch(pair, None) and _stands(design, cell, pair)
+            is_decided = sampled.always_stands(pair) and _stands(design, cell, pair)
         elif is_of_own_file(a, b):
             is_decided = near_in_chain(pair, bodies, cell=cell) and _own_links(design, sampled, pair)
         elif a.robot is None or a.robot != b.robot or grasp_of(a, b, cell):
             is_decided = False
+        elif _is_behind_flange(a, b, cell):
+            is_decided = True
+            _mount_behind(design, sampled, pair, holder)
         elif sampled.always_touch(pair, holder):
             is_decided = True
-            if not _mounted_behind(design, sampled, pair, holder):
-                body, link = sorted((pair.first, pair.second), key=lambda index: bodies[index].kind is Kind.LINK)
-                faults.setdefault((body, holder), []).append(link)
+            body, link = sorted((pair.first, pair.second), key=lambda index: bodies[index].kind is Kind.LINK)
+            faults.setdefault((body, holder), []).append(link)
         else:
             is_decided = near_in_chain(pair, sampled.views[holder], cell=cell)
             if is_decided:
@@ -132,20 +134,18 @@ class _Sampled:
     def always_touch(self, pair: ScenePair, holder: str | None) -> bool:
         """Whether two bodies touch in every configuration."""
         engine, poses, (first, second) = self.engine, self.poses(holder), (pair.first, pair.second)
-        if is_ground(self.bodies[second]):
-            height = heights(engine.bodies[first].hull, poses.R[first], poses.p[first], X_WS=self.bodies[second].X_BS)
-            return bool(np.all(height <= 0.0))
         return all(
             engine.touch(first, second, poses, sample=k) or is_inside(engine, (first, second), poses, sample=k)
             for k in range(poses.p.shape[1])
         )
 
-    def greatest_depth(self, pair: ScenePair, holder: str | None) -> float:
-        """How deep two bodies reach into each other at most, in [m]."""
-        poses, (first, second) = self.poses(holder), (pair.first, pair.second)
-        if is_ground(self.bodies[second]):
-            return float(ground_depth(self.engine.bodies[first], poses, first, X_WS=self.bodies[second].X_BS).max())
-        return max(overlap_depth(self.engine, (first, second), poses, sample=k) for k in range(poses.p.shape[1]))
+    def always_stands(self, pair: ScenePair) -> bool:
+        """Whether a link touches a thing in every configuration, rounding aside."""
+        poses, (first, second) = self.poses(None), (pair.first, pair.second)
+        if not is_ground(self.bodies[second]):
+            return self.distances(pair, None)[1] <= ROUNDING
+        height = heights(self.engine.bodies[first].hull, poses.R[first], poses.p[first], X_WS=self.bodies[second].X_BS)
+        return bool(np.all(height <= ROUNDING))
 
     def distances(self, pair: ScenePair, holder: str | None) -> tuple[float, float]:
         """Smallest and largest distance of two bodies in [m]."""
@@ -200,21 +200,25 @@ def _own_links(design: Design, sampled: _Sampled, pair: ScenePair) -> bool:
     return True
 
 
-def _mounted_behind(design: Design, sampled: _Sampled, pair: ScenePair, holder: str | None) -> bool:
-    """Let a tool or part on a flange without a body touch the link before it, as long as it does not sink in."""
-    cell, (a, b) = sampled.cell, (sampled.views[holder][index] for index in (pair.first, pair.second))
+def _is_behind_flange(a: SceneBody, b: SceneBody, cell: Cell) -> bool:
+    """Whether a tool, or a part that no tool holds, is on a flange without a body, and the other is the link before."""
     mounted, link = (b, a) if a.kind is Kind.LINK else (a, b)
-    model = cell.robot(str(link.robot)).model
-    is_behind = mounted.link == model.flange_link and LinkTree(model).carrier(model.flange_link) == link.link
-    grasps = [grasp for grasp in cell.part.held_by if mounted.kind is Kind.PART and grasp.robot == link.robot]
-    limit = grasps[0].depth if grasps else MOUNT_DEPTH
-    if not is_behind or sampled.greatest_depth(pair, holder) > limit:
+    robot = cell.robot(str(link.robot))
+    if mounted.kind is not Kind.TOOL and (mounted.kind is not Kind.PART or robot.tool.bodies):
         return False
-    kind, mount = (LeftOutKind.GRIP, Mount.GRIP) if grasps else (LeftOutKind.MOUNTED, Mount.MOUNT)
+    return link.kind is Kind.LINK and LinkTree(robot.model).carrier(robot.model.flange_link) == link.link
+
+
+def _mount_behind(design: Design, sampled: _Sampled, pair: ScenePair, holder: str | None) -> None:
+    """Let a tool or part on a flange without a body touch the link before it; how deep is judged over the motion."""
+    cell, ends = sampled.cell, [sampled.views[holder][index] for index in (pair.first, pair.second)]
+    grasps = [grasp for grasp in cell.part.held_by if grasp.robot == ends[0].robot]
+    is_grip = Kind.PART in (ends[0].kind, ends[1].kind)
+    limit = grasps[0].depth if is_grip else MOUNT_DEPTH
+    kind, mount = (LeftOutKind.GRIP, Mount.GRIP) if is_grip else (LeftOutKind.MOUNTED, Mount.MOUNT)
     reason = f"mounted on it, as the flange has no body: may touch, at most {1e3 * limit:g} mm deep"
     design.excluded.append(Excluded(pair.first, pair.second, reason, kind))
     design.mounted.append(MountedPair(first=pair.first, second=pair.second, mount=mount, limit=limit, moves=True))
-    return True
 
 
 def _relaxed(pair: ScenePair, sampled: _Sampled, holder: str | None) -> ScenePair:

@@ -11,7 +11,9 @@ from cellplan.scene.bodies import is_ground
 from cellplan.scene.mounting import MountedPair
 from cellplan.scene.scene import Scene
 
-MOST_ROWS: Final = 61  # [-] configurations of a motion at which two solids that move are measured: each takes about 1 ms
+MOST_ROWS: Final = (
+    61  # [-] configurations of a motion at which two solids that move are measured: each takes about 1 ms
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

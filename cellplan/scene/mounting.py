@@ -96,9 +96,7 @@ def mounted_pair(a: SceneBody, b: SceneBody, ends: tuple[int, int], cell: Cell) 
     return MountedPair(first=first, second=second, mount=Mount.GRIP, limit=grasp.depth, moves=moves)
 
 
-def refuse_wrong_mounting(
-    cell: Cell, bodies: Sequence[SceneBody], faults: Sequence[tuple[int, Sequence[int]]]
-) -> None:
+def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Sequence[tuple[int, Sequence[int]]]) -> None:
     """Refuse a cell in which what the user mounted touches links of its own robot in every configuration.
 
     Args:

@@ -8,7 +8,6 @@ import numpy as np
 from cellplan.collision.bodies import BodyPoses, CollisionBody, checked_poses, prepare
 from cellplan.collision.certificate import heights
 from cellplan.collision.engine import Engine
-from cellplan.collision.grip_zone import outside_grip
 from cellplan.collision.posture import Flags, PairIndices, first_touching
 from cellplan.collision.self_test import prove_engine
 from cellplan.collision.travel import Pair
@@ -16,16 +15,15 @@ from cellplan.collision.zone import outside_zone
 from cellplan.geometry.shapes import HalfSpace, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screws import ScrewChain
-from cellplan.model.cell import Cell, Grasp, Robot
+from cellplan.model.cell import Cell, Robot
 from cellplan.model.left_out import LeftOut, LeftOutKind
 from cellplan.model.task import Frame
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, scene_bodies
 from cellplan.scene.by_design import apply_design
+from cellplan.scene.grips import GripWatch, grip_watch
 from cellplan.scene.left_out import left_out
 from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
-
-GRIP_ROOM = 1e-4  # [m] by which the face of a grip may lie deeper than the grip: where it ends is judged by its depth
 
 _Outside = dict[tuple[Solid, bytes], tuple[CollisionBody | None, bool]]
 
@@ -175,7 +173,9 @@ def _at_work(cell: Cell, bodies: tuple[SceneBody, ...], pairs: list[ScenePair], 
             continue
         grasp = grasp_of(bodies[pair.first], bodies[pair.second], cell)
         if grasp is not None:
-            _watch_grip(watch, cell, bodies, pair=pair, grasp=grasp, next_index=solids + len(watch.cut))
+            holder = min((pair.first, pair.second), key=lambda index: bodies[index].kind is Kind.PART)
+            found = grip_watch(cell, bodies[holder], grasp)
+            _watch_grip(watch, pair, found, holder=holder, next_index=solids + len(watch.cut))
             continue
         watch.pairs.append(pair)
         watch.watched.append(None if is_ground(bodies[pair.second]) else (pair.first, pair.second))
@@ -207,32 +207,15 @@ def _watch_tool(
         watch.cut.append((tool, outside))
 
 
-def _watch_grip(
-    watch: _Watch, cell: Cell, bodies: tuple[SceneBody, ...], *, pair: ScenePair, grasp: Grasp, next_index: int
-) -> None:
-    """Watch what of a further holder's flange and tool sticks out of the zone in which it grips, and for contact only.
-
-    The first holder carries the part: of what is rigid with its flange only the depth is judged.
-    """
-    holder, part = sorted((pair.first, pair.second), key=lambda index: bodies[index].kind is Kind.PART)
-    body, robot, zone = bodies[holder], cell.robot(grasp.robot), cell.checks.contact_zone
-    if isinstance(body.shape, HalfSpace):
+def _watch_grip(watch: _Watch, pair: ScenePair, found: GripWatch, *, holder: int, next_index: int) -> None:
+    """Watch what of a further holder's flange and tool sticks out of the zone in which it grips."""
+    part = pair.second if holder == pair.first else pair.first
+    watch.pairs.append(replace(pair, rule=found.rule, reason=found.reason))
+    if found.outside is None:
+        watch.watched.append((holder, part) if found.is_whole else None)
         return
-    X_ST = inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT
-    surface, is_in_zone = outside_grip(body.shape, X_ST, radius=zone, layer=grasp.depth + GRIP_ROOM)
-    reason = "checked for contact only: rigid with a flange that holds the part"
-    if not is_in_zone:
-        watch.pairs.append(replace(pair, rule=Rule.CONTACT, reason=reason))
-        watch.watched.append((holder, part))
-        return
-    reason = (
-        f"grips the part: may touch within {1e3 * zone:g} mm of the tool tip and with the face at the tip, at most "
-        f"{1e3 * grasp.depth:g} mm deep; checked for contact behind it"
-    )
-    watch.pairs.append(replace(pair, rule=Rule.GRIP, reason=reason))
-    watch.watched.append(None if surface is None else (next_index, part))
-    if surface is not None:
-        watch.cut.append((holder, prepare(body.name, surface)))
+    watch.watched.append((next_index, part))
+    watch.cut.append((holder, found.outside))
 
 
 def _mounted(
