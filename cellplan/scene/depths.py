@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.collision.bodies import BodyPoses
 from cellplan.collision.depth import ground_depth, overlap_depth
 from cellplan.geometry.transforms import Array
 from cellplan.scene.bodies import is_ground
@@ -42,20 +43,29 @@ def mounted_depths(scene: Scene, q: Array) -> tuple[FoundDepth, ...]:
         scene: The scene.
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
     """
-    return tuple(_found(scene, pair, q) for pair in scene.mounted)
+    first = scene.body_poses(q[:1])
+    return tuple(_moving(scene, pair, q) if pair.moves else _at_rest(scene, pair, first) for pair in scene.mounted)
 
 
-def _found(scene: Scene, pair: MountedPair, q: Array) -> FoundDepth:
-    """Greatest depth of one pair."""
-    ends, ground = (pair.first, pair.second), scene.bodies[pair.second]
-    if is_ground(ground):
-        rows = np.arange(len(q) if pair.moves else 1)
-        poses = scene.pair_poses((pair.first, pair.first), q[rows])
-        depths = ground_depth(scene.engine.bodies[pair.first], poses, pair.first, X_WS=ground.X_BS)
-    else:
-        count = min(MOST_ROWS, len(q)) if pair.moves else 1
-        rows = np.unique(np.linspace(0, len(q) - 1, count).round().astype(np.intp))
-        poses = scene.pair_poses(ends, q[rows])
-        depths = np.array([overlap_depth(scene.engine, ends, poses, sample=k) for k in range(len(rows))])
+def _at_rest(scene: Scene, pair: MountedPair, poses: BodyPoses) -> FoundDepth:
+    """Depth of a pair whose bodies do not move against each other."""
+    return FoundDepth(pair=pair, depth=float(_depths(scene, pair, poses)[0]), row=0)
+
+
+def _moving(scene: Scene, pair: MountedPair, q: Array) -> FoundDepth:
+    """Greatest depth of a pair over a motion."""
+    has_ground = is_ground(scene.bodies[pair.second])
+    count = len(q) if has_ground else min(MOST_ROWS, len(q))
+    rows = np.unique(np.linspace(0, len(q) - 1, count).round().astype(np.intp))
+    ends = (pair.first, pair.first if has_ground else pair.second)
+    depths = _depths(scene, pair, scene.pair_poses(ends, q[rows]))
     deepest = int(np.argmax(depths))
     return FoundDepth(pair=pair, depth=float(depths[deepest]), row=int(rows[deepest]))
+
+
+def _depths(scene: Scene, pair: MountedPair, poses: BodyPoses) -> Array:
+    """Depth of a pair at each sample in [m], shape (N,)."""
+    ends, ground = (pair.first, pair.second), scene.bodies[pair.second]
+    if is_ground(ground):
+        return ground_depth(scene.engine.bodies[pair.first], poses, pair.first, X_WS=ground.X_BS)
+    return np.array([overlap_depth(scene.engine, ends, poses, sample=k) for k in range(poses.p.shape[1])])

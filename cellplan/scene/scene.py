@@ -74,7 +74,8 @@ class Scene:
         bodies = tuple(sorted(scene_bodies(cell), key=is_ground))
         solids = [prepare(body.name, body.shape) for body in bodies if not isinstance(body.shape, HalfSpace)]
         pairs, excluded = sort_pairs(cell, bodies)
-        design = apply_design(cell, bodies, pairs, engine=Engine(solids), chains=chains)
+        engine = Engine(solids)
+        design = apply_design(cell, bodies, pairs, engine=engine, chains=chains)
         watch = _at_work(cell, bodies, design.kept, solids=len(solids))
         excluded += design.excluded
         return cls(
@@ -89,7 +90,7 @@ class Scene:
             ),
             exclusions=_named(bodies, excluded),
             mounted=(*_mounted(cell, bodies, excluded, watch.pairs), *design.mounted),
-            left_out=left_out(bodies, watch.pairs, excluded),
+            left_out=left_out(cell, bodies, watch.pairs, excluded, engine=engine),
             engine=Engine([*solids, *(body for _, body in watch.cut)]),
             cut_from=tuple(tool for tool, _ in watch.cut),
         )
