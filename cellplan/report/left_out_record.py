@@ -12,10 +12,12 @@ def left_out_record(left_out: Iterable[LeftOut]) -> list[Record]:
 
 
 def told_left_out(record: Record) -> list[str]:
-    """One line for each kind, from a record; or that nothing was left out."""
+    """One line for each kind, from a record; or that nothing was left out. No line where the record is silent on it."""
+    if "left_out" not in record:
+        return []
     return left_out_lines((each["kind"], tuple(each["bodies"]), each["reason"]) for each in record["left_out"])
 
 
 def grips_told(record: Record) -> list[str]:
     """How deep each holder reaches into the part: the messages of these checks, each once."""
-    return list(dict.fromkeys(check["message"] for check in record["checks"] if check["name"] == "grip_depth"))
+    return list(dict.fromkeys(check["message"] for check in record["checks"] if check.get("name") == "grip_depth"))
