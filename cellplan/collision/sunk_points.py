@@ -37,7 +37,7 @@ def deepest_point(guest: CollisionBody, host: CollisionBody, R_HG: Array, p_HG: 
     """
     if isinstance(host.shape, Mesh) and not host.shape.is_closed:
         return 0.0
-    surface = _surface(guest)
+    surface, probe = _surface(guest), Engine((host, prepare("point", Sphere(POINT))))
     open_ = surface.vertices[surface.faces] @ R_HG.T + p_HG
     best, measured = 0.0, 0
     while len(open_) and measured < MOST_POINTS:
@@ -47,7 +47,7 @@ def deepest_point(guest: CollisionBody, host: CollisionBody, R_HG: Array, p_HG: 
         promising = promising[np.argsort(-reach[promising], kind="stable")][: MOST_POINTS - measured]
         open_, centres, radii = open_[promising], centres[promising], radii[promising]
         measured += len(open_)
-        depths = _depths(host, centres, worth=best + CLOSE - radii)
+        depths = _depths(probe, centres, worth=best + CLOSE - radii)
         best = max(best, float(depths.max(initial=0.0)))
         open_ = _halved(open_[depths + radii > best + CLOSE])
     return best
@@ -65,15 +65,15 @@ def _balls(triangles: Array) -> tuple[Array, Array]:
     return centres, radii
 
 
-def _depths(host: CollisionBody, points: Array, *, worth: Array) -> Array:
+def _depths(probe: Engine, points: Array, *, worth: Array) -> Array:
     """Depth of points in a solid in [m], shape (N,): exact inside, zero or less outside, changing evenly.
 
     Args:
-        host: The solid.
-        points: Shape (N, 3), in its frame in [m].
+        probe: The solid, and a point.
+        points: Shape (N, 3), in the frame of the solid in [m].
         worth: Of points nearer to the surface than that in [m], shape (N,), it is not asked on which side they are.
     """
-    match host.shape:
+    match probe.bodies[0].shape:
         case Box(size):
             depths: Array = (0.5 * np.asarray(size) - np.abs(points)).min(axis=1)
         case Cylinder(radius, length):
@@ -84,18 +84,17 @@ def _depths(host: CollisionBody, points: Array, *, worth: Array) -> Array:
             depths = radius - np.sqrt(points[:, 0] ** 2 + points[:, 1] ** 2 + beyond**2)
         case Sphere(radius):
             depths = radius - np.linalg.norm(points, axis=1)
-        case Mesh():
-            depths = _depths_in_mesh(host, host.shape, points, worth=worth)
+        case Mesh() as mesh:
+            depths = _depths_in_mesh(probe, mesh, points, worth=worth)
     return depths
 
 
-def _depths_in_mesh(host: CollisionBody, mesh: Mesh, points: Array, *, worth: Array) -> Array:
+def _depths_in_mesh(probe: Engine, mesh: Mesh, points: Array, *, worth: Array) -> Array:
     """Distance of points from a closed mesh in [m], negative outside."""
-    engine = Engine((host, prepare("point", Sphere(POINT))))
     R = np.broadcast_to(np.eye(3), (2, len(points), 3, 3))
     p = np.stack([np.zeros_like(points), points])
     poses = BodyPoses(np.ascontiguousarray(R), p)
-    depths = np.array([engine.surface_distance(0, 1, poses, sample=k) for k in range(len(points))])
+    depths = np.array([probe.surface_distance(0, 1, poses, sample=k) for k in range(len(points))])
     asked = depths > worth
     votes = np.zeros(np.count_nonzero(asked))
     corner = mesh.vertices[mesh.faces]
