@@ -64,6 +64,7 @@ def check_clearance(
         distance_queries=scene.engine.distance_queries - asked[0],
         contact_queries=scene.engine.contact_queries - asked[1],
         cut_steps=sum(pair.cuts for pair in found.found),
+        left_out=scene.left_out,
     )
     classes = [kind for kind in ClearanceClass if any(scene.pairs[row].clearance_class is kind for row in rows)]
     checks = [

@@ -12,6 +12,10 @@ from cellplan.scene.survey import Survey
 
 SAME_CONTACT: Final = 0.010  # [s] touches with shorter breaks between them are one contact
 MM: Final = 1e3
+OUTSIDE_ZONE: Final = {
+    Rule.PROCESS: "outside the contact zone of the tool at work",
+    Rule.GRIP: "outside the contact zone of the grip",
+}
 
 
 def find_contacts(survey: Survey, times: Array) -> tuple[Contact, ...]:
@@ -57,7 +61,7 @@ def collision_checks(
 def _of_pair(survey: Survey, times: Array, row: int) -> list[Contact]:
     """Contacts of one pair in the order of time."""
     pair = survey.scene.pairs[row]
-    reason = "outside the contact zone of the tool at work" if pair.rule is Rule.PROCESS else ""
+    reason = OUTSIDE_ZONE.get(pair.rule, "")
     return [
         Contact(
             pair=survey.scene.names(pair),

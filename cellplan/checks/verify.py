@@ -11,6 +11,7 @@ from cellplan.checks.conditioning import conditioning
 from cellplan.checks.idle import check_idle
 from cellplan.checks.limits import check_joints, joint_uses
 from cellplan.checks.locked import check_locked, told_with_failures
+from cellplan.checks.mounting import check_mounting
 from cellplan.checks.repeatability import check_joint_drift, repeatability
 from cellplan.checks.speeds import robot_speed
 from cellplan.checks.tracking import check_accuracy, part_poses, task_accuracy
@@ -86,7 +87,8 @@ def verify(
         preview(report)
     stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
     clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
-    return replace(report, checks=(*checks, *clearance_checks), clearance=clearance)
+    mounting = check_mounting(scene, stacked, schedule.times)
+    return replace(report, checks=(*checks, *mounting, *clearance_checks), clearance=clearance)
 
 
 def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccuracy]) -> list[Check]:

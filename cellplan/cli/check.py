@@ -41,6 +41,7 @@ def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_d
 
 def _record(result: CellCheck) -> dict[str, Any]:
     """What was found, in printed units."""
+    from cellplan.report.left_out_record import left_out_record
     from cellplan.report.open_surfaces import open_surface_lines, open_surfaces_record
     from cellplan.report.record import check_record, number
 
@@ -55,6 +56,7 @@ def _record(result: CellCheck) -> dict[str, Any]:
         "checks": [check_record(each) for each in result.checks],
         "open_surfaces": open_surfaces,
         "remarks": [f"{result.cell.origin.at(key)}: {line}" for key, line in open_surface_lines(open_surfaces)],
+        "left_out": left_out_record(result.left_out),
     }
 
 
@@ -74,6 +76,8 @@ def _start(robot: Robot) -> dict[str, float | None]:
 
 def _lines(record: dict[str, Any]) -> list[str]:
     """What was found, for people."""
+    from cellplan.cli.summary import left_out_lines
+
     lines = [f"{record['cell']}: {'sound' if record['status'] == 'passed' else 'not sound'}"]
     for robot, start in record["start"].items():
         posture = ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
@@ -81,4 +85,5 @@ def _lines(record: dict[str, Any]) -> list[str]:
     lines += [f"  {record['start_choice']}"] if record["start_choice"] else []
     lines += [f"  task {name}: path of {length:.4g} mm" for name, length in record["path_length_mm"].items()]
     lines += [f"  note: {remark}" for remark in record["remarks"]]
-    return lines + [f"  {'' if each['passed'] else 'FAILED '}{each['message']}" for each in record["checks"]]
+    lines += [f"  {'' if each['passed'] else 'FAILED '}{each['message']}" for each in record["checks"]]
+    return lines + left_out_lines(record)

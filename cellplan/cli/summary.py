@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from cellplan.report.left_out_record import grips_told, told_left_out
 from cellplan.report.method import USUAL_METHOD
 from cellplan.report.open_surfaces import open_surface_lines
 
@@ -41,7 +42,14 @@ def figure_lines(record: Record) -> list[str]:
         *_slack_lines(record["solver"]["slack"]),
         *_fallback_lines(record["solver"]),
         *(f"  note: {line}" for _, line in open_surface_lines(record.get("open_surfaces", []))),
+        *(f"  grip: {line}" for line in grips_told(record)),
+        *left_out_lines(record),
     ]
+
+
+def left_out_lines(record: Record) -> list[str]:
+    """One line for each kind of pairs that were not judged in full."""
+    return [f"  {line}" for line in told_left_out(record)]
 
 
 def _clock_word(record: Record) -> str:

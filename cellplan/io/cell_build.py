@@ -100,7 +100,12 @@ def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
         shape=shape,
         X_PS=X_PS,
         held_by=tuple(
-            Grasp(robot=grasp.robot, X_PT=pose_from_entry(grasp.at), axes=_axis_numbers(grasp.axes))
+            Grasp(
+                robot=grasp.robot,
+                X_PT=pose_from_entry(grasp.at),
+                axes=_axis_numbers(grasp.axes),
+                depth=grasp.depth_mm / MM,
+            )
             for grasp in entry.held_by
         ),
         X_WP=None if entry.at is None else pose_from_entry(entry.at),
@@ -273,4 +278,5 @@ def build_checks(entry: ChecksEntry) -> CheckSettings:
         exclusions=tuple(Exclusion(bodies=pair.bodies, reason=pair.reason) for pair in entry.exclude),
         closure_position=entry.closure_mm / MM,
         closure_orientation=float(np.deg2rad(entry.closure_deg)),
+        standing_depth=entry.standing_depth_mm / MM,
     )

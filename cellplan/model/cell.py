@@ -93,11 +93,13 @@ class Grasp:
         X_PT: The holder's tool tip in the part frame.
         axes: Components of the tool's motion on the part that a further holder keeps at zero, in the order x, y, z,
             rx, ry, rz.
+        depth: By how much in [m] what is rigid with the holder's flange may reach into the part.
     """
 
     robot: str
     X_PT: Array
     axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+    depth: float = 0.002
 
     @property
     def name(self) -> str:
@@ -192,6 +194,7 @@ class CheckSettings:
         exclusions: Pairs left out at the user's word.
         closure_position: Largest distance in [m] of a further holder's tool from its grasp.
         closure_orientation: Largest angle in [rad] between the two.
+        standing_depth: By how much in [m] bodies that never move may overlap where one stands on the other.
     """
 
     clearance: float
@@ -199,6 +202,7 @@ class CheckSettings:
     exclusions: tuple[Exclusion, ...] = ()
     closure_position: float = 3e-6
     closure_orientation: float = 1e-3 * math.pi / 180.0
+    standing_depth: float = 0.005
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.left_out import LeftOut
 
 CAUTION = (
     "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
@@ -194,6 +195,7 @@ class ClearanceReport:
         distance_queries: How often the collision engine was asked for a distance.
         contact_queries: How often it was asked for a contact.
         cut_steps: How many steps between samples had to be looked at in finer steps.
+        left_out: What was not judged in full, but for two links of one robot's file.
     """
 
     minima: Mapping[ClearanceClass, ClearanceMinimum]
@@ -207,6 +209,7 @@ class ClearanceReport:
     distance_queries: int = 0
     contact_queries: int = 0
     cut_steps: int = 0
+    left_out: tuple[LeftOut, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from cellplan.checks.mounting import check_mounting
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
+from cellplan.model.left_out import LeftOut
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
 from cellplan.pipeline.solve import with_start
@@ -28,6 +30,7 @@ class CellCheck:
         choice: How the start was chosen, in words; None when all of it was given.
         path_lengths: Length of each task's path on the surface in [m].
         checks: The verified statements.
+        left_out: What was not judged in full, but for two links of one robot's file.
     """
 
     cell: Cell
@@ -35,6 +38,7 @@ class CellCheck:
     choice: str | None
     path_lengths: Mapping[str, float]
     checks: tuple[Check, ...]
+    left_out: tuple[LeftOut, ...]
 
     @property
     def passed(self) -> bool:
@@ -73,7 +77,8 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
         found=found,
         choice=choice.words,
         path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
-        checks=(at_start,),
+        checks=(at_start, *check_mounting(scene, start[None])),
+        left_out=scene.left_out,
     )
 
 

@@ -12,6 +12,7 @@ from cellplan.model.motion import Motion
 from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Check, Report
 from cellplan.report.json_report import run_record, summary_record
+from cellplan.report.left_out_record import grips_told, told_left_out
 from cellplan.report.method import method_lines
 from cellplan.report.open_surfaces import open_surface_lines
 from cellplan.report.palette import ROBOTS, robot_colours
@@ -35,6 +36,9 @@ CHECKS = {
     "joint_drift": "joints back where each cycle began",
     "clearance": "required clearance kept",
     "collision": "no collision",
+    "grip_depth": "holders no deeper in the part than their grip",
+    "mount_depth": "tools no deeper in the arm than their mounting",
+    "standing_depth": "what stands no deeper in what carries it than allowed",
 }
 CLASSES = {
     "whole": "whole cell",
@@ -86,6 +90,8 @@ def report_page(record: Record, checks: Iterable[Check], *, cell: Cell, plots: M
         cell,
         {
             "figures": _figures(record),
+            "left_out": told_left_out(record),
+            "grips": grips_told(record),
             "check_groups": _check_groups(checks),
             "shares": _shares(record),
             "excluded": _by_reason(record["exclusions"]),
@@ -103,7 +109,8 @@ def overview_html(reports: Mapping[str, Report], *, cell: Cell, provenance: Prov
 
 def overview_page(record: Record, *, cell: Cell) -> str:
     """The page of a job of several runs whose record is at hand; see ``overview_html``."""
-    return _render("overview.html", record, cell, {"figures": _figures(record)})
+    parts = {"figures": _figures(record), "left_out": told_left_out(record), "grips": grips_told(record)}
+    return _render("overview.html", record, cell, parts)
 
 
 def rehearsal_html(rehearsal: Rehearsal, *, provenance: Provenance, plots: Mapping[str, bytes]) -> str:

@@ -11,6 +11,7 @@ from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, Joi
 from cellplan.report.clearance_record import clearance_proof_record, closest_pairs_record
 from cellplan.report.closure_record import closures_record, worst_closures_record
 from cellplan.report.idle_record import missing_moves
+from cellplan.report.left_out_record import left_out_record
 from cellplan.report.method import solver_record
 from cellplan.report.open_surfaces import open_surfaces_record
 from cellplan.report.record import (
@@ -52,6 +53,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
         "closest_pairs": closest_pairs_record(report.clearance),
         "clearance_proof": clearance_proof_record(report.clearance),
         "open_surfaces": open_surfaces_record(cell),
+        "left_out": left_out_record(report.clearance.left_out),
         "closure": closures_record(report, cell),
         "solver": solver_record(cell.solver, motion),
     }
@@ -90,6 +92,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
         "clearance": clearance_record(minima),
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
+        "left_out": left_out_record(dict.fromkeys(each for report in runs for each in report.clearance.left_out)),
         "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
         "not_in_program": missing_moves(cell, {name: report.tasks for name, report in reports.items()}),
         **origin_record(cell, provenance),

@@ -8,12 +8,12 @@ from itertools import combinations
 
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell
+from cellplan.model.left_out import LeftOutKind
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import BASE
 from cellplan.scene.bodies import Kind, SceneBody
 from cellplan.scene.links import NO_BODY, LinkTree
-
-ATTACHED = (Kind.TOOL, Kind.PART)  # bodies that a flange carries
+from cellplan.scene.mounting import grasp_of, left_out_kind, stand_on_each_other
 
 
 class Rule(StrEnum):
@@ -22,6 +22,7 @@ class Rule(StrEnum):
     CLEARANCE = "clearance"  # keep the distance that the cell demands
     CONTACT = "contact"  # do not touch; the distance between them is the robot's own design
     PROCESS = "process"  # touch inside the contact zone only
+    GRIP = "grip"  # touch where a further holder grips only
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,11 +46,12 @@ class ScenePair:
 
 @dataclass(frozen=True, slots=True)
 class Excluded:
-    """Two bodies that are not watched, and why."""
+    """Two bodies that are not watched, and why; ``kind`` is None for two links of one robot's own file."""
 
     first: int
     second: int
     reason: str
+    kind: LeftOutKind | None = None
 
 
 def sort_pairs(cell: Cell, bodies: Sequence[SceneBody]) -> tuple[list[ScenePair], list[Excluded]]:
@@ -62,9 +64,11 @@ def sort_pairs(cell: Cell, bodies: Sequence[SceneBody]) -> tuple[list[ScenePair]
     by_user = _user_exclusions(cell, bodies)
     watched, excluded = [], []
     for i, j in _index_pairs(bodies):
-        reason = by_user.get((i, j)) or _mounting(bodies[i], bodies[j], cell=cell, trees=trees)
-        if reason:
-            excluded.append(Excluded(i, j, reason))
+        mounting = _mounting(bodies[i], bodies[j], cell=cell, trees=trees)
+        if (i, j) in by_user:
+            excluded.append(Excluded(i, j, by_user[i, j], LeftOutKind.EXCLUDED))
+        elif mounting:
+            excluded.append(Excluded(i, j, mounting, left_out_kind(bodies[i], bodies[j])))
         else:
             kind = clearance_class(bodies[i], bodies[j])
             watched.append(ScenePair(first=i, second=j, clearance_class=kind, rule=Rule.CLEARANCE))
@@ -130,28 +134,24 @@ def _user_exclusions(cell: Cell, bodies: Sequence[SceneBody]) -> dict[tuple[int,
 
 def _mounting(a: SceneBody, b: SceneBody, *, cell: Cell, trees: Mapping[str, LinkTree]) -> str | None:
     """Why two bodies are joined by their mounting, or None."""
-    if Kind.OBSTACLE in (a.kind, b.kind):
-        return "both stand still: one is mounted among the other" if a.is_at_rest and b.is_at_rest else None
-    if Kind.PART in (a.kind, b.kind):
-        other = a if b.kind is Kind.PART else b
-        if other.robot in cell.positioners and other.link == cell.robot(str(other.robot)).model.flange_link:
-            return "holds the part"
+    if stand_on_each_other(a, b):
+        return f"both stand still: may touch, at most {1e3 * cell.checks.standing_depth:g} mm deep"
+    grasp = grasp_of(a, b, cell)
+    if grasp is not None:
+        is_first = grasp is cell.part.held_by[0]
+        return f"holds the part: may touch, at most {1e3 * grasp.depth:g} mm deep" if is_first else None
     if a.robot is None or a.robot != b.robot:
         return None
-    return _joined(a, b, trees[a.robot], has_tool=bool(cell.robot(a.robot).tool.bodies))
+    return _joined(a, b, trees[a.robot])
 
 
-def _joined(a: SceneBody, b: SceneBody, tree: LinkTree, *, has_tool: bool) -> str | None:
+def _joined(a: SceneBody, b: SceneBody, tree: LinkTree) -> str | None:
     """Why two bodies of one robot cannot come apart, or None."""
     if a.link == b.link:
         return "fixed to the same link"
     if a.kind is b.kind is Kind.LINK:
         child, parent = (a, b) if tree.parent(a.link) == b.link else (b, a)
         return f"joined by joint {tree.joint_name(child.link)}" if tree.parent(child.link) == parent.link else None
-    attached, link = (a, b) if a.kind in ATTACHED else (b, a)
-    is_outermost = attached.kind is Kind.TOOL or not has_tool
-    if is_outermost and link.kind is Kind.LINK and tree.carrier(attached.link) == link.link:
-        return "mounted on it"
     return None
 
 

@@ -16,9 +16,13 @@ from cellplan.geometry.shapes import HalfSpace, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import Cell, Robot
+from cellplan.model.left_out import LeftOut, LeftOutKind
 from cellplan.model.task import Frame
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, scene_bodies
 from cellplan.scene.by_design import apply_design
+from cellplan.scene.grips import GripWatch, grip_watch
+from cellplan.scene.left_out import left_out
+from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
 
 _Outside = dict[tuple[Solid, bytes], tuple[CollisionBody | None, bool]]
@@ -38,6 +42,8 @@ class Scene:
             what sticks out of the contact zone of a tool at work, and the part.
         ground_rows: Which pairs are a solid and a half-space, shape (G,).
         exclusions: Pairs that are not watched, as (first, second, reason).
+        mounted: Pairs that may touch and of which the depth is judged.
+        left_out: What is not judged in full, but for two links of one robot's file.
         engine: The solid bodies in the order of ``bodies``, then what of tools lies outside their contact zones.
         cut_from: The tool body that each of these last ones is cut from.
     """
@@ -50,6 +56,8 @@ class Scene:
     solid_pairs: PairIndices
     ground_rows: PairIndices
     exclusions: tuple[tuple[str, str, str], ...]
+    mounted: tuple[MountedPair, ...]
+    left_out: tuple[LeftOut, ...]
     engine: Engine
     cut_from: tuple[int, ...]
 
@@ -66,8 +74,10 @@ class Scene:
         bodies = tuple(sorted(scene_bodies(cell), key=is_ground))
         solids = [prepare(body.name, body.shape) for body in bodies if not isinstance(body.shape, HalfSpace)]
         pairs, excluded = sort_pairs(cell, bodies)
-        kept, by_design = apply_design(cell, bodies, pairs, engine=Engine(solids), chains=chains)
-        watch = _at_work(cell, bodies, kept, solids=len(solids))
+        engine = Engine(solids)
+        design = apply_design(cell, bodies, pairs, engine=engine, chains=chains)
+        watch = _at_work(cell, bodies, design.kept, solids=len(solids))
+        excluded += design.excluded
         return cls(
             cell=cell,
             chains=chains,
@@ -78,7 +88,9 @@ class Scene:
             ground_rows=np.array(
                 [row for row, pair in enumerate(watch.pairs) if is_ground(bodies[pair.second])], dtype=np.intp
             ),
-            exclusions=_named(bodies, [*excluded, *by_design]),
+            exclusions=_named(bodies, excluded),
+            mounted=(*_mounted(cell, bodies, excluded, watch.pairs), *design.mounted),
+            left_out=left_out(cell, bodies, watch.pairs, excluded, engine=engine),
             engine=Engine([*solids, *(body for _, body in watch.cut)]),
             cut_from=tuple(tool for tool, _ in watch.cut),
         )
@@ -160,6 +172,12 @@ def _at_work(cell: Cell, bodies: tuple[SceneBody, ...], pairs: list[ScenePair], 
         if _is_tool_at_work(bodies, pair, at_work):
             _watch_tool(watch, cell, bodies, pair=pair, next_index=solids + len(watch.cut), known=outside)
             continue
+        grasp = grasp_of(bodies[pair.first], bodies[pair.second], cell)
+        if grasp is not None:
+            holder = min((pair.first, pair.second), key=lambda index: bodies[index].kind is Kind.PART)
+            found = grip_watch(cell, bodies[holder], grasp)
+            _watch_grip(watch, pair, found, holder=holder, next_index=solids + len(watch.cut))
+            continue
         watch.pairs.append(pair)
         watch.watched.append(None if is_ground(bodies[pair.second]) else (pair.first, pair.second))
     return watch
@@ -188,6 +206,28 @@ def _watch_tool(
     watch.watched.append(None if outside is None else (next_index, part))
     if outside is not None:
         watch.cut.append((tool, outside))
+
+
+def _watch_grip(watch: _Watch, pair: ScenePair, found: GripWatch, *, holder: int, next_index: int) -> None:
+    """Watch what of a further holder's flange and tool sticks out of the zone in which it grips."""
+    part = pair.second if holder == pair.first else pair.first
+    watch.pairs.append(replace(pair, rule=found.rule, reason=found.reason))
+    if found.outside is None:
+        watch.watched.append((holder, part) if found.is_whole else None)
+        return
+    watch.watched.append((next_index, part))
+    watch.cut.append((holder, found.outside))
+
+
+def _mounted(
+    cell: Cell, bodies: tuple[SceneBody, ...], excluded: list[Excluded], watched: list[ScenePair]
+) -> list[MountedPair]:
+    """Pairs of which the depth is judged: grips and what stands, unless the user left them out."""
+    kinds = (LeftOutKind.GRIP, LeftOutKind.STANDING)
+    ends = [(pair.first, pair.second) for pair in excluded if pair.kind in kinds]
+    ends += [(pair.first, pair.second) for pair in watched if pair.rule in {Rule.GRIP, Rule.CONTACT}]
+    found = (mounted_pair(bodies[first], bodies[second], (first, second), cell) for first, second in sorted(ends))
+    return [pair for pair in found if pair is not None]
 
 
 def _outside_zone(cell: Cell, body: SceneBody, known: _Outside) -> tuple[CollisionBody | None, bool]:

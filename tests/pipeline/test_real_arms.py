@@ -56,7 +56,7 @@ robots:
 part:
   geometry: {{cylinder: {{radius_mm: 150, length_mm: 300, axis: z}}}}
   held_by:
-    - {{robot: table, at: {{xyz_mm: [0, 0, -150]}}}}
+    - {{robot: table, at: {{xyz_mm: [0, 0, -150]}}, depth_mm: 16}}  # the face of its plate is 15.2 mm above tool0
 tasks:
   top:
     robot: kuka

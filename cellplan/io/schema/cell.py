@@ -37,6 +37,10 @@ class GraspEntry(Entry):
         description="Components of its motion on the part that a further holder keeps at zero, in the part frame; the "
         "first holder carries the part frame and has all six.",
     )
+    depth_mm: Annotated[float, Field(ge=0.0, le=1000.0)] = Field(
+        default=2.0,
+        description="How deep the holder's flange, tool and all that is rigid with them may reach into the part.",
+    )
 
     @model_validator(mode="after")
     def _names_each_axis_once(self) -> Self:
@@ -146,6 +150,11 @@ class ChecksEntry(Entry):
     )
     closure_deg: Annotated[float, Field(gt=0.0, le=180.0)] = Field(
         default=0.001, description="Largest angle between a further holder's tool and its grasp on the part."
+    )
+    standing_depth_mm: Annotated[float, Field(ge=0.0, le=1000.0)] = Field(
+        default=5.0,
+        description="How deep bodies that never move may reach into each other where one stands on the other: a base "
+        "in a floor or plinth, a fixed part on a table.",
     )
     exclude: tuple[ExclusionEntry, ...] = Field(default=(), description="Pairs left out of the collision check.")
 

@@ -1,0 +1,69 @@
+"""What was not judged in full: pairs of bodies that were left out, or of which less was asked, and why."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+
+class LeftOutKind(StrEnum):
+    """Why less than the full distance is asked of bodies that are not two links of one robot's file."""
+
+    EXCLUDED = "excluded"  # named under checks.exclude
+    GRIP = "grip"  # the part and what holds it
+    MOUNTED = "mounted"  # fixed to each other
+    STANDING = "standing"  # one stands on the other
+    AT_WORK = "at_work"  # a tool that works on the part
+    CONTACT_ONLY = "contact_only"  # no contact, but any distance
+    ENVIRONMENT = "environment"  # things of the surroundings among themselves
+
+
+TITLES: Final = {
+    LeftOutKind.EXCLUDED: "excluded by the cell",
+    LeftOutKind.GRIP: "grip",
+    LeftOutKind.MOUNTED: "mounted on each other",
+    LeftOutKind.STANDING: "standing on each other",
+    LeftOutKind.AT_WORK: "at work",
+    LeftOutKind.CONTACT_ONLY: "contact only",
+    LeftOutKind.ENVIRONMENT: "surroundings",
+}
+NOTHING: Final = "nothing was left out"
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """Bodies that were not judged in full against each other.
+
+    Attributes:
+        kind: Why.
+        bodies: Their names: a pair, or all things of the surroundings.
+        reason: What is asked instead, in words.
+    """
+
+    kind: LeftOutKind
+    bodies: tuple[str, ...]
+    reason: str
+
+
+def left_out_lines(kinds: Iterable[tuple[str, tuple[str, ...], str]], *, most: int = 3) -> list[str]:
+    """One line for each kind: its pairs with their reasons, each reason once; or that nothing was left out.
+
+    Args:
+        kinds: Kind, bodies and reason of everything that was left out.
+        most: Pairs that are named for each reason; the others are counted.
+    """
+    grouped: dict[str, dict[str, list[str]]] = {}
+    for kind, bodies, reason in kinds:
+        grouped.setdefault(kind, {}).setdefault(reason, []).append(" - ".join(bodies))
+    lines = []
+    for kind in LeftOutKind:
+        told = [f"{_listed(pairs, most)} ({reason})" for reason, pairs in grouped.get(kind, {}).items()]
+        if told:
+            lines.append(f"left out, {TITLES[kind]}: {'; '.join(told)}")
+    return lines or [NOTHING]
+
+
+def _listed(pairs: list[str], most: int) -> str:
+    """The first pairs, and how many more there are."""
+    more = f" and {len(pairs) - most} more" if len(pairs) > most else ""
+    return ", ".join(pairs[:most]) + more

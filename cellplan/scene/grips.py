@@ -1,0 +1,99 @@
+"""What is watched of the flange and tool of a further holder: all that lies outside the zone in which it grips."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.collision.bodies import BodyPoses, CollisionBody, prepare
+from cellplan.collision.depth import overlap_depth
+from cellplan.collision.engine import Engine
+from cellplan.collision.grip_zone import outside_grip
+from cellplan.collision.inside import is_inside
+from cellplan.errors import InputError
+from cellplan.geometry.shapes import HalfSpace
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.model.cell import Cell, Grasp
+from cellplan.scene.bodies import SceneBody, part_body
+from cellplan.scene.pairs import Rule
+
+GRIP_ROOM: Final = 1e-4  # [m] by which the face of a grip may lie deeper than the grip: what counts there is its depth
+ALL_AXES: Final = 6  # [-] components of a grasp that leaves nothing open
+RIGID: Final = "checked for contact only: rigid with a flange that holds the part"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GripWatch:
+    """What is asked of a further holder's body and the part.
+
+    Attributes:
+        rule: What is asked.
+        reason: Why less than the full distance is.
+        is_whole: Whether the whole body is watched.
+        outside: What of it is watched otherwise; None when nothing is.
+    """
+
+    rule: Rule
+    reason: str
+    is_whole: bool
+    outside: CollisionBody | None
+
+
+def grip_watch(cell: Cell, body: SceneBody, grasp: Grasp) -> GripWatch:
+    """Say what of a further holder's body must not touch the part.
+
+    The first holder carries the part, and of what is rigid with its flange only the depth is judged. A further one may
+    touch the part near its tool tip, and with the face in the plane of the tip; everything behind is watched at every
+    instant, whether the grasp leaves axes free or not. A body that is too deep in the part by its grasp is not watched
+    as well: its depth fails the cell, and no start could be found.
+
+    Raises:
+        InputError: By a grasp that leaves no axis free the body touches the part elsewhere.
+    """
+    if isinstance(body.shape, HalfSpace):  # no tool is one
+        return GripWatch(rule=Rule.CONTACT, reason=RIGID, is_whole=False, outside=None)
+    robot, zone = cell.robot(grasp.robot), cell.checks.contact_zone
+    X_ST = inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT
+    surface, is_in_zone = outside_grip(body.shape, X_ST, radius=zone, layer=grasp.depth + GRIP_ROOM)
+    watched = prepare(body.name, body.shape if surface is None or not is_in_zone else surface)
+    outside = watched if is_in_zone and surface is not None else None
+    if len(grasp.axes) == ALL_AXES and (outside is not None or not is_in_zone):
+        if _depth(cell, body, grasp) > grasp.depth:
+            outside, is_in_zone = None, True
+        else:
+            _require_free(cell, body, grasp, watched)
+    if not is_in_zone:
+        return GripWatch(rule=Rule.CONTACT, reason=RIGID, is_whole=True, outside=None)
+    reason = (
+        f"grips the part: may touch within {1e3 * zone:g} mm of the tool tip and with the face at the tip, at most "
+        f"{1e3 * grasp.depth:g} mm deep; checked for contact behind it"
+    )
+    return GripWatch(rule=Rule.GRIP, reason=reason, is_whole=False, outside=outside)
+
+
+def _depth(cell: Cell, body: SceneBody, grasp: Grasp) -> float:
+    """How deep a body is in the part in [m] when the grasp is closed."""
+    solid = prepare(body.name, body.shape)  # type: ignore[arg-type] # no half-space
+    engine, poses = _gripped(cell, body, grasp, solid)
+    return overlap_depth(engine, (0, 1), poses, sample=0)
+
+
+def _require_free(cell: Cell, body: SceneBody, grasp: Grasp, outside: CollisionBody) -> None:
+    """Refuse a grasp by which what lies outside the zone touches the part."""
+    engine, poses = _gripped(cell, body, grasp, outside)
+    if engine.touch(0, 1, poses, sample=0) or is_inside(engine, (0, 1), poses, sample=0):
+        number = cell.positioners.index(grasp.robot)
+        zone = 1e3 * cell.checks.contact_zone
+        raise InputError(
+            f"{cell.origin.at(f'part.held_by[{number}].at')}: expected '{grasp.robot}' to touch the part near its tool "
+            f"tip (checks.contact_zone_mm = {zone:g}) or with the face at the tip, got {body.name} that touches it "
+            "elsewhere: is the grasp the right way round? If it may, name the pair under checks.exclude"
+        )
+
+
+def _gripped(cell: Cell, body: SceneBody, grasp: Grasp, solid: CollisionBody) -> tuple[Engine, BodyPoses]:
+    """A solid of the holder and the part, where the closed grasp has them, seen from the holder's base."""
+    part = part_body(cell, cell.part, grasp)
+    engine = Engine([solid, prepare(part.name, part.shape)])  # type: ignore[arg-type] # no half-space
+    X: Array = np.stack([body.X_BS, part.X_BS])
+    return engine, BodyPoses(X[:, None, :3, :3], X[:, None, :3, 3])

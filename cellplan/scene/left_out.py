@@ -1,0 +1,93 @@
+"""Everything in a scene that is not judged in full, but for two links of one robot's own file."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from cellplan.collision.bodies import BodyPoses
+from cellplan.collision.certificate import heights
+from cellplan.collision.engine import Engine
+from cellplan.collision.measure import measure
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.left_out import LeftOut, LeftOutKind
+from cellplan.scene.bodies import Kind, SceneBody, is_ground
+from cellplan.scene.mounting import is_of_own_file
+from cellplan.scene.pairs import Excluded, Rule, ScenePair
+
+Told = tuple[int, int, LeftOutKind, str]  # both bodies, kind and reason
+
+KIND: Final = {
+    Rule.CONTACT: LeftOutKind.CONTACT_ONLY,
+    Rule.PROCESS: LeftOutKind.AT_WORK,
+    Rule.GRIP: LeftOutKind.GRIP,
+}
+AMONG_THINGS: Final = "all of them stand still: they are not judged against each other"
+
+
+def left_out(
+    cell: Cell,
+    bodies: Sequence[SceneBody],
+    pairs: Sequence[ScenePair],
+    excluded: Sequence[Excluded],
+    *,
+    engine: Engine,
+) -> tuple[LeftOut, ...]:
+    """What was left out or asked less of, in the order of the bodies; the surroundings among themselves last.
+
+    Bodies that never move and keep the demanded clearance are not told: nothing was let pass there.
+
+    Args:
+        cell: The cell.
+        bodies: All solids.
+        pairs: Pairs that are watched.
+        excluded: Pairs that are not.
+        engine: The solids.
+    """
+    standing = _Standing(cell, bodies, engine)
+    told = [*_relaxed(bodies, pairs), *(each for each in _excluded(excluded) if not standing.is_clear(*each[:3]))]
+    found = sorted(told, key=lambda each: each[:2])
+    named = [LeftOut(kind, (bodies[i].name, bodies[j].name), reason) for i, j, kind, reason in found]
+    things = tuple(body.name for body in bodies if body.kind is Kind.OBSTACLE)
+    return (*named, *([LeftOut(LeftOutKind.ENVIRONMENT, things, AMONG_THINGS)] if len(things) > 1 else []))
+
+
+class _Standing:
+    """Bodies that never move, where they stand."""
+
+    def __init__(self, cell: Cell, bodies: Sequence[SceneBody], engine: Engine) -> None:
+        """Place them; the others are placed as if all joints were at zero, and nobody asks for them."""
+        self._bodies, self._engine, self._clearance = bodies, engine, cell.checks.clearance
+        X = [body.X_BS if body.robot is None else cell.robot(body.robot).X_WB @ body.X_BS for body in bodies]
+        placed: Array = np.array(X).reshape(-1, 4, 4)
+        self._poses = BodyPoses(placed[:, None, :3, :3], placed[:, None, :3, 3])
+        self._centres = (placed[: len(engine.bodies), :3, :3] @ engine.centres[..., None])[..., 0]
+        self._centres += placed[: len(engine.bodies), :3, 3]
+
+    def is_clear(self, first: int, second: int, kind: LeftOutKind) -> bool:
+        """Whether two bodies are both at rest and keep the demanded clearance."""
+        a, b, engine, poses = self._bodies[first], self._bodies[second], self._engine, self._poses
+        if kind is not LeftOutKind.STANDING or not (a.is_at_rest and b.is_at_rest):
+            return False
+        if is_ground(b):
+            hull = engine.bodies[first].hull
+            return bool(heights(hull, poses.R[first], poses.p[first], X_WS=b.X_BS)[0] >= self._clearance)
+        apart = np.linalg.norm(self._centres[second] - self._centres[first])
+        if apart >= engine.radii[first] + engine.radii[second] + self._clearance:
+            return True
+        return measure(engine, (first, second), poses, sample=0).bound >= self._clearance
+
+
+def _relaxed(bodies: Sequence[SceneBody], pairs: Sequence[ScenePair]) -> Iterator[Told]:
+    """Watched pairs of which less than the full distance is asked."""
+    for pair in pairs:
+        if pair.rule is not Rule.CLEARANCE and not is_of_own_file(bodies[pair.first], bodies[pair.second]):
+            yield pair.first, pair.second, KIND[pair.rule], pair.reason
+
+
+def _excluded(excluded: Sequence[Excluded]) -> Iterator[Told]:
+    """Pairs that are not watched, but for those that a robot's own file sets."""
+    for pair in excluded:
+        if pair.kind is not None:
+            yield pair.first, pair.second, pair.kind, pair.reason

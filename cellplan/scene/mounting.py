@@ -1,0 +1,153 @@
+"""What is fixed to what: bodies that may touch as one holds, carries or stands on the other, and how deep they may.
+
+Only two links of one robot's own file are excused by their design. What the user puts into the cell, a part, a tool, a
+base on a floor, is judged: by its depth where touching is its purpose, as any other contact where it is not.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from cellplan.errors import InputError
+from cellplan.model.cell import Cell, Grasp
+from cellplan.model.left_out import LeftOutKind
+from cellplan.scene.bodies import Kind, SceneBody
+
+MOUNT_DEPTH: Final = 0.002  # [m] by which a tool may reach into the link that its flange, without a body, is part of
+MOST_NAMED: Final = 3  # [-] bodies that an error names; the others are counted
+WITHOUT_LEAVE: Final = (Kind.LINK, Kind.TOOL, Kind.PART)  # nothing of these stands on another one of them
+
+
+class Mount(StrEnum):
+    """Why two bodies may touch."""
+
+    GRIP = "grip_depth"  # the one holds the part
+    STANDING = "standing_depth"  # the one stands on the other
+    MOUNT = "mount_depth"  # the one is fixed to a flange that has no body, near the other
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MountedPair:
+    """Two bodies that may touch, and reach into each other by so much.
+
+    Attributes:
+        first: Index of the one body of the scene.
+        second: Index of the other; a half-space is always the second.
+        mount: Why they may touch.
+        limit: Greatest allowed depth in [m].
+        moves: Whether the one moves against the other, so that every configuration of a motion counts.
+    """
+
+    first: int
+    second: int
+    mount: Mount
+    limit: float
+    moves: bool = False
+
+
+def is_of_own_file(a: SceneBody, b: SceneBody) -> bool:
+    """Whether both are links of one robot, placed against each other by its maker."""
+    return a.kind is b.kind is Kind.LINK and a.robot == b.robot
+
+
+def stand_on_each_other(a: SceneBody, b: SceneBody) -> bool:
+    """Whether two bodies never move and one may stand on the other: a base or a part on something of the cell's own.
+
+    The feet of two robots, and a foot and a part, keep their distance as everything else does.
+    """
+    return a.is_at_rest and b.is_at_rest and not (a.kind in WITHOUT_LEAVE and b.kind in WITHOUT_LEAVE)
+
+
+def is_rigid_with_flange(body: SceneBody, cell: Cell) -> bool:
+    """Whether a body is a flange, or fixed to one: a tool, a gripper of the robot's file that cannot move."""
+    if body.robot is None or body.kind is Kind.PART:
+        return False
+    return body.link == cell.robot(body.robot).model.flange_link
+
+
+def grasp_of(a: SceneBody, b: SceneBody, cell: Cell) -> Grasp | None:
+    """The grasp that two bodies belong to: the part, and a body that is rigid with the flange of a holder."""
+    if Kind.PART not in (a.kind, b.kind):
+        return None
+    other = a if b.kind is Kind.PART else b
+    held = (grasp for grasp in cell.part.held_by if grasp.robot == other.robot)
+    return next(held, None) if is_rigid_with_flange(other, cell) else None
+
+
+def left_out_kind(a: SceneBody, b: SceneBody) -> LeftOutKind | None:
+    """Kind of a pair that is not watched by its mounting; None for two links of one robot's own file."""
+    if is_of_own_file(a, b):
+        return None
+    if stand_on_each_other(a, b):
+        return LeftOutKind.STANDING
+    return LeftOutKind.GRIP if Kind.PART in (a.kind, b.kind) else LeftOutKind.MOUNTED
+
+
+def mounted_pair(a: SceneBody, b: SceneBody, ends: tuple[int, int], cell: Cell) -> MountedPair | None:
+    """What is asked of two bodies of which one holds the part or stands on the other; None for all others."""
+    first, second = ends
+    if stand_on_each_other(a, b):
+        return MountedPair(first=first, second=second, mount=Mount.STANDING, limit=cell.checks.standing_depth)
+    grasp = grasp_of(a, b, cell)
+    if grasp is None:
+        return None
+    moves = len(grasp.axes) < 6
+    return MountedPair(first=first, second=second, mount=Mount.GRIP, limit=grasp.depth, moves=moves)
+
+
+def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Sequence[tuple[int, Sequence[int]]]) -> None:
+    """Refuse a cell in which what the user mounted touches links of its own robot in every configuration.
+
+    Args:
+        cell: The cell.
+        bodies: All solids.
+        faults: Each such body and the links that it touches.
+
+    Raises:
+        InputError: There is such a body.
+    """
+    for mounted, links in faults:
+        body, others = bodies[mounted], [bodies[link].name for link in links]
+        more = len(others) - MOST_NAMED
+        named = ", ".join(others[:MOST_NAMED])
+        if more > 0:
+            named += f" and {more} more {'body' if more == 1 else 'bodies'}"
+        robot = str(bodies[links[0]].robot)
+        where = cell.origin.at(_key(cell, body, robot))
+        what, question = _words(body)
+        raise InputError(
+            f"{where}: expected {what} clear of the links of '{robot}' beyond its flange, got one that touches {named} "
+            f"in every configuration: {question} If they may touch, name the pairs under checks.exclude"
+        )
+
+
+def _key(cell: Cell, body: SceneBody, robot: str) -> str:
+    """Where in the cell file a body is mounted."""
+    if body.kind is Kind.PART:
+        number = [grasp.robot for grasp in cell.part.held_by].index(robot)
+        return f"part.held_by[{number}].at"
+    if body.kind is Kind.TOOL:
+        number = int(body.name.rpartition("_")[2]) - 1 if body.name != f"{robot}/tool" else 0
+        tool = _tool_as_written(cell, robot)
+        if tool.get("geometry") is None:
+            return f"robots.{robot}.tool.bodies[{number}]"
+        return f"robots.{robot}.tool.bodies[{number - 1}]" if number else f"robots.{robot}.tool.geometry"
+    return f"robots.{robot}"
+
+
+def _tool_as_written(cell: Cell, robot: str) -> Mapping[str, object]:
+    """The tool of a robot as the file gives it."""
+    values: object = cell.origin.document
+    for key in ("robots", robot, "tool"):
+        values = values.get(key) if isinstance(values, Mapping) else None
+    return values if isinstance(values, Mapping) else {}
+
+
+def _words(body: SceneBody) -> tuple[str, str]:
+    """What is mounted, and the question that leads to the mistake."""
+    if body.kind is Kind.PART:
+        return "a part", "is the grasp the right way round?"
+    if body.kind is Kind.TOOL:
+        return "a body of the tool", "does it lie in front of the flange, along its z?"
+    return "a body", "is it where it is mounted?"
