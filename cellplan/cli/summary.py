@@ -103,7 +103,9 @@ def _clearance_lines(whole: Record) -> Iterator[str]:
     if whole["minimum_mm"] is not None and whole["pair"]:
         first, second = whole["pair"]
         proof = "certified" if whole["certified"] else "not certified"
-        yield f"  smallest clearance {whole['minimum_mm']:.4g} mm, {proof}: {first} - {second}{_instant(whole['at_s'])}"
+        least = "" if whole.get("exact", True) else "at least "
+        figure = f"{least}{whole['minimum_mm']:.4g} mm, {proof}"
+        yield f"  smallest clearance {figure}: {first} - {second}{_instant(whole['at_s'])}"
 
 
 def _slack_lines(slack: Record | None) -> Iterator[str]:

@@ -85,12 +85,12 @@ def can_be_split(body: CollisionBody) -> bool:
 def split(engine: Engine, pair: Pair) -> tuple[Engine, bool]:
     """The pieces of that body of a pair which has more triangles, after the other one; and whether it is the first.
 
-    At least one of the two must be one that can be split.
+    At least one of the two must be one that can be split. It is taken apart once, however often it is asked for.
     """
     sizes = [len(engine.bodies[k].core.faces) if can_be_split(engine.bodies[k]) else 0 for k in pair]
     is_first = sizes[0] > sizes[1]
     whole, other = pair if is_first else pair[::-1]
-    return Engine((engine.bodies[other], *_pieces(engine.bodies[whole]))), is_first
+    return engine.part(pair, lambda: (engine.bodies[other], *_pieces(engine.bodies[whole]))), is_first
 
 
 def read_piece(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int) -> tuple[Reading, bool]:

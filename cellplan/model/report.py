@@ -142,15 +142,18 @@ class ClearanceMinimum:
     Attributes:
         minimum: Distance in [m], never above the truth; 0 when the pair touches; None when there is no such pair.
         pair: Names of the two bodies, None when there is no such pair.
-        at_s: Instant in [s].
-        certified: Whether the figure also holds between the samples.
+        at_s: Instant in [s] at which the pair was found to be nearest.
+        certified: Whether it is proved, between the samples too, that nothing touches and either that the demanded
+            distance is kept or that it is not. Otherwise ``minimum`` is what is proved, and may be 0 without a contact.
+        exact: Whether the truth is above ``minimum`` by no more than 0.1 mm; otherwise it is a lower bound.
         points: Where the two bodies are nearest, in the world in [m]; None when they touch or are not known.
     """
 
-    minimum: float | None
-    pair: tuple[str, str] | None
-    at_s: float | None
-    certified: bool
+    minimum: float | None = None
+    pair: tuple[str, str] | None = None
+    at_s: float | None = None
+    certified: bool = False
+    exact: bool = True
     points: tuple[Point, Point] | None = None
 
 
@@ -190,7 +193,7 @@ class ClearanceReport:
             the instant, shape (K,) each; exact to 0.1 mm at the minimum, elsewhere below what is reached in the
             middle of the stretch by no more than about a twentieth and a millimetre.
         closest: The closest pairs that are to keep the demanded distance, nearest first.
-        not_certified: Pairs that could neither be proved to be free nor found to touch.
+        not_certified: Pairs that were not found to touch or to come nearer than demanded, and not proved not to.
         distance_queries: How often the collision engine was asked for a distance.
         contact_queries: How often it was asked for a contact.
         cut_steps: How many steps between samples had to be looked at in finer steps.

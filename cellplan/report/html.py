@@ -294,6 +294,7 @@ def _clearance_figure(record: Record) -> Record:
         where = " and ".join(whole["pair"] or ())
         figure["detail"] = f"{where} at {_fixed(whole['at_s'], 3)} s; {required}"
         figure["is_bad"] = whole["minimum_mm"] < record["required_clearance_mm"]
+        figure["value"] = figure["value"] if whole["exact"] else f"at least {figure['value']}"
     return figure
 
 
