@@ -124,7 +124,8 @@ def _not_certified(survey: Survey, times: Array, row: int) -> Check:
     first, second = survey.scene.names(survey.scene.pairs[row])
     found, proved = survey.found[row], MM * max(0.0, float(survey.low[row].min()))
     at_s = float(seconds(times, np.array([min(found.unproved)]))[0])
-    more = f" and at {len(found.unproved) - 1} more instants" if len(found.unproved) > 1 else ""
+    others = len({int(at) for at in found.unproved}) - 1
+    more = f" and in {others} more steps" if others else ""
     required = MM * found.demand
     smallest = f", the smallest distance found is {MM * found.distance:.2f} mm" if np.isfinite(found.distance) else ""
     what = f"{np.floor(10.0 * proved) / 10.0:.1f} mm are proved, required {required:.1f} mm"

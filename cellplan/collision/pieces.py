@@ -14,7 +14,7 @@ from cellplan.collision.certificate import separation
 from cellplan.collision.engine import Engine
 from cellplan.collision.measure import SURELY_APART, TIGHT, TOUCHING, Reading
 from cellplan.collision.travel import ROUNDING, Bends, Motion, Pair
-from cellplan.geometry.shapes import Mesh, bounding_sphere
+from cellplan.geometry.shapes import Mesh, bounding_capsule
 from cellplan.geometry.transforms import Array
 
 PIECES: Final = 8  # [-] pieces that a body is taken apart into at once
@@ -138,7 +138,9 @@ def _piece(body: CollisionBody, group: np.ndarray) -> CollisionBody:
     surface = Mesh(
         vertices=body.core.vertices[used], faces=faces.reshape(-1, 3), source=body.core.source, is_closed=False
     )
-    centre, radius = bounding_sphere(surface)
+    centre = surface.vertices.mean(axis=0)  # within the body, as bends are those of its points
+    radius = float(np.linalg.norm(surface.vertices - centre, axis=1).max())
+    ends, girth = bounding_capsule(surface)
     return CollisionBody(
         name=body.name,
         shape=surface,
@@ -149,5 +151,7 @@ def _piece(body: CollisionBody, group: np.ndarray) -> CollisionBody:
         inflation=0.0,
         centre=centre,
         radius=radius,
+        ends=ends,
+        girth=girth,
         witnesses=surface.vertices[:1],
     )

@@ -8,8 +8,11 @@ The triangle inequality gives, for every point x of the body at the far end and 
 .. math:: |x - P_j| \le L_j = \sum_{i \ge j} \bigl( |P_{i+1} - P_i| + \hat q_i \bigr) + \rho
 
 with the largest position :math:`\hat q_i` of each sliding joint in the program, zero for those that turn, the centre c
-of a sphere round the body as the last point, and its radius :math:`\rho`. A sliding joint moves a point as far as it
-slides: :math:`L_j = 1`.
+of a sphere round the body as the last point, and its radius :math:`\rho`; or, where that is less, a line round which
+the body lies in place of the sphere. A sliding joint moves a point as far as it slides: :math:`L_j = 1`.
+
+What counts of a turning joint is the distance from its axis, not from :math:`P_j`. It is known for the joint next to
+the body, whose points keep their distance from that axis: that is its lever arm.
 """
 
 from dataclasses import dataclass
@@ -105,10 +108,15 @@ class LeverArms:
         point, length = self._at_reference(body, seen.centre), seen.radius
         for place in range(len(axes) - 1, -1, -1):
             axis = self._placed[axes[place]]
-            foot = axis.point_W + axis.axis_W * ((point - axis.point_W) @ axis.axis_W)
-            length += float(np.linalg.norm(point - foot)) + float(self._slides[axes[place]])
+            foot = axis.foot(point)
+            length += float(np.linalg.norm(point - foot))
+            if place == len(axes) - 1:
+                ends = self._at_reference(body, seen.ends)
+                length = min(length, float(np.linalg.norm(ends - foot, axis=1).max()) + seen.girth)
+                beside = float(np.linalg.norm(ends - axis.foot(ends), axis=1).max()) + seen.girth
+            length += float(self._slides[axes[place]])
             if axis.is_revolute:
-                levers[place] = length
+                levers[place] = min(length, beside) if place == len(axes) - 1 else length
             point = foot
         return Chain(np.array(axes, dtype=np.intp), levers, self._turns[axes])
 
@@ -121,10 +129,10 @@ class LeverArms:
             link = self._placed[way[-1]].parent
         return way
 
-    def _at_reference(self, body: SceneBody, point: Array) -> Array:
-        """A point of a body in the world when all joints are at zero, shape (3,)."""
+    def _at_reference(self, body: SceneBody, points: Array) -> Array:
+        """Points of a body in the world when all joints are at zero, shape (..., 3)."""
         X_WS = body.X_BS if body.robot is None else self._scene.cell.robot(body.robot).X_WB @ body.X_BS
-        placed: Array = X_WS[:3, :3] @ point + X_WS[:3, 3]
+        placed: Array = points @ X_WS[:3, :3].T + X_WS[:3, 3]
         return placed
 
 
@@ -149,6 +157,11 @@ class _PlacedAxis:
     parent: int
     point_W: Array
     axis_W: Array
+
+    def foot(self, points: Array) -> Array:
+        """The points of the axis that are nearest to some points, shape (..., 3)."""
+        nearest: Array = self.point_W + ((points - self.point_W) @ self.axis_W)[..., None] * self.axis_W
+        return nearest
 
 
 def _placed(robot: Robot, start: int) -> list[_PlacedAxis]:
