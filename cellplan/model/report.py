@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.between_rows import BetweenRows
 
 CAUTION = (
     "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
@@ -68,6 +69,7 @@ class TaskAccuracy:
         orientation_error: Rotation vector of ``R_PT,wanted R_PT^T`` in P in [rad], shape (N, 3); likewise.
         path_length: Length of the path on the surface in [m].
         end_s: Instant at which the path is done.
+        between: Errors between the rows; None where nobody looked.
     """
 
     task: str
@@ -76,6 +78,7 @@ class TaskAccuracy:
     orientation_error: Array
     path_length: float
     end_s: float
+    between: BetweenRows | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,12 +90,14 @@ class ClosureAccuracy:
         axes: Components that the grasp keeps, in the order x, y, z, rx, ry, rz.
         position_error: Position error in P in [m], shape (N, 3); components that the grasp leaves open are zero.
         orientation_error: Rotation vector of ``R_PT,wanted R_PT^T`` in P in [rad], shape (N, 3); likewise.
+        between: Errors between the rows; None where nobody looked.
     """
 
     robot: str
     axes: tuple[int, ...]
     position_error: Array
     orientation_error: Array
+    between: BetweenRows | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
