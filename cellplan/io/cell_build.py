@@ -181,12 +181,11 @@ def direction(written: Direction) -> Array:
 
 def _tolerance(entry: ToleranceEntry) -> Tolerance:
     """Allowed tool errors in [m] and [rad]."""
-    between_mm, between_deg = entry.between_rows_mm, entry.between_rows_deg
     return Tolerance(
         position=entry.position_mm / MM,
         orientation=float(np.deg2rad(entry.orientation_deg)),
-        position_between=None if between_mm is None else between_mm / MM,
-        orientation_between=None if between_deg is None else float(np.deg2rad(between_deg)),
+        position_between=(entry.between_rows_mm or entry.position_mm) / MM,
+        orientation_between=float(np.deg2rad(entry.between_rows_deg or entry.orientation_deg)),
     )
 
 
