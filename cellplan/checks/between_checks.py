@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from cellplan.model.report import Check, ClosureAccuracy, TaskAccuracy
 from cellplan.model.task import Tolerance
 from cellplan.scene.scene import Scene
 
+BETWEEN: Final = "_between_rows"  # what the name of a check ends with
 MM, DEG = 1e3, float(np.degrees(1.0))
 
 
@@ -70,10 +72,16 @@ def check_closures_between(cell: Cell, closures: Sequence[ClosureAccuracy]) -> l
     return checks
 
 
+def with_between(at_rows: Sequence[Check], between: Sequence[Check]) -> tuple[Check, ...]:
+    """Checks at the rows and between them, but for those of errors that are too large at the rows already."""
+    failed = {(check.name, check.subject) for check in at_rows if not check.passed}
+    return (*at_rows, *(c for c in between if (c.name.removesuffix(BETWEEN), c.subject) not in failed))
+
+
 def _check(name: str, error: BetweenError, subject: str, *, allowed: float, of: str) -> Check:
     """The largest error of one kind against its limit, with the step that would keep it."""
     scale, unit = (MM, "mm") if "position" in name else (DEG, "deg")
-    what = name.replace("_between_rows", "").replace("_", " ")
+    what = name.removesuffix(BETWEEN).replace("_", " ")
     message = (
         f"{what} {of} between the rows of its table: {scale * error.largest:.3g} {unit} at {error.at_s:.4f} s, "
         f"allowed {scale * allowed:g} {unit}"

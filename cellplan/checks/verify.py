@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cellplan.checks.between_checks import check_closures_between, check_task_between, look_between
+from cellplan.checks.between_checks import check_closures_between, check_task_between, look_between, with_between
 from cellplan.checks.clearance import UNKNOWN, check_clearance
 from cellplan.checks.closure import check_closure, closure_accuracy
 from cellplan.checks.conditioning import conditioning
@@ -57,8 +57,8 @@ def verify(
     closures = closure_accuracy(cell, scene.chains, q, X_WP)
     if schedule.desired is not None:
         accuracy, closures = look_between(scene, schedule, q, accuracy=accuracy, closures=closures)
-    checks = [*_accuracy_checks(cell, schedule, accuracy), *check_closure(cell, schedule.times, closures)]
-    checks += check_closures_between(cell, closures)
+    checks = _accuracy_checks(cell, schedule, accuracy)
+    checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
     uses, joint_checks = _joints(cell, schedule.times, q)
     checks += joint_checks
     drift = repeatability(cell, schedule, q)
@@ -96,7 +96,8 @@ def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccu
     checks: list[Check] = []
     for scheduled, errors in zip(schedule.tasks, accuracy, strict=True):
         tolerance = scheduled.task.tolerance
-        own = (*check_accuracy(schedule, errors, scheduled.task), *check_task_between(errors, tolerance))
+        at_rows = check_accuracy(schedule, errors, scheduled.task)
+        own = with_between(at_rows, check_task_between(errors, tolerance))
         checks += told_with_failures(own, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
     return checks
 
