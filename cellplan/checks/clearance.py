@@ -1,11 +1,13 @@
 """Clearance: what touches, when, and how near the bodies of a cell come to each other at any instant of a motion."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from cellplan.checks.contacts import MM, collision_checks, find_contacts, seconds, uncertified
+from cellplan.collision.measure import TIGHT
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
@@ -18,6 +20,7 @@ from cellplan.scene.survey import CLOSEST, Survey, lowest_bounds
 from cellplan.scene.survey_search import survey
 
 STAGE: Final = "checking clearance"
+EXACT: Final = 1e-4 - 2.0 * TIGHT  # [m] a bound this near to what was measured is a smallest distance, to 0.1 mm
 UNKNOWN: Final = ClearanceReport(
     minima={}, contacts=(), exclusions=(), pair_count=0, curve_times=np.empty(0), curves={}
 )  # before anything was checked
@@ -28,8 +31,9 @@ def check_clearance(
 ) -> tuple[ClearanceReport, tuple[Check, ...]]:
     """Find every contact and the smallest distance of each class, at the samples of a motion and between them.
 
-    Between two samples every joint is taken to move evenly. What is reported then holds at every instant; where that
-    cannot be proved the pair is "not certified", which fails the check.
+    Between two samples every joint is taken to move evenly. What is reported then holds at every instant. That the
+    demanded distance is kept is proved first; where it cannot be the pair is "not certified", which fails the check.
+    The smallest distance is looked for afterwards; where that takes too much work a lower bound of it is reported.
 
     The tool of a robot whose task is scheduled may touch the part within ``checks.contact_zone`` of its tip, from the
     first instant to the last: before its start and after its end it dwells on the part. Such contacts are listed as
@@ -43,11 +47,12 @@ def check_clearance(
         progress: Who wants to know how far it is.
 
     Returns:
-        The distances, never above the truth and within 0.1 mm of it, and a verdict on each class.
+        The distances, never above the truth and within 0.1 mm of it unless they are said not to be exact, and a verdict
+        on each class.
     """
     scene = scene_of_run(scene, [scheduled.task.name for scheduled in schedule.tasks])
     rows = range(len(scene.pairs))
-    asked = scene.engine.distance_queries, scene.engine.contact_queries
+    asked = replace(scene.engine.asked)
     found = survey(scene, q, progress=progress, stage=STAGE)
     contacts, open_rows = find_contacts(found, schedule.times), uncertified(found)
     minima = {kind: _minimum(found, schedule.times, kind, open_rows=open_rows) for kind in ClearanceClass}
@@ -61,8 +66,8 @@ def check_clearance(
         curves=curves,
         closest=_closest(found, schedule.times),
         not_certified=tuple(scene.names(scene.pairs[row]) for row in open_rows),
-        distance_queries=scene.engine.distance_queries - asked[0],
-        contact_queries=scene.engine.contact_queries - asked[1],
+        distance_queries=scene.engine.asked.distances - asked.distances,
+        contact_queries=scene.engine.asked.contacts - asked.contacts,
         cut_steps=sum(pair.cuts for pair in found.found),
         left_out=scene.left_out,
     )
@@ -72,36 +77,43 @@ def check_clearance(
         for kind in classes
         for check in collision_checks(found, contacts, schedule.times, kind=kind, open_rows=open_rows)
     ]
-    checks += [_clearance_check(scene.cell, kind, minima[kind]) for kind in classes if minima[kind].minimum is not None]
+    known = [kind for kind in classes if minima[kind].minimum is not None and minima[kind].certified]
+    checks += [_clearance_check(scene.cell, kind, minima[kind]) for kind in known]
     progress(STAGE, 1.0)
     return report, tuple(checks)
 
 
 def _minimum(seen: Survey, times: Array, kind: ClearanceClass, *, open_rows: Sequence[int]) -> ClearanceMinimum:
-    """Smallest distance of a class: zero where one of its pairs touches or is not certified."""
+    """Smallest distance of a class: zero where one of its pairs touches, a lower bound where no more is proved."""
     pairs, rows = seen.scene.pairs, seen.rows(kind)
     watched = seen.watched(kind)
     touching = [(min(seen.found[row].touches), row) for row in watched if seen.found[row].touches]
-    unproved = [(min(seen.found[row].unproved), row) for row in watched if row in open_rows]
-    if touching or unproved:
-        at, row = min(touching or unproved)
-        return ClearanceMinimum(
-            minimum=0.0,
-            pair=seen.scene.names(pairs[row]),
-            at_s=float(seconds(times, np.array([at]))[0]),
-            certified=bool(touching),
-        )
+    if touching:
+        at, row = min(touching)
+        return ClearanceMinimum(minimum=0.0, pair=seen.scene.names(pairs[row]), at_s=_second(times, at), certified=True)
+    unproved = [row for row in watched.tolist() if row in open_rows]
+    rows = np.union1d(rows, np.array(unproved, dtype=np.intp))
     if not len(rows):
-        return ClearanceMinimum(minimum=None, pair=None, at_s=None, certified=False)
+        return ClearanceMinimum()
+    proved = float(lowest_bounds(seen, rows).min())
     row = min(rows.tolist(), key=lambda row: seen.found[row].distance)
+    is_exact = not unproved and seen.found[row].distance - proved <= EXACT
+    if not is_exact:
+        row = min(rows.tolist(), key=lambda row: float(seen.low[row].min()))
     found, points = seen.found[row], seen.nearest_points(row)
     return ClearanceMinimum(
-        minimum=max(0.0, min(found.distance, float(lowest_bounds(seen, rows).min()))),
+        minimum=max(0.0, min(found.distance, proved)),
         pair=seen.scene.names(pairs[row]),
-        at_s=float(seconds(times, np.array([found.at]))[0]),
-        certified=True,
+        at_s=_second(times, found.at),
+        certified=not unproved,
+        exact=is_exact,
         points=None if points is None else (_point(points[0]), _point(points[1])),
     )
+
+
+def _second(times: Array, at: float) -> float:
+    """Instant in [s] from one counted in samples."""
+    return float(seconds(times, np.array([at]))[0])
 
 
 def _point(p: Array) -> tuple[float, float, float]:
@@ -159,7 +171,8 @@ def _clearance_check(cell: Cell, kind: ClearanceClass, found: ClearanceMinimum) 
     """Whether the smallest distance of a class is what the cell demands."""
     pair, at_s = found.pair or ("", ""), found.at_s or 0.0
     minimum, limit = MM * float(found.minimum or 0.0), MM * cell.checks.clearance
-    shown = np.floor(10.0 * minimum) / 10.0  # rounded down: never more than there is
+    shown = f"{np.floor(10.0 * minimum) / 10.0:.1f} mm"  # rounded down: never more than there is
+    shown = shown if found.exact else f"at least {shown}"
     return Check(
         name="clearance",
         subject=str(kind),
@@ -168,5 +181,5 @@ def _clearance_check(cell: Cell, kind: ClearanceClass, found: ClearanceMinimum) 
         limit=limit,
         unit="mm",
         at_s=at_s,
-        message=f"clearance {kind}: {pair[0]} to {pair[1]} {shown:.1f} mm at {at_s:.3f} s, required {limit:.1f} mm",
+        message=f"clearance {kind}: {pair[0]} to {pair[1]} {shown} at {at_s:.3f} s, required {limit:.1f} mm",
     )

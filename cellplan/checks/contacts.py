@@ -31,8 +31,8 @@ def find_contacts(survey: Survey, times: Array) -> tuple[Contact, ...]:
 
 
 def uncertified(survey: Survey) -> list[int]:
-    """Pairs that could neither be proved to be free nor found to touch."""
-    return [row for row, found in enumerate(survey.found) if found.unproved]
+    """Pairs that were not found to touch or to come nearer than demanded, and could not be proved not to."""
+    return [row for row in range(len(survey.found)) if _is_open(survey, row)]
 
 
 def seconds(times: Array, instants: Array) -> Array:
@@ -44,18 +44,23 @@ def seconds(times: Array, instants: Array) -> Array:
 def collision_checks(
     survey: Survey, contacts: Sequence[Contact], times: Array, *, kind: ClearanceClass, open_rows: Sequence[int]
 ) -> list[Check]:
-    """One failed check for each pair of a class that touches or is not certified, or one passed check for the class."""
+    """One failed check for each pair of a class that touches or is not certified; a passed one when none may touch."""
     own: dict[tuple[str, str], list[Contact]] = {}
     for contact in contacts:
         if contact.clearance_class is kind and not contact.is_allowed:
             own.setdefault(contact.pair, []).append(contact)
     checks = [_pair_collision(pair, found) for pair, found in own.items()]
     own_rows = [row for row in open_rows if survey.scene.pairs[row].clearance_class is kind]
-    checks += [_not_certified(survey, times, row) for row in own_rows]
-    if checks:
-        return checks
-    message = f"collision: none in class {kind}, certified between the samples"
-    return [_collision(str(kind), passed=True, length_s=0.0, at_s=None, message=message)]
+    if not checks and all(survey.low[row].min() > 0.0 for row in own_rows):
+        message = f"collision: none in class {kind}, certified between the samples"
+        checks.append(_collision(str(kind), passed=True, length_s=0.0, at_s=None, message=message))
+    return checks + [_not_certified(survey, times, row) for row in own_rows]
+
+
+def _is_open(survey: Survey, row: int) -> bool:
+    """Whether something was left unproved of a pair that matters for the verdict."""
+    found = survey.found[row]
+    return bool(found.unproved and not found.touches and survey.low[row].min() < found.needed)
 
 
 def _of_pair(survey: Survey, times: Array, row: int) -> list[Contact]:
@@ -117,18 +122,27 @@ def _pair_collision(pair: tuple[str, str], contacts: Sequence[Contact]) -> Check
 
 
 def _not_certified(survey: Survey, times: Array, row: int) -> Check:
-    """The failed check of a pair that may touch: nothing was found, and nothing proved."""
+    """The failed check of a pair of which neither a contact was found nor the demanded distance proved."""
     first, second = survey.scene.names(survey.scene.pairs[row])
-    unproved = survey.found[row].unproved
-    at_s = float(seconds(times, np.array([min(unproved)]))[0])
-    more = f" and at {len(unproved) - 1} more instants" if len(unproved) > 1 else ""
-    return _collision(
-        f"{first} - {second}",
+    found, proved = survey.found[row], MM * max(0.0, float(survey.low[row].min()))
+    at_s = float(seconds(times, np.array([min(found.unproved)]))[0])
+    others = len({int(at) for at in found.unproved}) - 1
+    more = f" and in {others} more steps" if others else ""
+    required = MM * found.demand
+    smallest = f", the smallest distance found is {MM * found.distance:.2f} mm" if np.isfinite(found.distance) else ""
+    what = f"{np.floor(10.0 * proved) / 10.0:.1f} mm are proved, required {required:.1f} mm"
+    if not proved > 0.0:
+        what = "no contact was found and none could be ruled out"
+    return Check(
+        name="clearance",
+        subject=f"{first} - {second}",
         passed=False,
-        length_s=0.0,
+        value=proved,
+        limit=required,
+        unit="mm",
         at_s=at_s,
-        message=f"not certified: {first} and {second} come so near at {at_s:.3f} s{more} that no contact was found and "
-        "none could be ruled out: keep them farther apart",
+        message=f"not certified: {first} to {second} at {at_s:.3f} s{more}: {what}{smallest}; keep them farther apart "
+        "or shorten motion.step_s",
     )
 
 

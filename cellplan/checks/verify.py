@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cellplan.checks.between_checks import check_closures_between, check_task_between, look_between, with_between
 from cellplan.checks.clearance import UNKNOWN, check_clearance
 from cellplan.checks.closure import check_closure, closure_accuracy
 from cellplan.checks.conditioning import conditioning
@@ -56,7 +57,10 @@ def verify(
         task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
     )
     closures = closure_accuracy(cell, scene.chains, q, X_WP)
-    checks = [*_accuracy_checks(cell, schedule, accuracy), *check_closure(cell, schedule.times, closures)]
+    if schedule.desired is not None:
+        accuracy, closures = look_between(scene, schedule, q, accuracy=accuracy, closures=closures)
+    checks = _accuracy_checks(cell, schedule, accuracy)
+    checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
     uses, joint_checks = _joints(cell, schedule.times, q)
     checks += joint_checks
     drift = repeatability(cell, schedule, q)
@@ -95,7 +99,9 @@ def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccu
     """Whether the tools are where they must be; where a joint failed, what it cost."""
     checks: list[Check] = []
     for scheduled, errors in zip(schedule.tasks, accuracy, strict=True):
-        own, tolerance = check_accuracy(schedule, errors, scheduled.task), scheduled.task.tolerance
+        tolerance = scheduled.task.tolerance
+        at_rows = check_accuracy(schedule, errors, scheduled.task)
+        own = with_between(at_rows, check_task_between(errors, tolerance))
         checks += told_with_failures(own, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
     return checks
 

@@ -64,14 +64,21 @@ def _method_word(solver: Record) -> str:
 
 def _task_lines(tasks: Record) -> Iterator[str]:
     for name, task in tasks.items():
-        position, orientation = task["max_position_error_mm"], task["max_orientation_error_deg"]
+        position, orientation = _largest(task, "position_error", "mm"), _largest(task, "orientation_error", "deg")
         yield f"  task {name} ({task['robot']}): largest error {_short(position)} mm, {_short(orientation)} deg"
 
 
 def _closure_lines(closures: Record) -> Iterator[str]:
     for robot, closure in closures.items():
-        position, orientation = closure["max_position_error_mm"], closure["max_orientation_error_deg"]
+        position, orientation = _largest(closure, "position_error", "mm"), _largest(closure, "orientation_error", "deg")
         yield f"  grasp of {robot}: largest closure error {_short(position)} mm, {_short(orientation)} deg"
+
+
+def _largest(errors: Record, name: str, unit: str) -> float | None:
+    """The larger one of an error at the rows and between them."""
+    at_rows: float | None = errors[f"max_{name}_{unit}"]
+    between: float | None = errors.get(f"max_{name}_between_rows_{unit}")
+    return at_rows if at_rows is None or between is None else max(at_rows, between)
 
 
 def _margin_lines(joints: Record) -> Iterator[str]:
@@ -118,7 +125,9 @@ def _clearance_lines(whole: Record) -> Iterator[str]:
     if whole["minimum_mm"] is not None and whole["pair"]:
         first, second = whole["pair"]
         proof = "certified" if whole["certified"] else "not certified"
-        yield f"  smallest clearance {whole['minimum_mm']:.4g} mm, {proof}: {first} - {second}{_instant(whole['at_s'])}"
+        least = "" if whole.get("exact", True) else "at least "
+        figure = f"{least}{whole['minimum_mm']:.4g} mm, {proof}"
+        yield f"  smallest clearance {figure}: {first} - {second}{_instant(whole['at_s'])}"
 
 
 def _slack_lines(slack: Record | None) -> Iterator[str]:

@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.collision.kept_hulls import hull_of
 from cellplan.errors import CellplanError, InputError, OverrunError
 from cellplan.geometry.mesh_topology import components
-from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, bounding_sphere
+from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, bounding_capsule, bounding_sphere
 from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import Array, is_rigid, pose_from
 
@@ -36,6 +36,8 @@ class CollisionBody:
         inflation: In [m]; a capsule is an inflated line, a sphere an inflated point.
         centre: Centre of a sphere that holds the solid, in its own frame in [m], shape (3,).
         radius: Radius of that sphere in [m].
+        ends: Ends of a line in [m], shape (2, 3); the solid is within ``girth`` of the line.
+        girth: In [m].
         witnesses: One point of each connected piece of the solid, shape (C, 3).
     """
 
@@ -48,6 +50,8 @@ class CollisionBody:
     inflation: float
     centre: Array
     radius: float
+    ends: Array
+    girth: float
     witnesses: Array
 
 
@@ -69,6 +73,7 @@ def prepare(name: str, shape: Solid) -> CollisionBody:
     hull, is_convex = _hull(shape)
     core, inflation = _core(shape)
     centre, radius = bounding_sphere(shape)
+    ends, girth = bounding_capsule(shape)
     return CollisionBody(
         name=name,
         shape=shape,
@@ -79,6 +84,8 @@ def prepare(name: str, shape: Solid) -> CollisionBody:
         inflation=inflation,
         centre=centre,
         radius=radius,
+        ends=ends,
+        girth=girth,
         witnesses=_witnesses(shape),
     )
 

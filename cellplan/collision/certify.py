@@ -2,60 +2,39 @@
 
 Each step of the motion has a lower bound of the distance that holds at all its instants. Bounding spheres give the
 first. A search then measures the pair at one sample after the other, where the bound is lowest; each reading raises the
-bounds of its neighbours (``travel``). A step that stays open with both ends measured is cut into finer steps. Where the
-steps become as fine as ``RESOLUTION`` and still nothing is proved, the answer is "not certified", never "free".
+bounds of its neighbours (``travel``). A step that stays open with both ends measured is cut into finer steps.
+
+What must be known comes first: that the bodies do not touch, then that they keep the distance that is demanded. Where
+the steps become as fine as ``RESOLUTION``, or too many have been cut, and this is still not proved, the answer is "not
+certified", never "free". Then the bounds are raised, the lowest first, until the smallest distance is known exactly;
+this ends earlier when it takes too much work, and what is proved by then remains true.
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.collision.engine import Engine
+from cellplan.collision.found import Flags, Found, StepBounds
 from cellplan.collision.inside import is_inside
 from cellplan.collision.measure import SURELY_APART, TIGHT, Reading, look, sharpen
 from cellplan.collision.pieces import PieceMotion, can_be_split, read_piece, split
 from cellplan.collision.travel import Motion, Pair, PairMotion
 from cellplan.geometry.transforms import Array
 
-Flags = NDArray[np.bool_]
-
-SEARCH_ROOM: Final = 5e-5  # [m] a search stops when nothing can be nearer than the nearest found by more than this
 RESOLUTION: Final = 1e-6  # [m] steps in which nothing travels farther than this are not cut any more
 PARTS: Final = 8  # [-] finer steps that an open step is cut into
 MOST_LOOSE: Final = 16  # [-] distances beyond those of the hulls that are measured before a body is taken apart
-MOST_CUTS: Final = 1000  # [-] steps of one pair that are cut, finer ones included; beyond that nothing is certified
-
-
-@dataclass(slots=True, kw_only=True)
-class Found:
-    """What a search has found; instants are counted in samples, with fractions between them.
-
-    Attributes:
-        distance: Smallest distance measured in [m], never above the truth and within 0.05 mm of it; inf where none was.
-        at: Its instant.
-        touches: Instants at which the bodies touch.
-        unproved: Instants at which steps begin that could not be certified.
-        cuts: How many steps have been cut.
-        most_cuts: How many may be.
-    """
-
-    distance: float = np.inf
-    at: float = 0.0
-    touches: list[float] = field(default_factory=list)
-    unproved: list[float] = field(default_factory=list)
-    cuts: int = 0
-    most_cuts: int = MOST_CUTS
+ROUGH: Final = 2e-4  # [m] a search for the smallest distance goes half the way to it at a time, until so near
 
 
 class Search(ABC):
     """The steps of one pair; what is common to two solids and to a solid above a half-space.
 
     Attributes:
-        low: No distance in the step is below this, in [m], shape (n - 1,); zero where the bodies touch and where
-            nothing is proved.
+        bounds: What is proved of each step.
         found: What has been found.
     """
 
@@ -68,27 +47,41 @@ class Search(ABC):
             begin: Instant of the first sample.
             width: Length of a step, in samples of the program.
         """
-        self.low, self.found = low, found
+        self.bounds, self.found = StepBounds(low), found
         self._begin, self._width = begin, width
         self._is_read: Flags = np.zeros(len(low) + 1, dtype=bool)
         self._touches: Flags = np.zeros(len(low) + 1, dtype=bool)
-        self._is_closed: Flags = np.zeros(len(low), dtype=bool)
+        self._fine: dict[int, Search] = {}
+
+    @property
+    def low(self) -> Array:
+        """No distance in the step is below this, in [m], shape (n - 1,); zero where the bodies touch."""
+        return self.bounds.low
 
     def run(self, cutoff: float) -> None:
         """Search until no step can be below a cutoff in [m] and nearer than the nearest found, or touches."""
-        while True:
-            goal = max(SURELY_APART, min(cutoff, self.found.distance - SEARCH_ROOM))
-            step = int(np.argmin(np.where(self._is_closed, np.inf, self.low)))
-            if self._is_closed[step] or self.low[step] >= goal:
-                break
-            unread = [sample for sample in (step, step + 1) if not self._is_read[sample]]
-            if self._takes_apart(cutoff):
-                continue
-            if unread:
-                self._read(unread[len(unread) // 2], goal)
-            else:
-                self._cut(step, cutoff)
+        found = self.found
+        found.is_needed = True
+        for level in (SURELY_APART, found.demand):
+            self.raise_to(level, cutoff)
+        found.is_needed = False
+        while not found.is_spent and (lowest := self.bounds.lowest()[1]) < (goal := found.goal(cutoff)):
+            self.raise_to(goal if goal - lowest <= ROUGH else 0.5 * (lowest + goal), cutoff)
         self._finish()
+
+    def raise_to(self, level: float, cutoff: float) -> None:
+        """Raise all bounds to a level in [m], as far as they are below a cutoff and what may be nearest."""
+        while not self.found.is_spent:
+            step, lowest = self.bounds.lowest()
+            if lowest >= min(level, self.found.goal(cutoff)):
+                break
+            if self._takes_apart(level, cutoff):
+                continue
+            unread = [sample for sample in (step, step + 1) if not self._is_read[sample]]
+            if unread:
+                self._read(unread[len(unread) // 2], self.found.goal(cutoff))
+            else:
+                self._cut(step, level, cutoff)
 
     def _instant(self, place: float) -> float:
         """Instant of a place among the samples."""
@@ -100,31 +93,31 @@ class Search(ABC):
         if touches:
             self._touches[sample] = True
             self.found.touches.append(self._instant(sample))
-            self._close(slice(max(0, sample - 1), sample + 1))
+            self.bounds.close(slice(max(0, sample - 1), sample + 1))
         elif is_exact and distance < self.found.distance:
             self.found.distance, self.found.at = distance, self._instant(sample)
 
-    def _close(self, steps: slice | Flags) -> None:
-        """Give up steps: nothing but zero can be said of them."""
-        self._is_closed[steps] = True
-        self.low[steps] = 0.0
-
-    def _cut(self, step: int, cutoff: float) -> None:
-        """Look at one step in finer steps."""
-        before = len(self.found.touches), len(self.found.unproved)
-        if self._travel(step) <= RESOLUTION or self.found.cuts >= self.found.most_cuts:
-            self.found.unproved.append(self._instant(step))
-            self._close(slice(step, step + 1))
+    def _cut(self, step: int, level: float, cutoff: float) -> None:
+        """Look at one step in finer steps; give it up where it cannot be cut any more."""
+        fine, bounds = self._fine.get(step), self.bounds
+        if fine is None:
+            if self._travel(step) <= RESOLUTION or not self.found.may_cut:
+                bounds.is_given_up[step] = True
+                if bounds.low[step] < self.found.needed:
+                    self.found.unproved.append(self._instant(step))
+                return
+            self.found.count_cut()
+            fine = self._fine[step] = self._finer(step)
+        before = len(self.found.touches)
+        fine.raise_to(level, cutoff)
+        fine._finish()
+        if len(self.found.touches) != before:
+            bounds.close(slice(step, step + 1))
             return
-        self.found.cuts += 1
-        fine = self._finer(step)
-        fine.run(cutoff)
-        if (len(self.found.touches), len(self.found.unproved)) != before:
-            self._close(slice(step, step + 1))
-        else:
-            self.low[step] = max(self.low[step], float(fine.low.min()))
+        bounds.low[step] = max(bounds.low[step], float(fine.low.min()))
+        bounds.is_given_up[step] = bool(bounds.low[step] < min(level, self.found.goal(cutoff)))
 
-    def _takes_apart(self, cutoff: float) -> bool:  # noqa: ARG002 - for those that have pieces
+    def _takes_apart(self, level: float, cutoff: float) -> bool:  # noqa: ARG002 - for those that have pieces
         """Search piece by piece where that is quicker; say whether it was done."""
         return False
 
@@ -176,7 +169,8 @@ class SolidSearch(Search):
         self._relative: PairMotion | None = None
         self._readings: dict[int, Reading] = {}
         self._loose = 0
-        self._was_split = not any(can_be_split(engine.bodies[index]) for index in pair)
+        self._can_be_split = any(can_be_split(engine.bodies[index]) for index in pair)
+        self._pieces: list[PieceSearch] = []
 
     @property
     def relative(self) -> PairMotion:
@@ -190,6 +184,7 @@ class SolidSearch(Search):
         reading = self._readings.get(sample)
         if reading is None:
             reading = self._measured(sample, goal)
+            self.found.spare_readings += not self.found.is_needed
             self.take(sample, reading, goal)
         return reading
 
@@ -209,7 +204,7 @@ class SolidSearch(Search):
         self._note(sample, reading.bound, touches=reading.touches, is_exact=reading.is_exact)
         if reading.touches:
             return
-        open_ = np.flatnonzero((self.low < goal) & ~self._is_closed)
+        open_ = np.flatnonzero((self.low < goal) & ~self.bounds.is_closed)
         if open_.size:
             first, last = min(int(open_[0]), sample), max(int(open_[-1]) + 1, sample)
             self.relative.carry(reading, sample, first=first, last=last, low=self.low)
@@ -218,7 +213,7 @@ class SolidSearch(Search):
             if ends[0] is not None and ends[1] is not None:
                 proved = 0.5 * (ends[0].bound + ends[1].bound - self.relative.step_travel(step))
                 self.low[step] = max(self.low[step], proved)
-        self.low[self._is_closed] = 0.0
+        self.low[self.bounds.is_closed] = 0.0
 
     def _read(self, sample: int, goal: float) -> None:
         self.read(sample, goal)
@@ -226,31 +221,34 @@ class SolidSearch(Search):
     def _travel(self, step: int) -> float:
         return self.relative.step_travel(step)
 
-    def _takes_apart(self, cutoff: float) -> bool:
-        if self._loose < MOST_LOOSE or self._was_split:
-            return False
-        self._was_split = True
-        engine, is_first_split = split(self._engine, self._pair)
-        motion = PieceMotion.of(self._motion, self._pair, engine, is_first_split=is_first_split)
-        lowest = np.full(len(self.low), np.inf)
-        for piece in range(len(engine.bodies) - 1):
-            search = PieceSearch(
-                engine, motion.piece_pair(piece), motion, found=self.found, begin=self._begin, width=self._width
-            )
-            search.go_on_from(self)
-            search.run(cutoff)
-            lowest = np.minimum(lowest, search.low)
-            self._touches |= search._touches
-            self._close(self._is_closed | search._is_closed)
-        self.low = np.where(self._is_closed, 0.0, np.maximum(self.low, lowest))
-        self._engine.distance_queries += engine.distance_queries
-        self._engine.contact_queries += engine.contact_queries
+    def _takes_apart(self, level: float, cutoff: float) -> bool:
+        if not self._pieces:
+            if self._loose < MOST_LOOSE or not self._can_be_split:
+                return False
+            self._pieces = self._split()
+        bounds, lowest = self.bounds, np.full(len(self.low), np.inf)
+        for piece in self._pieces:
+            piece.raise_to(level, cutoff)
+            piece._finish()
+            lowest = np.minimum(lowest, piece.low)
+            self._touches |= piece._touches
+            bounds.close(bounds.is_closed | piece.bounds.is_closed)
+        bounds.lift(lowest)
+        bounds.is_given_up |= bounds.low < min(level, self.found.goal(cutoff))
         return True
 
-    def go_on_from(self, whole: "SolidSearch") -> None:
-        """Take over what is known of the bodies of which these are pieces."""
-        self._is_closed |= whole._is_closed
-        self.low = np.where(self._is_closed, 0.0, np.maximum(self.low, whole.low))
+    def _split(self) -> list["PieceSearch"]:
+        """A search for each piece of a body that is not convex, the nearest first."""
+        engine, is_first_split = split(self._engine, self._pair)
+        motion = PieceMotion.of(self._motion, self._pair, engine, is_first_split=is_first_split)
+        found, begin, width = self.found, self._begin, self._width
+        pairs = [motion.piece_pair(piece) for piece in range(len(engine.bodies) - 1)]
+        pieces = [PieceSearch(engine, pair, motion, found=found, begin=begin, width=width) for pair in pairs]
+        pieces.sort(key=lambda piece: float(piece.low.min()))
+        for piece in pieces:
+            piece.bounds.is_closed |= self.bounds.is_closed
+            piece.bounds.lift(self.low)
+        return pieces
 
     def _finer(self, step: int) -> "Search":
         fine = type(self)(
@@ -267,14 +265,14 @@ class SolidSearch(Search):
 
     def _finish(self) -> None:
         """Read the samples between steps given up, and find where one body lies wholly inside the other."""
-        is_left = np.append(True, self._is_closed) & np.append(self._is_closed, True) & ~self._is_read
+        is_left = np.append(True, self.bounds.is_closed) & np.append(self.bounds.is_closed, True) & ~self._is_read
         for sample in np.flatnonzero(is_left):
             self.read(int(sample), SURELY_APART)
         if self._finds_enclosures and self._width == 1.0:
-            for stretch in _free_stretches(self._touches, self._is_closed):
+            for stretch in _free_stretches(self._touches, self.bounds.is_closed):
                 if self._is_enclosed(stretch):
                     self.found.touches += [self._instant(int(sample)) for sample in stretch]
-                    self._close(slice(max(0, stretch[0] - 1), stretch[-1] + 1))
+                    self.bounds.close(slice(max(0, stretch[0] - 1), stretch[-1] + 1))
 
     def _is_enclosed(self, stretch: NDArray[np.intp]) -> bool:
         """Whether one body lies inside the other throughout a stretch: one proof that it does not is enough."""

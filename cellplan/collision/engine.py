@@ -5,7 +5,8 @@ proposal that ``certificate`` has to prove. Poses are checked before they come h
 and results are new for each question because FCL leaves old values in them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import fcl
@@ -19,6 +20,14 @@ from cellplan.geometry.transforms import Array
 NO_ANSWER: Final = "collision: the engine gave a distance that is not a number between '{}' and '{}'"
 
 
+@dataclass(slots=True)
+class Asked:
+    """How many contacts and how many distances were asked for."""
+
+    contacts: int = 0
+    distances: int = 0
+
+
 class Engine:
     """A set of bodies that can be asked about in pairs; built once, safe to send to another process.
 
@@ -26,8 +35,7 @@ class Engine:
         bodies: The bodies.
         centres: Centres of their bounding spheres, each in the body's own frame in [m], shape (B, 3).
         radii: Radii of these spheres in [m], shape (B,).
-        contact_queries: How often a contact was asked for so far.
-        distance_queries: How often a distance was asked for so far.
+        asked: What was asked for so far, of pieces of the bodies too.
     """
 
     def __init__(self, bodies: Sequence[CollisionBody]) -> None:
@@ -35,12 +43,21 @@ class Engine:
         self.bodies = tuple(bodies)
         self.centres = np.array([body.centre for body in self.bodies]).reshape(-1, 3)
         self.radii = np.array([body.radius for body in self.bodies])
-        self.contact_queries = self.distance_queries = 0
-        self._objects: dict[tuple[str, int], Any] = {}
+        self.asked = Asked()
+        self._objects: dict[tuple[str, int], Any] = {}  # by kind and identity of the body
+        self._parts: dict[Hashable, Engine] = {}
 
     def __reduce__(self) -> tuple[type["Engine"], tuple[tuple[CollisionBody, ...]]]:
         """Leave FCL's own objects behind; the other side builds them anew."""
         return Engine, (self.bodies,)
+
+    def part(self, key: Hashable, bodies: Callable[[], Sequence[CollisionBody]]) -> "Engine":
+        """An engine for bodies that are made of this one's: built once for each key, and counted here."""
+        known = self._parts.get(key)
+        if known is None:
+            known = self._parts[key] = Engine(bodies())
+            known.asked, known._objects = self.asked, self._objects
+        return known
 
     def sphere_centres(self, poses: BodyPoses, *, sample: int) -> Array:
         """Centres of the bounding spheres in the world at a sample in [m], shape (B, 3)."""
@@ -49,13 +66,13 @@ class Engine:
 
     def touch(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> bool:
         """Say whether two bodies touch at a sample. A mesh is its surface here; what lies inside is asked elsewhere."""
-        self.contact_queries += 1
+        self.asked.contacts += 1
         a, b = self._placed("solid", first, poses, sample), self._placed("solid", second, poses, sample)
         return bool(fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0)
 
     def proposed_direction(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[float, Array]:
         """FCL's distance in [m] between the hulls of two bodies and the direction from first to second: unproven."""
-        self.distance_queries += 1
+        self.asked.distances += 1
         a, b = self._placed("hull", first, poses, sample), self._placed("hull", second, poses, sample)
         result = fcl.DistanceResult()
         distance = fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
@@ -64,7 +81,7 @@ class Engine:
 
     def proposed_points(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[Array, Array]:
         """FCL's nearest points of the hulls of two bodies in the world, shape (3,) each: unproven."""
-        self.distance_queries += 1
+        self.asked.distances += 1
         a, b = self._placed("hull", first, poses, sample), self._placed("hull", second, poses, sample)
         result = fcl.DistanceResult()
         fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
@@ -76,7 +93,7 @@ class Engine:
 
         Exact but slow.
         """
-        self.distance_queries += 1
+        self.asked.distances += 1
         a, b = self._placed("core", first, poses, sample), self._placed("core", second, poses, sample)
         result = fcl.DistanceResult()
         distance = fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
@@ -93,7 +110,7 @@ class Engine:
         Raises:
             CellplanError: The engine's answer is not a number.
         """
-        self.distance_queries += 1
+        self.asked.distances += 1
         a, b = self._placed("core", first, poses, sample), self._placed("core", second, poses, sample)
         distance = float(fcl.distance(a, b, fcl.DistanceRequest(), fcl.DistanceResult()))
         if not np.isfinite(distance):
@@ -102,9 +119,10 @@ class Engine:
 
     def _placed(self, kind: str, index: int, poses: BodyPoses, sample: int) -> Any:
         """FCL's object for the solid, hull or core of a body, moved to its pose."""
-        found = self._objects.get((kind, index))
+        key = (kind, id(self.bodies[index]))
+        found = self._objects.get(key)
         if found is None:
-            found = self._objects[kind, index] = self._built(kind, index)
+            found = self._objects[key] = self._built(kind, index)
         found.setTransform(fcl.Transform(poses.R[index, sample], poses.p[index, sample]))
         return found
 

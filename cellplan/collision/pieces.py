@@ -14,7 +14,7 @@ from cellplan.collision.certificate import separation
 from cellplan.collision.engine import Engine
 from cellplan.collision.measure import SURELY_APART, TIGHT, TOUCHING, Reading
 from cellplan.collision.travel import ROUNDING, Bends, Motion, Pair
-from cellplan.geometry.shapes import Mesh, bounding_sphere
+from cellplan.geometry.shapes import Mesh, bounding_capsule
 from cellplan.geometry.transforms import Array
 
 PIECES: Final = 8  # [-] pieces that a body is taken apart into at once
@@ -85,12 +85,12 @@ def can_be_split(body: CollisionBody) -> bool:
 def split(engine: Engine, pair: Pair) -> tuple[Engine, bool]:
     """The pieces of that body of a pair which has more triangles, after the other one; and whether it is the first.
 
-    At least one of the two must be one that can be split.
+    At least one of the two must be one that can be split. It is taken apart once, however often it is asked for.
     """
     sizes = [len(engine.bodies[k].core.faces) if can_be_split(engine.bodies[k]) else 0 for k in pair]
     is_first = sizes[0] > sizes[1]
     whole, other = pair if is_first else pair[::-1]
-    return Engine((engine.bodies[other], *_pieces(engine.bodies[whole]))), is_first
+    return engine.part(pair, lambda: (engine.bodies[other], *_pieces(engine.bodies[whole]))), is_first
 
 
 def read_piece(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int) -> tuple[Reading, bool]:
@@ -138,7 +138,9 @@ def _piece(body: CollisionBody, group: np.ndarray) -> CollisionBody:
     surface = Mesh(
         vertices=body.core.vertices[used], faces=faces.reshape(-1, 3), source=body.core.source, is_closed=False
     )
-    centre, radius = bounding_sphere(surface)
+    centre = surface.vertices.mean(axis=0)  # within the body, as bends are those of its points
+    radius = float(np.linalg.norm(surface.vertices - centre, axis=1).max())
+    ends, girth = bounding_capsule(surface)
     return CollisionBody(
         name=body.name,
         shape=surface,
@@ -149,5 +151,7 @@ def _piece(body: CollisionBody, group: np.ndarray) -> CollisionBody:
         inflation=0.0,
         centre=centre,
         radius=radius,
+        ends=ends,
+        girth=girth,
         witnesses=surface.vertices[:1],
     )

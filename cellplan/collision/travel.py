@@ -8,12 +8,15 @@ Between two samples all joints move evenly; the unit of time here is that step. 
   fixed point is largest at one of its ends. So a distance d(m), proved at a sample m, proves
   :math:`d(s) \ge d(m) - \max(\delta(0), \delta(1)) - M/8`, where :math:`\delta(k)` is the farthest that a point moved
   between m and the sample k: :math:`|c(k) - c(m)| + \rho\,|R(k) - R(m)|_2` with a sphere :math:`(c, \rho)` round B.
+  With a line from a to b and a radius r round it that hold B, it is also
+  :math:`\max(|a(k) - a(m)|, |b(k) - b(m)|) + r\,|R(k) - R(m)|_2`, which is less for a slender body.
 - For a direction n fixed in A, ``n.x`` less what A reaches along n bounds the distance, for the point x of B that
   comes lowest; a minimum over points of functions that stay within M/8 of their chords does so from below:
   :math:`d(s) \ge \min(g(0), g(1)) - M/8`.
 - :math:`\dot x(s) - (x(1) - x(0)) = \int_0^1 (\dot x(s) - \dot x(u))\,du` is no longer than
   :math:`M (s^2 + (1-s)^2)/2`, of which the integral over the step is M/3. So no point travels farther in a step than
-  :math:`D = |\Delta c| + \rho\,|\Delta R|_2 + M/3`, and :math:`d(s) \ge (d(0) + d(1) - D)/2`.
+  :math:`D = |\Delta c| + \rho\,|\Delta R|_2 + M/3` (or as much with the line in place of the sphere), and
+  :math:`d(s) \ge (d(0) + d(1) - D)/2`.
 
 All of it holds for A seen from B as well; the better one counts. D is also no more than the sum of each joint's turn
 times its longest lever arm (``Bends.reach``), however long the step is.
@@ -25,7 +28,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.collision.bodies import BodyPoses
+from cellplan.collision.bodies import BodyPoses, CollisionBody
 from cellplan.collision.certificate import supports
 from cellplan.collision.engine import Engine
 from cellplan.collision.measure import Reading
@@ -83,17 +86,16 @@ class PairMotion:
         self._a, self._b = engine.bodies[first], engine.bodies[second]
         self._R_WA = motion.poses.R[first]
         self._R_AB, self._p_AB = motion.relative(pair)
-        self._b_in_A = self._p_AB + self._R_AB @ self._b.centre
-        self._a_in_B = ((self._a.centre - self._p_AB)[:, None, :] @ self._R_AB)[:, 0]
+        R_BA = np.swapaxes(self._R_AB, 1, 2)
+        p_BA = -(R_BA @ self._p_AB[..., None])[..., 0]
+        self._b_in_A, self._a_in_B = _Carried(self._b, self._R_AB, self._p_AB), _Carried(self._a, R_BA, p_BA)
         self._work = sum(len(body.hull.vertices) for body in (self._a, self._b) if isinstance(body.hull, Mesh))
         self._bends = motion.bends(pair)
         self._strays_b, self._strays_a = self._bends.second / 8.0, self._bends.first / 8.0
 
     def step_travel(self, step: int) -> float:
         """How far no point of the one body travels farther in a step, seen from the other, in [m]."""
-        turn = float(_turns(self._R_AB[step + 1] - self._R_AB[step])[0])
-        along_b = float(np.linalg.norm(self._b_in_A[step + 1] - self._b_in_A[step])) + self._b.radius * turn
-        along_a = float(np.linalg.norm(self._a_in_B[step + 1] - self._a_in_B[step])) + self._a.radius * turn
+        along_b, along_a = (float(moved[0]) for moved in self.displacement(step, slice(step + 1, step + 2)))
         along_b += float(self._bends.second[step]) / 3.0
         along_a += float(self._bends.first[step]) / 3.0
         return min(along_a, along_b, float(self._bends.reach[step])) + ROUNDING
@@ -109,9 +111,7 @@ class PairMotion:
             Two arrays in [m], shape (m,).
         """
         turn = _turns(self._R_AB[others] - self._R_AB[sample])
-        moved_b = np.linalg.norm(self._b_in_A[others] - self._b_in_A[sample], axis=1) + self._b.radius * turn
-        moved_a = np.linalg.norm(self._a_in_B[others] - self._a_in_B[sample], axis=1) + self._a.radius * turn
-        return moved_b, moved_a
+        return self._b_in_A.displacement(sample, others, turn), self._a_in_B.displacement(sample, others, turn)
 
     def carry(self, reading: Reading, sample: int, *, first: int, last: int, low: Array) -> None:
         """Raise the lower bounds of the steps from one sample to a later one by what a reading proves there.
@@ -157,6 +157,24 @@ class PairMotion:
         by_B = np.minimum(in_B[1:], in_B[:-1]) - self._strays_a[first:last]
         proved: Array = np.maximum(by_A, by_B) - self._a.looseness - self._b.looseness
         return proved
+
+
+class _Carried:
+    """What holds one body, seen from the other at all samples: the centre of a sphere, and both ends of a line."""
+
+    def __init__(self, body: CollisionBody, R: Array, p: Array) -> None:
+        """Carry the three points along; poses of the body seen from the other, shapes (n, 3, 3) and (n, 3)."""
+        points = np.concatenate([body.centre[None], body.ends])
+        self._points = np.swapaxes(R @ points.T, 1, 2) + p[:, None]
+        self._radius, self._girth = body.radius, body.girth
+
+    def displacement(self, sample: int, others: slice | Samples, turn: Array) -> Array:
+        """Farthest that a point of the body moved between a sample and m others, which turned it so far, shape (m,)."""
+        moved = self._points[others] - self._points[sample]
+        length = np.sqrt(np.einsum("ijk,ijk->ij", moved, moved))
+        by_line = np.maximum(length[:, 1], length[:, 2]) + self._girth * turn
+        farthest: Array = np.minimum(length[:, 0] + self._radius * turn, by_line)
+        return farthest
 
 
 def _turns(change: Array) -> Array:

@@ -133,3 +133,32 @@ def bounding_sphere(shape: Solid) -> tuple[Array, float]:
         case Mesh():
             centre = 0.5 * (shape.vertices.min(axis=0) + shape.vertices.max(axis=0))
             return centre, float(np.linalg.norm(shape.vertices - centre, axis=1).max())
+
+
+def bounding_capsule(shape: Solid) -> tuple[Array, float]:
+    """Both ends of a line in the shape's frame, shape (2, 3), and a radius round it that hold the whole shape.
+
+    The line lies along the longest extent: for slender shapes this tells much more than a sphere does.
+    """
+    match shape:
+        case Box(size):
+            along = int(np.argmax(size))
+            across = np.delete(size, along)
+            return _line(np.zeros(3), along, 0.5 * size[along]), 0.5 * float(np.linalg.norm(across))
+        case Cylinder(radius, length) | Capsule(radius, length):
+            return _line(np.zeros(3), 2, 0.5 * length), radius
+        case Sphere(radius):
+            return np.zeros((2, 3)), radius
+        case Mesh():
+            low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
+            along, centre = int(np.argmax(high - low)), 0.5 * (low + high)
+            off = np.delete(shape.vertices - centre, along, axis=1)
+            radius = float(np.sqrt(np.einsum("ij,ij->i", off, off).max()))
+            return _line(centre, along, 0.5 * float(high[along] - low[along])), radius
+
+
+def _line(centre: Array, along: int, half: float) -> Array:
+    """Both ends of a line along an axis, shape (2, 3)."""
+    ends = np.stack([centre, centre])
+    ends[:, along] += (-half, half)
+    return ends

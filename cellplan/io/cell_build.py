@@ -19,6 +19,7 @@ from cellplan.io.schema.task import (
     RectangleEntry,
     RhombusEntry,
     TaskEntry,
+    ToleranceEntry,
     TrapezoidEntry,
 )
 from cellplan.io.shape_build import MM, MeshReader, centred_solid, obstacle_shape, pose_from_entry, tool_solid
@@ -137,9 +138,7 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
         turn=float(np.deg2rad(entry.tool_turn_deg)),
         axes=_axis_numbers(entry.axes),
         is_spin_free="spin" in entry.free,
-        tolerance=Tolerance(
-            position=entry.tolerance.position_mm / MM, orientation=float(np.deg2rad(entry.tolerance.orientation_deg))
-        ),
+        tolerance=_tolerance(entry.tolerance),
         start=entry.begins_s,
         duration=entry.duration_s,
         feed=None if entry.feed_mm_s is None else entry.feed_mm_s / MM,
@@ -193,6 +192,16 @@ def direction(written: Direction) -> Array:
     return unit
 
 
+def _tolerance(entry: ToleranceEntry) -> Tolerance:
+    """Allowed tool errors in [m] and [rad]."""
+    return Tolerance(
+        position=entry.position_mm / MM,
+        orientation=float(np.deg2rad(entry.orientation_deg)),
+        position_between=(entry.between_rows_mm or entry.position_mm) / MM,
+        orientation_between=float(np.deg2rad(entry.between_rows_deg or entry.orientation_deg)),
+    )
+
+
 def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict[str, Any]:
     """The file as plain values in its own units, with every default that follows from other entries filled in.
 
@@ -206,6 +215,8 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         entry = values["tasks"][name]
         tool_axis, entry["tool_x"] = tool_directions(task)
         entry["start_s"] = task.begins_s
+        entry["tolerance"].setdefault("between_rows_mm", task.tolerance.position_mm)
+        entry["tolerance"].setdefault("between_rows_deg", task.tolerance.orientation_deg)
         entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
         if name not in timed:
             entry.setdefault("time_law", motion["time_law"])

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -34,6 +35,21 @@ class TaskSchedule:
     cycle_ends: tuple[float, ...] = ()
 
 
+class DesiredMotion(Protocol):
+    """Where every tool must be at any instant, not at those of the clock only."""
+
+    @property
+    def times(self) -> Array:
+        """Instants of the clock in [s], shape (N,)."""
+
+    @property
+    def jumps(self) -> Array:
+        """Instants in [s], increasing, at which the speed of a tool may jump, or its rate."""
+
+    def poses(self, times: Array) -> tuple[Array, ...]:
+        """Wanted tool tips in P of all tasks at instants in [s], shape (M,), shape (M, 4, 4) each."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Schedule:
     """All tasks on one clock.
@@ -41,10 +57,13 @@ class Schedule:
     Attributes:
         times: Instants in [s], evenly spaced from 0, shape (N,).
         tasks: The tasks that are worked on.
+        desired: Where their tools must be between these instants; None where nobody knows, and errors are looked at
+            at the instants of the clock only.
     """
 
     times: Array
     tasks: tuple[TaskSchedule, ...]
+    desired: DesiredMotion | None = None
 
     @property
     def step(self) -> float:

@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.between_rows import BetweenRows
 from cellplan.model.left_out import LeftOut
 
 CAUTION = (
@@ -69,6 +70,7 @@ class TaskAccuracy:
         orientation_error: Rotation vector of ``R_PT,wanted R_PT^T`` in P in [rad], shape (N, 3); likewise.
         path_length: Length of the path on the surface in [m].
         end_s: Instant at which the path is done.
+        between: Errors between the rows; None where nobody looked.
     """
 
     task: str
@@ -77,6 +79,7 @@ class TaskAccuracy:
     orientation_error: Array
     path_length: float
     end_s: float
+    between: BetweenRows | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -88,12 +91,14 @@ class ClosureAccuracy:
         axes: Components that the grasp keeps, in the order x, y, z, rx, ry, rz.
         position_error: Position error in P in [m], shape (N, 3); components that the grasp leaves open are zero.
         orientation_error: Rotation vector of ``R_PT,wanted R_PT^T`` in P in [rad], shape (N, 3); likewise.
+        between: Errors between the rows; None where nobody looked.
     """
 
     robot: str
     axes: tuple[int, ...]
     position_error: Array
     orientation_error: Array
+    between: BetweenRows | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,15 +148,18 @@ class ClearanceMinimum:
     Attributes:
         minimum: Distance in [m], never above the truth; 0 when the pair touches; None when there is no such pair.
         pair: Names of the two bodies, None when there is no such pair.
-        at_s: Instant in [s].
-        certified: Whether the figure also holds between the samples.
+        at_s: Instant in [s] at which the pair was found to be nearest.
+        certified: Whether it is proved, between the samples too, that nothing touches and either that the demanded
+            distance is kept or that it is not. Otherwise ``minimum`` is what is proved, and may be 0 without a contact.
+        exact: Whether the truth is above ``minimum`` by no more than 0.1 mm; otherwise it is a lower bound.
         points: Where the two bodies are nearest, in the world in [m]; None when they touch or are not known.
     """
 
-    minimum: float | None
-    pair: tuple[str, str] | None
-    at_s: float | None
-    certified: bool
+    minimum: float | None = None
+    pair: tuple[str, str] | None = None
+    at_s: float | None = None
+    certified: bool = False
+    exact: bool = True
     points: tuple[Point, Point] | None = None
 
 
@@ -191,7 +199,7 @@ class ClearanceReport:
             the instant, shape (K,) each; exact to 0.1 mm at the minimum, elsewhere below what is reached in the
             middle of the stretch by no more than about a twentieth and a millimetre.
         closest: The closest pairs that are to keep the demanded distance, nearest first.
-        not_certified: Pairs that could neither be proved to be free nor found to touch.
+        not_certified: Pairs that were not found to touch or to come nearer than demanded, and not proved not to.
         distance_queries: How often the collision engine was asked for a distance.
         contact_queries: How often it was asked for a contact.
         cut_steps: How many steps between samples had to be looked at in finer steps.

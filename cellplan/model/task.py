@@ -140,10 +140,27 @@ class TimeLaw:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerance:
-    """Largest allowed tool error on the part in [m] and [rad]."""
+    """Largest allowed tool error on the part in [m] and [rad].
+
+    Attributes:
+        position: At the rows of the tables.
+        orientation: Likewise.
+        position_between: Between the rows; None for the same as at the rows.
+        orientation_between: Likewise.
+    """
 
     position: float
     orientation: float
+    position_between: float | None = None
+    orientation_between: float | None = None
+
+    @property
+    def between(self) -> tuple[float, float]:
+        """Largest position error in [m] and orientation error in [rad] between the rows."""
+        return (
+            self.position if self.position_between is None else self.position_between,
+            self.orientation if self.orientation_between is None else self.orientation_between,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

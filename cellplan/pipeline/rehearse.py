@@ -30,7 +30,9 @@ MEASUREMENT_STREAM: Final = 1  # stream of random numbers of the measurements of
 IN_PASS_STREAM: Final = 2
 MOST_ERRORS: Final = 4_000_000  # trials times samples times tasks that are kept: 200 MB, twice with feedback
 DEFAULT_ROUNDS: Final = 20
-TOOL_ERRORS: Final = frozenset({"position_error", "orientation_error"})
+TOOL_ERRORS: Final = frozenset(
+    {"position_error", "orientation_error", "position_error_between_rows", "orientation_error_between_rows"}
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

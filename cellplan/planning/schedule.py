@@ -52,7 +52,8 @@ def time_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> TimedTasks:
 
 def sample(timed: TimedTasks) -> Schedule:
     """Look at all tasks at the instants of their clock."""
-    return Schedule(times=timed.times, tasks=tuple(_on_clock(timed.times, path) for path in timed.paths))
+    tasks = tuple(_on_clock(timed.times, path) for path in timed.paths)
+    return Schedule(times=timed.times, tasks=tasks, desired=timed)
 
 
 def examine_times(cell: Cell, toolpaths: Sequence[Toolpath]) -> None:

@@ -221,6 +221,15 @@ class TimedTasks:
         """Those of them that do not come from knots of the paths, which join pieces smoothly."""
         return self._within([path.jumps for path in self.paths])
 
+    def poses(self, times: Array) -> tuple[Array, ...]:
+        """Wanted poses X_PT of all tasks at instants in [s], shape (M,), shape (M, 4, 4) each."""
+        found = []
+        for path in self.paths:
+            X_PT, V_PT_P, _ = path.targets(times, path.stretches(times + INSTANT_ROOM))
+            stand_off(times, path.task, X_PT, V_PT_P=V_PT_P, end=path.end)
+            found.append(X_PT)
+        return tuple(found)
+
     def _within(self, found: Sequence[Array]) -> Array:
         """Instants of all paths within the clock, and its ends."""
         end = float(self.times[-1])

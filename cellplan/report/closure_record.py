@@ -7,6 +7,7 @@ import numpy as np
 
 from cellplan.model.cell import Cell
 from cellplan.model.report import ClosureAccuracy, Report
+from cellplan.report.between_record import between_record
 from cellplan.report.record import AXES, Record, number
 
 
@@ -24,8 +25,10 @@ def worst_closures_record(runs: Iterable[Report], cell: Cell) -> Record:
             for name, instant in (
                 ("max_position_error_mm", "at_s"),
                 ("max_orientation_error_deg", "max_orientation_error_at_s"),
+                ("max_position_error_between_rows_mm", "max_position_error_between_rows_at_s"),
+                ("max_orientation_error_between_rows_deg", "max_orientation_error_between_rows_at_s"),
             ):
-                if record[name] > known[name]:
+                if name in record and record[name] > known[name]:
                     known |= {name: record[name], instant: record[instant]}
     return {
         robot: {key: value for key, value in record.items() if "mean" not in key} for robot, record in worst.items()
@@ -49,4 +52,5 @@ def _closure_record(closure: ClosureAccuracy, report: Report, cell: Cell) -> Rec
             "orientation_deg": number(math.degrees(cell.checks.closure_orientation)),
         },
         "axes": [AXES[index] for index in closure.axes],
+        **({} if closure.between is None else between_record(closure.between)),
     }

@@ -220,11 +220,11 @@ def _clearance_sheet(report: Report, required: float) -> Sheet:
         if not known.any() or minimum is None or minimum.minimum is None or minimum.at_s is None:
             sheet.panel(index, title, note="no such pair", span=(0.0, 1.0), is_floored=True)
             continue
-        smallest = 1e3 * minimum.minimum
+        smallest, word = 1e3 * minimum.minimum, "smallest" if minimum.exact else "at least"
         panel = sheet.panel(
             index,
             f"{title}, in mm",
-            note=f"smallest {rounded_down(smallest):.1f} at {minimum.at_s:.2f} s, required {1e3 * required:g}",
+            note=f"{word} {rounded_down(smallest):.1f} at {minimum.at_s:.2f} s, required {1e3 * required:g}",
             span=(0.0, max(float(curve[known].max()), 1e3 * required) or 1.0),
             is_floored=True,
         )

@@ -288,15 +288,14 @@ def clearance_record(minima: Mapping[ClearanceClass, ClearanceMinimum]) -> Recor
     """Smallest distance of the whole cell and of each class."""
     measured = [minimum for minimum in minima.values() if minimum.minimum is not None]
     record = {"whole": _whole_record(measured)}
-    nothing = ClearanceMinimum(minimum=None, pair=None, at_s=None, certified=False)
     order = (ClearanceClass.ROBOT_ROBOT, ClearanceClass.SELF, ClearanceClass.PART, ClearanceClass.ENVIRONMENT)
-    return record | {str(kind): _minimum_record(minima.get(kind, nothing)) for kind in order}
+    return record | {str(kind): _minimum_record(minima.get(kind, ClearanceMinimum())) for kind in order}
 
 
 def _whole_record(measured: list[ClearanceMinimum]) -> Record:
     """The smallest of all classes; it is certified when every class is."""
     if not measured:
-        return _minimum_record(ClearanceMinimum(minimum=None, pair=None, at_s=None, certified=False))
+        return _minimum_record(ClearanceMinimum())
     smallest = min(measured, key=lambda minimum: minimum.minimum or 0.0)
     return _minimum_record(replace(smallest, certified=all(minimum.certified for minimum in measured)))
 
@@ -307,6 +306,7 @@ def _minimum_record(minimum: ClearanceMinimum) -> Record:
         "pair": list(minimum.pair) if minimum.pair else None,
         "at_s": number(minimum.at_s),
         "certified": minimum.certified,
+        "exact": minimum.certified and minimum.exact,
         "points_mm": [[number(1e3 * x) for x in point] for point in minimum.points] if minimum.points else None,
     }
 

@@ -6,8 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.collision.certify import Found, SolidSearch
+from cellplan.collision.certify import SolidSearch
 from cellplan.collision.engine import Engine
+from cellplan.collision.found import Found
 from cellplan.collision.measure import TIGHT
 from cellplan.collision.travel import Pair
 from cellplan.geometry.transforms import Array

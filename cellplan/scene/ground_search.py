@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from cellplan.collision.certify import PARTS, Found, Search
+from cellplan.collision.certify import PARTS, Search
+from cellplan.collision.found import Found
 from cellplan.geometry.transforms import Array
 from cellplan.scene.pairs import ScenePair
 from cellplan.scene.straight_motion import StraightMotion

@@ -8,8 +8,11 @@ The triangle inequality gives, for every point x of the body at the far end and 
 .. math:: |x - P_j| \le L_j = \sum_{i \ge j} \bigl( |P_{i+1} - P_i| + \hat q_i \bigr) + \rho
 
 with the largest position :math:`\hat q_i` of each sliding joint in the program, zero for those that turn, the centre c
-of a sphere round the body as the last point, and its radius :math:`\rho`. A sliding joint moves a point as far as it
-slides: :math:`L_j = 1`.
+of a sphere round the body as the last point, and its radius :math:`\rho`; or, where that is less, a line round which
+the body lies in place of the sphere. A sliding joint moves a point as far as it slides: :math:`L_j = 1`.
+
+What counts of a turning joint is the distance from its axis, not from :math:`P_j`. It is known for the joint next to
+the body, whose points keep their distance from that axis: that is its lever arm.
 """
 
 from dataclasses import dataclass
@@ -54,6 +57,11 @@ class Chain:
         bend: Array = (moved * self.levers * (2.0 * np.cumsum(turned, axis=1) - turned)).sum(axis=1)
         return bend
 
+    def turn_bend(self, steps: Array) -> Array:
+        """Largest second derivative of a unit vector that turns with the second body, likewise, shape (n - 1,)."""
+        bend: Array = (steps[:, self.axes] @ self.turns) ** 2
+        return bend
+
     def reach(self, steps: Array) -> Array:
         """How far a point of the second body travels at most in each step, seen from the first, in [m]."""
         reach: Array = steps[:, self.axes] @ self.levers
@@ -91,41 +99,62 @@ class LeverArms:
         """The joints between two of the engine's bodies; ``first`` is None for the ground."""
         found = self._known.get((first, second))
         if found is None:
-            down = [] if first is None else self._way(self._scene.carrier(first))
+            down = [] if first is None else self._way(*_link(self._scene.carrier(first)))
             found = self._known[first, second] = self._chain(down, second)
         return found
+
+    def tool(self, robot: str, *, seen_by: str | None) -> Chain:
+        """The joints between the flange of a robot, or the ground for None, and the tool tip of another one."""
+        cell = self._scene.cell
+        placed = cell.robot(robot)
+        tip = (placed.X_WB @ placed.model.X_BF @ placed.tool.X_FT)[:3, 3]
+        down = [] if seen_by is None else self._way(seen_by, cell.robot(seen_by).model.flange_link)
+        return self._between(down, self._way(robot, placed.model.flange_link), _Held(tip, 0.0, tip[None], 0.0))
 
     def _chain(self, down: list[int], index: int) -> Chain:
         """The joints on the way down from one link and up to another body."""
         body, seen = self._scene.carrier(index), self._scene.engine.bodies[index]
-        up = self._way(body)
+        X_WS = body.X_BS if body.robot is None else self._scene.cell.robot(body.robot).X_WB @ body.X_BS
+        held = _Held(_moved(X_WS, seen.centre), seen.radius, _moved(X_WS, seen.ends), seen.girth)
+        return self._between(down, self._way(*_link(body)), held)
+
+    def _between(self, down: list[int], up: list[int], held: "_Held") -> Chain:
+        """The joints on the way down from one link and up to another one, which something moves with."""
         shared = set(down) & set(up)
         axes = [axis for axis in down if axis not in shared] + [axis for axis in reversed(up) if axis not in shared]
         levers = np.ones(len(axes))
-        point, length = self._at_reference(body, seen.centre), seen.radius
+        point, length = held.centre, held.radius
         for place in range(len(axes) - 1, -1, -1):
             axis = self._placed[axes[place]]
-            foot = axis.point_W + axis.axis_W * ((point - axis.point_W) @ axis.axis_W)
-            length += float(np.linalg.norm(point - foot)) + float(self._slides[axes[place]])
+            foot = axis.foot(point)
+            length += float(np.linalg.norm(point - foot))
+            if place == len(axes) - 1:
+                length = min(length, float(np.linalg.norm(held.ends - foot, axis=1).max()) + held.girth)
+                beside = float(np.linalg.norm(held.ends - axis.foot(held.ends), axis=1).max()) + held.girth
+            length += float(self._slides[axes[place]])
             if axis.is_revolute:
-                levers[place] = length
+                levers[place] = min(length, beside) if place == len(axes) - 1 else length
             point = foot
         return Chain(np.array(axes, dtype=np.intp), levers, self._turns[axes])
 
-    def _way(self, body: SceneBody) -> list[int]:
-        """Axes from the link that carries a body to the ground."""
+    def _way(self, robot: str | None, link: int) -> list[int]:
+        """Axes from a link to the ground."""
         way: list[int] = []
-        link = BASE if body.robot is None else body.link
+        link = BASE if robot is None else link
         while link != BASE:
-            way.append(self._first[str(body.robot)] + link)
+            way.append(self._first[str(robot)] + link)
             link = self._placed[way[-1]].parent
         return way
 
-    def _at_reference(self, body: SceneBody, point: Array) -> Array:
-        """A point of a body in the world when all joints are at zero, shape (3,)."""
-        X_WS = body.X_BS if body.robot is None else self._scene.cell.robot(body.robot).X_WB @ body.X_BS
-        placed: Array = X_WS[:3, :3] @ point + X_WS[:3, 3]
-        return placed
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Held:
+    """What moves with a link, in the world when all joints are at zero: a sphere, and a line with a radius round it."""
+
+    centre: Array
+    radius: float
+    ends: Array
+    girth: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -149,6 +178,11 @@ class _PlacedAxis:
     parent: int
     point_W: Array
     axis_W: Array
+
+    def foot(self, points: Array) -> Array:
+        """The points of the axis that are nearest to some points, shape (..., 3)."""
+        nearest: Array = self.point_W + ((points - self.point_W) @ self.axis_W)[..., None] * self.axis_W
+        return nearest
 
 
 def _placed(robot: Robot, start: int) -> list[_PlacedAxis]:
@@ -178,3 +212,14 @@ def _starts(cell: Cell) -> list[int]:
     """Place of each robot's first axis among all."""
     counts = [len(robot.model.joints) + len(robot.model.followers) for robot in cell.robots]
     return [0, *np.cumsum(counts)[:-1].tolist()]
+
+
+def _link(body: SceneBody) -> tuple[str | None, int]:
+    """Robot and link that carry a body."""
+    return body.robot, body.link
+
+
+def _moved(X: Array, points: Array) -> Array:
+    """Displaced points, shape (..., 3)."""
+    moved: Array = points @ X[:3, :3].T + X[:3, 3]
+    return moved

@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.collision.certify import SEARCH_ROOM, Found, Search
+from cellplan.collision.certify import Search
+from cellplan.collision.found import SEARCH_ROOM, Found
 from cellplan.collision.measure import SURELY_APART
 from cellplan.collision.points import nearest_points, point_above
 from cellplan.collision.travel import Pair
@@ -43,8 +44,8 @@ class Survey:
         scene: The scene.
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
         edges: Samples at which blocks begin and end, ascending from 0 to N - 1, shape (K + 1,).
-        low: No distance of a pair is below this in a block, in [m], shape (pairs, K); zero where the pair touches or
-            nothing is proved; inf where nothing of a tool sticks out of its contact zone. May be negative where nobody
+        low: No distance of a pair is below this in a block, in [m], shape (pairs, K); zero where the pair touches; inf
+            where nothing of a tool sticks out of its contact zone. May be negative where little is proved, or nobody
             looked: for pairs left out.
         found: What is known of each pair; instants are counted in samples.
         solid_ends: The engine's bodies of each pair of solids, by the pair.
@@ -65,7 +66,7 @@ class Survey:
         self.scene, self.q, self.left_out = scene, q, frozenset(left_out)
         self.edges = np.unique(np.linspace(0, len(q) - 1, min(BLOCKS, len(q) - 1) + 1).round().astype(np.intp))
         self.low = np.full((count, len(self.edges) - 1), np.inf)
-        self.found = [Found(most_cuts=0) if row in self.left_out else Found() for row in range(count)]
+        self.found = [_nothing_found(scene, row, is_left_out=row in self.left_out) for row in range(count)]
         self.at_surface: dict[int, tuple[int, int]] = {}
         pairs = zip(scene.solid_rows.tolist(), scene.solid_pairs.tolist(), strict=True)
         self.solid_ends: dict[int, Pair] = {row: (first, second) for row, (first, second) in pairs}
@@ -168,3 +169,11 @@ def lowest_bounds(seen: Survey, rows: Rows) -> Array:
     for first in range(0, len(rows), ROWS_AT_ONCE):
         np.minimum(lowest, seen.low[rows[first : first + ROWS_AT_ONCE]].min(axis=0), out=lowest)
     return lowest
+
+
+def _nothing_found(scene: Scene, row: int, *, is_left_out: bool) -> Found:
+    """What is known of a pair before anything is searched, with what is to be proved of it first."""
+    if is_left_out:
+        return Found(most_cuts=0)
+    demand = scene.cell.checks.clearance if scene.pairs[row].rule is Rule.CLEARANCE else 0.0
+    return Found(demand=max(SURELY_APART, demand))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scene_builders import fixed_part, make_cell, placed, slide_model, thing
 
-from cellplan.collision.certify import Found, SolidSearch
+from cellplan.collision.certify import SolidSearch
+from cellplan.collision.found import Found
 from cellplan.collision.measure import SURELY_APART, measure
 from cellplan.geometry.shapes import Box, Capsule, Sphere
 from cellplan.geometry.tessellation import tessellate

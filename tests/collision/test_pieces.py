@@ -5,8 +5,9 @@ import pytest
 from scene_builders import arm_model, make_cell, placed, random_pose, thing
 
 from cellplan.collision.bodies import checked_poses, prepare
-from cellplan.collision.certify import Found, SolidSearch
+from cellplan.collision.certify import SolidSearch
 from cellplan.collision.engine import Engine
+from cellplan.collision.found import Found
 from cellplan.collision.measure import measure
 from cellplan.collision.pieces import can_be_split, read_piece, split
 from cellplan.geometry.shapes import Box, Capsule, Mesh
@@ -84,7 +85,7 @@ def test_a_search_by_pieces_finds_the_smallest_distance_with_few_questions() -> 
     scene, q, pair = stirring()
     poses = scene.body_poses(q)
     brute = [measure(scene.engine, pair, poses, sample=k) for k in range(len(q))]
-    asked = scene.engine.distance_queries
+    asked = scene.engine.asked.distances
 
     search = SolidSearch(scene.engine, pair, StraightMotion.of_cell(scene, LeverArms(scene, q), q), found=Found())
     search.run(np.inf)
@@ -95,4 +96,4 @@ def test_a_search_by_pieces_finds_the_smallest_distance_with_few_questions() -> 
     assert smallest > 0.01
     assert search.low.min() <= smallest + EXACT / 2
     assert smallest - EXACT <= search.low.min()  # the steps are short
-    assert scene.engine.distance_queries - asked < len(q)
+    assert scene.engine.asked.distances - asked < len(q)

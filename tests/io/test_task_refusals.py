@@ -196,7 +196,7 @@ Refuse = Callable[..., list[str]]
             "tool_axis: normal",
             "tolerance: {position: 0.1}",
             "c:20: tasks.ring.tolerance.position: unknown key, did you mean 'position_mm'?; allowed: "
-            "position_mm, orientation_deg",
+            "position_mm, orientation_deg, between_rows_mm, between_rows_deg",
         ),
     ],
 )

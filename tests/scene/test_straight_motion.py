@@ -5,7 +5,8 @@ import pytest
 from moving_cells import cell_with_bodies, program, relative
 from scene_builders import floor, make_cell, placed, slide_model
 
-from cellplan.collision.certify import Found
+from cellplan.collision.bodies import CollisionBody
+from cellplan.collision.found import Found
 from cellplan.collision.measure import measure
 from cellplan.collision.travel import PairMotion
 from cellplan.geometry.shapes import Box
@@ -37,6 +38,12 @@ def within(q: Array, step: int, count: int = FINE) -> Array:
     return (1.0 - s) * q[step] + s * q[step + 1]
 
 
+def farthest_points(body: CollisionBody, directions: Array) -> Array:
+    """The points of a body that are farthest in some directions, and the middle of its sphere."""
+    corners = body.core.vertices[np.argmax(directions @ body.core.vertices.T, axis=1)]
+    return np.concatenate([corners + body.inflation * directions, body.centre[None]])
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_points_bend_and_travel_no_more_than_the_joints_between_allow(seed: int) -> None:
     scene, motion, q = moving(seed, stride=0.2)
@@ -46,7 +53,7 @@ def test_points_bend_and_travel_no_more_than_the_joints_between_allow(seed: int)
         bends, seen = motion.bends(pair), PairMotion(scene.engine, pair, motion)
         directions = rng.normal(size=(30, 3))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        points = scene.engine.centres[second] + scene.engine.radii[second] * directions
+        points = farthest_points(scene.engine.bodies[second], directions)
         for step in range(len(q) - 1):
             R, p = relative(scene, within(q, step), pair)
             paths = points @ np.swapaxes(R, 1, 2) + p[:, None, :]

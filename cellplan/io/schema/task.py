@@ -209,6 +209,14 @@ class ToleranceEntry(Entry):
     orientation_deg: Annotated[float, Field(gt=0.0, le=180.0)] = Field(
         default=0.01, description="Largest orientation error."
     )
+    between_rows_mm: Annotated[float, Field(gt=0.0, le=1000.0)] | None = Field(
+        default=None,
+        description="Largest position error between the rows of the tables, where joints move evenly from row to row; "
+        "position_mm when left out. A larger one is for steps that something else prescribes.",
+    )
+    between_rows_deg: Annotated[float, Field(gt=0.0, le=180.0)] | None = Field(
+        default=None, description="Likewise for the orientation; orientation_deg when left out."
+    )
 
 
 StandOff = Annotated[float, Field(ge=0.0, le=FARTHEST_STAND_OFF_MM)]

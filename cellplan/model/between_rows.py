@@ -1,0 +1,36 @@
+"""Errors between the rows of the tables: what a tool does while every joint moves evenly from one row to the next."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BetweenError:
+    """One error of a tool between the rows, in [m] or [rad].
+
+    Attributes:
+        largest: Largest one found between two neighbouring rows: in the middle of every step, and at ten subdivisions
+            of the worst steps and of those for which the bound is too wide.
+        at_s: Its instant in [s].
+        bound: No error between the rows is larger; None where the bound is wider than what is allowed, and the verdict
+            rests on ten subdivisions of every such step.
+        longest_step: A step in [s] that keeps what is allowed for all tools, by the way errors grow with the step; None
+            where the error is small enough, or too large at the rows already.
+    """
+
+    largest: float
+    at_s: float
+    bound: float | None
+    longest_step: float | None = None
+
+    @property
+    def proof(self) -> str:
+        """What the verdict rests on."""
+        return "ten subdivisions" if self.bound is None else "bound"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BetweenRows:
+    """Errors of one tool between the rows."""
+
+    position: BetweenError
+    orientation: BetweenError

@@ -1,0 +1,24 @@
+"""Certified distances are never above what another engine finds, and at most 0.1 mm below, in cells of real arms."""
+
+from pathlib import Path
+
+import certified
+import pytest
+
+
+def agrees(folder: Path, seed: int) -> None:
+    found = certified.compare(*certified.random_cell(folder, seed))
+
+    assert len(found) >= 3
+    assert [one for one in found if not one.is_right] == []
+
+
+def test_certified_distances_agree_with_brute_force(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(certified, "STEPS", 12)
+    agrees(tmp_path, 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_ten_random_cells_of_real_arms_agree_with_brute_force(tmp_path: Path, seed: int) -> None:
+    agrees(tmp_path, seed)
