@@ -12,6 +12,7 @@ from cellplan.checks.limits import check_joints, joint_uses
 from cellplan.checks.locked import check_locked, told_with_failures
 from cellplan.checks.repeatability import check_joint_drift, repeatability
 from cellplan.checks.speeds import robot_speed
+from cellplan.checks.tool_depth import check_depths, tool_depths
 from cellplan.checks.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
@@ -60,6 +61,8 @@ def verify(
     drift = repeatability(cell, schedule, q)
     checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
     checks += check_locked(cell, schedule.times, q)
+    depths = tool_depths(cell, schedule, scene.chains, q)
+    checks += check_depths(cell, depths)
     report = Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
@@ -79,6 +82,7 @@ def verify(
         repeatability=drift,
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
         closures=closures,
+        depths=depths,
     )
     if preview is not None:
         preview(report)

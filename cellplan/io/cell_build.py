@@ -137,6 +137,7 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
         approach=_straight_move(entry.approach_mm, entry.approach_s),
         retract=_straight_move(entry.retract_mm, entry.retract_s),
         relative_to=Frame(entry.relative_to),
+        tool_depth=None if entry.tool_depth_mm is None else entry.tool_depth_mm / MM,
     )
 
 
@@ -193,6 +194,8 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         entry = values["tasks"][name]
         tool_axis, entry["tool_x"] = tool_directions(task)
         entry["start_s"] = task.begins_s
+        if task.relative_to == "part":
+            entry.setdefault("tool_depth_mm", document.checks.tool_depth_mm)
         entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
         if name not in timed:
             entry.setdefault("time_law", dumped_motion["time_law"])
@@ -267,4 +270,5 @@ def build_checks(entry: ChecksEntry) -> CheckSettings:
         exclusions=tuple(Exclusion(bodies=pair.bodies, reason=pair.reason) for pair in entry.exclude),
         closure_position=entry.closure_mm / MM,
         closure_orientation=float(np.deg2rad(entry.closure_deg)),
+        tool_depth=entry.tool_depth_mm / MM,
     )

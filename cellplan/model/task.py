@@ -184,6 +184,7 @@ class Task:
         retract: How the tool leaves the end of its path; None when it stays there.
         relative_to: Frame that path and axes are given in. In the world, the first holder's task says where the part
             is carried; P then reads W in everything that is said of the task.
+        tool_depth: Largest depth in [m] of the tool in the part, along the tool's axis; None: what the checks allow.
     """
 
     name: str
@@ -207,6 +208,7 @@ class Task:
     approach: StraightMove | None = None
     retract: StraightMove | None = None
     relative_to: Frame = Frame.PART
+    tool_depth: float | None = None
 
     @property
     def judged_from(self) -> float:

@@ -24,6 +24,7 @@ from cellplan.io.schema.robot import SlidingSpeed
 PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
 FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
+DEEPEST_CUT_MM: Final = 100.0  # a tool that is to stand deeper in the part is no tool that works on its surface
 LONGEST_S: Final = 1e6  # [s] eleven days: longer is a slip of the unit
 MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
@@ -211,6 +212,7 @@ class ToleranceEntry(Entry):
     )
 
 
+ToolDepth = Annotated[float, Field(ge=0.0, le=DEEPEST_CUT_MM)]
 StandOff = Annotated[float, Field(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
 
@@ -279,6 +281,10 @@ class TaskEntry(Entry):
         description="Time after the start during which the tool may come from beside its path: its error is reported "
         "and not judged. Shorter than the task.",
     )
+    tool_depth_mm: ToolDepth | None = Field(
+        default=None,
+        description="Largest depth of the tool in the part, for processes that cut; checks.tool_depth_mm when absent.",
+    )
     time_law: TimeLawChoice | None = Field(
         default=None, description="Law of each stretch between stops; the motion's when absent."
     )
@@ -293,6 +299,8 @@ class TaskEntry(Entry):
             raise rule("expected either duration_s or feed_mm_s, got both", "feed_mm_s")
         if self.relative_to == "world" and self.path.project is not None:
             raise rule("unexpected key, a path in the world is not laid on the part", "path.project")
+        if self.relative_to == "world" and self.tool_depth_mm is not None:
+            raise rule("unexpected key, a tool in the world does not work on the part", "tool_depth_mm")
         for name, words in (("axes", self.axes), ("free", self.free)):
             require_each_once(words, name)
         if self.start_s is not None and self.start_s < self.approaching_s:
