@@ -18,6 +18,7 @@ from cellplan.model.task import Frame, SampledPath, Task, TimedPath
 
 MM: Final = 1000.0  # [mm/m]
 AXIS: Final = "axis"
+AXIS_COMPONENTS: Final = (0, 1, 2, 3, 4)  # of a task: they leave no more than the turn about one axis open
 ROOM: Final = 1e-6  # [m] tracking errors of a micrometre do not decide about a cut that is as deep as it may be
 FINE_STEP: Final = 1e-3  # [m] longer steps of a tool between two rows are looked at in between, joints moving evenly
 MOST_INSTANTS: Final = 4000  # instants to which long steps are refined; programs of more rows are taken as they are
@@ -55,9 +56,22 @@ def check_depths(cell: Cell, found: Sequence[ToolDepth]) -> list[Check]:
     return [_check(cell.task(depth.task), depth) for depth in found]
 
 
-def allowed_depth(cell: Cell, task: Task) -> float:
-    """Depth in [m] that a task may reach."""
-    return cell.checks.tool_depth if task.tool_depth is None else task.tool_depth
+def path_depth(cell: Cell, task: Task, X_PT: Array) -> ToolDepth | None:
+    """Depth of a tool's axis on its path as it is wanted, before there is a motion.
+
+    None where the task leaves the place or the lean of the axis open: then only the motion says how deep it is.
+
+    Args:
+        cell: The cell.
+        task: One of its tasks.
+        X_PT: Wanted tool poses on the part, shape (N, 4, 4).
+    """
+    if task.relative_to is not Frame.PART or not set(AXIS_COMPONENTS) <= set(task.axes):
+        return None
+    tool = cell.robot(task.robot).tool
+    length = axis_length(tool.X_FT, cell.checks.contact_zone)
+    depth = float(axis_depths(length, cell.part.shape, inverse(cell.part.X_PS) @ X_PT).max())
+    return ToolDepth(task=task.name, robot=task.robot, depth=depth, at_s=None, limit=task.tool_depth, body=AXIS)
 
 
 def _task_depth(
@@ -80,7 +94,7 @@ def _task_depth(
         robot=task.robot,
         depth=depth,
         at_s=float(instants[row]),
-        limit=allowed_depth(cell, task),
+        limit=task.tool_depth,
         body=name,
     )
 
@@ -137,9 +151,10 @@ def _check(task: Task, found: ToolDepth) -> Check:
     depth, limit = MM * found.depth, MM * found.limit
     passed = found.depth <= found.limit + ROOM
     what = "its axis" if found.body == AXIS else f"{found.robot}/{found.body}"
+    when = " on its path" if found.at_s is None else f" at {found.at_s:.3f} s"
     message = (
-        f"tool depth of task '{task.name}': {depth:.3g} mm of the tool inside the part or beyond it at "
-        f"{found.at_s:.3f} s ({what}), allowed {limit:g} mm"
+        f"tool depth of task '{task.name}': {depth:.3g} mm of the tool inside the part or beyond it{when} ({what}), "
+        f"allowed {limit:g} mm"
     )
     return Check(
         name="tool_depth",

@@ -42,6 +42,7 @@ def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_d
 def _record(result: CellCheck) -> dict[str, Any]:
     """What was found, in printed units."""
     from cellplan.report.record import check_record, number
+    from cellplan.report.task_record import direction_record
 
     return {
         "cell": result.cell.name,
@@ -49,6 +50,7 @@ def _record(result: CellCheck) -> dict[str, Any]:
         "start": {robot.name: _start(robot) for robot in result.cell.robots},
         "start_found": list(result.found),
         "path_length_mm": {name: number(1e3 * length) for name, length in result.path_lengths.items()},
+        "direction": {task.name: direction_record(task) for task in result.cell.tasks},
         "checks": [check_record(each) for each in result.checks],
     }
 
@@ -69,9 +71,12 @@ def _start(robot: Robot) -> dict[str, float | None]:
 
 def _lines(record: dict[str, Any]) -> list[str]:
     """What was found, for people."""
+    from cellplan.report.task_record import direction_words
+
     lines = [f"{record['cell']}: {'sound' if record['status'] == 'passed' else 'not sound'}"]
     for robot, start in record["start"].items():
         posture = ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
         lines.append(f"  start of {robot} ({'found' if robot in record['start_found'] else 'given'}): {posture}")
-    lines += [f"  task {name}: path of {length:.4g} mm" for name, length in record["path_length_mm"].items()]
+    for name, length in record["path_length_mm"].items():
+        lines.append(f"  task {name}: path of {length:.4g} mm, {direction_words(record['direction'][name])}")
     return lines + [f"  {'' if each['passed'] else 'FAILED '}{each['message']}" for each in record["checks"]]

@@ -190,7 +190,6 @@ class CheckSettings:
         exclusions: Pairs left out at the user's word.
         closure_position: Largest distance in [m] of a further holder's tool from its grasp.
         closure_orientation: Largest angle in [rad] between the two.
-        tool_depth: Largest depth in [m] of a tool in the part, along the tool's axis, where a task gives none.
     """
 
     clearance: float
@@ -198,7 +197,6 @@ class CheckSettings:
     exclusions: tuple[Exclusion, ...] = ()
     closure_position: float = 3e-6
     closure_orientation: float = 1e-3 * math.pi / 180.0
-    tool_depth: float = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

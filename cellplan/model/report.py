@@ -103,7 +103,7 @@ class ToolDepth:
         task: Name of the task.
         robot: Name of the operator.
         depth: Largest depth in [m]; 0 when the tool is free or just touches.
-        at_s: Its instant in [s].
+        at_s: Its instant in [s]; None where a path is looked at before it has a clock.
         limit: Depth that is allowed in [m].
         body: What of the tool is so deep: ``axis``, or the name of a body of it.
     """
@@ -111,7 +111,7 @@ class ToolDepth:
     task: str
     robot: str
     depth: float
-    at_s: float
+    at_s: float | None
     limit: float
     body: str
 

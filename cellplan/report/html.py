@@ -16,6 +16,7 @@ from cellplan.report.method import method_lines
 from cellplan.report.palette import ROBOTS, robot_colours
 from cellplan.report.record import Provenance, Record, rounded_down
 from cellplan.report.rehearsal_record import rehearsal_record
+from cellplan.report.task_record import direction_words
 
 MODES = {
     "simultaneous": "all robots move",
@@ -31,6 +32,7 @@ CHECKS = {
     "orientation_error": "tool orientation on the part within tolerance",
     "closure_position_error": "further holders' tools on their grasps",
     "closure_orientation_error": "further holders' tools turned as they grasp",
+    "tool_depth": "tools no deeper in the part than allowed",
     "joint_drift": "joints back where each cycle began",
     "clearance": "required clearance kept",
     "collision": "no collision",
@@ -123,6 +125,7 @@ def _environment() -> Environment:
         "percent": _percent,
         "floored": _floored,
         "range_bar": _range_bar,
+        "way_round": direction_words,
         "worst": _worst,
     }
     return environment

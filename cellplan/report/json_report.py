@@ -23,10 +23,10 @@ from cellplan.report.record import (
     repeatability_record,
     report_record,
     status,
-    tasks_record,
     withdrawals,
 )
 from cellplan.report.series import INDENT, series, series_text
+from cellplan.report.task_record import tasks_record
 
 
 def report_json(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> str:
@@ -47,6 +47,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
     """The record of one run, of its closures and of how its motion was found, without the series."""
     record = report_record(report, cell=cell, provenance=provenance)
     return record | {
+        "tasks": tasks_record(report, cell),
         "closest_pairs": closest_pairs_record(report.clearance),
         "clearance_proof": clearance_proof_record(report.clearance),
         "closure": closures_record(report, cell),

@@ -4,12 +4,12 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, Tag, model_validator
 
+from cellplan.io.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
 from cellplan.io.schema.common import (
     Angle,
     Coordinate,
     Entry,
     Name,
-    PlaneCoordinates,
     SignedAxis,
     Size,
     Text,
@@ -28,7 +28,6 @@ DEEPEST_CUT_MM: Final = 100.0  # a tool that is to stand deeper in the part is n
 LONGEST_S: Final = 1e6  # [s] eleven days: longer is a slip of the unit
 MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
-PlaneWord = Literal["xy", "yz", "xz"]
 Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
 
 DIRECTION_WORDS: Final = "+x, -x, +y, -y, +z, -z or a direction [x, y, z]"
@@ -38,34 +37,8 @@ CORNER_WORDS: Final = "stop or {blend_mm: 2}"
 CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
 
 
-class CircleEntry(Entry):
-    """A circle; it starts on the plane's first axis."""
-
-    radius_mm: Size = Field(description="Radius.")
-    plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field(default=(0.0, 0.0), description="Centre on the plane's two axes.")
-
-
-class RectangleEntry(Entry):
-    """A rectangle; it starts at the (+, +) corner."""
-
-    sides_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
-    plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field(default=(0.0, 0.0), description="Centre on the plane's two axes.")
-    angle_deg: Angle = Field(default=0.0, description="Turn in the plane, from the first axis towards the second.")
-
-
-class RhombusEntry(Entry):
-    """A rhombus; it starts on the first axis."""
-
-    diagonals_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
-    plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field(default=(0.0, 0.0), description="Centre on the plane's two axes.")
-    angle_deg: Angle = Field(default=0.0, description="Turn in the plane, from the first axis towards the second.")
-
-
 class PolylineEntry(Entry):
-    """Points joined by straight sides: two coordinates each in a plane, or three in space."""
+    """Points joined by straight sides in the order they are listed: two coordinates each in a plane, or three."""
 
     points_mm: tuple[tuple[Coordinate, ...], ...] = Field(
         min_length=2, description="Points, all [u, v] on the plane's axes or all [x, y, z] in the part frame."
