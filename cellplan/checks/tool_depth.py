@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cellplan.checks.tracking import part_poses
 from cellplan.geometry.shapes import Mesh
-from cellplan.geometry.tool_columns import Columns, axis_depths, axis_length, body_columns, depths
+from cellplan.geometry.tool_columns import Columns, body_columns, depths, line_depths
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import Cell
@@ -69,9 +69,11 @@ def path_depth(cell: Cell, task: Task, X_PT: Array) -> ToolDepth | None:
     if task.relative_to is not Frame.PART or not set(AXIS_COMPONENTS) <= set(task.axes):
         return None
     tool = cell.robot(task.robot).tool
-    length = axis_length(tool.X_FT, cell.checks.contact_zone)
-    depth = float(axis_depths(length, cell.part.shape, inverse(cell.part.X_PS) @ X_PT).max())
-    return ToolDepth(task=task.name, robot=task.robot, depth=depth, at_s=None, limit=task.tool_depth, body=AXIS)
+    X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone
+    along = line_depths(tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not tool.bodies)
+    return ToolDepth(
+        task=task.name, robot=task.robot, depth=float(along.max()), at_s=None, limit=task.tool_depth, body=AXIS
+    )
 
 
 def _task_depth(
@@ -83,7 +85,7 @@ def _task_depth(
     instants, X_PT = _tool_on_part(cell, task, times, chains=chains, q=q)
     X_ST = inverse(cell.part.X_PS) @ X_PT
     tool, zone = robot.tool, cell.checks.contact_zone
-    along = axis_depths(axis_length(tool.X_FT, zone), cell.part.shape, X_ST)
+    along = line_depths(tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not tool.bodies)
     deepest = [(AXIS, int(np.argmax(along)), float(along.max()))]
     for body in tool.bodies:
         columns = body_columns(body.shape, inverse(tool.X_FT) @ body.X_BS, zone)

@@ -14,7 +14,7 @@ from cellplan.geometry.line_spans import line_spans
 from cellplan.geometry.shapes import Mesh, Solid, support_point
 from cellplan.geometry.transforms import Array
 
-GRAZE: Final = 1e-5  # [m] an axis that is free this far aside runs along the surface: tracking errors decide nothing
+GRAZE: Final = 1e-5  # [m] an axis that is free this far aside, or a back end that is so near the far side, only touches
 SIDE_ROOM: Final = 1e-4  # [m] what the side of a body reaches into a wall along it by less is touching, not depth
 EDGE_ROOM: Final = 1e-6  # [m] columns of a rim stand this far within it, so that rounding does not lose them
 HALF: Final = 0.5  # [-] a column that is less than half as deep just beside grazes
@@ -135,7 +135,7 @@ def _depths(columns: Columns, shape: Solid, X_ST: Array) -> Array:
     directions = np.broadcast_to(R[:, None, :, 2], points.shape)
     spans = line_spans(shape, points.reshape(-1, 3), directions.reshape(-1, 3))
     pose, column = np.divmod(spans.line, max(count, 1))
-    entered = (spans.leave > columns.back[column]) & (spans.enter < columns.front[column])
+    entered = (spans.leave > columns.back[column] + GRAZE) & (spans.enter < columns.front[column])
     depth = np.zeros(poses * lines)
     place = pose * lines + columns.line[column]
     np.maximum.at(depth, place[entered], (columns.front[column] - spans.enter)[entered])
@@ -172,10 +172,23 @@ def _outline(shape: Solid, X_TS: Array) -> tuple[Array, Array]:
     return centre, rim
 
 
-def axis_length(X_FT: Array, zone: float) -> float:
-    """Length of a tool's axis in [m] that counts as tool, back from the tip.
+def line_depths(X_FT: Array, shape: Solid, X_ST: Array, *, zone: float, is_all: bool) -> Array:
+    """Depth of the axis of a tool in [m] for each pose, from the flange's side to the tip, shape (N,).
 
-    It goes back to where the flange stands beside it, and at least through the contact zone: a tool without bodies is a
-    straight line there, and what lies beside that line is not known.
+    The axis counts from the tip back to where the flange stands beside it, and at least through the contact zone. A
+    tool may also reach round and point back at its flange; then its bodies say where it goes round. Where there are
+    none it is a straight line to the side of the flange.
+
+    Args:
+        X_FT: The tool in the flange frame.
+        shape: The part.
+        X_ST: Tool poses in the frame of the part's shape, shape (N, 4, 4).
+        zone: Radius of the contact zone in [m].
+        is_all: Whether this line is all that is known of the tool.
     """
-    return max(float(X_FT[:3, 3] @ X_FT[:3, 2]), zone)
+    along = float(X_FT[:3, 3] @ X_FT[:3, 2])
+    found = axis_depths(max(along, zone), shape, X_ST)
+    if is_all and along < -EDGE_ROOM:
+        turned = X_ST * np.array([1.0, -1.0, -1.0, 1.0])  # half a turn about x: the columns of y and z
+        found = np.maximum(found, axis_depths(-along, shape, turned))
+    return found
