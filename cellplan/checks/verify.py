@@ -55,14 +55,13 @@ def verify(
         task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
     )
     closures = closure_accuracy(cell, scene.chains, q, X_WP)
-    checks = [*_accuracy_checks(cell, schedule, accuracy), *check_closure(cell, schedule.times, closures)]
+    depths = tool_depths(cell, schedule, scene.chains, q)
+    checks = [*_accuracy_checks(cell, schedule, accuracy), *check_depths(cell, depths)]
+    checks += check_closure(cell, schedule.times, closures)
     uses, joint_checks = _joints(cell, schedule.times, q)
     checks += joint_checks
     drift = repeatability(cell, schedule, q)
-    checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
-    checks += check_locked(cell, schedule.times, q)
-    depths = tool_depths(cell, schedule, scene.chains, q)
-    checks += check_depths(cell, depths)
+    checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
     report = Report(
         cell=cell.name,
         mode=str(cell.motion.mode),

@@ -1,4 +1,4 @@
-"""Depths of tools in closed form: along the axis, under a leaning rod, in a hollow, behind a sheet and beside a wall."""
+"""Depths of tools in closed form: along the axis, under a leaning rod, in a hollow, behind a sheet, at a wall."""
 
 import numpy as np
 import pytest
@@ -104,9 +104,9 @@ def test_a_body_beside_the_axis_counts() -> None:
 
 
 def test_a_body_that_goes_round_a_part_is_free() -> None:
-    jaws = [tessellate(Box((0.1, 0.02, 0.01))) for _ in range(2)]
-    both = np.concatenate([jaws[0].vertices + [0.0, 0.0, -0.005], jaws[1].vertices + [0.0, 0.0, -0.125]])
-    faces = np.concatenate([jaws[0].faces, jaws[1].faces + len(jaws[0].vertices)])
+    jaw = tessellate(Box((0.1, 0.02, 0.01)))
+    both = np.concatenate([np.add(jaw.vertices, (0.0, 0.0, -0.005)), np.add(jaw.vertices, (0.0, 0.0, -0.125))])
+    faces = np.concatenate([jaw.faces, jaw.faces + len(jaw.vertices)])
     clamp = Mesh(vertices=both, faces=faces, source="clamp", is_closed=True)
 
     depth = depths(body_columns(clamp, np.eye(4), ZONE), BLOCK, at(0.0, 0.0, -0.06))
