@@ -57,9 +57,8 @@ def verify(
     closures = closure_accuracy(cell, scene.chains, q, X_WP)
     depths = tool_depths(cell, schedule, scene.chains, q)
     checks = [*_accuracy_checks(cell, schedule, accuracy), *check_depths(cell, depths)]
-    checks += check_closure(cell, schedule.times, closures)
     uses, joint_checks = _joints(cell, schedule.times, q)
-    checks += joint_checks
+    checks += [*check_closure(cell, schedule.times, closures), *joint_checks]
     drift = repeatability(cell, schedule, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
     report = Report(
