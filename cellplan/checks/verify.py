@@ -15,6 +15,7 @@ from cellplan.checks.locked import check_locked, told_with_failures
 from cellplan.checks.mounting import check_mounting
 from cellplan.checks.repeatability import check_joint_drift, repeatability
 from cellplan.checks.speeds import robot_speed
+from cellplan.checks.tool_depth import check_depths, tool_depths
 from cellplan.checks.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
@@ -59,13 +60,13 @@ def verify(
     closures = closure_accuracy(cell, scene.chains, q, X_WP)
     if schedule.desired is not None:
         accuracy, closures = look_between(scene, schedule, q, accuracy=accuracy, closures=closures)
-    checks = _accuracy_checks(cell, schedule, accuracy)
+    depths = tool_depths(cell, schedule, scene.chains, q)
+    checks = [*_accuracy_checks(cell, schedule, accuracy), *check_depths(cell, depths)]
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
     uses, joint_checks = _joints(cell, schedule.times, q)
-    checks += joint_checks
+    checks += [*check_closure(cell, schedule.times, closures), *joint_checks]
     drift = repeatability(cell, schedule, q)
-    checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
-    checks += check_locked(cell, schedule.times, q)
+    checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
     checks += check_idle(cell, schedule, q)
     report = Report(
         cell=cell.name,
@@ -86,6 +87,7 @@ def verify(
         repeatability=drift,
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
         closures=closures,
+        depths=depths,
     )
     if preview is not None:
         preview(report)

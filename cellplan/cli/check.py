@@ -44,6 +44,7 @@ def _record(result: CellCheck) -> dict[str, Any]:
     from cellplan.report.left_out_record import left_out_record
     from cellplan.report.open_surfaces import open_surface_lines, open_surfaces_record
     from cellplan.report.record import check_record, number
+    from cellplan.report.task_record import direction_record
 
     open_surfaces = open_surfaces_record(result.cell)
     return {
@@ -53,6 +54,7 @@ def _record(result: CellCheck) -> dict[str, Any]:
         "start_found": list(result.found),
         "start_choice": result.choice,
         "path_length_mm": {name: number(1e3 * length) for name, length in result.path_lengths.items()},
+        "direction": {task.name: direction_record(task) for task in result.cell.tasks},
         "checks": [check_record(each) for each in result.checks],
         "open_surfaces": open_surfaces,
         "remarks": [f"{result.cell.origin.at(key)}: {line}" for key, line in open_surface_lines(open_surfaces)],
@@ -77,13 +79,15 @@ def _start(robot: Robot) -> dict[str, float | None]:
 def _lines(record: dict[str, Any]) -> list[str]:
     """What was found, for people."""
     from cellplan.cli.summary import left_out_lines
+    from cellplan.report.task_record import direction_words
 
     lines = [f"{record['cell']}: {'sound' if record['status'] == 'passed' else 'not sound'}"]
     for robot, start in record["start"].items():
         posture = ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
         lines.append(f"  start of {robot} ({'found' if robot in record['start_found'] else 'given'}): {posture}")
     lines += [f"  {record['start_choice']}"] if record["start_choice"] else []
-    lines += [f"  task {name}: path of {length:.4g} mm" for name, length in record["path_length_mm"].items()]
+    for name, length in record["path_length_mm"].items():
+        lines.append(f"  task {name}: path of {length:.4g} mm, {direction_words(record['direction'][name])}")
     lines += [f"  note: {remark}" for remark in record["remarks"]]
     lines += [f"  {'' if each['passed'] else 'FAILED '}{each['message']}" for each in record["checks"]]
     return lines + left_out_lines(record)

@@ -21,6 +21,7 @@ BOX_SLACK: Final = 1e-9  # [-] of the extent: boxes are grown by it so that rays
 EDGE_SLACK: Final = 1e-14  # [-] rounding of a triple product against the squared distance of the corners
 GRAZING: Final = 1e-12  # [rad] rays flatter than this to a triangle run along it: its neighbours are hit instead
 MORTON_BITS: Final = 20  # bits per axis of the order in which triangles are put into the tree
+SAME_WAY: Final = 10  # decimals of a way in [m]: crossings that agree in them are one, and entering comes first
 
 Indices = NDArray[np.int64]
 
@@ -44,6 +45,21 @@ class RayHits:
         """Which rays meet the mesh, shape (N,)."""
         met: NDArray[np.bool_] = self.faces >= 0
         return met
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Crossings:
+    """Every crossing of some lines with a mesh, sorted by line and then along the line.
+
+    Attributes:
+        line: Which line, shape (K,).
+        way: Signed way from the line's point in [m], shape (K,).
+        is_entering: Whether the line enters the solid there rather than leaves it, shape (K,).
+    """
+
+    line: Indices
+    way: Array
+    is_entering: NDArray[np.bool_]
 
 
 def ray_hits(mesh: Mesh, origins: Array, directions: Array) -> RayHits:
@@ -135,15 +151,59 @@ def _passes(low: Array, high: Array, rays: Array) -> NDArray[np.bool_]:
     along = rays == 0.0
     slope = np.where(along, 1.0, rays)
     a, b = low / slope, high / slope
-    enter = np.where(along, -np.inf, np.minimum(a, b)).max(axis=1)
-    leave = np.where(along, np.inf, np.maximum(a, b)).min(axis=1)
-    beside = np.any(along & ((low > 0.0) | (high < 0.0)), axis=1)
-    passed: NDArray[np.bool_] = (enter <= leave) & ~beside
+    enters = np.where(along, -np.inf, np.minimum(a, b)).T
+    leaves = np.where(along, np.inf, np.maximum(a, b)).T
+    beside = (along & ((low > 0.0) | (high < 0.0))).T
+    enter = np.maximum(np.maximum(enters[0], enters[1]), enters[2])  # three times as fast as a reduction over rows
+    leave = np.minimum(np.minimum(leaves[0], leaves[1]), leaves[2])
+    passed: NDArray[np.bool_] = (enter <= leave) & ~(beside[0] | beside[1] | beside[2])
     return passed
+
+
+def line_crossings(mesh: Mesh, points: Array, directions: Array) -> Crossings:
+    """All crossings of endless lines with a mesh, in the order of the lines and along each of them.
+
+    Args:
+        mesh: The surface.
+        points: A point of each line in [m], shape (N, 3), in the frame of the mesh.
+        directions: Unit directions, shape (N, 3).
+    """
+    triangles = mesh.vertices[mesh.faces]
+    tree = _Tree.over(triangles)
+    middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
+    ahead = np.sum((middle - points) * directions, axis=1)
+    lines, ways, enters = [], [], []
+    for first in range(0, len(points), RAY_CHUNK):
+        chosen = slice(first, first + RAY_CHUNK)
+        starts = points[chosen] + ahead[chosen, None] * directions[chosen]
+        line, _, way, steep = _all_hits(tree, triangles, starts, rays=directions[chosen])
+        lines.append(line + first)
+        ways.append(way + ahead[line + first])
+        enters.append(steep < 0.0)
+    line, way, entering = np.concatenate(lines), np.concatenate(ways), np.concatenate(enters)
+    order = np.lexsort((~entering, np.round(way, SAME_WAY), line))
+    return Crossings(line=line[order], way=way[order], is_entering=entering[order])
 
 
 def _first_hits(tree: _Tree, triangles: Array, starts: Array, *, rays: Array, behind: Array) -> tuple[Indices, Array]:
     """Nearest triangle of each ray, and the way to it from ``starts``; ways below ``behind`` lie behind the origin."""
+    ray, face, way, _ = _all_hits(tree, triangles, starts, rays=rays)
+    reach = float(np.abs(triangles).max()) + float(np.abs(starts).max(initial=0.0))
+    ahead = way >= behind[ray] - GRAZING * reach
+    ray, face, way = ray[ahead], face[ahead], way[ahead]
+    order = np.lexsort((face, way, ray))
+    met, place = np.unique(ray[order], return_index=True)
+    first_face, first_way = np.full(len(starts), -1), np.full(len(starts), np.inf)
+    first_face[met], first_way[met] = face[order][place], way[order][place]
+    return first_face, first_way
+
+
+def _all_hits(tree: _Tree, triangles: Array, starts: Array, *, rays: Array) -> tuple[Indices, Indices, Array, Array]:
+    """Each meeting of a ray's line with a triangle, shape (K,) each.
+
+    Returns:
+        Ray, triangle, way from the start, and how the ray crosses: below zero against the triangle's normal.
+    """
     ray, face = tree.near(starts, rays)
     corner = triangles[face] - starts[ray, None, :]
     direction = rays[ray]
@@ -158,14 +218,7 @@ def _first_hits(tree: _Tree, triangles: Array, starts: Array, *, rays: Array, be
     way = np.sum(normal[crossing] * corner[:, 0], axis=1) / steep[crossing]
     depth = np.einsum("kci,ki->kc", corner, direction[crossing])
     way = np.clip(way, depth.min(axis=1, initial=np.inf), depth.max(axis=1, initial=-np.inf))
-    reach = float(np.abs(triangles).max()) + float(np.abs(starts).max(initial=0.0))
-    ahead = way >= behind[ray] - GRAZING * reach
-    ray, face, way = ray[ahead], face[ahead], way[ahead]
-    order = np.lexsort((face, way, ray))
-    met, place = np.unique(ray[order], return_index=True)
-    first_face, first_way = np.full(len(starts), -1), np.full(len(starts), np.inf)
-    first_face[met], first_way[met] = face[order][place], way[order][place]
-    return first_face, first_way
+    return ray, face, way, steep[crossing]
 
 
 def _triple(d: Array, p: Array, q: Array) -> Array:

@@ -10,14 +10,13 @@ from cellplan.io.cell_rules import needs_surface
 from cellplan.io.robot_rules import home_configuration, start_posture
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry
+from cellplan.io.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
 from cellplan.io.schema.robot import ToolEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.task import (
     BlendEntry,
     PathEntry,
     PolylineEntry,
-    RectangleEntry,
-    RhombusEntry,
     TaskEntry,
     ToleranceEntry,
     TrapezoidEntry,
@@ -42,6 +41,7 @@ from cellplan.model.task import (
     PathSpec,
     PlaneName,
     PolygonPath,
+    RunDirection,
     SampledPath,
     SpacePolylinePath,
     StraightMove,
@@ -149,6 +149,7 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
         approach=_straight_move(entry.approach_mm, entry.approach_s),
         retract=_straight_move(entry.retract_mm, entry.retract_s),
         relative_to=Frame(entry.relative_to),
+        tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm) / MM,
     )
 
 
@@ -217,6 +218,8 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         entry["start_s"] = task.begins_s
         entry["tolerance"].setdefault("between_rows_mm", task.tolerance.position_mm)
         entry["tolerance"].setdefault("between_rows_deg", task.tolerance.orientation_deg)
+        if task.relative_to == "part":
+            entry.setdefault("tool_depth_mm", document.checks.tool_depth_mm)
         entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
         if name not in timed:
             entry.setdefault("time_law", motion["time_law"])
@@ -232,10 +235,7 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
 def _path(name: str, entry: PathEntry, read_targets: TargetReader) -> PathSpec:
     """Geometry of a path in [m]."""
     if entry.circle is not None:
-        u, v = entry.circle.center_mm
-        return CirclePath(
-            plane=PlaneName(entry.circle.plane), center=(u / MM, v / MM), radius=entry.circle.radius_mm / MM
-        )
+        return _circle(entry.circle)
     if entry.rectangle is not None:
         return _polygon(entry.rectangle, entry.rectangle.sides_mm, ((1, 1), (-1, 1), (-1, -1), (1, -1)))
     if entry.rhombus is not None:
@@ -243,15 +243,35 @@ def _path(name: str, entry: PathEntry, read_targets: TargetReader) -> PathSpec:
     return read_targets(name) if entry.polyline is None else _polyline(entry.polyline)
 
 
+def _circle(entry: CircleEntry) -> CirclePath:
+    """A circle with a unit direction to its start."""
+    u, v = entry.center_mm
+    toward = start_direction(entry.start_at, entry.plane)
+    size = float(np.hypot(*toward))
+    return CirclePath(
+        plane=PlaneName(entry.plane),
+        center=(u / MM, v / MM),
+        radius=entry.radius_mm / MM,
+        start=(toward[0] / size, toward[1] / size),
+        direction=RunDirection(entry.direction),
+    )
+
+
 def _polygon(
     entry: RectangleEntry | RhombusEntry, extents_mm: tuple[float, float], signs: tuple[tuple[int, int], ...]
 ) -> PolygonPath:
-    """Corners of a centred shape, turned and moved in its plane."""
+    """Corners of a centred shape, turned and moved in its plane, from its start on."""
+    start = tuple(int(np.sign(part)) for part in start_direction(entry.start_at, entry.plane))
+    first = signs.index((start[0], start[1]))
+    signs = (*signs[first:], *signs[:first])
     angle = np.deg2rad(entry.angle_deg)
     R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     corners = np.array(signs) * (0.5 * np.array(extents_mm)) @ R.T + np.array(entry.center_mm)
     return PolygonPath(
-        plane=PlaneName(entry.plane), corners=tuple((float(u) / MM, float(v) / MM) for u, v in corners), is_closed=True
+        plane=PlaneName(entry.plane),
+        corners=tuple((float(u) / MM, float(v) / MM) for u, v in corners),
+        is_closed=True,
+        direction=RunDirection(entry.direction),
     )
 
 

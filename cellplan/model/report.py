@@ -102,6 +102,27 @@ class ClosureAccuracy:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ToolDepth:
+    """How deep the tool of one task stands in the part, or beyond it, along the tool's axis.
+
+    Attributes:
+        task: Name of the task.
+        robot: Name of the operator.
+        depth: Largest depth in [m]; 0 when the tool is free or just touches.
+        at_s: Its instant in [s]; None where a path is looked at before it has a clock.
+        limit: Depth that is allowed in [m].
+        body: What of the tool is so deep: ``axis``, or the name of a body of it.
+    """
+
+    task: str
+    robot: str
+    depth: float
+    at_s: float | None
+    limit: float
+    body: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointUse:
     """How one joint is used, in [rad] or [m], and where it is worst."""
 
@@ -311,6 +332,7 @@ class Report:
         qd: Speeds between the samples, shape (N - 1, n), by robot.
         closures: Closure errors, one entry per holder but the first.
         repeatability: Whether the joints come back with the tools; None when not all tools come back.
+        depths: How deep tools stand in the part, one entry per task on it.
     """
 
     cell: str
@@ -328,6 +350,7 @@ class Report:
     qd: Mapping[str, Array]
     closures: tuple[ClosureAccuracy, ...] = ()
     repeatability: Repeatability | None = None
+    depths: tuple[ToolDepth, ...] = ()
 
     @property
     def passed(self) -> bool:

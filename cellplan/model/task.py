@@ -19,13 +19,30 @@ class PlaneName(StrEnum):
     XZ = "xz"
 
 
+class RunDirection(StrEnum):
+    """Way round that a closed path runs, seen from outside the surface."""
+
+    COUNTERCLOCKWISE = "counterclockwise"
+    CLOCKWISE = "clockwise"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CirclePath:
-    """Circle in a plane of the part frame; starts on the plane's first axis."""
+    """Circle in a plane of the part frame.
+
+    Attributes:
+        plane: The plane.
+        center: Centre on the plane's two axes in [m].
+        radius: Radius in [m].
+        start: Unit direction on the plane's axes from the centre to the start.
+        direction: Way round, seen from outside the surface.
+    """
 
     plane: PlaneName
     center: tuple[float, float]
     radius: float
+    start: tuple[float, float] = (1.0, 0.0)
+    direction: RunDirection = RunDirection.COUNTERCLOCKWISE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,13 +52,14 @@ class PolygonPath:
     Attributes:
         plane: The plane.
         corners: Corner points on the plane's two axes in [m]; the first is the start.
-        is_closed: Whether the last corner is joined to the first; closed paths are turned counter-clockwise seen
-            from outside the surface.
+        is_closed: Whether the last corner is joined to the first.
+        direction: Way round of a closed path, seen from outside the surface; None: as the corners are listed.
     """
 
     plane: PlaneName
     corners: tuple[tuple[float, float], ...]
     is_closed: bool
+    direction: RunDirection | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,6 +220,7 @@ class Task:
         retract: How the tool leaves the end of its path; None when it stays there.
         relative_to: Frame that path and axes are given in. In the world, the first holder's task says where the part
             is carried; P then reads W in everything that is said of the task.
+        tool_depth: Largest depth in [m] that the tool may have in the part, along its axis.
     """
 
     name: str
@@ -225,6 +244,7 @@ class Task:
     approach: StraightMove | None = None
     retract: StraightMove | None = None
     relative_to: Frame = Frame.PART
+    tool_depth: float = 1e-3
 
     @property
     def leaving(self) -> float:

@@ -2,13 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
 
 from cellplan.checks.mounting import check_mounting
+from cellplan.checks.tool_depth import check_depths, path_depth
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOut
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
+from cellplan.model.toolpath import Toolpath, Trajectory
 from cellplan.pipeline.solve import with_start
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.modes import plan_runs, standing
@@ -18,6 +23,8 @@ from cellplan.planning.start_search import choose_start
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.of_run import scene_of_run
 from cellplan.scene.scene import Scene
+
+POSES: Final = 1001  # [-] poses of each path at which the depth of the tool's axis is looked at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,7 +84,7 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
         found=found,
         choice=choice.words,
         path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
-        checks=(at_start, *check_mounting(scene, start[None])),
+        checks=(at_start, *check_mounting(scene, start[None]), *_depths_on_paths(cell, toolpaths)),
         left_out=scene.left_out,
     )
 
@@ -90,3 +97,17 @@ def _touching_at_start(scene: Scene, start: Array) -> tuple[str, str] | None:
         if pair is not None:
             return pair
     return None
+
+
+def _depths_on_paths(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> list[Check]:
+    """Checks of those tools whose axis would stand too deep in the part on the desired path."""
+    found = [path_depth(cell, cell.task(name), _poses(toolpath)) for name, toolpath in toolpaths.items()]
+    checks = check_depths(cell, [depth for depth in found if depth is not None])
+    return [check for check in checks if not check.passed]
+
+
+def _poses(toolpath: Toolpath) -> Array:
+    """Desired tool poses spread over a path, shape (POSES, 4, 4)."""
+    if isinstance(toolpath, Trajectory):
+        return toolpath.at(np.linspace(0.0, toolpath.duration, POSES))[0]
+    return toolpath.poses(np.linspace(0.0, toolpath.length, POSES))

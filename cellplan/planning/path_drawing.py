@@ -19,16 +19,14 @@ from cellplan.geometry.curves import (
 from cellplan.geometry.splines import spline_through
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Origin
-from cellplan.model.task import CirclePath, PlaneName, PolygonPath, SampledPath, SpacePolylinePath, Task, TimedPath
+from cellplan.model.path_direction import outside_of, plane_axes
+from cellplan.model.task import CirclePath, PolygonPath, RunDirection, SampledPath, SpacePolylinePath, Task, TimedPath
 from cellplan.planning.path_words import direction_name, in_mm, length
 
 SAME_POINT: Final = 1e-9  # [m] points nearer than this are one point written twice
 STRAIGHT_ON: Final = 1e-9  # [rad] a change of direction below this is no corner
 SHARPEST_BLEND: Final = np.deg2rad(175.0)  # a path that turns back more sharply cannot be rounded without a cusp
 IN_PLANE: Final = np.sin(np.deg2rad(1.0))  # [-] a side seen at a flatter angle than 1 deg squeezes the path to a line
-EDGE_ON: Final = 1e-9  # [-] a tool axis that leans less out of the plane does not tell its outside
-
-_PLANE_AXES: Final = {PlaneName.XY: (0, 1), PlaneName.YZ: (1, 2), PlaneName.XZ: (0, 2)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,7 +51,7 @@ class Drawing:
 def draw_path(task: Task, origin: Origin) -> Drawing:
     """Draw the path of a task in the part frame.
 
-    Closed planar paths are turned so that they run counter-clockwise seen from outside.
+    Listed points are passed in their order; shapes that have none run the way round that their task says.
 
     Raises:
         InputError: The points do not make a path, or a corner cannot be rounded as asked.
@@ -77,15 +75,18 @@ def draw_path(task: Task, origin: Origin) -> Drawing:
 
 
 def _draw_circle(path: CirclePath, task: Task, where: str) -> Drawing:
-    """Full circle from the plane's first axis."""
+    """Full circle from its start."""
     if not path.radius > SAME_POINT:
         raise InputError(f"{where}: expected a circle with a radius above zero, got {length(path.radius)} mm")
-    first, second, normal = _plane_axes(path.plane)
-    turn = -1.0 if _outside(task, normal, where) @ normal < 0.0 else 1.0
+    first, second, normal = plane_axes(path.plane)
+    turn = 1.0 if path.direction is RunDirection.COUNTERCLOCKWISE else -1.0
+    if _outside(task, normal, where) @ normal < 0.0:
+        turn = -turn
+    u, v = path.start
     curve = CircleCurve(
         centre=path.center[0] * first + path.center[1] * second + task.plane_offset * normal,
-        first=path.radius * first,
-        second=turn * path.radius * second,
+        first=path.radius * (u * first + v * second),
+        second=turn * path.radius * (u * second - v * first),
     )
     return Drawing(curve=curve, stops=curve.knots, given=curve.knots, is_closed=True, runs_on=True)
 
@@ -93,36 +94,26 @@ def _draw_circle(path: CirclePath, task: Task, where: str) -> Drawing:
 def _polygon_points(path: PolygonPath, task: Task, where: str) -> Array:
     """Corners in P in the order they are passed; the first is repeated at the end of a closed path."""
     corners = np.asarray(path.corners, dtype=float).reshape(-1, 2)
-    first, second, normal = _plane_axes(path.plane)
+    first, second, normal = plane_axes(path.plane)
     points = corners @ np.stack([first, second]) + task.plane_offset * normal
     _refuse_poor_points(points, path.is_closed, where=where)
     outside = _outside(task, normal, where)
-    if path.is_closed:
+    if path.direction is not None:
         u, v = (corners - corners.mean(axis=0)).T
-        area = 0.5 * float(np.sum(u * np.roll(v, -1) - v * np.roll(u, -1)))
-        if area * (outside @ normal) < 0.0:
+        area = 0.5 * float(np.sum(u * np.roll(v, -1) - v * np.roll(u, -1))) * (outside @ normal)
+        if (area < 0.0) == (path.direction is RunDirection.COUNTERCLOCKWISE):
             points = np.concatenate([points[:1], points[:0:-1]])
     return _closed(points, path.is_closed)
 
 
-def _plane_axes(plane: PlaneName) -> tuple[Array, Array, Array]:
-    """First and second axis of a plane and their cross product."""
-    first, second = (np.eye(3)[axis] for axis in _PLANE_AXES[plane])
-    return first, second, np.cross(first, second)
-
-
 def _outside(task: Task, normal: Array, where: str) -> Array:
     """Direction a planar path is seen from: the side it is laid on from, else against the tool axis."""
-    if task.project is None:
-        if task.tool_axis is None or abs(task.tool_axis @ normal) <= EDGE_ON:
-            return normal
-        return -task.tool_axis
-    if abs(task.project @ normal) < IN_PLANE:
+    if task.project is not None and abs(task.project @ normal) < IN_PLANE:
         raise InputError(
             f"{where}.project: expected a side that faces the path's plane, got {direction_name(task.project)}, which "
             f"lies in it; project from {direction_name(normal)} or {direction_name(-normal)}"
         )
-    return task.project
+    return outside_of(task, normal)
 
 
 def _refuse_poor_points(points: Array, is_closed: bool, *, where: str, source: str = "") -> None:

@@ -18,6 +18,7 @@ from cellplan.report.open_surfaces import open_surface_lines
 from cellplan.report.palette import ROBOTS, robot_colours
 from cellplan.report.record import Provenance, Record, rounded_down
 from cellplan.report.rehearsal_record import rehearsal_record
+from cellplan.report.task_record import direction_words
 
 MODES = {
     "simultaneous": "all robots move",
@@ -37,6 +38,7 @@ CHECKS = {
     "closure_orientation_error_between_rows": "further holders' tools turned as they grasp between the rows",
     "closure_position_error": "further holders' tools on their grasps",
     "closure_orientation_error": "further holders' tools turned as they grasp",
+    "tool_depth": "tools no deeper in the part than allowed",
     "joint_drift": "joints back where each cycle began",
     "clearance": "required clearance kept",
     "collision": "no collision",
@@ -147,6 +149,7 @@ def _environment() -> Environment:
         "percent": _percent,
         "floored": _floored,
         "range_bar": _range_bar,
+        "way_round": direction_words,
         "worst": _worst,
     }
     return environment

@@ -8,7 +8,6 @@ from dataclasses import replace
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, JointUse, Report
-from cellplan.report.between_record import full_tasks_record
 from cellplan.report.clearance_record import clearance_proof_record, closest_pairs_record
 from cellplan.report.closure_record import closures_record, worst_closures_record
 from cellplan.report.idle_record import missing_moves
@@ -30,6 +29,7 @@ from cellplan.report.record import (
     status,
 )
 from cellplan.report.series import INDENT, series, series_text
+from cellplan.report.task_record import tasks_record
 
 
 def report_json(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> str:
@@ -50,7 +50,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
     """The record of one run, of its closures and of how its motion was found, without the series."""
     record = report_record(report, cell=cell, provenance=provenance)
     return record | {
-        "tasks": full_tasks_record(report, cell),
+        "tasks": tasks_record(report, cell),
         "closest_pairs": closest_pairs_record(report.clearance),
         "clearance_proof": clearance_proof_record(report.clearance),
         "open_surfaces": open_surfaces_record(cell),
@@ -86,7 +86,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "cycle_time_s": number(sum(report.cycle_time for report in runs)),
         "clock_from": clock_from(cell),
         "runs": {name: _run_record(name, report, cell) for name, report in reports.items()},
-        "tasks": {name: record for report in runs for name, record in full_tasks_record(report, cell).items()},
+        "tasks": {name: record for report in runs for name, record in tasks_record(report, cell).items()},
         "open_surfaces": open_surfaces_record(cell),
         "closure": worst_closures_record(runs, cell),
         "joints": joints_record(merge_joint_uses(use for report in runs for use in report.joints)),
@@ -114,7 +114,7 @@ def _run_record(name: str, report: Report, cell: Cell) -> Record:
         "max_orientation_error_between_rows_deg",
     )
     record: Record = {"status": status(report), "folder": name, "cycle_time_s": number(report.cycle_time)}
-    for task in full_tasks_record(report, cell).values():
+    for task in tasks_record(report, cell).values():
         record |= {key: task[key] for key in errors if key in task}
     return record
 

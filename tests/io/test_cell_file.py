@@ -13,7 +13,7 @@ from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Sp
 from cellplan.geometry.transforms import pose
 from cellplan.io.cell_file import load_cell
 from cellplan.model.cell import Cell, Mode
-from cellplan.model.task import CirclePath, Frame, PlaneName, PolygonPath, SampledPath, TimeLawKind
+from cellplan.model.task import CirclePath, Frame, PlaneName, PolygonPath, RunDirection, SampledPath, TimeLawKind
 
 Load = Callable[..., Cell]
 Refuse = Callable[..., list[str]]
@@ -115,6 +115,21 @@ def test_planar_paths_start_where_the_interface_says(load: Load) -> None:
     assert isinstance(path, PolygonPath)
     assert path.plane is PlaneName.XZ
     np.testing.assert_allclose(path.corners, [(0.02, 0), (0, 0.01), (-0.02, 0), (0, -0.01)], atol=1e-15)
+
+
+def test_closed_shapes_start_where_they_are_told_and_run_as_they_are_told(load: Load) -> None:
+    circle = "circle: {radius_mm: 100, plane: xy}"
+
+    started = load((circle, "circle: {radius_mm: 100, plane: yz, direction: clockwise, start_at: -z}")).tasks[0].path
+    rectangle = load((circle, "rectangle: {sides_mm: [4, 2], plane: xy, start_at: [-1, 1]}")).tasks[0].path
+    rhombus = load((circle, "rhombus: {diagonals_mm: [4, 2], plane: xz, start_at: -z, angle_deg: 90}")).tasks[0].path
+
+    assert isinstance(started, CirclePath)
+    assert (started.start, started.direction) == ((0.0, -1.0), RunDirection.CLOCKWISE)
+    assert isinstance(rectangle, PolygonPath)
+    assert rectangle.corners == ((-0.002, 0.001), (-0.002, -0.001), (0.002, -0.001), (0.002, 0.001))
+    assert isinstance(rhombus, PolygonPath)
+    np.testing.assert_allclose(rhombus.corners[0], (0.001, 0.0), atol=1e-15)  # the lower corner, turned by a quarter
 
 
 def test_task_settings_override_those_of_the_motion(load: Load) -> None:

@@ -59,6 +59,11 @@ Refuse = Callable[..., list[str]]
             "c:13: part.geometry.unit: expected mm, m or inch, got 'cm'",
         ),
         (
+            "motion: {",
+            "checks: {contact_zone_mm: 10000}\nmotion: {",
+            "c:21: checks.contact_zone_mm: expected a number of millimetres of at most 50, got 10000",
+        ),
+        (
             "{robot: holder,",
             "{robot: hodler,",
             "c:15: part.held_by[0].robot: expected a robot of this cell (holder, worker), got 'hodler', did you "

@@ -22,6 +22,32 @@ Refuse = Callable[..., list[str]]
             "c:20: tasks.ring.duration_s: expected a positive number of seconds, got -4",
         ),
         (
+            "plane: xy}",
+            "plane: xy, direction: cw}",
+            "c:19: tasks.ring.path.circle.direction: expected counterclockwise or clockwise, got 'cw'",
+        ),
+        (
+            "plane: xy}",
+            "plane: xy, start_at: +z}",
+            "c:19: tasks.ring.path.circle.start_at: expected an axis of the plane xy: +x, -x, +y, -y, got +z",
+        ),
+        (
+            "circle: {radius_mm: 100, plane: xy}",
+            "rectangle: {sides_mm: [10, 10], plane: xy, start_at: [2, 1]}",
+            "c:19: tasks.ring.path.rectangle.start_at: expected a corner: [1, 1], [-1, 1], [-1, -1] or [1, -1], "
+            "got [2, 1]",
+        ),
+        (
+            "circle: {radius_mm: 100, plane: xy}",
+            "rhombus: {diagonals_mm: [10, 10], plane: xy, start_at: [1, 1]}",
+            "c:19: tasks.ring.path.rhombus.start_at: expected a corner: [1, 0], [0, 1], [-1, 0] or [0, -1], got [1, 1]",
+        ),
+        (
+            "tool_axis: normal",
+            "tool_depth_mm: 101",
+            "c:20: tasks.ring.tool_depth_mm: expected a number of millimetres of at most 100, got 101",
+        ),
+        (
             "robot: worker",
             "robot: holder",
             "c:18: tasks.ring.robot: expected a robot that does not hold the part, got the positioner 'holder'",

@@ -20,31 +20,66 @@ from roller_paths import (
 
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box
-from cellplan.model.task import (
-    PlaneName,
-    PolygonPath,
-    SpacePolylinePath,
-)
+from cellplan.model.path_direction import run_direction
+from cellplan.model.task import PlaneName, PolygonPath, RunDirection, SpacePolylinePath
 from cellplan.planning.toolpaths import build_toolpath
 
 
 @pytest.mark.parametrize(("axis", "sign"), list(product(range(3), (1.0, -1.0))))
-def test_closed_paths_run_counter_clockwise_seen_from_every_side(axis: int, sign: float) -> None:
+def test_shapes_run_the_way_round_that_is_asked_for_seen_from_every_side(axis: int, sign: float) -> None:
     side = sign * np.eye(3)[axis]
     plane = next(name for name, axes in PLANES.items() if not any(a[axis] for a in axes))
     first, second = PLANES[plane]
     block = part_of(Box((0.6, 0.6, 0.6)))
     square = PolygonPath(plane=plane, corners=((0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1), (0.1, -0.1)), is_closed=True)
-    clockwise = replace(square, corners=square.corners[:1] + square.corners[:0:-1])
-    for path in (circle(0.1, plane), square, clockwise):
+    for drawn, direction in product((circle(0.1, plane), square), RunDirection):
+        path = replace(drawn, direction=direction)
         task = task_on(path, project=side, tool_x=first)
         toolpath = build_toolpath(task, block, ORIGIN)
         p = toolpath.poses(np.linspace(0.0, toolpath.length, 401))[:, :3, 3]
         area = 0.5 * np.cross(p[:-1], p[1:]).sum(axis=0) @ side
-        assert area > 0.0
-        start = 0.1 * first if path is not square and path is not clockwise else 0.1 * (first + second)
+        assert (area > 0.0) == (direction is RunDirection.COUNTERCLOCKWISE)
+        assert run_direction(task) == (direction, pytest.approx(side))
+        start = 0.1 * first if drawn is not square else 0.1 * (first + second)
         assert np.allclose(p[0], start + 0.3 * side, atol=1e-15)
         assert np.allclose(p[-1], p[0], atol=1e-12)
+
+
+def test_a_circle_starts_where_it_is_told_and_runs_on_from_there() -> None:
+    path = replace(circle(0.1, PlaneName.XY), start=(0.6, -0.8), direction=RunDirection.CLOCKWISE)
+
+    toolpath = build_toolpath(task_on(path, tool_axis=-EZ), ROLLER, ORIGIN)
+
+    quarter = toolpath.poses(np.array([0.0, 0.25, 0.5]) * toolpath.length)[:, :3, 3]
+    assert np.allclose(quarter, [[0.06, -0.08, 0], [-0.08, -0.06, 0], [-0.06, 0.08, 0]], atol=1e-12)
+
+
+@pytest.mark.parametrize("side", [EX, -EX])
+@pytest.mark.parametrize("is_reversed", [False, True])
+def test_closed_lists_of_points_run_as_listed_from_every_side(side: np.ndarray, is_reversed: bool) -> None:
+    corners = ((0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1))  # counter-clockwise seen from +x
+    listed = corners[::-1] if is_reversed else corners
+    task = task_on(
+        PolygonPath(plane=PlaneName.YZ, corners=listed, is_closed=True),
+        project=side,
+        tool_x=EZ,
+    )
+
+    toolpath = build_toolpath(task, part_of(Box((0.6, 0.6, 0.6))), ORIGIN)
+
+    passed = toolpath.poses(toolpath.behind)[:, 1:3, 3]
+    assert np.allclose(passed, [*listed, listed[0]], atol=1e-12)
+    is_counterclockwise = (side[0] > 0.0) != is_reversed
+    expected = RunDirection.COUNTERCLOCKWISE if is_counterclockwise else RunDirection.CLOCKWISE
+    assert run_direction(task) == (expected, pytest.approx(side))
+
+
+def test_a_closed_list_that_encloses_nothing_has_no_way_round() -> None:
+    eight = ((0.1, 0.1), (-0.1, -0.1), (-0.1, 0.1), (0.1, -0.1))
+
+    task = task_on(PolygonPath(plane=PlaneName.XY, corners=eight, is_closed=True), tool_axis=-EZ)
+
+    assert run_direction(task) == (None, None)
 
 
 @pytest.mark.parametrize("plane", list(PlaneName))

@@ -15,6 +15,7 @@ from cellplan.io.schema.task import (
     TaskAxis,
     TaskEntry,
     TimeLawChoice,
+    ToolDepth,
     require_each_once,
 )
 
@@ -22,6 +23,7 @@ SCHEMA_VERSION: Final = 1
 ROBOT_LIMIT: Final = 64
 TASK_LIMIT: Final = 200
 OBSTACLE_LIMIT: Final = 500
+WIDEST_CONTACT_MM: Final = 50.0  # farther from its tip a tool that touches the part collides with it
 SAMPLE_LIMIT: Final = 2_000_000  # tables longer than this fill disks, not controllers
 ALL_AXES: Final[tuple[TaskAxis, ...]] = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -142,8 +144,12 @@ class ChecksEntry(Entry):
     clearance_mm: Annotated[float, Field(ge=0.0, le=10_000.0)] = Field(
         default=5.0, description="Smallest allowed distance between things that must not touch."
     )
-    contact_zone_mm: Annotated[float, Field(ge=0.0, le=10_000.0)] = Field(
+    contact_zone_mm: Annotated[float, Field(ge=0.0, le=WIDEST_CONTACT_MM)] = Field(
         default=20.0, description="Radius round the tool tip within which tool and part may touch."
+    )
+    tool_depth_mm: ToolDepth = Field(
+        default=1.0,
+        description="Largest length of tool inside the part or beyond it, along the tool's axis from where it enters.",
     )
     closure_mm: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(
         default=0.003, description="Largest distance of a further holder's tool from its grasp on the part."

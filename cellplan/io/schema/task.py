@@ -4,12 +4,12 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, Tag, model_validator
 
+from cellplan.io.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
 from cellplan.io.schema.common import (
     Angle,
     Coordinate,
     Entry,
     Name,
-    PlaneCoordinates,
     SignedAxis,
     Size,
     Text,
@@ -24,10 +24,10 @@ from cellplan.io.schema.robot import SlidingSpeed
 PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
 FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
+DEEPEST_CUT_MM: Final = 100.0  # a tool that is to stand deeper in the part is no tool that works on its surface
 LONGEST_S: Final = 1e6  # [s] eleven days: longer is a slip of the unit
 MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
-PlaneWord = Literal["xy", "yz", "xz"]
 Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
 
 DIRECTION_WORDS: Final = "+x, -x, +y, -y, +z, -z or a direction [x, y, z]"
@@ -37,34 +37,8 @@ CORNER_WORDS: Final = "stop or {blend_mm: 2}"
 CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
 
 
-class CircleEntry(Entry):
-    """A circle; it starts on the plane's first axis."""
-
-    radius_mm: Size = Field(description="Radius.")
-    plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field(default=(0.0, 0.0), description="Centre on the plane's two axes.")
-
-
-class RectangleEntry(Entry):
-    """A rectangle; it starts at the (+, +) corner."""
-
-    sides_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
-    plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field(default=(0.0, 0.0), description="Centre on the plane's two axes.")
-    angle_deg: Angle = Field(default=0.0, description="Turn in the plane, from the first axis towards the second.")
-
-
-class RhombusEntry(Entry):
-    """A rhombus; it starts on the first axis."""
-
-    diagonals_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
-    plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field(default=(0.0, 0.0), description="Centre on the plane's two axes.")
-    angle_deg: Angle = Field(default=0.0, description="Turn in the plane, from the first axis towards the second.")
-
-
 class PolylineEntry(Entry):
-    """Points joined by straight sides: two coordinates each in a plane, or three in space."""
+    """Points joined by straight sides in the order they are listed: two coordinates each in a plane, or three."""
 
     points_mm: tuple[tuple[Coordinate, ...], ...] = Field(
         min_length=2, description="Points, all [u, v] on the plane's axes or all [x, y, z] in the part frame."
@@ -219,6 +193,7 @@ class ToleranceEntry(Entry):
     )
 
 
+ToolDepth = Annotated[float, Field(ge=0.0, le=DEEPEST_CUT_MM)]
 StandOff = Annotated[float, Field(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
 
@@ -287,6 +262,10 @@ class TaskEntry(Entry):
         description="Time after the start during which the tool may come from beside its path: its error is reported "
         "and not judged. Shorter than the task.",
     )
+    tool_depth_mm: ToolDepth | None = Field(
+        default=None,
+        description="Largest depth of the tool in the part, for processes that cut; checks.tool_depth_mm when absent.",
+    )
     time_law: TimeLawChoice | None = Field(
         default=None, description="Law of each stretch between stops; the motion's when absent."
     )
@@ -301,6 +280,8 @@ class TaskEntry(Entry):
             raise rule("expected either duration_s or feed_mm_s, got both", "feed_mm_s")
         if self.relative_to == "world" and self.path.project is not None:
             raise rule("unexpected key, a path in the world is not laid on the part", "path.project")
+        if self.relative_to == "world" and self.tool_depth_mm is not None:
+            raise rule("unexpected key, a tool in the world does not work on the part", "tool_depth_mm")
         for name, words in (("axes", self.axes), ("free", self.free)):
             require_each_once(words, name)
         if self.start_s is not None and self.start_s < self.approaching_s:
