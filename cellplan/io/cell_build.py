@@ -6,11 +6,12 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.io.acceleration_build import acceleration_rule, controller_cycle, fill_in_accelerations
 from cellplan.io.cell_rules import needs_surface
 from cellplan.io.robot_rules import start_posture
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry
-from cellplan.io.schema.robot import RobotEntry, ToolEntry
+from cellplan.io.schema.robot import ToolEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.task import (
     BlendEntry,
@@ -57,8 +58,9 @@ PLANE_NORMAL: Final = {"xy": "z", "yz": "x", "xz": "y"}
 TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> its file, read
 
 
-def build_robot(name: str, entry: RobotEntry, model: RobotModel, read_mesh: MeshReader) -> Robot:
-    """A robot placed in the cell."""
+def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh: MeshReader) -> Robot:
+    """A robot placed in the cell, with the cell's settings where it has none of its own."""
+    entry = document.robots[name]
     weights = np.ones(len(model.joints)) if entry.weights is None else np.array(entry.weights)
     return Robot(
         name=name,
@@ -67,6 +69,8 @@ def build_robot(name: str, entry: RobotEntry, model: RobotModel, read_mesh: Mesh
         tool=_tool(entry.tool, read_mesh),
         start=start_posture(entry, model),
         weights=weights,
+        acceleration=acceleration_rule(entry, document.acceleration),
+        controller_cycle=controller_cycle(entry, document),
     )
 
 
@@ -202,6 +206,7 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         if task.path.is_planar and task.path.project is None:
             entry["path"].setdefault("offset_mm", 0.0)
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}
+    fill_in_accelerations(document, values)
     for grasp in values["part"]["held_by"][:1]:
         del grasp["axes"]  # the first holder has no choice
     return values
@@ -267,4 +272,5 @@ def build_checks(entry: ChecksEntry) -> CheckSettings:
         exclusions=tuple(Exclusion(bodies=pair.bodies, reason=pair.reason) for pair in entry.exclude),
         closure_position=entry.closure_mm / MM,
         closure_orientation=float(np.deg2rad(entry.closure_deg)),
+        part_acceleration=entry.part_acceleration_m_s2,
     )

@@ -6,6 +6,7 @@ from typing import Final
 
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Mesh
+from cellplan.io.acceleration_build import acceleration_complaints
 from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.cell_build import (
     build_checks,
@@ -61,6 +62,7 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
     models = _models(pieces, document, sources)
     for name, model in models.items():
         complaints += robot_complaints(name, pieces.robots[name], model, document)
+    complaints += acceleration_complaints(pieces, models, document)
     complaints += _unknown_bodies(pieces, models, document)
     complaints += solver_complaints(pieces, models, document)
     complaints += _part_extent(pieces, document)
@@ -165,7 +167,7 @@ def _cell(
     timed = {name for name, path in targets.items() if isinstance(path, TimedPath)}
     return Cell(
         name=whole.name,
-        robots=tuple(build_robot(name, entry, models[name], mesh) for name, entry in whole.robots.items()),
+        robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
         part=build_part(whole.part, mesh),
         tasks=tuple(build_task(name, whole, targets.__getitem__) for name in whole.tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),

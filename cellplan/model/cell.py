@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array
+from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Frame, Task
@@ -69,6 +70,8 @@ class Robot:
         tool: What it carries.
         start: Start posture in [rad] or [m], shape (n,); None when it is to be found.
         weights: Joint weights, positive, shape (n,): a larger one moves that joint less.
+        acceleration: Against which accelerations its joints are judged.
+        controller_cycle: Cycle of its controller in [s]; jerk is taken over it.
     """
 
     name: str
@@ -77,6 +80,8 @@ class Robot:
     tool: Tool
     start: Array | None
     weights: Array
+    acceleration: AccelerationRule = USUAL_ACCELERATION
+    controller_cycle: float = USUAL_CYCLE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -190,6 +195,7 @@ class CheckSettings:
         exclusions: Pairs left out at the user's word.
         closure_position: Largest distance in [m] of a further holder's tool from its grasp.
         closure_orientation: Largest angle in [rad] between the two.
+        part_acceleration: Largest allowed acceleration of the part in [m/s^2]; None: it is only reported.
     """
 
     clearance: float
@@ -197,6 +203,7 @@ class CheckSettings:
     exclusions: tuple[Exclusion, ...] = ()
     closure_position: float = 3e-6
     closure_orientation: float = 1e-3 * math.pi / 180.0
+    part_acceleration: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

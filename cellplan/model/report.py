@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.acceleration import UNKNOWN_ACCELERATIONS, MotionAccelerations
 
 CAUTION = (
     "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
@@ -300,6 +301,7 @@ class Report:
         qd: Speeds between the samples, shape (N - 1, n), by robot.
         closures: Closure errors, one entry per holder but the first.
         repeatability: Whether the joints come back with the tools; None when not all tools come back.
+        accelerations: Accelerations, jerk and process speeds.
     """
 
     cell: str
@@ -317,6 +319,7 @@ class Report:
     qd: Mapping[str, Array]
     closures: tuple[ClosureAccuracy, ...] = ()
     repeatability: Repeatability | None = None
+    accelerations: MotionAccelerations = UNKNOWN_ACCELERATIONS
 
     @property
     def passed(self) -> bool:

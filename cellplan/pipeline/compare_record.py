@@ -10,6 +10,12 @@ Record = Mapping[str, Any]
 
 RELATIVE: Final = 1e-6  # [-] figures have seven digits at least
 ABSOLUTE: Final = 1e-7  # [-] in printed units; below it stands the noise of the arithmetic
+ABSOLUTE_BY_ENDING: Final[Mapping[str, float]] = {  # differences of positions over short times enlarge that noise
+    "acceleration": 1e-5,
+    "acceleration_m_s2": 1e-5,
+    "jerk": 1e-2,
+    "jerk_m_s3": 1e-2,
+}
 COMPARED_ELSEWHERE: Final = frozenset({"inputs", "versions", "digests"})
 KNOWN_TO_THE_PLANNER: Final = frozenset(  # what the planner's steps and nodes took cannot be seen in the tables
     {
@@ -52,7 +58,7 @@ def _compare(said: Any, found: Any, path: tuple[str, ...], *, same_program: bool
     elif isinstance(found, list) and isinstance(said, list) and len(found) == len(said):
         for index, (left, right) in enumerate(zip(said, found, strict=True)):
             yield from _compare(left, right, (*path[:-1], f"{path[-1]}[{index}]"), same_program=same_program)
-    elif not _is_same(said, found):
+    elif not _is_same(said, found, room=_room(path)):
         yield ".".join(path), said, found
 
 
@@ -63,11 +69,17 @@ def _is_left_out(path: tuple[str, ...], key: str) -> bool:
     return (*path, key) in KNOWN_TO_THE_PLANNER or key.endswith(INSTANT) or key in WORDS
 
 
-def _is_same(said: Any, found: Any) -> bool:
+def _room(path: tuple[str, ...]) -> float:
+    """Noise of a figure in its printed unit, by the ending of its key."""
+    key = path[-1] if path else ""
+    return max((room for ending, room in ABSOLUTE_BY_ENDING.items() if key.endswith(ending)), default=ABSOLUTE)
+
+
+def _is_same(said: Any, found: Any, *, room: float = ABSOLUTE) -> bool:
     """Whether two single values are the same up to rounding; a number is never the same as a word."""
     are_numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (said, found))
     if are_numbers:
-        return math.isclose(said, found, rel_tol=RELATIVE, abs_tol=ABSOLUTE)
+        return math.isclose(said, found, rel_tol=RELATIVE, abs_tol=room)
     return type(said) is type(found) and bool(said == found)
 
 

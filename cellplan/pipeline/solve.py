@@ -25,6 +25,7 @@ from cellplan.planning.modes import RunPlan, plan_runs
 from cellplan.planning.schedule import examine_times, sample, time_tasks
 from cellplan.planning.start_search import find_start
 from cellplan.planning.toolpaths import build_toolpath
+from cellplan.report.acceleration_record import table_line
 from cellplan.scene.scene import Scene
 
 START_DECIMALS: Final = 12  # of a degree or a metre, as in the tables: below the noise of the arithmetic
@@ -109,7 +110,8 @@ def with_verdict(cell: Cell, program: Program, report: Report, *, remark: str = 
         digests=_digests(cell, program),
         remark=remark,
     )
-    return Program(tables={name: replace_header(text, header=header) for name, text in program.tables.items()})
+    headers = {name: replace(header, accelerations=table_line(report.accelerations, name)) for name in program.tables}
+    return Program(tables={name: replace_header(text, header=headers[name]) for name, text in program.tables.items()})
 
 
 def _digests(cell: Cell, program: Program) -> dict[str, str]:
