@@ -57,12 +57,10 @@ def verify(
     closures = closure_accuracy(cell, scene.chains, q, X_WP)
     checks = [*_accuracy_checks(cell, schedule, accuracy), *check_closure(cell, schedule.times, closures)]
     uses, joint_checks = _joints(cell, schedule.times, q)
-    checks += joint_checks
     accelerations = motion_accelerations(cell, scene.chains, schedule, q=q, X_WP=X_WP)
-    checks += check_accelerations(cell, accelerations)
+    checks += [*joint_checks, *check_accelerations(cell, accelerations)]
     drift = repeatability(cell, schedule, q)
-    checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
-    checks += check_locked(cell, schedule.times, q)
+    checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
     report = Report(
         cell=cell.name,
         mode=str(cell.motion.mode),

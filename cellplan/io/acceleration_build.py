@@ -1,6 +1,7 @@
 """Accelerations of a cell file: the rule of each robot, its own or the cell's, and what contradicts its joints."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 from cellplan.io.complaints import Complaint, KeyPath, listed
@@ -10,14 +11,20 @@ from cellplan.io.schema.pieces import Pieces
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml_reader import YamlDocument
 from cellplan.model.acceleration import USUAL_ACCELERATION, AccelerationRule
+from cellplan.model.cell import Robot
 from cellplan.model.robot import RobotModel
 
 MS: Final = 1000.0  # [ms/s]
 
 
-def acceleration_rule(entry: RobotEntry, cell: AccelerationChoice | None) -> AccelerationRule:
-    """The rule of one robot: its own, else the cell's, else the usual assumption."""
-    choice = cell if entry.acceleration is None else entry.acceleration
+def acceleration_rule(entry: RobotEntry, cell: AccelerationChoice | None, *, joints: int) -> AccelerationRule:
+    """The rule of one robot of so many joints: its own, else the cell's, else the usual assumption."""
+    rule = _chosen(cell if entry.acceleration is None else entry.acceleration)
+    return replace(rule, full_speed_in=rule.full_speed_in[:joints])
+
+
+def _chosen(choice: AccelerationChoice | None) -> AccelerationRule:
+    """The rule that an entry asks for."""
     if choice is None:
         return USUAL_ACCELERATION
     if isinstance(choice, AccelerationRuleEntry):
@@ -34,19 +41,9 @@ def controller_cycle(entry: RobotEntry, document: CellDocument) -> float:
     return (document.motion.controller_cycle_ms if own is None else own) / MS
 
 
-def fill_in_accelerations(document: CellDocument, values: dict[str, Any]) -> None:
-    """Write the rule and the controller's cycle of every robot into the plain values of a file, in place."""
-    for name, entry in document.robots.items():
-        written = {
-            **values["robots"][name],
-            "acceleration": _written(acceleration_rule(entry, document.acceleration)),
-            "controller_cycle_ms": entry.controller_cycle_ms or document.motion.controller_cycle_ms,
-        }
-        values["robots"][name] = {key: written[key] for key in RobotEntry.model_fields if key in written}
-
-
-def _written(rule: AccelerationRule) -> Any:
-    """A rule in the words of a cell file."""
+def written_rule(robot: Robot) -> Any:
+    """The rule of a robot in the words of a cell file."""
+    rule = robot.acceleration
     if rule.is_unlimited:
         return {"unlimited": rule.reason} if rule.reason else "unlimited"
     return {"full_speed_in_s": list(rule.full_speed_in)} if rule.full_speed_in else "stated"

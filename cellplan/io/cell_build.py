@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.io.acceleration_build import acceleration_rule, controller_cycle, fill_in_accelerations
+from cellplan.io.acceleration_build import acceleration_rule, controller_cycle
 from cellplan.io.cell_rules import needs_surface
 from cellplan.io.robot_rules import start_posture
 from cellplan.io.schema import CellDocument
@@ -69,7 +69,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         tool=_tool(entry.tool, read_mesh),
         start=start_posture(entry, model),
         weights=weights,
-        acceleration=acceleration_rule(entry, document.acceleration),
+        acceleration=acceleration_rule(entry, document.acceleration, joints=len(model.joints)),
         controller_cycle=controller_cycle(entry, document),
     )
 
@@ -206,7 +206,6 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         if task.path.is_planar and task.path.project is None:
             entry["path"].setdefault("offset_mm", 0.0)
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}
-    fill_in_accelerations(document, values)
     for grasp in values["part"]["held_by"][:1]:
         del grasp["axes"]  # the first holder has no choice
     return values
