@@ -138,9 +138,7 @@ def test_tool_and_part_are_told_in_the_world_and_the_part_may_be_limited() -> No
         assert check.passed == passed
 
 
-@pytest.mark.parametrize(
-    ("is_smooth", "ratio", "share", "stretches"), [(False, 1.0, 1.0, 0), (True, 1.875, 0.16, 2)]
-)
+@pytest.mark.parametrize(("is_smooth", "ratio", "share", "stretches"), [(False, 1.0, 1.0, 0), (True, 1.875, 0.16, 2)])
 def test_process_speed_has_mean_peak_and_the_stretches_that_are_slower(
     is_smooth: bool, ratio: float, share: float, stretches: int
 ) -> None:

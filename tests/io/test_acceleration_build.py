@@ -80,7 +80,9 @@ def test_jerk_is_limited_where_the_cell_says_so(load: Load) -> None:
 
 
 def test_the_cycle_of_a_robot_counts_before_that_of_the_motion(load: Load) -> None:
-    cell = load(("duration_s: 4", "duration_s: 4, controller_cycle_ms: 8"), (HOLDER, f"{HOLDER}    controller_cycle_ms: 2\n"))
+    cell = load(
+        ("duration_s: 4", "duration_s: 4, controller_cycle_ms: 8"), (HOLDER, f"{HOLDER}    controller_cycle_ms: 2\n")
+    )
     assert [robot.controller_cycle for robot in cell.robots] == [0.002, 0.008]
 
 
@@ -130,5 +132,7 @@ def test_rule_and_cycle_of_every_robot_are_written_out(load: Load, words: str) -
         ),
     ],
 )
-def test_a_rule_that_does_not_fit_is_refused_with_its_cure(refuse: Refuse, change: tuple[str, str], message: str) -> None:
+def test_a_rule_that_does_not_fit_is_refused_with_its_cure(
+    refuse: Refuse, change: tuple[str, str], message: str
+) -> None:
     assert message in refuse(change)

@@ -207,7 +207,7 @@ Refuse = Callable[..., list[str]]
             "environment:",
             "enviroment: {}\nenvironment:",
             "c:22: enviroment: unknown key, did you mean 'environment'?; allowed: cellplan, name, robots, part, "
-            "tasks, environment, motion, solver, checks, layout",
+            "tasks, environment, motion, acceleration, solver, checks, layout",
         ),
     ],
 )
