@@ -1,11 +1,10 @@
-"""Joint positions, speeds and accelerations that were read back, against their limits."""
+"""Joint positions and speeds that were read back, against their limits."""
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 from cellplan.model.report import Check, JointUse
-from cellplan.model.robot import Joint
 
 
 def joint_uses(robot: Robot, times: Array, q: Array) -> tuple[JointUse, ...]:
@@ -22,13 +21,11 @@ def joint_uses(robot: Robot, times: Array, q: Array) -> tuple[JointUse, ...]:
     return tuple(_use(robot, index, times, q[:, index], speeds=speeds[:, index]) for index in range(q.shape[1]))
 
 
-def check_joints(robot: Robot, uses: tuple[JointUse, ...], times: Array, q: Array) -> list[Check]:
-    """Position and speed of every joint, and acceleration where a limit is known."""
+def check_joints(uses: tuple[JointUse, ...], times: Array, q: Array) -> list[Check]:
+    """Position and speed of every joint."""
     checks = []
-    for index, (joint, use) in enumerate(zip(robot.model.joints, uses, strict=True)):
+    for index, use in enumerate(uses):
         checks += [_check_position(use, times, q[:, index]), _check_velocity(use)]
-        if joint.acceleration is not None:
-            checks.append(_check_acceleration(robot, joint, times, q[:, index]))
     return checks
 
 
@@ -101,29 +98,6 @@ def _check_velocity(use: JointUse) -> Check:
         message=(
             f"joint {use.robot}/{use.joint} {verdict} {scale * use.peak_velocity:.4g} {unit}/s "
             f"at {use.peak_velocity_at_s:.3f} s ({percent:.4g} % of its limit {scale * use.velocity_limit:g} {unit}/s)"
-        ),
-    )
-
-
-def _check_acceleration(robot: Robot, joint: Joint, times: Array, q: Array) -> Check:
-    """One joint's largest acceleration, from second differences."""
-    scale, unit = _unit(joint.is_revolute)
-    speeds = np.diff(q) / np.diff(times)
-    accelerations = np.abs(np.diff(speeds)) / np.diff(times)[1:]
-    worst = int(np.argmax(accelerations)) if len(accelerations) else 0
-    value = float(accelerations[worst]) if len(accelerations) else 0.0
-    limit = joint.acceleration if joint.acceleration is not None else np.inf
-    return Check(
-        name="joint_acceleration",
-        subject=f"{robot.name}/{joint.name}",
-        passed=value <= limit,
-        value=scale * value,
-        limit=scale * limit,
-        unit=f"{unit}/s2",
-        at_s=float(times[worst + 1]),
-        message=(
-            f"joint {robot.name}/{joint.name} accelerates at most at {scale * value:.4g} {unit}/s2 "
-            f"at {times[worst + 1]:.3f} s, limit {scale * limit:g} {unit}/s2"
         ),
     )
 

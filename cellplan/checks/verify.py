@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cellplan.checks.acceleration_limits import check_accelerations, motion_accelerations
 from cellplan.checks.between_checks import check_closures_between, check_task_between, look_between, with_between
 from cellplan.checks.clearance import UNKNOWN, check_clearance
 from cellplan.checks.closure import check_closure, closure_accuracy
@@ -64,7 +65,8 @@ def verify(
     checks = [*_accuracy_checks(cell, schedule, accuracy), *check_depths(cell, depths)]
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
     uses, joint_checks = _joints(cell, schedule.times, q)
-    checks += [*check_closure(cell, schedule.times, closures), *joint_checks]
+    accelerations = motion_accelerations(cell, scene.chains, schedule, q=q, X_WP=X_WP)
+    checks += [*joint_checks, *check_accelerations(cell, accelerations)]
     drift = repeatability(cell, schedule, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
     checks += check_idle(cell, schedule, q)
@@ -88,6 +90,7 @@ def verify(
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
         closures=closures,
         depths=depths,
+        accelerations=accelerations,
     )
     if preview is not None:
         preview(report)
@@ -115,7 +118,7 @@ def _joints(cell: Cell, times: Array, q: Mapping[str, Array]) -> tuple[list[Join
     for robot in cell.robots:
         own = joint_uses(robot, times, q[robot.name])
         uses += own
-        checks += check_joints(robot, own, times, q[robot.name])
+        checks += check_joints(own, times, q[robot.name])
     return uses, checks
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from cellplan.cli.acceleration_summary import acceleration_lines
 from cellplan.report.left_out_record import grips_told, told_left_out
 from cellplan.report.method import USUAL_METHOD
 from cellplan.report.open_surfaces import open_surface_lines
@@ -37,6 +38,7 @@ def figure_lines(record: Record) -> list[str]:
         *_closure_lines(record.get("closure", {})),
         *_margin_lines(record["joints"]),
         *_speed_lines(record["joints"]),
+        *acceleration_lines(record),
         *_drift_lines(record.get("repeatability", {})),
         *_clearance_lines(record["clearance"]["whole"]),
         *_slack_lines(record["solver"]["slack"]),

@@ -6,6 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.io.acceleration_build import acceleration_rule, controller_cycle
 from cellplan.io.cell_rules import needs_surface
 from cellplan.io.robot_rules import home_configuration, start_posture
 from cellplan.io.schema import CellDocument
@@ -58,15 +59,15 @@ PLANE_NORMAL: Final = {"xy": "z", "yz": "x", "xz": "y"}
 TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> its file, read
 
 
-def build_robot(name: str, whole: CellDocument, model: RobotModel, read_mesh: MeshReader) -> Robot:
-    """A robot placed in the cell.
+def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh: MeshReader) -> Robot:
+    """A robot placed in the cell, with the cell's settings where it has none of its own.
 
-    One that has nothing to do in the cell, and of which nothing but the start is given, stands there: it is its home.
+    The home of a robot that has nothing to do in the cell, and of which nothing but the start is given, is its start.
     """
-    entry = whole.robots[name]
+    entry = document.robots[name]
     weights = np.ones(len(model.joints)) if entry.weights is None else np.array(entry.weights)
     start, home = start_posture(entry, model), home_configuration(entry, model)
-    at_work = {task.robot for task in whole.tasks.values()} | {grasp.robot for grasp in whole.part.held_by}
+    at_work = {task.robot for task in document.tasks.values()} | {grasp.robot for grasp in document.part.held_by}
     if name not in at_work and entry.home_deg is None and entry.home is None:
         home = start
     return Robot(
@@ -77,6 +78,8 @@ def build_robot(name: str, whole: CellDocument, model: RobotModel, read_mesh: Me
         start=start,
         weights=weights,
         home=home,
+        acceleration=acceleration_rule(entry, document.acceleration, joints=len(model.joints)),
+        controller_cycle=controller_cycle(entry, document),
     )
 
 
@@ -310,4 +313,5 @@ def build_checks(entry: ChecksEntry) -> CheckSettings:
         closure_position=entry.closure_mm / MM,
         closure_orientation=float(np.deg2rad(entry.closure_deg)),
         standing_depth=entry.standing_depth_mm / MM,
+        part_acceleration=entry.part_acceleration_m_s2,
     )

@@ -6,6 +6,7 @@ from typing import Final
 
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Mesh
+from cellplan.io.acceleration_build import acceleration_complaints
 from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.cell_build import (
     build_checks,
@@ -63,6 +64,7 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
     models = _models(pieces, document, sources)
     for name, model in models.items():
         complaints += robot_complaints(name, pieces.robots[name], model, document)
+    complaints += acceleration_complaints(pieces, models, document)
     complaints += _unknown_bodies(pieces, models, document)
     complaints += solver_complaints(pieces, models, document)
     complaints += _part_extent(pieces, document)

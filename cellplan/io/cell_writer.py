@@ -6,6 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array, pose, rpy_from_rotation
+from cellplan.io.acceleration_build import written_rule
 from cellplan.io.robot_rules import start_keys
 from cellplan.io.schema.cell import MotionEntry
 from cellplan.io.schema.robot import RobotEntry
@@ -75,6 +76,8 @@ def _robot(entry: Mapping[str, Any], robot: Robot, found: Array | None) -> dict[
     written |= _configuration("start", robot.model, robot.start if robot.start is not None else found)
     written |= _configuration("home", robot.model, robot.home)
     written["weights"] = [float(weight) for weight in robot.weights]
+    written["acceleration"] = written_rule(robot)
+    written["controller_cycle_ms"] = _file_number(robot.controller_cycle, is_revolute=False)
     return {key: written[key] for key in RobotEntry.model_fields if key in written}
 
 

@@ -44,13 +44,15 @@ def _configuration(given: Given, model: RobotModel) -> Array | None:
 
 
 def limits_in_si(entry: LimitsEntry) -> JointLimits:
-    """Limits of a cell in [rad], [m], [rad/s], [m/s], [rad/s^2] and [m/s^2]."""
+    """Limits of a cell in [rad], [m], [rad/s], [m/s] and the two rates after these."""
     slides = entry.unit == "mm"
     given = (getattr(entry, name) for name in (SLIDING_LIMITS if slides else TURNING_LIMITS))
-    lower, upper, velocity, acceleration = (
+    lower, upper, velocity, acceleration, jerk = (
         None if value is None else value / 1000.0 if slides else float(np.deg2rad(value)) for value in given
     )
-    return JointLimits(lower=lower, upper=upper, velocity=velocity, acceleration=acceleration, wraps=entry.wrap)
+    return JointLimits(
+        lower=lower, upper=upper, velocity=velocity, acceleration=acceleration, jerk=jerk, wraps=entry.wrap
+    )
 
 
 def robot_complaints(name: str, entry: RobotEntry, model: RobotModel, document: YamlDocument) -> Iterator[Complaint]:
@@ -144,6 +146,7 @@ def _wider(joint: Joint, entry: LimitsEntry) -> Iterator[tuple[str, str]]:
         ("upper", limits.upper, joint.upper, unit),
         ("velocity", limits.velocity, joint.velocity, f"{unit}_s"),
         ("acceleration", limits.acceleration, joint.acceleration, f"{unit}_s2"),
+        ("jerk", limits.jerk, joint.jerk, f"{unit}_s3"),
     ):
         if value is None or own is None:
             continue
@@ -161,11 +164,14 @@ def _wider(joint: Joint, entry: LimitsEntry) -> Iterator[tuple[str, str]]:
 
 
 def _within(joint: Joint, limits: JointLimits) -> Joint:
-    """The joint with tighter limits; an acceleration limit may also be a new one."""
+    """The joint with tighter limits; limits of acceleration and jerk may also be new ones."""
     accelerations = [value for value in (joint.acceleration, limits.acceleration) if value is not None]
+    jerks = [value for value in (joint.jerk, limits.jerk) if value is not None]
     return replace(
         joint,
         acceleration=min(accelerations, default=None),
+        jerk=min(jerks, default=None),
+        rated_velocity=None if limits.velocity is None else joint.top_speed,
         lower=joint.lower if limits.lower is None else max(joint.lower, limits.lower),
         upper=joint.upper if limits.upper is None else min(joint.upper, limits.upper),
         velocity=joint.velocity if limits.velocity is None else min(joint.velocity, limits.velocity),

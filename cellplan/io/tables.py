@@ -44,6 +44,7 @@ class TableHeader:
         verdict: ``passed``, ``REJECTED: <first violation>`` or ``not checked``.
         digests: SHA-256 in hexadecimal by what it is the digest of (``cell``, ``program``).
         remark: What else has to be known of the rows; empty for the program of the cell as it is written.
+        accelerations: The largest acceleration and jerk of the robot's joints; empty for rows that are not checked.
     """
 
     cell: str
@@ -51,6 +52,7 @@ class TableHeader:
     verdict: str = NOT_CHECKED
     digests: Mapping[str, str]
     remark: str = ""
+    accelerations: str = ""
 
 
 def render_table(robot: Robot, times: Array, q: Array, *, header: TableHeader) -> str:
@@ -136,6 +138,7 @@ def parse_header(text: str, source: str) -> TableHeader:
         verdict=fields["verdict"],
         digests=digests,
         remark=fields.get("remark", ""),
+        accelerations=fields.get("accelerations", ""),
     )
 
 
@@ -143,6 +146,7 @@ def _render_header(robot: str, header: TableHeader) -> str:
     fields = {"robot": robot, "cell": header.cell, "mode": header.mode}
     fields |= {f"{name} digest": f"{_SHA256}{digest}" for name, digest in header.digests.items()}
     fields |= {"remark": header.remark} if header.remark else {}
+    fields |= {"accelerations": header.accelerations} if header.accelerations else {}
     fields["verdict"] = header.verdict
     lines = [TITLE, *(f"{key}: {_one_line(value)}" for key, value in fields.items()), CAUTION]
     return "".join(f"# {line}\n" for line in lines)

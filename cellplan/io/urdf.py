@@ -109,6 +109,8 @@ def _driven(joint: UrdfJoint, roles: Roles, posture: ZeroPosture, *, limits: Map
         upper=allowed.upper,
         velocity=allowed.velocity,
         acceleration=wanted.acceleration,
+        jerk=wanted.jerk,
+        rated_velocity=allowed.rated_velocity,
     )
 
 

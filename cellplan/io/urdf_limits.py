@@ -25,6 +25,7 @@ class JointLimits:
         upper: Highest position.
         velocity: Largest speed.
         acceleration: Largest acceleration, if known.
+        jerk: Largest jerk, if known.
         wraps: Whether a continuous joint may turn without end.
     """
 
@@ -32,16 +33,21 @@ class JointLimits:
     upper: float | None = None
     velocity: float | None = None
     acceleration: float | None = None
+    jerk: float | None = None
     wraps: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Range:
-    """Complete limits of one joint; infinite positions where it may turn without end."""
+    """Complete limits of one joint; infinite positions where it may turn without end.
+
+    ``rated_velocity`` is the URDF's own top speed where the cell names another; None where it does not.
+    """
 
     lower: float
     upper: float
     velocity: float
+    rated_velocity: float | None = None
 
 
 def joint_range(joint: UrdfJoint, wanted: JointLimits, followers: Iterable[UrdfJoint]) -> Range:
@@ -58,7 +64,8 @@ def joint_range(joint: UrdfJoint, wanted: JointLimits, followers: Iterable[UrdfJ
         got = f"{in_user_unit(joint, lower)} and {in_user_unit(joint, upper)}"
         raise joint.error(f"expected the lower limit below the upper one, got {got}")
     _require_likely(joint, Range(lower=lower, upper=upper, velocity=velocity))
-    return Range(lower=lower, upper=upper, velocity=velocity)
+    rated = None if wanted.velocity is None else joint.limit.velocity
+    return Range(lower=lower, upper=upper, velocity=velocity, rated_velocity=rated)
 
 
 def _positions(joint: UrdfJoint, wanted: JointLimits) -> tuple[float, float]:

@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array
+from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Frame, Task
@@ -70,6 +71,8 @@ class Robot:
         start: Start posture in [rad] or [m], shape (n,); None when it is to be found.
         weights: Joint weights, positive, shape (n,): a larger one moves that joint less.
         home: Where it stands while it is idle in [rad] or [m], shape (n,); None when that is to be found.
+        acceleration: Against which accelerations its joints are judged.
+        controller_cycle: Cycle of its controller in [s]; jerk is taken over it.
     """
 
     name: str
@@ -79,6 +82,8 @@ class Robot:
     start: Array | None
     weights: Array
     home: Array | None = None
+    acceleration: AccelerationRule = USUAL_ACCELERATION
+    controller_cycle: float = USUAL_CYCLE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -195,6 +200,7 @@ class CheckSettings:
         closure_position: Largest distance in [m] of a further holder's tool from its grasp.
         closure_orientation: Largest angle in [rad] between the two.
         standing_depth: By how much in [m] bodies that never move may overlap where one stands on the other.
+        part_acceleration: Largest allowed acceleration of the part in [m/s^2]; None: it is only reported.
     """
 
     clearance: float
@@ -203,6 +209,7 @@ class CheckSettings:
     closure_position: float = 3e-6
     closure_orientation: float = 1e-3 * math.pi / 180.0
     standing_depth: float = 0.005
+    part_acceleration: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.acceleration import UNKNOWN_ACCELERATIONS, MotionAccelerations
 from cellplan.model.between_rows import BetweenRows
 from cellplan.model.left_out import LeftOut
 
@@ -333,6 +334,7 @@ class Report:
         closures: Closure errors, one entry per holder but the first.
         repeatability: Whether the joints come back with the tools; None when not all tools come back.
         depths: How deep tools stand in the part, one entry per task on it.
+        accelerations: Accelerations, jerk and process speeds.
     """
 
     cell: str
@@ -351,6 +353,7 @@ class Report:
     closures: tuple[ClosureAccuracy, ...] = ()
     repeatability: Repeatability | None = None
     depths: tuple[ToolDepth, ...] = ()
+    accelerations: MotionAccelerations = UNKNOWN_ACCELERATIONS
 
     @property
     def passed(self) -> bool:

@@ -33,6 +33,7 @@ class Joint:
         velocity: Largest allowed speed in [rad/s] or [m/s].
         acceleration: Largest allowed acceleration, if known.
         jerk: Largest allowed jerk, if known.
+        rated_velocity: Top speed of the arm itself, where the cell allows less; None where it does not.
     """
 
     name: str
@@ -45,6 +46,12 @@ class Joint:
     velocity: float
     acceleration: float | None = None
     jerk: float | None = None
+    rated_velocity: float | None = None
+
+    @property
+    def top_speed(self) -> float:
+        """Speed that the drive is made for in [rad/s] or [m/s], whatever the cell allows."""
+        return self.velocity if self.rated_velocity is None else self.rated_velocity
 
     @property
     def is_revolute(self) -> bool:

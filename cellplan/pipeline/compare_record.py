@@ -6,12 +6,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from cellplan.pipeline.same_words import is_same
+from cellplan.pipeline.same_words import NOISE, is_same
 
 Record = Mapping[str, Any]
 
 INSTANT: Final = "at_s"  # ends the names of instants
 WORDS: Final = frozenset({"message", "pair", "axis", "joint", "sliding_joint", "busiest_joint"})
+NOISE_BY_ENDING: Final[Mapping[str, float]] = {  # in printed units: differences over short times enlarge the noise
+    "acceleration": 1e-5,
+    "acceleration_m_s2": 1e-5,
+    "jerk": 1e-2,
+    "jerk_m_s3": 1e-2,
+}
 COMPARED_ELSEWHERE: Final = frozenset({"inputs", "versions", "digests"})
 KNOWN_TO_THE_PLANNER: Final = frozenset(  # what the planner's steps and nodes took cannot be seen in the tables
     {
@@ -53,7 +59,7 @@ def _compare(said: Any, found: Any, path: tuple[str, ...], *, same_program: bool
     elif isinstance(found, list) and isinstance(said, list) and len(found) == len(said):
         for index, (left, right) in enumerate(zip(said, found, strict=True)):
             yield from _compare(left, right, (*path[:-1], f"{path[-1]}[{index}]"), same_program=same_program)
-    elif not is_same(said, found):
+    elif not is_same(said, found, noise=_noise(path)):
         yield ".".join(path), said, found
 
 
@@ -65,6 +71,12 @@ def _is_left_out(path: tuple[str, ...], key: str) -> bool:
 def _is_of_a_tie(key: str) -> bool:
     """Whether a key says when or where an extreme is: another version may choose another one of two that are alike."""
     return key.endswith(INSTANT) or key in WORDS
+
+
+def _noise(path: tuple[str, ...]) -> float:
+    """Noise of a figure in its printed unit, by the ending of its key."""
+    key = path[-1] if path else ""
+    return max((noise for ending, noise in NOISE_BY_ENDING.items() if key.endswith(ending)), default=NOISE)
 
 
 def _compare_series(said: Any, found: np.ndarray[Any, Any], key: str) -> Iterator[tuple[str, Any, Any]]:

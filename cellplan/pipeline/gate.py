@@ -26,6 +26,7 @@ from cellplan.pipeline.write_run import versions
 from cellplan.planning.modes import RunPlan, homeless, plan_runs
 from cellplan.planning.schedule import schedule_tasks
 from cellplan.planning.toolpaths import build_toolpath
+from cellplan.report.acceleration_record import table_line
 from cellplan.report.idle_record import missing_moves
 from cellplan.report.json_report import run_record, summary_record
 from cellplan.report.record import Provenance, Record
@@ -69,6 +70,7 @@ def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], prog
     _refuse_failing(stored, motions)
     for plan, motion in zip(plans, motions, strict=True):
         _refuse_other_start(stored, plan, source.cell, tables=motion.tables)
+        _refuse_other_accelerations(stored, motion)
     _refuse_other_report(stored, source.cell, motions)
     of_pages = _refuse_other_pages(stored, source.cell, motions)
     return VerifiedRun(
@@ -170,6 +172,17 @@ def _refuse_other_header(header: TableHeader, expected: TableHeader, file: str) 
     for name in dict.fromkeys([*expected.digests, *header.digests]):
         if header.digests.get(name) != expected.digests.get(name):
             raise InputError(f"{file}: {name} digest: is not that of this run; tables of different runs do not mix")
+
+
+def _refuse_other_accelerations(stored: StoredRun, motion: VerifiedMotion) -> None:
+    """Refuse a table whose header names other accelerations than its rows have; older versions named none."""
+    place = motion.name or ""
+    is_same = stored.manifest.versions.get("cellplan") == versions()["cellplan"]
+    for robot, text in stored.tables[place].items():
+        file = stored.file(place, f"tables/{robot}.csv")
+        said, found = parse_header(text, file).accelerations, table_line(motion.report.accelerations, robot)
+        if said != found and (said or is_same):
+            raise InputError(f"{file}: accelerations: expected {shown(found)}, got {shown(said)}")
 
 
 def _refuse_other_clock(stored: StoredRun, place: str, schedule: Schedule, *, tables: Mapping[str, JointTable]) -> None:

@@ -5,15 +5,21 @@ import re
 from typing import Any, Final
 
 RELATIVE: Final = 1e-6  # [-] figures have seven digits at least
-ABSOLUTE: Final = 1e-7  # [-] in printed units; below it stands the noise of the arithmetic
+NOISE: Final = 1e-7  # [-] in printed units; below it stands the noise of the arithmetic
 NUMBER: Final = re.compile(r"((?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]))")  # not a part of a name
 
 
-def is_same(said: Any, found: Any) -> bool:
-    """Whether two single values are the same up to rounding; a number is never the same as a word."""
+def is_same(said: Any, found: Any, *, noise: float = NOISE) -> bool:
+    """Whether two single values are the same up to rounding; a number is never the same as a word.
+
+    Args:
+        said: The one value.
+        found: The other.
+        noise: Difference of numbers in their printed unit below which stands the noise of the arithmetic.
+    """
     are_numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (said, found))
     if are_numbers:
-        return math.isclose(said, found, rel_tol=RELATIVE, abs_tol=ABSOLUTE)
+        return math.isclose(said, found, rel_tol=RELATIVE, abs_tol=noise)
     if isinstance(said, str) and isinstance(found, str):
         return first_difference(said, found) is None
     return type(said) is type(found) and bool(said == found)

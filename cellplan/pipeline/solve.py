@@ -22,6 +22,7 @@ from cellplan.planning.modes import plan_runs, standing
 from cellplan.planning.schedule import examine_times
 from cellplan.planning.start_search import choose_start
 from cellplan.planning.toolpaths import build_toolpath
+from cellplan.report.acceleration_record import table_line
 from cellplan.scene.scene import Scene
 
 
@@ -97,7 +98,8 @@ def with_verdict(cell: Cell, program: Program, report: Report, *, remark: str = 
         digests=_digests(cell, program),
         remark="; ".join(filter(None, [remark, not_in_program(cell, report.tasks)])),
     )
-    return Program(tables={name: replace_header(text, header=header) for name, text in program.tables.items()})
+    headers = {name: replace(header, accelerations=table_line(report.accelerations, name)) for name in program.tables}
+    return Program(tables={name: replace_header(text, header=headers[name]) for name, text in program.tables.items()})
 
 
 def _digests(cell: Cell, program: Program) -> dict[str, str]:

@@ -9,21 +9,22 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Grasp, Relation
 from cellplan.model.motion import Schedule
+from cellplan.planning.common_cycles import SAME_PERIOD, common_cycles
 from cellplan.planning.singularity import singular_words
 from cellplan.planning.tracking_problem import TrackingProblem
 
 CLOSED: Final = 1e-9  # [rad] or [m] of drift in the null space per cycle that counts as none
 ROUNDS: Final = 40  # cycles tried; four robots need about ten
 SAME_POSE: Final = 1e-9  # largest difference of pose entries at both ends of a closed path: rounding
-SAME_PERIOD: Final = 1e-9  # [s] difference of cycles that take equally long: rounding
 SINGULAR: Final = 1e-9  # singular values below this share of the largest one are zero: rounding of the matrix
 
 
 def close(problem: TrackingProblem, schedule: Schedule, start: Array, carry: Callable[[int], Array]) -> None:
     """Give the problem a drift with which the joint motion closes, cycle after cycle.
 
-    The first cycle gets a constant drift. What is left of the error would grow from cycle to cycle where the map of one
-    cycle onto the next is not a contraction, so every later cycle is drawn towards the first one at the feedback gain.
+    The first cycle gets a drift in one direction, at rest at both ends. What is left of the error would grow from cycle
+    to cycle where the map of one cycle onto the next is not a contraction, so every later cycle is drawn towards the
+    first one at the feedback gain.
 
     Args:
         problem: The tasks; their drift is set.
@@ -36,26 +37,38 @@ def close(problem: TrackingProblem, schedule: Schedule, start: Array, carry: Cal
         NoSolutionError: The cycle does not close.
     """
     begin, end = first_cycle(problem.cell, schedule)
+    middles = (np.arange(end - begin) + 0.5) / (end - begin)
+    pace = drift_pace(middles) / drift_pace(middles).mean()  # of each step of the cycle, as Euler takes it
 
-    def cycle(constant: Array) -> Array:
-        problem.drift = lambda _k, _q: constant
+    def drifting(k: int, mean: Array) -> Array:
+        speeds: Array = mean * pace[(k - begin) % (end - begin)] if k >= begin else np.zeros_like(mean)
+        return speeds
+
+    def cycle(mean: Array) -> Array:
+        problem.drift = lambda k, _q: drifting(k, mean)
         return carry(end)
 
-    def gap(constant: Array) -> Array:
-        q = cycle(constant)
+    def gap(mean: Array) -> Array:
+        q = cycle(mean)
         moved: Array = q[-1] - q[begin]
         return moved
 
-    constant = closing_drift(problem, start, gap, duration=float(schedule.times[end]))
-    first = cycle(constant)
+    mean = closing_drift(problem, start, gap, duration=float(schedule.times[end] - schedule.times[begin]))
+    first = cycle(mean)
 
     def held(k: int, q: Array) -> Array:
         if k < end:
-            return constant
-        drawn: Array = constant + problem.gain * (first[begin + (k - begin) % (end - begin)] - q)
+            return drifting(k, mean)
+        drawn: Array = drifting(k, mean) + problem.gain * (first[begin + (k - begin) % (end - begin)] - q)
         return drawn
 
     problem.drift = held
+
+
+def drift_pace(share: Array) -> Array:
+    """Speed of a drift as a multiple of its mean, at shares 0..1 of the cycle: at rest at both ends, 1 on average."""
+    pace: Array = 30.0 * (share * (1.0 - share)) ** 2
+    return pace
 
 
 def closing_drift(
@@ -70,12 +83,12 @@ def closing_drift(
     Args:
         problem: The tasks.
         start: Stacked posture at the beginning of the cycle, shape (nq,).
-        moved: How far the joints are from where they began after one cycle under a constant drift, shape (nq,).
-        duration: Time ``T`` of the motion in [s].
+        moved: How far the joints are from where they began after one cycle, by the mean of the drift, shape (nq,).
+        duration: Time ``T`` of the cycle in [s].
         instant: Number of the instant of the clock at which the cycle begins.
 
     Returns:
-        Speeds in [rad/s] or [m/s], shape (nq,); ``moved`` was asked about them last.
+        Mean speeds in [rad/s] or [m/s], shape (nq,); ``moved`` was asked about them last.
 
     Raises:
         NoSolutionError: The cycle does not close.
@@ -121,13 +134,6 @@ def first_cycle(cell: Cell, schedule: Schedule) -> tuple[int, int]:
         if gap > SAME_POSE:
             raise InputError(not_back(cell, task.task, float(schedule.times[last])))
     return first, last
-
-
-def common_cycles(schedule: Schedule) -> Array | None:
-    """Instants in [s] between which the cycles of all tasks lie, shape (cycles + 1,); None when they differ."""
-    every = [np.array([each.task.start, *each.cycle_ends]) for each in schedule.tasks]
-    same = all(len(each) == len(every[0]) and np.max(np.abs(each - every[0])) <= SAME_PERIOD for each in every)
-    return every[0] if same and len(every[0]) > 1 else None
 
 
 def not_back(cell: Cell, task: Relation, end: float) -> str:

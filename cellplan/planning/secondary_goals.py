@@ -73,7 +73,7 @@ class SecondaryGoals:
     """All secondary goals of a cell along one motion."""
 
     def __init__(
-        self, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], times: Array, start: Array
+        self, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], times: Array, start: Array, rests: Array
     ) -> None:
         """Make ready what each goal needs.
 
@@ -83,13 +83,14 @@ class SecondaryGoals:
             tasks: The tasks and closures, one block row each.
             times: Instants of the motion in [s], shape (N,).
             start: Stacked posture at the first instant, shape (nq,).
+            rests: Instants in [s] at which the goals ask for nothing: the ends of the motion and of cycles to close.
         """
         self._pulls = [(goal.gain, _pull(goal, cell, model, tasks=tasks, start=start)) for goal in cell.solver.goals]
         self._lower = np.concatenate([robot.model.lower for robot in cell.robots])
         self._upper = np.concatenate([robot.model.upper for robot in cell.robots])
         self._limits = SPEED_SHARE * np.concatenate([robot.model.velocity for robot in cell.robots])
         self._step = float(times[1] - times[0]) if len(times) > 1 else cell.motion.step
-        self._fade = np.ones(len(times)) if cell.motion.cyclic else _fade(times)
+        self._fade = _fade(times, rests)
 
     def speeds(self, k: int, stance: Stance) -> Array:
         r"""Joint speeds that the goals ask for at an instant, shape (nq,), in [rad/s] or [m/s].
@@ -99,8 +100,8 @@ class SecondaryGoals:
         .. math:: \dot q_0 = \frac{k_0}{1 + k_0 h c} W^{-1} \nabla w
 
         which is ``k_0`` for all gains that make sense, and does not overshoot for those that do not. No goal asks for
-        more than a joint can do: its speeds are scaled together, so their direction stays. Away from cyclic motions the
-        goals set in and leave off smoothly, so that the cell starts and ends at rest.
+        more than a joint can do: its speeds are scaled together, so their direction stays. The goals set in and leave
+        off smoothly, so that the cell starts and ends at rest.
         """
         asked = np.zeros_like(stance.q)
         for gain, pull in self._pulls:
@@ -134,11 +135,11 @@ def share_within(speeds: Array, extra: Array, *, lowest: Array, highest: Array) 
     return float(np.clip(room.min(initial=1.0), 0.0, 1.0))
 
 
-def _fade(times: Array) -> Array:
-    """Share of the goals at each instant: up from 0 at the start, down to 0 at the end, smooth in between."""
-    length = float(times[-1] - times[0])
-    x = np.minimum(times - times[0], times[-1] - times) / max(min(FADE, FADE_SHARE * length), np.finfo(float).tiny)
-    x = np.clip(x, 0.0, 1.0)
+def _fade(times: Array, rests: Array) -> Array:
+    """Share of the goals at each instant: 0 at every rest, 1 away from them, smooth in between."""
+    length = float(np.diff(rests).max())
+    away = np.min(np.abs(times[:, None] - rests), axis=1)
+    x = np.clip(away / max(min(FADE, FADE_SHARE * length), np.finfo(float).tiny), 0.0, 1.0)
     share: Array = x * x * (3.0 - 2.0 * x)
     return share
 

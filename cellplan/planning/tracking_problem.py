@@ -13,6 +13,7 @@ from cellplan.model.cell import Cell, Grasp, Relation
 from cellplan.model.motion import Schedule
 from cellplan.model.task import Frame
 from cellplan.planning.closures import targets
+from cellplan.planning.common_cycles import common_cycles
 from cellplan.planning.cooperation import (
     column_signs,
     constraint_rows,
@@ -124,7 +125,7 @@ class TrackingProblem:
         self.signs = column_signs(cell, self._model, tasks, moving)
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
         self.drift: Drift | None = None
-        self._goals = self._secondary_goals(start) if cell.solver.goals else None
+        self._goals = self._secondary_goals(start, _rests(cell, schedule)) if cell.solver.goals else None
         self._locked_since = locked_since(cell)
         self._may_move = np.isin(_owners(cell), moving)
 
@@ -178,11 +179,11 @@ class TrackingProblem:
             np.concatenate([pick @ part for pick, part in zip(picks, error, strict=True)]),
         )
 
-    def _secondary_goals(self, start: Array | None) -> SecondaryGoals:
+    def _secondary_goals(self, start: Array | None, rests: Array) -> SecondaryGoals:
         """The goals of the cell, which may lead back to the start posture."""
         if start is None:
             raise ValueError("secondary goals need the start posture of the motion")
-        return SecondaryGoals(self.cell, self._model, tasks=self.tasks, times=self.times, start=start)
+        return SecondaryGoals(self.cell, self._model, tasks=self.tasks, times=self.times, start=start, rests=rests)
 
     def _drift(self, k: int, q: Array) -> Array | None:
         """Joint speeds that are asked for to close a cycle, of those joints that may move."""
@@ -234,3 +235,10 @@ def _place(task: Relation) -> str:
 def _owners(cell: Cell) -> list[str]:
     """Name of the robot of each joint."""
     return [robot.name for robot in cell.robots for _ in robot.model.joints]
+
+
+def _rests(cell: Cell, schedule: Schedule) -> Array:
+    """Instants in [s] at which goals ask for nothing: the ends of the motion, and of each cycle that is to close."""
+    bounds = common_cycles(schedule) if cell.motion.cyclic else None
+    ends = schedule.times[[0, -1]]
+    return ends if bounds is None else np.unique(np.concatenate([ends, bounds]))

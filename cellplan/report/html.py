@@ -11,6 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion
 from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Check, Report
+from cellplan.report.acceleration_figures import acceleration_figures
 from cellplan.report.json_report import run_record, summary_record
 from cellplan.report.left_out_record import grips_told, told_left_out
 from cellplan.report.method import method_lines
@@ -29,6 +30,9 @@ CHECKS = {
     "joint_position": "joint positions within their limits",
     "joint_velocity": "joint velocities within their limits",
     "joint_acceleration": "joint accelerations within their limits",
+    "joint_acceleration_assumed": "joint accelerations within assumed limits",
+    "joint_jerk": "joint jerk within its limits",
+    "part_acceleration": "acceleration of the part within its limit",
     "locked_joint": "joints that failed stand still",
     "position_error": "tool position on the part within tolerance",
     "orientation_error": "tool orientation on the part within tolerance",
@@ -241,6 +245,7 @@ def _figures(record: Record) -> list[Record]:
         *_error_figures(record["tasks"]),
         *_closure_figures(record["closure"]),
         *_joint_figures(record["joints"]),
+        *acceleration_figures(record["joints"]),
         _clearance_figure(record),
     ]
 

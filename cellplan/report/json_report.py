@@ -8,6 +8,7 @@ from dataclasses import replace
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, JointUse, Report
+from cellplan.report.acceleration_record import acceleration_parts, merge_accelerations
 from cellplan.report.clearance_record import clearance_proof_record, closest_pairs_record
 from cellplan.report.closure_record import closures_record, worst_closures_record
 from cellplan.report.idle_record import missing_moves
@@ -57,6 +58,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
         "left_out": left_out_record(report.clearance.left_out),
         "closure": closures_record(report, cell),
         "solver": solver_record(cell.solver, motion),
+        **acceleration_parts(record, report.accelerations),
     }
 
 
@@ -78,7 +80,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
     """
     runs = list(reports.values())
     minima = _merge_minima(runs)
-    return {
+    record = {
         "schema": SCHEMA,
         "cell": cell.name,
         "status": "passed" if all(report.passed for report in runs) else "failed",
@@ -100,6 +102,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "caution": CAUTION,
         "solver": solver_record(cell.solver),
     }
+    return record | acceleration_parts(record, merge_accelerations(report.accelerations for report in runs))
 
 
 def _run_record(name: str, report: Report, cell: Cell) -> Record:

@@ -212,7 +212,7 @@ Refuse = Callable[..., list[str]]
             "environment:",
             "enviroment: {}\nenvironment:",
             "c:22: enviroment: unknown key, did you mean 'environment'?; allowed: cellplan, name, robots, part, "
-            "tasks, environment, motion, solver, checks, layout",
+            "tasks, environment, motion, acceleration, solver, checks, layout",
         ),
     ],
 )
@@ -237,7 +237,7 @@ def test_all_complaints_come_at_once_in_the_order_of_the_file(refuse: Refuse) ->
         "c:13: part.geometry.cylinder.radius_mm: expected a positive number of millimetres, got -250",
         "c:18: tasks.ring.robot: expected a robot of this cell (holder, worker), got 'wroker', did you mean 'worker'?",
         "c:21: motion.duratoin_s: unknown key, did you mean 'duration_s'?; allowed: mode, duration_s, step_s, "
-        "time_law, "
+        "controller_cycle_ms, time_law, "
         "corners, cyclic, locked_joints",
     ]
 

@@ -33,6 +33,7 @@ tasks:
     axes: [x, y]
     {words}
 motion: {{duration_s: {duration}, step_s: {step}}}
+acceleration: {{unlimited: constant laws and starts beside the path are looked at for other reasons}}
 solver: {{integrator: euler, gain_per_s: {gain}}}
 """
 RECTANGLE = "{rectangle: {sides_mm: [400, 300], plane: xy, center_mm: [1300, 0]}}"

@@ -4,6 +4,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
+from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
 from cellplan.io.schema.common import Angle, Coordinate, Entry, Name, PoseEntry, Text, by_kind, rule
 from cellplan.io.schema.robot import Mass, RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
@@ -102,6 +103,9 @@ class MotionEntry(Entry):
         "own (duration_s, feed_mm_s or a file with instants) and the clock ends with the last one.",
     )
     step_s: Seconds = Field(default=0.001, description="Time between two samples.")
+    controller_cycle_ms: CycleTime = Field(
+        default=4.0, description="Cycle of the controllers, over which jerk is taken."
+    )
     time_law: TimeLawChoice = Field(default="quintic", description="Law of each stretch of path between stops.")
     corners: CornerChoice = Field(default="stop", description="Stop at corners, or round them.")
     cyclic: bool = Field(default=False, description="Whether all joints are to end where they started.")
@@ -161,6 +165,11 @@ class ChecksEntry(Entry):
         default=5.0,
         description="How deep bodies that never move may reach into each other where one stands on the other: a base "
         "in a floor or plinth, a fixed part on a table.",
+    )
+    part_acceleration_m_s2: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = Field(
+        default=None,
+        description="Largest allowed acceleration in the world of any corner of the bounding box of a part that is "
+        "held; it is only reported when absent.",
     )
     exclude: tuple[ExclusionEntry, ...] = Field(default=(), description="Pairs left out of the collision check.")
 
@@ -228,6 +237,11 @@ class CellDocument(Entry):
         default={}, max_length=OBSTACLE_LIMIT, description="Fixed things in the cell by name."
     )
     motion: MotionEntry = Field(description="Who moves, and the common clock.")
+    acceleration: AccelerationChoice | None = Field(
+        default=None,
+        description="Accelerations that the joints of all robots are judged against, where a robot says nothing of its "
+        "own: {full_speed_in_s: [0.25, 0.25, 0.25, 0.15]} when absent. A stated limit of a joint always counts.",
+    )
     solver: SolverEntry = Field(default=SolverEntry(), description="How joint speeds are found.")
     checks: ChecksEntry = Field(default=ChecksEntry(), description="What the checks demand.")
     layout: LayoutEntry | None = Field(default=None, description="What a layout search may change; not used by solve.")

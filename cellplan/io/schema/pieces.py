@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cellplan.io.complaints import Complaint
+from cellplan.io.schema.acceleration import AccelerationChoice
 from cellplan.io.schema.cell import (
     OBSTACLE_LIMIT,
     ROBOT_LIMIT,
@@ -37,6 +38,7 @@ class Pieces:
         solver: The solver's settings, if understood.
         checks: The checks, if understood.
         layout: The layout, if given and understood.
+        acceleration: What the cell says of accelerations, if the whole file is understood.
         names: All names that the file gives in each section, understood or not.
     """
 
@@ -49,6 +51,7 @@ class Pieces:
     solver: SolverEntry | None
     checks: ChecksEntry | None
     layout: LayoutEntry | None
+    acceleration: AccelerationChoice | None
     names: Mapping[str, tuple[str, ...]]
 
     @property
@@ -70,6 +73,7 @@ def read_pieces(document: YamlDocument) -> tuple[Pieces, list[Complaint]]:
         solver=_single(SolverEntry, document, "solver"),
         checks=_single(ChecksEntry, document, "checks"),
         layout=_single(LayoutEntry, document, "layout"),
+        acceleration=None if whole is None else whole.acceleration,
         names={key: tuple(_section(document, key)) for key in ("robots", "tasks", "environment")},
     )
     return pieces, complaints

@@ -4,6 +4,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
+from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
 from cellplan.io.schema.common import Angle, Coordinate, Entry, PoseEntry, Text, by_kind, rule
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
 
@@ -23,8 +24,8 @@ Mass = Annotated[float, Field(ge=0.0, le=HEAVIEST_KG)]
 Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
 JointPosition = Annotated[float, Field(ge=-100_000.0, le=100_000.0)]
 
-TURNING_LIMITS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2")
-SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2")
+TURNING_LIMITS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
+SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
 
 POSTURE_WORDS: Final = "auto or a list of joint angles"
 POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
@@ -59,12 +60,14 @@ class LimitsEntry(Entry):
     acceleration_deg_s2: Acceleration | None = Field(
         default=None, description="Largest acceleration of a revolute joint."
     )
+    jerk_deg_s3: Acceleration | None = Field(default=None, description="Largest jerk of a revolute joint.")
     lower_mm: Coordinate | None = Field(default=None, description="Lowest position of a prismatic joint.")
     upper_mm: Coordinate | None = Field(default=None, description="Highest position of a prismatic joint.")
     velocity_mm_s: SlidingSpeed | None = Field(default=None, description="Largest speed of a prismatic joint.")
     acceleration_mm_s2: Acceleration | None = Field(
         default=None, description="Largest acceleration of a prismatic joint."
     )
+    jerk_mm_s3: Acceleration | None = Field(default=None, description="Largest jerk of a prismatic joint.")
     wrap: bool = Field(default=False, description="Whether a continuous joint may turn without end.")
 
     @model_validator(mode="after")
@@ -130,6 +133,14 @@ class RobotEntry(Entry):
         description="One positive weight per joint, ones when absent; a larger weight moves that joint less.",
     )
     limits: dict[str, LimitsEntry] = Field(default={}, description="Limits by joint name, beside those of the model.")
+    acceleration: AccelerationChoice | None = Field(
+        default=None,
+        description="Accelerations that its joints are judged against; a stated limit of a joint always counts. "
+        "The cell's when absent.",
+    )
+    controller_cycle_ms: CycleTime | None = Field(
+        default=None, description="Cycle of its controller, over which jerk is taken; the motion's when absent."
+    )
     locked: dict[str, JointPosition] = Field(
         default={},
         description="Positions of URDF joints that do not lead to the flange, by joint name with its unit (finger_mm).",

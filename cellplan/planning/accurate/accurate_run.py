@@ -1,6 +1,6 @@
 """Accurate run: the joints of one cell as polynomials in time, by collocation."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Final
 
@@ -18,7 +18,7 @@ from cellplan.planning.accurate.lane_targets import LaneTargets
 from cellplan.planning.accurate.lane_tasks import LaneTasks
 from cellplan.planning.accurate.start_offset import start_offset
 from cellplan.planning.accurate.windows import Panel, Window, windows_between
-from cellplan.planning.closing import SAME_POSE
+from cellplan.planning.closing import SAME_POSE, drift_pace
 from cellplan.planning.closures import closures
 from cellplan.planning.locked_joints import locked_since
 from cellplan.planning.timing import TimedTasks, distinct
@@ -26,7 +26,7 @@ from cellplan.planning.timing import TimedTasks, distinct
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
 SHORTEST_SHARE: Final = 1.0 / 4096.0  # of the motion: panels may be that short where steps of the clock are longer
 TO_CLOSE: Final = 1e-7  # [m] and [rad]: what no tool is back to brings no joint back
-STEADY: Final = 1e-10  # [rad] and [m]: postures this near to their limit depend smoothly on a drift, as a search asks
+STEADY: Final = 1e-12  # [rad] and [m]: postures this near to their limit depend smoothly on a drift, as a search asks
 ONLY: Final = np.zeros(1, dtype=np.intp)  # the one cell among all of a collocation
 
 
@@ -76,7 +76,8 @@ class AccurateRun:
             q: The posture.
             begin: First instant in [s].
             end: Last instant in [s].
-            drift: Joint speeds that are asked for in the null space of the tasks, shape (nq,).
+            drift: Joint speeds that are asked for in the null space of the tasks, shape (nq,), on average: they begin
+                and end with rest.
         """
         panels: list[Panel] = []
         nodes: list[Array] = []
@@ -88,7 +89,7 @@ class AccurateRun:
             errors.append(float(worst[0]))
             self._progress("planning", window.panels[-1].end / self.end)
 
-        self.collocation.drift = drift
+        self.collocation.drift = None if drift is None else _paced(drift, begin, end)
         at = q[:, None].copy()
         for breaks in self._stretches(begin, end):
             self.collocation.mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
@@ -133,6 +134,16 @@ class AccurateRun:
         is_lock = np.min(np.abs(breaks[:, None] - self._locked_since), axis=1) <= INSTANT_ROOM
         cuts = [0, *(np.flatnonzero(is_lock[1:-1]) + 1).tolist(), len(breaks) - 1]
         return [breaks[low : high + 1] for low, high in pairwise(cuts)]
+
+
+def _paced(drift: Array, begin: float, end: float) -> Callable[[Array], Array]:
+    """Speeds at instants in [s] that begin and end with rest, for mean ones of shape (nq,)."""
+
+    def speeds(instants: Array) -> Array:
+        at_instants: Array = drift[:, None] * drift_pace((instants - begin) / (end - begin))
+        return at_instants
+
+    return speeds
 
 
 def _settled(cell: Cell, timed: TimedTasks, grasps: int) -> Array:

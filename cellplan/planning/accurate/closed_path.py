@@ -11,7 +11,8 @@ from cellplan.model.motion import Schedule
 from cellplan.model.task import INSTANT_ROOM
 from cellplan.planning.accurate.accurate_run import AccurateRun
 from cellplan.planning.accurate.joint_path import JointPath, joined
-from cellplan.planning.closing import SAME_POSE, closing_drift, common_cycles, not_back
+from cellplan.planning.closing import SAME_POSE, closing_drift, not_back
+from cellplan.planning.common_cycles import common_cycles
 from cellplan.planning.tracking_problem import TrackingProblem
 
 PERIODIC: Final = 3e-9  # [rad] or [m] by which joints may be off after a cycle that is repeated: they would jump by it
@@ -24,9 +25,10 @@ class _LostWayError(NoSolutionError):
 def closed_path(run: AccurateRun, problem: TrackingProblem, schedule: Schedule, *, start: Array) -> JointPath | None:
     """A path that closes in every cycle; None where the accurate mode finds no way.
 
-    Each cycle gets a constant drift of its own. Where the targets of a cycle are those of the one before, it repeats
-    its motion: a drift alone would let rounding grow from cycle to cycle, as the map of one cycle onto the next need
-    not be a contraction. Before the first cycle and after the last one there is nothing to close, and no drift.
+    Each cycle gets a drift of its own, in one direction and at rest at both ends. Where the targets of a cycle are
+    those of the one before, it repeats its motion: a drift alone would let rounding grow from cycle to cycle, as the
+    map of one cycle onto the next need not be a contraction. Before the first cycle and after the last one there is
+    nothing to close, and no drift.
 
     Args:
         run: The run.

@@ -58,7 +58,8 @@ class Collocation:
         sweeps: Passes over windows so far.
         solves: Systems of equations solved so far: nodes of all passes.
         mobile: 1 for joints that are not locked, shape (nq,).
-        drift: Joint speeds that are asked for in the null space of the tasks, shape (nq,); None for none.
+        drift: Joint speeds that are asked for in the null space of the tasks at instants in [s], as a function of
+            shape (K,) to (nq, K); None for none.
         posture_room: How far postures may be from the limit of the passes, in [rad] and [m].
         shortest: Length in [s] below which no panel is made by halving.
     """
@@ -75,7 +76,7 @@ class Collocation:
         self._tasks, self._targets, self._placement, self._accuracy = tasks, targets, placement, accuracy
         self.sweeps = self.solves = 0
         self.mobile: Array = np.ones(tasks.joint_count)
-        self.drift: Array | None = None
+        self.drift: Callable[[Array], Array] | None = None
         self.shortest, self.posture_room = 0.0, POSTURE_SHARE * accuracy
 
     def carry(self, windows: tuple[Window, ...], q: Array, cells: Indices, record: Record) -> Indices:
@@ -145,7 +146,8 @@ class Collocation:
         self.sweeps += 1
         self.solves += q.shape[1] * q.shape[2]
         look = self._tasks.look(q.reshape(len(q), -1), wanted, placement, mobile=self.mobile)
-        speeds = look.speeds(self.drift).reshape(q.shape)
+        drift = None if self.drift is None else np.tile(self.drift(window.instants[: window.count]), q.shape[1])
+        speeds = look.speeds(drift).reshape(q.shape)
         picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
         moved: Array = (picard + look.correction(picard)).reshape(q.shape)
         moved[:, :, 0] = 0.0

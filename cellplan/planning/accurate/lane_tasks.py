@@ -222,11 +222,14 @@ class Look:
         self.errors = errors
 
     def speeds(self, drift: Array | None = None) -> Array:
-        r"""Joint speeds ``J^# x_dot + (I - J^# J) u`` for the wanted twists and a drift ``u``, shape (nq, lanes)."""
+        r"""Joint speeds ``J^# x_dot + (I - J^# J) u`` for the wanted twists and a drift ``u``, shape (nq, lanes).
+
+        The drift has the shape (nq,) or (nq, lanes).
+        """
         b = self._turned(self._wanted)
         if drift is None:
             return self._tasks.stacked(*self._arrow.speeds(b))
-        u = np.broadcast_to((self._mobile * drift)[:, None], (len(drift), b.shape[2]))
+        u = np.broadcast_to((self._mobile * drift.T).T.reshape(len(drift), -1), (len(drift), b.shape[2]))
         return u + self._tasks.stacked(*self._arrow.speeds(b - self._arrow.twists(*self._tasks.unstacked(u))))
 
     def correction(self, moved: Array) -> Array:

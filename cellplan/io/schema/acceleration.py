@@ -1,0 +1,47 @@
+"""Accelerations in a cell file: stated limits only, an assumption for the other joints, or none with a reason."""
+
+from typing import Annotated, ClassVar, Final, Literal, Self
+
+from pydantic import ConfigDict, Field, Tag, model_validator
+
+from cellplan.io.schema.common import Entry, Text, by_kind, one_of_keys, require_one
+
+AXES: Final = 64  # joints of one robot
+SECONDS_WORDS: Final = "a number of seconds or a list of them"
+RULE_WORDS: Final = "stated, unlimited, {full_speed_in_s: …} or {unlimited: reason}"
+
+SpeedUpTime = Annotated[float, Field(ge=0.001, le=1000.0)]  # [s]
+CycleTime = Annotated[float, Field(ge=0.1, le=1000.0)]  # [ms]
+SpeedUpTimes = Annotated[
+    Annotated[SpeedUpTime, Tag("<number>")]
+    | Annotated[tuple[SpeedUpTime, ...], Field(min_length=1, max_length=AXES), Tag("<list>")],
+    by_kind(SECONDS_WORDS, number=(int, float), list=tuple),
+]
+
+
+class AccelerationRuleEntry(Entry):
+    """What is taken for the accelerations that joints reach."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys("full_speed_in_s", "unlimited"))
+
+    full_speed_in_s: SpeedUpTimes | None = Field(
+        default=None,
+        description="Time in which a joint without a stated limit is taken to reach its top speed: one for all joints, "
+        "or a list along the chain whose last entry counts for all further joints.",
+    )
+    unlimited: Text | None = Field(
+        default=None, description="Accelerations and jerk are reported and not judged; the reason why."
+    )
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        """Exactly one of the two."""
+        require_one(self, ("full_speed_in_s", "unlimited"))
+        return self
+
+
+AccelerationChoice = Annotated[
+    Annotated[Literal["stated", "unlimited"], Tag(f"<{RULE_WORDS}>")]
+    | Annotated[AccelerationRuleEntry, Tag("<mapping>")],
+    by_kind(RULE_WORDS, mapping=dict),
+]

@@ -1,0 +1,152 @@
+"""Accelerations: what a cell demands of them, and those of the written motion at joints, tools, part and processes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Final
+
+USUAL_FULL_SPEED_IN: Final = (0.25, 0.25, 0.25, 0.15)  # [s] axes 1 to 3, then all others: arms of 5 to 20 kg do it
+USUAL_CYCLE: Final = 0.004  # [s] of a controller that interpolates joints
+
+
+class LimitSource(StrEnum):
+    """Where the acceleration limit of a joint comes from."""
+
+    STATED = "stated"
+    ASSUMED = "assumed"
+    UNLIMITED = "unlimited"
+    NOT_STATED = "not_stated"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AccelerationRule:
+    """Against which accelerations the joints of one robot are judged.
+
+    A stated limit of a joint always counts, unless accelerations are not judged at all.
+
+    Attributes:
+        full_speed_in: For joints without a stated limit, the seconds in which they are taken to reach their top speed,
+            in the order of the joints; the last one counts for all further joints. Empty: nothing is assumed.
+        is_unlimited: Whether neither accelerations nor jerk are judged.
+        reason: Why they are not; empty where nobody says so.
+    """
+
+    full_speed_in: tuple[float, ...] = USUAL_FULL_SPEED_IN
+    is_unlimited: bool = False
+    reason: str = ""
+
+
+USUAL_ACCELERATION: Final = AccelerationRule()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointAcceleration:
+    """The acceleration and jerk of one joint in [rad] or [m] and seconds.
+
+    Attributes:
+        robot: Name of the robot.
+        joint: Name of the joint.
+        is_revolute: Whether it turns rather than slides.
+        peak: Largest acceleration, the step out of rest and the one into rest included.
+        peak_at_s: Its instant.
+        limit: What is allowed; None where nothing is.
+        source: Where the limit comes from.
+        peak_jerk: Largest change of acceleration over ``window``, divided by it.
+        peak_jerk_at_s: Its instant.
+        jerk_limit: What is allowed; None where nothing is stated or nothing is judged.
+        window: Time in [s] over which jerk is taken.
+        from_rest: Whether the peak is a jump of speed out of rest or into it.
+    """
+
+    robot: str
+    joint: str
+    is_revolute: bool
+    peak: float
+    peak_at_s: float
+    limit: float | None
+    source: LimitSource
+    peak_jerk: float
+    peak_jerk_at_s: float
+    jerk_limit: float | None
+    window: float
+    from_rest: bool = False
+
+    @property
+    def ratio(self) -> float | None:
+        """Largest acceleration as a share of its limit; None where there is no limit."""
+        return None if self.limit is None else self.peak / self.limit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointAcceleration:
+    """Acceleration in [m/s^2] and jerk in [m/s^3] of a point in the world, with their instants in [s]."""
+
+    peak: float
+    peak_at_s: float
+    peak_jerk: float
+    peak_jerk_at_s: float
+    window: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartAcceleration:
+    """How the part is accelerated: at the centre of its bounding box, and at that corner of it that has most."""
+
+    centre: PointAcceleration
+    corner: PointAcceleration
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProcessSpeed:
+    """How fast a tool tip moves on the part, or in the world for a task that is given there, while its task runs.
+
+    Attributes:
+        mean: Mean speed in [m/s] from the start of the path, once the tool has settled, to its end.
+        peak: Largest speed between two samples.
+        peak_at_s: Its instant.
+        steady_share: Share of that time, 0..1, in which the speed is within ``STEADY`` of the peak.
+        slower: Stretches of time in [s] in which it is lower, as (from, to).
+    """
+
+    mean: float
+    peak: float
+    peak_at_s: float
+    steady_share: float
+    slower: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NotJudged:
+    """Something of a robot's accelerations that was not judged, and why; an empty robot stands for the whole cell."""
+
+    robot: str
+    what: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionAccelerations:
+    """All accelerations of a written motion; the robots stand still before its first row and after its last one.
+
+    Attributes:
+        joints: One entry per joint of every robot.
+        tools: The tool tip of each robot, by robot.
+        part: The part; None when nobody holds it.
+        process: Process speed by task; a task whose tool stands still has none.
+        not_judged: What was left out.
+    """
+
+    joints: tuple[JointAcceleration, ...] = ()
+    tools: Mapping[str, PointAcceleration] = field(default_factory=dict)
+    part: PartAcceleration | None = None
+    process: Mapping[str, ProcessSpeed] = field(default_factory=dict)
+    not_judged: tuple[NotJudged, ...] = ()
+
+
+UNKNOWN_ACCELERATIONS: Final = MotionAccelerations()
+STEADY: Final = 0.05  # [-] of the peak: a process speed that varies less is constant
+
+
+def full_speed_in(rule: AccelerationRule, index: int) -> float | None:
+    """Seconds in which a joint, counted from 0, is taken to reach its top speed; None where nothing is assumed."""
+    return rule.full_speed_in[min(index, len(rule.full_speed_in) - 1)] if rule.full_speed_in else None
