@@ -7,10 +7,11 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.cell_rules import needs_surface
+from cellplan.io.mounting_build import build_attachments, build_pedestal, floor_height_mm
 from cellplan.io.robot_rules import start_posture
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry
-from cellplan.io.schema.robot import RobotEntry, ToolEntry
+from cellplan.io.schema.robot import ToolEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.task import (
     BlendEntry,
@@ -57,8 +58,9 @@ PLANE_NORMAL: Final = {"xy": "z", "yz": "x", "xz": "y"}
 TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> its file, read
 
 
-def build_robot(name: str, entry: RobotEntry, model: RobotModel, read_mesh: MeshReader) -> Robot:
+def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh: MeshReader) -> Robot:
     """A robot placed in the cell."""
+    entry = document.robots[name]
     weights = np.ones(len(model.joints)) if entry.weights is None else np.array(entry.weights)
     return Robot(
         name=name,
@@ -67,6 +69,8 @@ def build_robot(name: str, entry: RobotEntry, model: RobotModel, read_mesh: Mesh
         tool=_tool(entry.tool, read_mesh),
         start=start_posture(entry, model),
         weights=weights,
+        attachments=build_attachments(entry.attachments, model, read_mesh),
+        pedestal=build_pedestal(entry, document.environment),
     )
 
 
@@ -202,6 +206,9 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         if task.path.is_planar and task.path.project is None:
             entry["path"].setdefault("offset_mm", 0.0)
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}
+    for name, robot in document.robots.items():
+        if robot.pedestal is not None:
+            values["robots"][name]["pedestal"]["floor_z_mm"] = floor_height_mm(robot, document.environment)
     for grasp in values["part"]["held_by"][:1]:
         del grasp["axes"]  # the first holder has no choice
     return values

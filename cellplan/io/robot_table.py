@@ -20,7 +20,7 @@ from cellplan.io.schema.messages import validate
 from cellplan.io.schema.robot_table import JointEntry
 from cellplan.io.shape_build import MM, link_solid, pose_from_entry
 from cellplan.io.yaml_reader import YamlDocument, read_yaml
-from cellplan.model.robot import BASE, Body, Joint, JointKind, RobotModel
+from cellplan.model.robot import BASE, Body, Joint, JointKind, Link, RobotModel
 
 MESH_UNITS: Final[Mapping[str, float]] = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}  # [m]
 FOOT: Final = "base"  # word for the link that does not move
@@ -162,6 +162,9 @@ def _model(table: RobotTableDocument, bodies: tuple[Body, ...]) -> RobotModel:
         flange_link=len(table.joints) - 1,
         X_BF=pose_from_entry(table.flange),
         bodies=bodies,
+        links=tuple(
+            Link(name=name, index=index - 1, X_BL=np.eye(4)) for index, name in enumerate((FOOT, *table.joints))
+        ),
     )
 
 

@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array
+from cellplan.model.mounting import Pedestal
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Frame, Task
@@ -69,6 +70,8 @@ class Robot:
         tool: What it carries.
         start: Start posture in [rad] or [m], shape (n,); None when it is to be found.
         weights: Joint weights, positive, shape (n,): a larger one moves that joint less.
+        attachments: Solids mounted on its links, their poses ``X_BS`` in B while all joints read zero.
+        pedestal: What the base stands on; None when it stands on whatever the surroundings have there.
     """
 
     name: str
@@ -77,6 +80,8 @@ class Robot:
     tool: Tool
     start: Array | None
     weights: Array
+    attachments: tuple[Body, ...] = ()
+    pedestal: Pedestal | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -100,6 +100,21 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Link:
+    """A link by name, so that things can be mounted on it.
+
+    Attributes:
+        name: Name as the robot's file has it.
+        index: Index of the joint that carries it; ``BASE`` for the foot of the robot.
+        X_BL: The frame in which poses on it are given, in B while all joints read zero.
+    """
+
+    name: str
+    index: int
+    X_BL: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotModel:
     """A kind of robot: what stands in its data sheet.
 
@@ -108,6 +123,7 @@ class RobotModel:
         source: Where the figures come from.
         joints: The driven joints, each after the one that carries it.
         followers: Joints driven through linkages; they come after all joints in link numbering.
+        links: Links on which something can be mounted, by the names of the robot's file.
         flange_link: Index of the joint that carries the flange.
         X_BF: Flange (mechanical interface) in B at the reference posture, z out of the flange.
         bodies: Link bodies.
@@ -120,6 +136,7 @@ class RobotModel:
     X_BF: Array
     bodies: tuple[Body, ...]
     followers: tuple[FollowerJoint, ...] = ()
+    links: tuple[Link, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""

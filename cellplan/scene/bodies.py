@@ -21,6 +21,8 @@ class Kind(StrEnum):
     TOOL = "tool"
     PART = "part"
     OBSTACLE = "obstacle"
+    ATTACHMENT = "attachment"
+    PEDESTAL = "pedestal"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -28,7 +30,8 @@ class SceneBody:
     """One solid of the cell.
 
     Attributes:
-        name: ``<robot>/<body>``, ``<robot>/tool``, ``part`` or the name of a thing in the surroundings.
+        name: ``<robot>/<body>``, ``<robot>/tool``, ``<robot>/pedestal`` or ``<robot>/<attachment>``, ``part`` or the
+            name of a thing in the surroundings.
         kind: What it belongs to.
         shape: The solid, in its own frame S.
         robot: The robot that moves it; None when it is fixed in the world.
@@ -50,7 +53,7 @@ class SceneBody:
 
 
 def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
-    """All solids of a cell: robot by robot links before tools, then the part, then the surroundings.
+    """All solids of a cell: by robot its links, tools, attachments and pedestal, then the part and the surroundings.
 
     Raises:
         InputError: Two bodies have the same name.
@@ -115,6 +118,27 @@ def _robot_bodies(robot: Robot) -> list[SceneBody]:
                 X_BS=model.X_BF @ body.X_BS,
             )
         )
+    return bodies + _mounted_bodies(robot)
+
+
+def _mounted_bodies(robot: Robot) -> list[SceneBody]:
+    """What is mounted on the links of a robot, and what it stands on."""
+    bodies = [
+        SceneBody(
+            name=f"{robot.name}/{body.name}",
+            kind=Kind.ATTACHMENT,
+            shape=body.shape,
+            robot=robot.name,
+            link=body.link,
+            X_BS=body.X_BS,
+        )
+        for body in robot.attachments
+    ]
+    below = None if robot.pedestal is None else robot.pedestal.solid(robot.X_WB)
+    if below is not None:
+        shape, X_BS = below
+        name = f"{robot.name}/pedestal"
+        bodies.append(SceneBody(name=name, kind=Kind.PEDESTAL, shape=shape, robot=robot.name, link=BASE, X_BS=X_BS))
     return bodies
 
 

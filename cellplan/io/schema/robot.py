@@ -5,6 +5,7 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import Field, Tag, model_validator
 
 from cellplan.io.schema.common import Angle, Coordinate, Entry, PoseEntry, Text, by_kind, rule
+from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
 
 LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a slip of the unit
@@ -105,8 +106,15 @@ class RobotEntry(Entry):
     base: PoseEntry = Field(
         default=PoseEntry(), description="Pose of the robot's base (root link of a URDF) in the world."
     )
+    pedestal: PedestalEntry | None = Field(
+        default=None,
+        description="Column or box from the floor to the base; it moves with the base and is judged like any body.",
+    )
     tool: ToolEntry = Field(
         default=ToolEntry(), description="What the robot carries; without it the flange is the tool tip."
+    )
+    attachments: tuple[AttachmentEntry, ...] = Field(
+        default=(), max_length=200, description="Solids mounted on links, such as hoses, feeders and valve blocks."
     )
     start_deg: Posture | None = Field(
         default=None,
