@@ -5,17 +5,18 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.contacts import MM, collision_checks, find_contacts, seconds, uncertified
+from cellplan.checks.contacts import collision_checks, find_contacts, seconds, uncertified
+from cellplan.checks.demanded_clearance import demanded_clearance
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check, ClearanceClass, ClearanceMinimum, ClearanceReport, ClosePair
 from cellplan.model.task import Frame
 from cellplan.scene.bodies import Kind
+from cellplan.scene.demands import accuracy
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
-from cellplan.scene.survey import CLOSEST, Survey, lowest_bounds
+from cellplan.scene.survey import CLOSEST, Survey, lowest_bounds, proved_distance
 from cellplan.scene.survey_search import survey
 
 STAGE: Final = "checking clearance"
@@ -74,7 +75,7 @@ def check_clearance(
         for kind in classes
         for check in collision_checks(found, contacts, schedule.times, kind=kind, open_rows=open_rows)
     ]
-    checks += [_clearance_check(scene.cell, kind, minima[kind]) for kind in classes if minima[kind].minimum is not None]
+    checks += [demanded_clearance(found, schedule.times, kind, minima[kind]) for kind in classes if minima[kind].pair]
     progress(STAGE, 1.0)
     return report, tuple(checks)
 
@@ -105,6 +106,7 @@ def _minimum(seen: Survey, times: Array, kind: ClearanceClass, *, open_rows: Seq
             pair=seen.scene.names(pairs[row]),
             at_s=float(seconds(times, np.array([at]))[0]),
             certified=bool(touching),
+            accuracies=_accuracies(seen, row),
         )
     if not len(rows):
         return ClearanceMinimum(minimum=None, pair=None, at_s=None, certified=False)
@@ -116,7 +118,14 @@ def _minimum(seen: Survey, times: Array, kind: ClearanceClass, *, open_rows: Seq
         at_s=float(seconds(times, np.array([found.at]))[0]),
         certified=True,
         points=None if points is None else (_point(points[0]), _point(points[1])),
+        accuracies=_accuracies(seen, row),
     )
+
+
+def _accuracies(seen: Survey, row: int) -> tuple[float | None, float | None]:
+    """How good the two bodies of a pair are, in [m]; None where it is not stated."""
+    scene, pair = seen.scene, seen.scene.pairs[row]
+    return accuracy(scene.cell, scene.bodies[pair.first]), accuracy(scene.cell, scene.bodies[pair.second])
 
 
 def _point(p: Array) -> tuple[float, float, float]:
@@ -132,7 +141,7 @@ def _closest(seen: Survey, times: Array) -> tuple[ClosePair, ...]:
         ClosePair(
             pair=seen.scene.names(pairs[row]),
             clearance_class=pairs[row].clearance_class,
-            distance=max(0.0, min(seen.distance(row), float(seen.low[row].min()))),
+            distance=proved_distance(seen, row),
             at_s=float(seconds(times, np.array([min(seen.found[row].touches, default=seen.found[row].at)]))[0]),
         )
         for row in rows
@@ -168,20 +177,3 @@ def _stated(scene: Scene, rows: Sequence[int]) -> list[tuple[str, str, str]]:
         for row in rows
         if scene.pairs[row].rule is not Rule.CLEARANCE
     ]
-
-
-def _clearance_check(cell: Cell, kind: ClearanceClass, found: ClearanceMinimum) -> Check:
-    """Whether the smallest distance of a class is what the cell demands."""
-    pair, at_s = found.pair or ("", ""), found.at_s or 0.0
-    minimum, limit = MM * float(found.minimum or 0.0), MM * cell.checks.clearance
-    shown = np.floor(10.0 * minimum) / 10.0  # rounded down: never more than there is
-    return Check(
-        name="clearance",
-        subject=str(kind),
-        passed=bool(found.minimum is not None and found.minimum >= cell.checks.clearance),
-        value=minimum,
-        limit=limit,
-        unit="mm",
-        at_s=at_s,
-        message=f"clearance {kind}: {pair[0]} to {pair[1]} {shown:.1f} mm at {at_s:.3f} s, required {limit:.1f} mm",
-    )

@@ -10,6 +10,7 @@ from cellplan.checks.closure import check_closure, closure_accuracy
 from cellplan.checks.conditioning import conditioning
 from cellplan.checks.limits import check_joints, joint_uses
 from cellplan.checks.locked import check_locked, told_with_failures
+from cellplan.checks.payload import check_payload, load_uses
 from cellplan.checks.repeatability import check_joint_drift, repeatability
 from cellplan.checks.speeds import robot_speed
 from cellplan.checks.tracking import check_accuracy, part_poses, task_accuracy
@@ -18,7 +19,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report import Check, JointUse, Report, TaskAccuracy
+from cellplan.model.report import Check, JointUse, Report, RobotSpeed, TaskAccuracy
 from cellplan.scene.scene import Scene
 
 
@@ -60,6 +61,8 @@ def verify(
     drift = repeatability(cell, schedule, q)
     checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
     checks += check_locked(cell, schedule.times, q)
+    loads = load_uses(cell, scene.chains, schedule.times, q)
+    checks += check_payload(loads)
     report = Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
@@ -70,15 +73,13 @@ def verify(
         clearance=UNKNOWN,
         conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving),
         motion_share=_motion_share(uses),
-        speeds={
-            robot.name: robot_speed(robot, scene.chains[robot.name], schedule.times, q[robot.name])
-            for robot in cell.robots
-        },
+        speeds=_speeds(scene, schedule.times, q),
         times=schedule.times,
         q=q,
         repeatability=drift,
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
         closures=closures,
+        loads=loads,
     )
     if preview is not None:
         preview(report)
@@ -105,6 +106,13 @@ def _joints(cell: Cell, times: Array, q: Mapping[str, Array]) -> tuple[list[Join
         uses += own
         checks += check_joints(robot, own, times, q[robot.name])
     return uses, checks
+
+
+def _speeds(scene: Scene, times: Array, q: Mapping[str, Array]) -> dict[str, RobotSpeed]:
+    """How fast each robot moves in the world."""
+    return {
+        robot.name: robot_speed(robot, scene.chains[robot.name], times, q[robot.name]) for robot in scene.cell.robots
+    }
 
 
 def _positions(cell: Cell, schedule: Schedule, tables: Sequence[JointTable]) -> Mapping[str, Array]:

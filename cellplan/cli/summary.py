@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from cellplan.report.method import USUAL_METHOD
+from cellplan.report.rests_on import good_to
 
 Record = dict[str, Any]
 
@@ -22,6 +23,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
         f"{record['cell']}: {record['status']}",
         *figure_lines(record),
         *_failure_lines(record["checks"]),
+        *(f"  {line}" for line in record.get("rests_on", {}).get("lines", [])),
         *(f"  before you run it: {line}" for line in record.get("before_you_run", [])),
         *_place_lines(record, folder),
     ]
@@ -103,7 +105,9 @@ def _clearance_lines(whole: Record) -> Iterator[str]:
     if whole["minimum_mm"] is not None and whole["pair"]:
         first, second = whole["pair"]
         proof = "certified" if whole["certified"] else "not certified"
-        yield f"  smallest clearance {whole['minimum_mm']:.4g} mm, {proof}: {first} - {second}{_instant(whole['at_s'])}"
+        rests_on = good_to(whole["pair"], whole.get("accuracies_mm"))
+        where = f"{first} - {second}{_instant(whole['at_s'])}{f', {rests_on}' if rests_on else ''}"
+        yield f"  smallest clearance {whole['minimum_mm']:.4g} mm, {proof}: {where}"
 
 
 def _slack_lines(slack: Record | None) -> Iterator[str]:

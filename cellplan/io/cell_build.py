@@ -85,7 +85,12 @@ def _tool(entry: ToolEntry, read_mesh: MeshReader) -> Tool:
         Body(name="tool" if number == 1 else f"tool_{number}", link=BASE, shape=solid, X_BS=X_FS)
         for number, (solid, X_FS) in enumerate(placed, start=1)
     ]
-    return Tool(X_FT=X_FT, bodies=tuple(bodies), mass=entry.mass_kg)
+    return Tool(X_FT=X_FT, bodies=tuple(bodies), mass=entry.mass_kg, centre=_centre(entry.centre_mm))
+
+
+def _centre(centre_mm: tuple[float, float, float] | None) -> Array | None:
+    """A centre of mass in [m]."""
+    return None if centre_mm is None else np.divide(centre_mm, MM)
 
 
 def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
@@ -100,6 +105,7 @@ def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
         ),
         X_WP=None if entry.at is None else pose_from_entry(entry.at),
         mass=entry.mass_kg,
+        centre=_centre(entry.centre_mm),
     )
 
 
@@ -270,6 +276,7 @@ def build_checks(entry: ChecksEntry) -> CheckSettings:
     """Demands."""
     return CheckSettings(
         clearance=entry.clearance_mm / MM,
+        adds_accuracy=entry.body_accuracy == "add",
         contact_zone=entry.contact_zone_mm / MM,
         exclusions=tuple(Exclusion(bodies=pair.bodies, reason=pair.reason) for pair in entry.exclude),
         closure_position=entry.closure_mm / MM,

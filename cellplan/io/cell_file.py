@@ -19,8 +19,8 @@ from cellplan.io.cell_build import (
 from cellplan.io.cell_rules import rule_complaints
 from cellplan.io.cell_sources import Sources
 from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, raise_complaints, shown
-from cellplan.io.mounting_build import mounted_names, mounting_complaints
-from cellplan.io.robot_rules import robot_complaints
+from cellplan.io.mounting_build import accuracy_complaints, mounted_names, mounting_complaints
+from cellplan.io.robot_rules import robot_complaints, with_statements
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.mounting import AttachmentEntry
 from cellplan.io.schema.pieces import Pieces, read_pieces
@@ -65,6 +65,7 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
         complaints += robot_complaints(name, pieces.robots[name], model, document)
         complaints += mounting_complaints(name, model, pieces, document)
     complaints += _unknown_bodies(pieces, models, document)
+    complaints += accuracy_complaints(pieces, models, document)
     complaints += solver_complaints(pieces, models, document)
     complaints += _part_extent(pieces, document)
     _read_meshes(pieces, sources)
@@ -83,7 +84,7 @@ def _models(pieces: Pieces, document: YamlDocument, sources: Sources) -> dict[st
         written = document.root["robots"][name]
         if name not in found and isinstance(written, dict) and isinstance(written.get("model"), str):
             sources.look_for_model(name, written["model"])
-    return {name: model for name, model in found.items() if model is not None}
+    return {name: with_statements(pieces.robots[name], model) for name, model in found.items() if model is not None}
 
 
 def _targets(pieces: Pieces, sources: Sources) -> Targets:

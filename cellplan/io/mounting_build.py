@@ -127,3 +127,16 @@ def _pedestal_complaints(
             "draw what it hangs on or stands on in the environment"
         )
         yield document.complaint(path, text)
+
+
+def accuracy_complaints(
+    pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument
+) -> Iterator[Complaint]:
+    """An accuracy can be added to the clearance only where it is stated."""
+    if pieces.checks is None or pieces.checks.body_accuracy != "add":
+        return
+    unknown = [name for name, model in models.items() if model.bodies and model.body_accuracy is None]
+    if unknown:
+        cure = f"state robots.{unknown[0]}.bodies: {{accuracy_mm: …, source: …}}"
+        text = f"expected stated accuracies of all link bodies to add, got none for {listed(unknown)}: {cure}"
+        yield document.complaint(("checks", "body_accuracy"), text)

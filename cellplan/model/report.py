@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.payload import LoadUse
 
 CAUTION = (
     "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
@@ -145,6 +146,7 @@ class ClearanceMinimum:
         at_s: Instant in [s].
         certified: Whether the figure also holds between the samples.
         points: Where the two bodies are nearest, in the world in [m]; None when they touch or are not known.
+        accuracies: How far the real things may stick out of the two bodies in [m], each None when it is not stated.
     """
 
     minimum: float | None
@@ -152,6 +154,7 @@ class ClearanceMinimum:
     at_s: float | None
     certified: bool
     points: tuple[Point, Point] | None = None
+    accuracies: tuple[float | None, float | None] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -300,6 +303,7 @@ class Report:
         qd: Speeds between the samples, shape (N - 1, n), by robot.
         closures: Closure errors, one entry per holder but the first.
         repeatability: Whether the joints come back with the tools; None when not all tools come back.
+        loads: What each robot carries.
     """
 
     cell: str
@@ -317,6 +321,7 @@ class Report:
     qd: Mapping[str, Array]
     closures: tuple[ClosureAccuracy, ...] = ()
     repeatability: Repeatability | None = None
+    loads: tuple[LoadUse, ...] = ()
 
     @property
     def passed(self) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 
 from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import Array, is_rigid
+from cellplan.model.payload import Payload
 
 BASE = -1  # index of the link that does not move, where a link is named by the joint that carries it
 
@@ -99,6 +100,19 @@ class Body:
     X_BS: Array
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyAccuracy:
+    """How far the real arm may stick out of the bodies that stand for it.
+
+    Attributes:
+        distance: Largest distance in [m].
+        source: Where the figure comes from.
+    """
+
+    distance: float
+    source: str
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Link:
     """A link by name, so that things can be mounted on it.
@@ -124,6 +138,8 @@ class RobotModel:
         joints: The driven joints, each after the one that carries it.
         followers: Joints driven through linkages; they come after all joints in link numbering.
         links: Links on which something can be mounted, by the names of the robot's file.
+        body_accuracy: How good the link bodies are; None when nobody states it.
+        payload: What it may carry; None when nobody states it.
         flange_link: Index of the joint that carries the flange.
         X_BF: Flange (mechanical interface) in B at the reference posture, z out of the flange.
         bodies: Link bodies.
@@ -137,6 +153,8 @@ class RobotModel:
     bodies: tuple[Body, ...]
     followers: tuple[FollowerJoint, ...] = ()
     links: tuple[Link, ...] = ()
+    body_accuracy: BodyAccuracy | None = None
+    payload: Payload | None = None
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""

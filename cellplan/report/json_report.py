@@ -11,6 +11,7 @@ from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, Joi
 from cellplan.report.clearance_record import clearance_proof_record, closest_pairs_record
 from cellplan.report.closure_record import closures_record, worst_closures_record
 from cellplan.report.method import solver_record
+from cellplan.report.payload_record import worst_loads
 from cellplan.report.record import (
     SCHEMA,
     Provenance,
@@ -26,6 +27,7 @@ from cellplan.report.record import (
     tasks_record,
     withdrawals,
 )
+from cellplan.report.rests_on import rests_on_record, with_accuracies
 from cellplan.report.series import INDENT, series, series_text
 
 
@@ -47,6 +49,8 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
     """The record of one run, of its closures and of how its motion was found, without the series."""
     record = report_record(report, cell=cell, provenance=provenance)
     return record | {
+        "clearance": with_accuracies(record["clearance"], report.clearance.minima),
+        "rests_on": rests_on_record(cell, report.loads),
         "closest_pairs": closest_pairs_record(report.clearance),
         "clearance_proof": clearance_proof_record(report.clearance),
         "closure": closures_record(report, cell),
@@ -83,10 +87,11 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "closure": worst_closures_record(runs, cell),
         "joints": joints_record(merge_joint_uses(use for report in runs for use in report.joints)),
         "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
-        "clearance": clearance_record(minima),
+        "clearance": with_accuracies(clearance_record(minima), minima),
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
         "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
         "before_you_run": [f"{name}: {line}" for name, report in reports.items() for line in withdrawals(report, cell)],
+        "rests_on": rests_on_record(cell, worst_loads(runs)),
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "solver": solver_record(cell.solver),

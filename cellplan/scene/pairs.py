@@ -11,6 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import BASE
 from cellplan.scene.bodies import Kind, SceneBody
+from cellplan.scene.demands import demand
 from cellplan.scene.links import NO_BODY, LinkTree
 
 ATTACHED = (Kind.TOOL, Kind.PART)  # bodies that a flange carries
@@ -37,6 +38,7 @@ class ScenePair:
         clearance_class: What keeps its distance from what.
         rule: What is asked of them.
         reason: Why less than the full distance is asked; empty for the rule ``clearance``.
+        demand: Distance in [m] that a pair with the rule ``clearance`` is to keep.
     """
 
     first: int
@@ -44,6 +46,7 @@ class ScenePair:
     clearance_class: ClearanceClass
     rule: Rule
     reason: str = ""
+    demand: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +73,8 @@ def sort_pairs(cell: Cell, bodies: Sequence[SceneBody]) -> tuple[list[ScenePair]
             excluded.append(Excluded(i, j, reason))
         else:
             kind = clearance_class(bodies[i], bodies[j])
-            watched.append(ScenePair(first=i, second=j, clearance_class=kind, rule=Rule.CLEARANCE))
+            asked = demand(cell, bodies[i], bodies[j])
+            watched.append(ScenePair(first=i, second=j, clearance_class=kind, rule=Rule.CLEARANCE, demand=asked))
     return watched, excluded
 
 

@@ -14,7 +14,7 @@ Refuse = Callable[..., list[str]]
             "    base: {xyz",
             "    bsae: {xyz",
             "c:9: robots.worker.bsae: unknown key, did you mean 'base'?; allowed: model, package_dirs, flange, "
-            "base, pedestal, tool, attachments, start_deg, start, weights, limits, locked",
+            "base, bodies, payload, pedestal, tool, attachments, start_deg, start, weights, limits, locked",
         ),
         (
             "xyz_mm: [2000, 0, 0]",

@@ -49,7 +49,9 @@ def test_names_that_scripts_rely_on_are_there(passed_run: Any) -> None:
         record["joints"]["kuka"]["B2"]
     )
     assert list(record["clearance"]) == ["whole", "robot_robot", "self", "part", "environment"]
-    assert {"minimum_mm", "pair", "at_s", "certified", "points_mm"} == set(record["clearance"]["whole"])
+    assert {"minimum_mm", "pair", "at_s", "certified", "points_mm", "accuracies_mm"} == set(
+        record["clearance"]["whole"]
+    )
 
 
 def test_units_are_degrees_and_millimetres(passed_run: Any) -> None:
@@ -68,6 +70,7 @@ def test_units_are_degrees_and_millimetres(passed_run: Any) -> None:
         "at_s": 1.72,
         "certified": True,
         "points_mm": [[1200.0, 0.0, 900.0], [1413.0, 0.0, 900.0]],
+        "accuracies_mm": None,
     }
 
 
