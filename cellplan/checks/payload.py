@@ -195,11 +195,13 @@ def _checks(use: LoadUse) -> list[Check]:
 
 def _mass_check(use: LoadUse, limits: Payload) -> Check:
     """The mass against the payload."""
-    words = [f"tool {use.tool_mass:.4g} kg" if use.tool_mass is not None else "tool not stated"]
+    words = []
+    if use.tool_mass is None or use.tool_mass > 0.0:
+        words.append(f"tool {use.tool_mass:.4g} kg" if use.tool_mass is not None else "tool not stated")
     if use.part_mass is None or use.part_mass > 0.0:
         share = "" if use.holders < 2 else f" as one of {use.holders} holders"
         words.append(f"part {use.part_mass:.4g} kg{share}" if use.part_mass is not None else "part not stated")
-    carried = f"carries {use.known_mass:.4g} kg ({', '.join(words)})"
+    carried = f"carries {use.known_mass:.4g} kg" + (f" ({', '.join(words)})" if words else "")
     return Check(
         name="payload",
         subject=use.robot,

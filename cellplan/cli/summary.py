@@ -23,7 +23,6 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
         f"{record['cell']}: {record['status']}",
         *figure_lines(record),
         *_failure_lines(record["checks"]),
-        *(f"  {line}" for line in record.get("rests_on", {}).get("lines", [])),
         *(f"  before you run it: {line}" for line in record.get("before_you_run", [])),
         *_place_lines(record, folder),
     ]
@@ -41,6 +40,7 @@ def figure_lines(record: Record) -> list[str]:
         *_clearance_lines(record["clearance"]["whole"]),
         *_slack_lines(record["solver"]["slack"]),
         *_fallback_lines(record["solver"]),
+        *(f"  {line}" for line in record.get("rests_on", {}).get("lines", [])),
     ]
 
 

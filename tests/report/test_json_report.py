@@ -137,7 +137,14 @@ def test_what_does_not_exist_is_null(rail_run: Any) -> None:
     assert (endless["lower"], endless["upper"], endless["margin"]) == (None, None, None)
     assert endless["worst_at_s"] == endless["peak_velocity_at_s"]
     assert record["joints"]["reis"]["D1"]["unit"] == "mm"
-    nothing = {"minimum_mm": None, "pair": None, "at_s": None, "certified": False, "points_mm": None}
+    nothing = {
+        "minimum_mm": None,
+        "pair": None,
+        "at_s": None,
+        "certified": False,
+        "points_mm": None,
+        "accuracies_mm": None,
+    }
     assert record["clearance"]["environment"] == nothing
 
 
