@@ -87,6 +87,12 @@ def check_payload(uses: tuple[LoadUse, ...]) -> list[Check]:
     return [check for use in uses for check in _checks(use)]
 
 
+def check_payload_at_rest(cell: Cell, chains: Mapping[str, ScrewChain], start: Array) -> list[Check]:
+    """What the robots carry while they stand at one stacked posture of shape (nq,) in [rad] or [m]."""
+    still = {robot.name: np.tile(start[cell.columns(robot.name)], (2, 1)) for robot in cell.robots}
+    return check_payload(load_uses(cell, chains, np.array([0.0, 1.0]), still))
+
+
 def _load_use(cell: Cell, robot: Robot, chain: ScrewChain, *, times: Array, q: Array) -> LoadUse:
     """What one robot carries."""
     grasp = next((grasp for grasp in cell.part.held_by if grasp.robot == robot.name), None)
@@ -261,7 +267,7 @@ def _axis_checks(use: LoadUse, axis: AxisUse, limit: AxisLimit) -> list[Check]:
         )
     if limit.inertia is not None:
         text = (
-            f"payload {subject}: inertia of the load {axis.inertia:.4g} kg m² at {axis.inertia_at_s:.3f} s, "
+            f"payload {subject}: inertia of the load {axis.inertia:.4f} kg m² at {axis.inertia_at_s:.3f} s, "
             f"allowed {limit.inertia:g} kg m²"
         )
         checks.append(

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from cellplan.checks.payload import check_payload_at_rest
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
@@ -37,7 +38,7 @@ class CellCheck:
 
 
 def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
-    """Lay the paths on the part, examine or find the start postures, and look for collisions there.
+    """Lay the paths on the part, examine or find the start postures, and look for collisions and loads there.
 
     Raises:
         InputError: A path misses the part, or a given start is out of limits or off its task.
@@ -61,9 +62,10 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
         at_s=0.0,
         message=words,
     )
+    loads = check_payload_at_rest(cell, scene.chains, start)
     return CellCheck(
         cell=with_start(cell, start),
         found=found,
         path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
-        checks=(at_start,),
+        checks=(at_start, *(each for each in loads if each.name == "payload" or not each.passed)),
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scene_builders import QUARTER, arm_model, fixed_part, held_part, joint, make_cell, no_tool, placed, slide_model
 
-from cellplan.checks.payload import GRAVITY, check_payload, load_uses, point_accelerations
+from cellplan.checks.payload import GRAVITY, check_payload, check_payload_at_rest, load_uses, point_accelerations
 from cellplan.geometry.shapes import Box, Cylinder, Sphere
 from cellplan.geometry.transforms import pose
 from cellplan.kinematics.screws import ScrewChain
@@ -94,6 +94,17 @@ def test_the_part_weighs_at_its_centre_with_the_inertia_of_its_shape() -> None:
     assert use.known_mass == 3.0
     assert use.axes[0].static_moment == pytest.approx(3.0 * GRAVITY * 0.5)
     assert use.axes[0].inertia == pytest.approx(3.0 * (0.5**2 + 0.2**2 / 4.0 + 0.3**2 / 12.0))
+
+
+def test_the_load_at_rest_is_judged_without_a_motion() -> None:
+    limits = replace(SIX_KG, axes=(AxisLimit(joint="a", moment=11.0),))
+    cell = make_cell(robot(arm(payload=limits), with_tool=tool(2.0)))
+    chains = {"a": ScrewChain(cell.robot("a"))}
+
+    level, hanging = (check_payload_at_rest(cell, chains, np.array([angle])) for angle in (0.0, QUARTER))
+
+    assert [check.passed for check in level] == [True, False]
+    assert [check.passed for check in hanging] == [True, True]
 
 
 def test_holders_share_the_part_equally() -> None:
