@@ -13,7 +13,6 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check, ClearanceClass, ClearanceMinimum, ClearanceReport, ClosePair
 from cellplan.model.task import Frame
 from cellplan.scene.bodies import Kind
-from cellplan.scene.demands import accuracy
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 from cellplan.scene.survey import CLOSEST, Survey, lowest_bounds, proved_distance
@@ -125,7 +124,7 @@ def _minimum(seen: Survey, times: Array, kind: ClearanceClass, *, open_rows: Seq
 def _accuracies(seen: Survey, row: int) -> tuple[float | None, float | None]:
     """How good the two bodies of a pair are, in [m]; None where it is not stated."""
     scene, pair = seen.scene, seen.scene.pairs[row]
-    return accuracy(scene.cell, scene.bodies[pair.first]), accuracy(scene.cell, scene.bodies[pair.second])
+    return scene.bodies[pair.first].accuracy, scene.bodies[pair.second].accuracy
 
 
 def _point(p: Array) -> tuple[float, float, float]:

@@ -135,7 +135,7 @@ def accuracy_complaints(
     """An accuracy can be added to the clearance only where it is stated."""
     if pieces.checks is None or pieces.checks.body_accuracy != "add":
         return
-    unknown = [name for name, model in models.items() if model.bodies and model.body_accuracy is None]
+    unknown = [name for name, model in models.items() if any(model.accuracy_of(body) is None for body in model.bodies)]
     if unknown:
         cure = f"state robots.{unknown[0]}.bodies: {{accuracy_mm: …, source: …}}"
         text = f"expected stated accuracies of all link bodies to add, got none for {listed(unknown)}: {cure}"

@@ -124,12 +124,11 @@ def tightened(
 
 def with_statements(entry: RobotEntry, model: RobotModel) -> RobotModel:
     """The model with what the cell states in place of the robot's own file."""
-    accuracy, payload = model.body_accuracy, model.payload
     if entry.bodies is not None:
         accuracy = BodyAccuracy(distance=entry.bodies.accuracy_mm / 1000.0, source=entry.bodies.source)
-    if entry.payload is not None:
-        payload = build_payload(entry.payload)
-    return replace(model, body_accuracy=accuracy, payload=payload)
+        bodies = tuple(replace(body, accuracy=None) for body in model.bodies)
+        model = replace(model, body_accuracy=accuracy, bodies=bodies)
+    return model if entry.payload is None else replace(model, payload=build_payload(entry.payload))
 
 
 def _wider(joint: Joint, entry: LimitsEntry) -> Iterator[tuple[str, str]]:

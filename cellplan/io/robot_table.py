@@ -143,7 +143,8 @@ def _bodies(table: RobotTableDocument, meshes: _Meshes) -> Iterator[Body]:
         name = entry.name or _free_name(entry.link, taken)
         taken.add(name)
         shape, X_BS = link_solid(entry, partial(meshes.known, index=index))
-        yield Body(name=name, link=links[entry.link], shape=shape, X_BS=X_BS)
+        accuracy = None if entry.accuracy_mm is None else entry.accuracy_mm / MM
+        yield Body(name=name, link=links[entry.link], shape=shape, X_BS=X_BS, accuracy=accuracy)
 
 
 def _free_name(link: str, taken: set[str]) -> str:

@@ -92,12 +92,14 @@ class Body:
         link: Index of the joint that carries it, followers counted after joints; ``BASE`` for the foot of the robot.
         shape: The solid, in its own frame.
         X_BS: Pose of the shape's frame in B at the reference posture (for tools: in F; for parts: in P).
+        accuracy: How far the real link may stick out of it in [m]; None for what the robot states for all its bodies.
     """
 
     name: str
     link: int
     shape: Solid
     X_BS: Array
+    accuracy: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,7 +140,7 @@ class RobotModel:
         joints: The driven joints, each after the one that carries it.
         followers: Joints driven through linkages; they come after all joints in link numbering.
         links: Links on which something can be mounted, by the names of the robot's file.
-        body_accuracy: How good the link bodies are; None when nobody states it.
+        body_accuracy: How good the link bodies are that do not say it themselves; None when nobody states it.
         payload: What it may carry; None when nobody states it.
         flange_link: Index of the joint that carries the flange.
         X_BF: Flange (mechanical interface) in B at the reference posture, z out of the flange.
@@ -166,6 +168,12 @@ class RobotModel:
                 raise ValueError(f"robot '{self.name}': joint '{axis.name}' needs a unit axis")
         if not is_rigid(self.X_BF):
             raise ValueError(f"robot '{self.name}': the flange frame is not a rigid pose")
+
+    def accuracy_of(self, body: Body) -> float | None:
+        """How far the real arm may stick out of one of its bodies in [m]; None when nobody states it."""
+        if body.accuracy is not None or self.body_accuracy is None:
+            return body.accuracy
+        return self.body_accuracy.distance
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -25,18 +25,20 @@ def bodies_record(cell: Cell) -> Record:
     """How good the link bodies of each robot are and who says so; nothing for a robot without bodies."""
     record: Record = {}
     for robot in cell.robots:
-        stated = robot.model.body_accuracy
+        stated, own = robot.model.body_accuracy, [body for body in robot.model.bodies if body.accuracy is not None]
         if robot.model.bodies:
             record[robot.name] = {
                 "accuracy_mm": None if stated is None else number(1e3 * stated.distance),
                 "source": "not stated" if stated is None else stated.source,
+                "own_accuracy_mm": {body.name: number(1e3 * (body.accuracy or 0.0)) for body in own},
             }
     return record
 
 
 def unstated_bodies(cell: Cell) -> list[str]:
     """One line on the robots of which nobody says how good their bodies are; none when all are stated."""
-    unknown = [name for name, stated in bodies_record(cell).items() if stated["accuracy_mm"] is None]
+    models = {robot.name: robot.model for robot in cell.robots}
+    unknown = [name for name, model in models.items() if any(model.accuracy_of(body) is None for body in model.bodies)]
     return [f"accuracy of bodies of {', '.join(unknown)} not stated"] if unknown else []
 
 

@@ -37,6 +37,8 @@ class SceneBody:
         robot: The robot that moves it; None when it is fixed in the world.
         link: The link of that robot it is fixed to.
         X_BS: Its pose at the reference posture in the robot's base frame; in the world when no robot moves it.
+        accuracy: How far the real thing may stick out of it in [m]; None when nobody states it. What the user draws
+            (tools, part, attachments, pedestals, surroundings) is taken as exact.
     """
 
     name: str
@@ -45,6 +47,7 @@ class SceneBody:
     robot: str | None
     link: int
     X_BS: Array
+    accuracy: float | None = 0.0
 
     @property
     def is_at_rest(self) -> bool:
@@ -104,6 +107,7 @@ def _robot_bodies(robot: Robot) -> list[SceneBody]:
             robot=robot.name,
             link=body.link,
             X_BS=body.X_BS,
+            accuracy=model.accuracy_of(body),
         )
         for body in model.bodies
     ]

@@ -73,7 +73,7 @@ def sort_pairs(cell: Cell, bodies: Sequence[SceneBody]) -> tuple[list[ScenePair]
             excluded.append(Excluded(i, j, reason))
         else:
             kind = clearance_class(bodies[i], bodies[j])
-            asked = demand(cell, bodies[i], bodies[j])
+            asked = demand(cell.checks, bodies[i], bodies[j])
             watched.append(ScenePair(first=i, second=j, clearance_class=kind, rule=Rule.CLEARANCE, demand=asked))
     return watched, excluded
 

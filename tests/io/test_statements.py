@@ -36,6 +36,14 @@ def test_bodies_are_a_list_or_a_mapping_that_says_how_good_they_are(tmp_path: Pa
     assert (len(stated.bodies), stated.body_accuracy) == (1, BodyAccuracy(distance=0.003, source="scan"))
 
 
+def test_a_solid_may_say_itself_how_good_it_is(tmp_path: Path) -> None:
+    better = SOLID.replace("{link: a,", "{link: a, accuracy_mm: 1,")
+
+    model = read_robot_table(table(tmp_path, f"bodies: {{accuracy_mm: 3, solids: [{SOLID}, {better}]}}\n"))
+
+    assert [model.accuracy_of(body) for body in model.bodies] == [0.003, 0.001]
+
+
 @pytest.mark.parametrize(
     ("more", "message"),
     [
@@ -76,8 +84,10 @@ def test_the_cell_goes_before_the_file_of_the_robot(load: Callable[..., Cell]) -
 
     cell = load((WEIGHTS, stated))
 
-    assert cell.robot("worker").model.body_accuracy == BodyAccuracy(distance=0.002, source="stated in the cell")
-    assert cell.robot("worker").model.payload == Payload(
+    model = cell.robot("worker").model
+    assert model.body_accuracy == BodyAccuracy(distance=0.002, source="stated in the cell")
+    assert {model.accuracy_of(body) for body in model.bodies} == {0.002}
+    assert model.payload == Payload(
         mass=8.0, along=0.1, across=0.05, axes=(AxisLimit(joint="F3", moment=6.0, inertia=0.1),), source="sheet"
     )
     own = cell.robot("holder").model

@@ -328,6 +328,16 @@ def test_bodies_are_not_fatter_than_the_real_arm(name: str, shared_robots: Path)
         assert beyond.mean() < 0.012, f"link {link}"
 
 
+def test_the_flange_of_the_abb_is_as_good_as_it_says(shared_robots: Path) -> None:
+    model = load_bundled("abb_irb1600")
+    disc = next(body for body in model.bodies if body.name == "flange")
+    vertices = vertices_of(shared_robots / "abb_irb1600_8_145", "link_6", at=(815, 0, 961.5)) / 1000.0
+    before_the_wrist = vertices[vertices[:, 0] > 0.786]  # behind it the shaft runs inside the wrist
+    missed = distance_to(disc.shape, transform_points(inverse(disc.X_BS), before_the_wrist)).max()
+    assert model.accuracy_of(disc) == 0.002
+    assert missed < 0.002
+
+
 def test_real_meshes_stand_where_the_joints_of_the_table_are(shared_robots: Path) -> None:
     """The castings reach from joint to joint, so the comparison above compares like with like."""
     arm = kuka_vertices(shared_robots)

@@ -115,6 +115,10 @@ class LinkBodyEntry(Entry):
     capsule: SegmentEntry | None = Field(default=None, description="Cylinder with round ends beyond the segment.")
     sphere: PlacedSphereEntry | None = Field(default=None, description="Ball.")
     mesh: PlacedMeshEntry | None = Field(default=None, description="Mesh from a file.")
+    accuracy_mm: Accuracy | None = Field(
+        default=None,
+        description="How far the real link may stick out of this solid; when absent what is stated for all of them.",
+    )
 
     @model_validator(mode="after")
     def _is_one_shape(self) -> Self:
