@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scene_builders import arm_model, body, floor, make_cell, placed, stick, thing
 
 from cellplan.geometry.shapes import Box, Sphere
@@ -45,6 +47,27 @@ def test_a_pedestal_reaches_from_the_floor_to_the_base_wherever_the_base_stands(
         X_WS = pose((1.0, 2.0, height)) @ column.X_BS
         assert column.shape.length == pytest.approx(height)
         np.testing.assert_allclose(X_WS[:3, 3], (1.0, 2.0, 0.5 * height))
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    x=st.floats(-5.0, 5.0),
+    floor_z=st.floats(-1.0, 1.0),
+    height=st.floats(0.01, 2.0),
+    heading=st.floats(-3.1, 3.1),
+    lean=st.floats(-0.017, 0.017),
+)
+def test_a_pedestal_stands_upright_between_floor_and_base(x, floor_z, height, heading, lean) -> None:
+    X_WB = pose((x, -x, floor_z + height), (lean, 0.0, heading))
+
+    shape, X_BS = Pedestal(size=(0.5, 0.4), floor=floor_z).solid(X_WB) or (None, np.eye(4))
+
+    X_WS = X_WB @ X_BS
+    assert isinstance(shape, Box)
+    np.testing.assert_allclose(X_WS[2], (0.0, 0.0, 1.0, floor_z + 0.5 * height), atol=1e-9)
+    np.testing.assert_allclose(X_WS[:2, 3], (x, -x), atol=1e-9)
+    assert shape.size == pytest.approx((0.5, 0.4, height))
+    assert X_WS[:2, 0] @ X_WB[:2, 0] == pytest.approx(1.0, abs=1e-3)  # a box turns with its base
 
 
 def test_a_base_on_the_floor_has_no_pedestal() -> None:
