@@ -17,9 +17,9 @@ from PIL import Image, ImageDraw, ImageFont
 
 from cellplan import Solution, load_cell, solve
 from cellplan.geometry.mesh_topology import make_mesh
-from cellplan.geometry.shapes import Box, Capsule, Mesh
+from cellplan.geometry.shapes import Capsule, Mesh
 from cellplan.geometry.tessellation import tessellate
-from cellplan.geometry.transforms import Array, frame_from_axes, inverse, pose, pose_from, transform_points
+from cellplan.geometry.transforms import Array, frame_from_axes, inverse, pose_from, transform_points
 from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.report.palette import INK, robot_colours
@@ -44,7 +44,8 @@ AMBIENT, FILL, SHADE, GLOSS = 0.44, 0.20, 0.30, 0.14  # light from everywhere an
 GRID, GRID_LINE = 0.5, 0.005  # [m] between the lines on the floor, and half their width
 FADE: Final = (2.3, 4.2)  # [m] from the middle: here the floor begins and ends to vanish
 FLOOR, LINE, PART, STAND, METAL = "#f3f5f8", "#cfd6de", "#c9ced4", "#aab2bc", "#525b66"
-ROD, LINE_RADIUS = 0.013, 0.0055  # [m] radius of a tool without a body, and of the line that stands for a path
+SHADES: Final = {Kind.PART: PART, Kind.TOOL: METAL, Kind.PEDESTAL: STAND}  # others have the colour of their robot
+ROD, LINE_RADIUS = 0.010, 0.0055  # [m] radius of the line from flange to tip, and of the line that stands for a path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,7 +90,7 @@ def round_normals(mesh: Mesh) -> Array:
 
 
 def pieces_of(solution: Solution) -> Iterator[tuple[Mesh, Array, str]]:
-    """Everything that stands on the floor at the instant: bodies, tools without one, plinths and the paths."""
+    """Everything that stands on the floor at the instant: bodies, pedestals, tools without a body, and the paths."""
     cell, motion = solution.cell, solution.runs[0].motion
     k = int(np.searchsorted(motion.times, INSTANT))
     q = {robot.name: motion.q[k : k + 1, cell.columns(robot.name)] for robot in cell.robots}
@@ -97,11 +98,9 @@ def pieces_of(solution: Solution) -> Iterator[tuple[Mesh, Array, str]]:
     colours = robot_colours(cell)
     bodies = [body for body in scene_bodies(cell) if body.kind is not Kind.OBSTACLE]
     for body, X_WS in zip(bodies, body_poses(bodies, chains, q), strict=True):
-        colour = {Kind.PART: PART, Kind.TOOL: METAL}.get(body.kind) or colours[str(body.robot)]
+        colour = SHADES.get(body.kind) or colours[str(body.robot)]
         yield tessellate(body.shape, SEGMENTS), X_WS[0], colour
     for robot in cell.robots:
-        height = float(robot.X_WB[2, 3])
-        yield tessellate(Box((0.46, 0.46, height))), robot.X_WB @ pose((0.0, 0.0, -0.5 * height)), STAND
         flange = chains[robot.name].flange_poses(q[robot.name])[0]
         yield from rods(np.stack([flange[:3, 3], (flange @ robot.tool.X_FT)[:3, 3]]), radius=ROD, colour=METAL)
     yield from drawn_paths(solution, part_pose(cell, chains, q))

@@ -25,7 +25,8 @@ the same as a JSON Schema for editors.
   `0x10`, `no`, `on`, `2010-01-01`) are errors with file and line. Put such a word in quotes where it is meant as a
   text. Truth values are `true` and `false`.
 - **Limits**: 2 MB, 200,000 values, 32 levels, 64 robots, 200 tasks, 2,000,000 samples.
-- **Bodies** are called `ROBOT/LINK`, `ROBOT/tool`, `ROBOT/tool_2`, …, `part` and by their names in the environment.
+- **Bodies** are called `ROBOT/LINK`, `ROBOT/tool`, `ROBOT/tool_2`, …, `ROBOT/pedestal`, `ROBOT/NAME` for
+  attachments, `part`, and by their names in the environment.
 
 All complaints about a file come at once, in the order of the file, as `FILE:LINE: key.path: what, got, allowed`.
 

@@ -6,21 +6,19 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.contacts import MM, collision_checks, find_contacts, seconds, uncertified
-from cellplan.collision.measure import TIGHT
+from cellplan.checks.contacts import collision_checks, find_contacts, seconds, uncertified
+from cellplan.checks.demanded_clearance import EXACT, demanded_clearance
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check, ClearanceClass, ClearanceMinimum, ClearanceReport, ClosePair
 from cellplan.scene.of_run import scene_of_run
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
-from cellplan.scene.survey import CLOSEST, Survey, lowest_bounds
+from cellplan.scene.survey import CLOSEST, Survey, lowest_bounds, proved_distance
 from cellplan.scene.survey_search import survey
 
 STAGE: Final = "checking clearance"
-EXACT: Final = 1e-4 - 2.0 * TIGHT  # [m] a bound this near to what was measured is a smallest distance, to 0.1 mm
 UNKNOWN: Final = ClearanceReport(
     minima={}, contacts=(), exclusions=(), pair_count=0, curve_times=np.empty(0), curves={}
 )  # before anything was checked
@@ -78,7 +76,7 @@ def check_clearance(
         for check in collision_checks(found, contacts, schedule.times, kind=kind, open_rows=open_rows)
     ]
     known = [kind for kind in classes if minima[kind].minimum is not None and minima[kind].certified]
-    checks += [_clearance_check(scene.cell, kind, minima[kind]) for kind in known]
+    checks += [demanded_clearance(found, schedule.times, kind, minima[kind]) for kind in known]
     progress(STAGE, 1.0)
     return report, tuple(checks)
 
@@ -90,7 +88,13 @@ def _minimum(seen: Survey, times: Array, kind: ClearanceClass, *, open_rows: Seq
     touching = [(min(seen.found[row].touches), row) for row in watched if seen.found[row].touches]
     if touching:
         at, row = min(touching)
-        return ClearanceMinimum(minimum=0.0, pair=seen.scene.names(pairs[row]), at_s=_second(times, at), certified=True)
+        return ClearanceMinimum(
+            minimum=0.0,
+            pair=seen.scene.names(pairs[row]),
+            at_s=_second(times, at),
+            certified=True,
+            accuracies=_accuracies(seen, row),
+        )
     unproved = [row for row in watched.tolist() if row in open_rows]
     rows = np.union1d(rows, np.array(unproved, dtype=np.intp))
     if not len(rows):
@@ -108,12 +112,19 @@ def _minimum(seen: Survey, times: Array, kind: ClearanceClass, *, open_rows: Seq
         certified=not unproved,
         exact=is_exact,
         points=None if points is None else (_point(points[0]), _point(points[1])),
+        accuracies=_accuracies(seen, row),
     )
 
 
 def _second(times: Array, at: float) -> float:
     """Instant in [s] from one counted in samples."""
     return float(seconds(times, np.array([at]))[0])
+
+
+def _accuracies(seen: Survey, row: int) -> tuple[float | None, float | None]:
+    """How good the two bodies of a pair are, in [m]; None where it is not stated."""
+    scene, pair = seen.scene, seen.scene.pairs[row]
+    return scene.bodies[pair.first].accuracy, scene.bodies[pair.second].accuracy
 
 
 def _point(p: Array) -> tuple[float, float, float]:
@@ -129,7 +140,7 @@ def _closest(seen: Survey, times: Array) -> tuple[ClosePair, ...]:
         ClosePair(
             pair=seen.scene.names(pairs[row]),
             clearance_class=pairs[row].clearance_class,
-            distance=max(0.0, min(seen.distance(row), float(seen.low[row].min()))),
+            distance=proved_distance(seen, row),
             at_s=float(seconds(times, np.array([min(seen.found[row].touches, default=seen.found[row].at)]))[0]),
         )
         for row in rows
@@ -165,21 +176,3 @@ def _stated(scene: Scene, rows: Sequence[int]) -> list[tuple[str, str, str]]:
         for row in rows
         if scene.pairs[row].rule is not Rule.CLEARANCE
     ]
-
-
-def _clearance_check(cell: Cell, kind: ClearanceClass, found: ClearanceMinimum) -> Check:
-    """Whether the smallest distance of a class is what the cell demands."""
-    pair, at_s = found.pair or ("", ""), found.at_s or 0.0
-    minimum, limit = MM * float(found.minimum or 0.0), MM * cell.checks.clearance
-    shown = f"{np.floor(10.0 * minimum) / 10.0:.1f} mm"  # rounded down: never more than there is
-    shown = shown if found.exact else f"at least {shown}"
-    return Check(
-        name="clearance",
-        subject=str(kind),
-        passed=bool(found.minimum is not None and found.minimum >= cell.checks.clearance),
-        value=minimum,
-        limit=limit,
-        unit="mm",
-        at_s=at_s,
-        message=f"clearance {kind}: {pair[0]} to {pair[1]} {shown} at {at_s:.3f} s, required {limit:.1f} mm",
-    )

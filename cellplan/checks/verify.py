@@ -14,6 +14,7 @@ from cellplan.checks.idle import check_idle
 from cellplan.checks.limits import check_joints, joint_uses
 from cellplan.checks.locked import check_locked, told_with_failures
 from cellplan.checks.mounting import check_mounting
+from cellplan.checks.payload import check_payload, load_uses
 from cellplan.checks.repeatability import check_joint_drift, repeatability
 from cellplan.checks.speeds import robot_speed
 from cellplan.checks.tool_depth import check_depths, tool_depths
@@ -23,7 +24,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report import Check, JointUse, Report, TaskAccuracy
+from cellplan.model.report import Check, JointUse, Report, RobotSpeed, TaskAccuracy
 from cellplan.scene.scene import Scene
 
 
@@ -69,7 +70,8 @@ def verify(
     checks += [*joint_checks, *check_accelerations(cell, accelerations)]
     drift = repeatability(cell, schedule, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
-    checks += check_idle(cell, schedule, q)
+    loads = load_uses(cell, scene.chains, schedule.times, q)
+    checks += [*check_idle(cell, schedule, q), *check_payload(loads)]
     report = Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
@@ -80,10 +82,7 @@ def verify(
         clearance=UNKNOWN,
         conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving),
         motion_share=_motion_share(uses),
-        speeds={
-            robot.name: robot_speed(robot, scene.chains[robot.name], schedule.times, q[robot.name])
-            for robot in cell.robots
-        },
+        speeds=_speeds(scene, schedule.times, q),
         times=schedule.times,
         q=q,
         repeatability=drift,
@@ -91,6 +90,7 @@ def verify(
         closures=closures,
         depths=depths,
         accelerations=accelerations,
+        loads=loads,
     )
     if preview is not None:
         preview(report)
@@ -120,6 +120,13 @@ def _joints(cell: Cell, times: Array, q: Mapping[str, Array]) -> tuple[list[Join
         uses += own
         checks += check_joints(own, times, q[robot.name])
     return uses, checks
+
+
+def _speeds(scene: Scene, times: Array, q: Mapping[str, Array]) -> dict[str, RobotSpeed]:
+    """How fast each robot moves in the world."""
+    return {
+        robot.name: robot_speed(robot, scene.chains[robot.name], times, q[robot.name]) for robot in scene.cell.robots
+    }
 
 
 def _positions(cell: Cell, schedule: Schedule, tables: Sequence[JointTable]) -> Mapping[str, Array]:

@@ -9,6 +9,7 @@ from cellplan.cli.acceleration_summary import acceleration_lines
 from cellplan.report.left_out_record import grips_told, told_left_out
 from cellplan.report.method import USUAL_METHOD
 from cellplan.report.open_surfaces import open_surface_lines
+from cellplan.report.rests_on import good_to
 
 Record = dict[str, Any]
 
@@ -45,6 +46,7 @@ def figure_lines(record: Record) -> list[str]:
         *_fallback_lines(record["solver"]),
         *(f"  note: {line}" for _, line in open_surface_lines(record.get("open_surfaces", []))),
         *(f"  grip: {line}" for line in grips_told(record)),
+        *(f"  {line}" for line in record.get("rests_on", {}).get("lines", [])),
         *left_out_lines(record),
     ]
 
@@ -129,7 +131,9 @@ def _clearance_lines(whole: Record) -> Iterator[str]:
         proof = "certified" if whole["certified"] else "not certified"
         least = "" if whole.get("exact", True) else "at least "
         figure = f"{least}{whole['minimum_mm']:.4g} mm, {proof}"
-        yield f"  smallest clearance {figure}: {first} - {second}{_instant(whole['at_s'])}"
+        rests_on = good_to(whole["pair"], whole.get("accuracies_mm"))
+        where = f"{first} - {second}{_instant(whole['at_s'])}{f', {rests_on}' if rests_on else ''}"
+        yield f"  smallest clearance {figure}: {where}"
 
 
 def _slack_lines(slack: Record | None) -> Iterator[str]:

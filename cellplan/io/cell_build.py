@@ -8,6 +8,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.io.acceleration_build import acceleration_rule, controller_cycle
 from cellplan.io.cell_rules import needs_surface
+from cellplan.io.mounting_build import build_attachments, build_pedestal, floor_height_mm
 from cellplan.io.robot_rules import home_configuration, start_posture
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry
@@ -80,6 +81,8 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         home=home,
         acceleration=acceleration_rule(entry, document.acceleration, joints=len(model.joints)),
         controller_cycle=controller_cycle(entry, document),
+        attachments=build_attachments(entry.attachments, model, read_mesh),
+        pedestal=build_pedestal(entry, document.environment),
     )
 
 
@@ -94,7 +97,12 @@ def _tool(entry: ToolEntry, read_mesh: MeshReader) -> Tool:
         Body(name="tool" if number == 1 else f"tool_{number}", link=BASE, shape=solid, X_BS=X_FS)
         for number, (solid, X_FS) in enumerate(placed, start=1)
     ]
-    return Tool(X_FT=X_FT, bodies=tuple(bodies), mass=entry.mass_kg)
+    return Tool(X_FT=X_FT, bodies=tuple(bodies), mass=entry.mass_kg, centre=_centre(entry.centre_mm))
+
+
+def _centre(centre_mm: tuple[float, float, float] | None) -> Array | None:
+    """A centre of mass in [m]."""
+    return None if centre_mm is None else np.divide(centre_mm, MM)
 
 
 def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
@@ -114,6 +122,7 @@ def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
         ),
         X_WP=None if entry.at is None else pose_from_entry(entry.at),
         mass=entry.mass_kg,
+        centre=_centre(entry.centre_mm),
     )
 
 
@@ -230,6 +239,9 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         if task.path.is_planar and task.path.project is None:
             entry["path"].setdefault("offset_mm", 0.0)
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}
+    for name, robot in document.robots.items():
+        if robot.pedestal is not None:
+            values["robots"][name]["pedestal"]["floor_z_mm"] = floor_height_mm(robot, document.environment)
     for grasp in values["part"]["held_by"][:1]:
         del grasp["axes"]  # the first holder has no choice
     return values
@@ -308,6 +320,7 @@ def build_checks(entry: ChecksEntry) -> CheckSettings:
     """Demands."""
     return CheckSettings(
         clearance=entry.clearance_mm / MM,
+        adds_accuracy=entry.body_accuracy == "add",
         contact_zone=entry.contact_zone_mm / MM,
         exclusions=tuple(Exclusion(bodies=pair.bodies, reason=pair.reason) for pair in entry.exclude),
         closure_position=entry.closure_mm / MM,

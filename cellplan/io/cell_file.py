@@ -20,8 +20,10 @@ from cellplan.io.cell_build import (
 from cellplan.io.cell_rules import rule_complaints
 from cellplan.io.cell_sources import Sources
 from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, raise_complaints, shown
-from cellplan.io.robot_rules import robot_complaints
+from cellplan.io.mounting_build import accuracy_complaints, mounted_names, mounting_complaints
+from cellplan.io.robot_rules import robot_complaints, with_statements
 from cellplan.io.schema import CellDocument
+from cellplan.io.schema.mounting import AttachmentEntry
 from cellplan.io.schema.pieces import Pieces, read_pieces
 from cellplan.io.schema.shapes import ObstacleEntry, ToolBodyEntry, ToolShapeEntry
 from cellplan.io.solver_build import build_solver
@@ -64,8 +66,10 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
     models = _models(pieces, document, sources)
     for name, model in models.items():
         complaints += robot_complaints(name, pieces.robots[name], model, document)
+        complaints += mounting_complaints(name, model, pieces, document)
     complaints += acceleration_complaints(pieces, models, document)
     complaints += _unknown_bodies(pieces, models, document)
+    complaints += accuracy_complaints(pieces, models, document)
     complaints += solver_complaints(pieces, models, document)
     complaints += _part_extent(pieces, document)
     _read_meshes(pieces, sources)
@@ -84,7 +88,7 @@ def _models(pieces: Pieces, document: YamlDocument, sources: Sources) -> dict[st
         written = document.root["robots"][name]
         if name not in found and isinstance(written, dict) and isinstance(written.get("model"), str):
             sources.look_for_model(name, written["model"])
-    return {name: model for name, model in found.items() if model is not None}
+    return {name: with_statements(pieces.robots[name], model) for name, model in found.items() if model is not None}
 
 
 def _targets(pieces: Pieces, sources: Sources) -> Targets:
@@ -106,6 +110,7 @@ def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: 
         tool = pieces.robots[name].tool
         count = len(tool.bodies) + (tool.geometry is not None)
         known |= {f"{name}/{body.name}" for body in model.bodies}
+        known |= {f"{name}/{body}" for body in mounted_names(pieces.robots[name])}
         known |= {f"{name}/tool" if number == 1 else f"{name}/tool_{number}" for number in range(1, count + 1)}
     for index, pair in enumerate(pieces.checks.exclude):
         for side, body in enumerate(pair.bodies):
@@ -132,7 +137,7 @@ def _part_extent(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
         yield document.complaint(("part", "geometry"), text)
 
 
-Meshed = ToolShapeEntry | ToolBodyEntry | ObstacleEntry
+Meshed = ToolShapeEntry | ToolBodyEntry | ObstacleEntry | AttachmentEntry
 
 
 def _read_meshes(pieces: Pieces, sources: Sources) -> None:
@@ -141,6 +146,7 @@ def _read_meshes(pieces: Pieces, sources: Sources) -> None:
     for name, robot in pieces.robots.items():
         place: KeyPath = ("robots", name, "tool")
         shapes += [((*place, "bodies", index), body) for index, body in enumerate(robot.tool.bodies)]
+        shapes += [(("robots", name, "attachments", index), it) for index, it in enumerate(robot.attachments)]
         shapes += [((*place, "geometry"), robot.tool.geometry)] if robot.tool.geometry is not None else []
     if pieces.part is not None and pieces.part.geometry.mesh is not None and pieces.part.geometry.unit is not None:
         sources.solid_mesh(pieces.part.geometry.mesh, pieces.part.geometry.unit, ("part", "geometry", "mesh"))

@@ -8,10 +8,11 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.complaints import Complaint, did_you_mean, listed, shown
+from cellplan.io.payload_build import build_payload, payload_complaints
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
 from cellplan.io.urdf_limits import JointLimits
 from cellplan.io.yaml_reader import YamlDocument
-from cellplan.model.robot import Joint, RobotModel
+from cellplan.model.robot import BodyAccuracy, Joint, RobotModel
 
 FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference posture: farther is a slip of the unit
 Given = tuple[float, ...] | dict[str, Any] | None  # a configuration in the units of a file; None: to be found
@@ -61,6 +62,8 @@ def robot_complaints(name: str, entry: RobotEntry, model: RobotModel, document: 
     yield from _configuration_complaints((*path, "start"), entry.given_start, model, document)
     yield from _configuration_complaints((*path, "home"), entry.given_home, model, document)
     yield from _unit_complaints(("robots", name), entry, model, document)
+    turning = tuple(joint.name for joint in model.joints if joint.is_revolute)
+    yield from payload_complaints(("robots", name, "payload"), entry.payload, turning, document)
     count = len(model.joints)
     if entry.weights is not None and len(entry.weights) != count:
         text = f"expected {count} weights, one per joint ({listed(model.joint_names)}), got {len(entry.weights)}"
@@ -133,6 +136,15 @@ def tightened(
         complaints += [document.complaint((*path, "limits", joint.name, key), text) for key, text in wider]
         joints.append(joint if wider else _within(joint, limits_in_si(limits)))
     return replace(model, joints=tuple(joints)), complaints
+
+
+def with_statements(entry: RobotEntry, model: RobotModel) -> RobotModel:
+    """The model with what the cell states in place of the robot's own file."""
+    if entry.bodies is not None:
+        accuracy = BodyAccuracy(distance=entry.bodies.accuracy_mm / 1000.0, source=entry.bodies.source)
+        bodies = tuple(replace(body, accuracy=None) for body in model.bodies)
+        model = replace(model, body_accuracy=accuracy, bodies=bodies)
+    return model if entry.payload is None else replace(model, payload=build_payload(entry.payload))
 
 
 def _wider(joint: Joint, entry: LimitsEntry) -> Iterator[tuple[str, str]]:

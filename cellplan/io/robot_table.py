@@ -15,13 +15,14 @@ from cellplan.geometry.meshes import read_mesh
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.allowed_folders import AllowedFolders
-from cellplan.io.complaints import Complaint, did_you_mean, listed, raise_complaints, shown
+from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, listed, raise_complaints, shown
+from cellplan.io.payload_build import build_payload, payload_complaints
 from cellplan.io.schema import RobotTableDocument
 from cellplan.io.schema.messages import validate
-from cellplan.io.schema.robot_table import JointEntry
+from cellplan.io.schema.robot_table import BodiesEntry, JointEntry
 from cellplan.io.shape_build import MM, link_solid, pose_from_entry
 from cellplan.io.yaml_reader import YamlDocument, read_yaml
-from cellplan.model.robot import BASE, Body, Joint, JointKind, RobotModel
+from cellplan.model.robot import BASE, Body, BodyAccuracy, Joint, JointKind, Link, RobotModel
 
 MESH_UNITS: Final[Mapping[str, float]] = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}  # [m]
 FOOT: Final = "base"  # word for the link that does not move
@@ -64,7 +65,7 @@ def load_robot_table(path: Path, *, file: str, folders: AllowedFolders) -> Robot
     complaints += document.complaints
     if table is not None:
         complaints += _rules(table, document)
-    meshes = _Meshes(document, folders)
+    meshes = _Meshes(document, folders, table.solids_path if table is not None else ())
     bodies = tuple(_bodies(table, meshes)) if table is not None and not complaints else ()
     raise_complaints(file, [*complaints, *meshes.complaints])
     if table is None:
@@ -78,27 +79,29 @@ def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Compla
         if name == FOOT or TOOL_NAME.fullmatch(name):
             text = f"expected another name, '{name}' means {'the foot' if name == FOOT else 'the tool'} of the robot"
             yield document.key_complaint(("joints", name), text)
-    links = (FOOT, *table.joints)
-    for index, body in enumerate(table.bodies):
+    links, place = (FOOT, *table.joints), table.solids_path
+    for index, body in enumerate(table.solids):
         if body.link not in links:
             hint = did_you_mean(body.link, links)
             text = f"expected a link ({listed(links)}), got {shown(body.link)}{hint}"
-            yield document.complaint(("bodies", index, "link"), text)
+            yield document.complaint((*place, index, "link"), text)
         if body.name is not None and TOOL_NAME.fullmatch(body.name):
             text = f"expected another name, '{body.name}' means the tool of the robot"
-            yield document.complaint(("bodies", index, "name"), text)
-    named = [(index, body.name) for index, body in enumerate(table.bodies) if body.name is not None]
-    for place, (index, name) in enumerate(named):
-        if name in {other for _, other in named[:place]}:
-            yield document.complaint(("bodies", index, "name"), f"expected a name of its own, got '{name}' twice")
+            yield document.complaint((*place, index, "name"), text)
+    turning = tuple(name for name, joint in table.joints.items() if joint.type == "revolute")
+    yield from payload_complaints(("payload",), table.payload, turning, document)
+    named = [(index, body.name) for index, body in enumerate(table.solids) if body.name is not None]
+    for order, (index, name) in enumerate(named):
+        if name in {other for _, other in named[:order]}:
+            yield document.complaint((*place, index, "name"), f"expected a name of its own, got '{name}' twice")
 
 
 class _Meshes:
     """Mesh files of a table, each read once for each unit."""
 
-    def __init__(self, document: YamlDocument, folders: AllowedFolders) -> None:
+    def __init__(self, document: YamlDocument, folders: AllowedFolders, place: KeyPath) -> None:
         """Remember where to look and where to complain."""
-        self._document = document
+        self._document, self._place = document, place
         self._folders = folders
         self._read: dict[tuple[str, str], Mesh] = {}
         self.files: dict[str, Path] = {}
@@ -111,13 +114,13 @@ class _Meshes:
         try:
             path = self._folders.file(written)
         except InputError as error:
-            self.complaints.append(self._document.complaint(("bodies", index, "mesh", "file"), str(error)))
+            self.complaints.append(self._document.complaint((*self._place, index, "mesh", "file"), str(error)))
             return None
         try:
             guard = Guard(file=written, worker="the mesh reader")
             mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), path, guard=guard)
         except InputError as error:
-            self.complaints.append(self._document.complaint(("bodies", index, "mesh", "file"), str(error)))
+            self.complaints.append(self._document.complaint((*self._place, index, "mesh", "file"), str(error)))
             return None
         self.files[written] = path
         self._read[written, unit] = replace(mesh, is_leaky=not mesh.is_closed)
@@ -134,14 +137,15 @@ class _Meshes:
 def _bodies(table: RobotTableDocument, meshes: _Meshes) -> Iterator[Body]:
     """Link bodies; one whose mesh cannot be read is left out after its complaint."""
     links = {FOOT: BASE, **{name: index for index, name in enumerate(table.joints)}}
-    taken = {body.name for body in table.bodies if body.name is not None}
-    for index, entry in enumerate(table.bodies):
+    taken = {body.name for body in table.solids if body.name is not None}
+    for index, entry in enumerate(table.solids):
         if entry.mesh is not None and meshes.mesh(entry.mesh.file, entry.mesh.unit, index=index) is None:
             continue
         name = entry.name or _free_name(entry.link, taken)
         taken.add(name)
         shape, X_BS = link_solid(entry, partial(meshes.known, index=index))
-        yield Body(name=name, link=links[entry.link], shape=shape, X_BS=X_BS)
+        accuracy = None if entry.accuracy_mm is None else entry.accuracy_mm / MM
+        yield Body(name=name, link=links[entry.link], shape=shape, X_BS=X_BS, accuracy=accuracy)
 
 
 def _free_name(link: str, taken: set[str]) -> str:
@@ -163,7 +167,20 @@ def _model(table: RobotTableDocument, bodies: tuple[Body, ...]) -> RobotModel:
         flange_link=len(table.joints) - 1,
         X_BF=pose_from_entry(table.flange),
         bodies=bodies,
+        body_accuracy=_body_accuracy(table),
+        payload=build_payload(table.payload),
+        links=tuple(
+            Link(name=name, index=index - 1, X_BL=np.eye(4)) for index, name in enumerate((FOOT, *table.joints))
+        ),
     )
+
+
+def _body_accuracy(table: RobotTableDocument) -> BodyAccuracy | None:
+    """How good the bodies are, if the table says so."""
+    bodies = table.bodies
+    if not isinstance(bodies, BodiesEntry) or bodies.accuracy_mm is None:
+        return None
+    return BodyAccuracy(distance=bodies.accuracy_mm / MM, source=bodies.source)
 
 
 def _joint(name: str, entry: JointEntry, parent: int) -> Joint:

@@ -8,6 +8,7 @@ import numpy as np
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Solid, Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.io.schema.common import PoseEntry
+from cellplan.io.schema.mounting import AttachmentEntry
 from cellplan.io.schema.robot_table import LinkBodyEntry, SegmentEntry
 from cellplan.io.schema.shapes import (
     BoxEntry,
@@ -39,12 +40,14 @@ def pose_from_entry(entry: PoseEntry | None) -> Array:
     return pose(np.divide(entry.xyz_mm, MM), np.deg2rad(entry.rpy_deg))
 
 
-def centred_solid(entry: PartShapeEntry | ToolBodyEntry | ObstacleEntry, read_mesh: MeshReader) -> tuple[Solid, Array]:
+def centred_solid(
+    entry: PartShapeEntry | ToolBodyEntry | ObstacleEntry | AttachmentEntry, read_mesh: MeshReader
+) -> tuple[Solid, Array]:
     """Solid of a shape that is centred on its frame, and the pose of the solid's own frame in it."""
     match entry:
         case PartShapeEntry(mesh=str(file), unit=str(unit)) | ToolBodyEntry(mesh=str(file), unit=str(unit)):
             return read_mesh(file, unit), np.eye(4)
-        case ObstacleEntry(mesh=str(file), unit=str(unit)):
+        case ObstacleEntry(mesh=str(file), unit=str(unit)) | AttachmentEntry(mesh=str(file), unit=str(unit)):
             return read_mesh(file, unit), np.eye(4)
     round_shape = entry.cylinder or getattr(entry, "capsule", None)
     X = np.eye(4)

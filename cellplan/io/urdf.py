@@ -11,8 +11,17 @@ from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.urdf_bodies import MeshShelf, link_bodies
 from cellplan.io.urdf_document import UrdfDocument, UrdfJoint, read_document
 from cellplan.io.urdf_limits import JointLimits, joint_range
-from cellplan.io.urdf_tree import Roles, ZeroPosture, assign_roles, build_tree, choose_flange, known_joint, zero_posture
-from cellplan.model.robot import FollowerJoint, Joint, JointKind, RobotModel
+from cellplan.io.urdf_tree import (
+    Roles,
+    ZeroPosture,
+    assign_roles,
+    build_tree,
+    choose_flange,
+    known_joint,
+    links_in_order,
+    zero_posture,
+)
+from cellplan.model.robot import FollowerJoint, Joint, JointKind, Link, RobotModel
 
 __all__ = ["JointLimits", "UrdfOptions", "UrdfRobot", "load_urdf", "read_urdf"]
 
@@ -78,6 +87,10 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         flange_link=posture.carrier[flange],
         X_BF=posture.X_BL[flange],
         bodies=link_bodies(tree, posture, shelf),
+        links=tuple(
+            Link(name=link.name, index=posture.carrier[link.name], X_BL=posture.X_BL[link.name])
+            for link in links_in_order(tree)
+        ),
     )
     _require_complete(document, roles, model)
     return UrdfRobot(model=model, mesh_files=tuple(shelf.files))

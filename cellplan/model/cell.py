@@ -5,9 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+
 from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
+from cellplan.model.mounting import Pedestal
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Frame, Task
@@ -51,12 +54,19 @@ class Tool:
     Attributes:
         X_FT: Tool tip in the flange frame, z out of the tool.
         bodies: Solids, their poses ``X_BS`` given in F, ``link`` unused.
-        mass: Mass in [kg], thought of at the tip.
+        mass: Mass in [kg]; None when it is not stated.
+        centre: Centre of mass in F in [m], shape (3,); None to think of the mass at the tip.
     """
 
     X_FT: Array
     bodies: tuple[Body, ...]
-    mass: float = 0.0
+    mass: float | None = None
+    centre: Array | None = None
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether there is no tool at all: the tip is the flange and nothing is drawn."""
+        return not self.bodies and bool(np.array_equal(self.X_FT, np.eye(4)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,6 +83,8 @@ class Robot:
         home: Where it stands while it is idle in [rad] or [m], shape (n,); None when that is to be found.
         acceleration: Against which accelerations its joints are judged.
         controller_cycle: Cycle of its controller in [s]; jerk is taken over it.
+        attachments: Solids mounted on its links, their poses ``X_BS`` in B while all joints read zero.
+        pedestal: What the base stands on; None when it stands on whatever the surroundings have there.
     """
 
     name: str
@@ -84,6 +96,8 @@ class Robot:
     home: Array | None = None
     acceleration: AccelerationRule = USUAL_ACCELERATION
     controller_cycle: float = USUAL_CYCLE
+    attachments: tuple[Body, ...] = ()
+    pedestal: Pedestal | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -134,14 +148,16 @@ class Part:
         X_PS: Pose of the shape's frame in the part frame P.
         held_by: The robots that hold it; empty when it is fixed in the world.
         X_WP: Pose in the world when nobody holds it; None otherwise.
-        mass: Mass in [kg], thought of at the origin of the shape's frame.
+        mass: Mass in [kg]; None when it is not stated.
+        centre: Centre of mass in P in [m], shape (3,); None when it is not stated.
     """
 
     shape: Solid
     X_PS: Array
     held_by: tuple[Grasp, ...]
     X_WP: Array | None
-    mass: float = 0.0
+    mass: float | None = None
+    centre: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -195,6 +211,7 @@ class CheckSettings:
 
     Attributes:
         clearance: Smallest allowed distance in [m] between things that must not touch.
+        adds_accuracy: Whether the accuracy of both bodies is added to the demanded clearance of a pair.
         contact_zone: Radius in [m] round the tool tip within which tool and part may touch.
         exclusions: Pairs left out at the user's word.
         closure_position: Largest distance in [m] of a further holder's tool from its grasp.
@@ -210,6 +227,7 @@ class CheckSettings:
     closure_orientation: float = 1e-3 * math.pi / 180.0
     standing_depth: float = 0.005
     part_acceleration: float | None = None
+    adds_accuracy: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

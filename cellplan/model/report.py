@@ -10,6 +10,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.acceleration import UNKNOWN_ACCELERATIONS, MotionAccelerations
 from cellplan.model.between_rows import BetweenRows
 from cellplan.model.left_out import LeftOut
+from cellplan.model.payload import LoadUse
 
 CAUTION = (
     "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
@@ -175,6 +176,7 @@ class ClearanceMinimum:
             distance is kept or that it is not. Otherwise ``minimum`` is what is proved, and may be 0 without a contact.
         exact: Whether the truth is above ``minimum`` by no more than 0.1 mm; otherwise it is a lower bound.
         points: Where the two bodies are nearest, in the world in [m]; None when they touch or are not known.
+        accuracies: How far the real things may stick out of the two bodies in [m], each None when it is not stated.
     """
 
     minimum: float | None = None
@@ -183,6 +185,7 @@ class ClearanceMinimum:
     certified: bool = False
     exact: bool = True
     points: tuple[Point, Point] | None = None
+    accuracies: tuple[float | None, float | None] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -335,6 +338,7 @@ class Report:
         repeatability: Whether the joints come back with the tools; None when not all tools come back.
         depths: How deep tools stand in the part, one entry per task on it.
         accelerations: Accelerations, jerk and process speeds.
+        loads: What each robot carries.
     """
 
     cell: str
@@ -354,6 +358,7 @@ class Report:
     repeatability: Repeatability | None = None
     depths: tuple[ToolDepth, ...] = ()
     accelerations: MotionAccelerations = UNKNOWN_ACCELERATIONS
+    loads: tuple[LoadUse, ...] = ()
 
     @property
     def passed(self) -> bool:

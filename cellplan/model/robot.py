@@ -7,6 +7,7 @@ import numpy as np
 
 from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import Array, is_rigid
+from cellplan.model.payload import Payload
 
 BASE = -1  # index of the link that does not move, where a link is named by the joint that carries it
 
@@ -98,12 +99,42 @@ class Body:
         link: Index of the joint that carries it, followers counted after joints; ``BASE`` for the foot of the robot.
         shape: The solid, in its own frame.
         X_BS: Pose of the shape's frame in B at the reference posture (for tools: in F; for parts: in P).
+        accuracy: How far the real link may stick out of it in [m]; None for what the robot states for all its bodies.
     """
 
     name: str
     link: int
     shape: Solid
     X_BS: Array
+    accuracy: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyAccuracy:
+    """How far the real arm may stick out of the bodies that stand for it.
+
+    Attributes:
+        distance: Largest distance in [m].
+        source: Where the figure comes from.
+    """
+
+    distance: float
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Link:
+    """A link by name, so that things can be mounted on it.
+
+    Attributes:
+        name: Name as the robot's file has it.
+        index: Index of the joint that carries it; ``BASE`` for the foot of the robot.
+        X_BL: The frame in which poses on it are given, in B while all joints read zero.
+    """
+
+    name: str
+    index: int
+    X_BL: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -115,6 +146,9 @@ class RobotModel:
         source: Where the figures come from.
         joints: The driven joints, each after the one that carries it.
         followers: Joints driven through linkages; they come after all joints in link numbering.
+        links: Links on which something can be mounted, by the names of the robot's file.
+        body_accuracy: How good the link bodies are that do not say it themselves; None when nobody states it.
+        payload: What it may carry; None when nobody states it.
         flange_link: Index of the joint that carries the flange.
         X_BF: Flange (mechanical interface) in B at the reference posture, z out of the flange.
         bodies: Link bodies.
@@ -127,6 +161,9 @@ class RobotModel:
     X_BF: Array
     bodies: tuple[Body, ...]
     followers: tuple[FollowerJoint, ...] = ()
+    links: tuple[Link, ...] = ()
+    body_accuracy: BodyAccuracy | None = None
+    payload: Payload | None = None
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""
@@ -138,6 +175,12 @@ class RobotModel:
                 raise ValueError(f"robot '{self.name}': joint '{axis.name}' needs a unit axis")
         if not is_rigid(self.X_BF):
             raise ValueError(f"robot '{self.name}': the flange frame is not a rigid pose")
+
+    def accuracy_of(self, body: Body) -> float | None:
+        """How far the real arm may stick out of one of its bodies in [m]; None when nobody states it."""
+        if body.accuracy is not None or self.body_accuracy is None:
+            return body.accuracy
+        return self.body_accuracy.distance
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.checks.mounting import check_mounting
+from cellplan.checks.payload import check_payload_at_rest
 from cellplan.checks.tool_depth import check_depths, path_depth
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
@@ -54,7 +55,7 @@ class CellCheck:
 
 
 def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
-    """Lay the paths on the part, examine or find the start postures, and look for collisions there.
+    """Lay the paths on the part, examine or find the start postures, and look for collisions and loads there.
 
     Raises:
         InputError: A path misses the part, or a given start is out of limits or off its task.
@@ -79,12 +80,18 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
         at_s=0.0,
         message=words,
     )
+    loads = check_payload_at_rest(cell, scene.chains, start)
     return CellCheck(
         cell=with_start(cell, start),
         found=found,
         choice=choice.words,
         path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
-        checks=(at_start, *check_mounting(scene, start[None]), *_depths_on_paths(cell, toolpaths)),
+        checks=(
+            at_start,
+            *check_mounting(scene, start[None]),
+            *_depths_on_paths(cell, toolpaths),
+            *(each for each in loads if each.name == "payload" or not each.passed),
+        ),
         left_out=scene.left_out,
     )
 

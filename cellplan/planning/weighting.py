@@ -27,7 +27,7 @@ class JointWeights:
         self._upper = np.array([joint.upper for joint in joints])
         self._turning = TURNING * np.array([joint.velocity for joint in joints])
         self._carries = model.carries_flange.astype(float)
-        self._tools = np.array([robot.tool.mass for robot in cell.robots])
+        self._tools = np.array([robot.tool.mass or 0.0 for robot in cell.robots])
         self._shares = np.array([_part_share(cell, robot.name) for robot in cell.robots])
         self._p_PS = cell.part.X_PS[:3, 3]
         self._varies = self._near_limits > 0.0 or self._load > 0.0
@@ -115,7 +115,7 @@ def limit_slope(q: Array, lower: Array, upper: Array) -> Array:
 
 def _part_share(cell: Cell, robot: str) -> float:
     """Mass in [kg] of the part that a robot carries."""
-    return cell.part.mass / len(cell.positioners) if robot in cell.positioners else 0.0
+    return (cell.part.mass or 0.0) / len(cell.positioners) if robot in cell.positioners else 0.0
 
 
 def _rising(screws_W: Array, points: Array) -> Array:

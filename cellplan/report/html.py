@@ -19,6 +19,7 @@ from cellplan.report.open_surfaces import open_surface_lines
 from cellplan.report.palette import ROBOTS, robot_colours
 from cellplan.report.record import Provenance, Record, rounded_down
 from cellplan.report.rehearsal_record import rehearsal_record
+from cellplan.report.rests_on import good_to
 from cellplan.report.task_record import direction_words
 
 MODES = {
@@ -45,6 +46,10 @@ CHECKS = {
     "tool_depth": "tools no deeper in the part than allowed",
     "joint_drift": "joints back where each cycle began",
     "clearance": "required clearance kept",
+    "payload": "tool and part within the payload",
+    "payload_centre": "centre of the load within its distances",
+    "payload_moment": "moments of the load on the wrist within their limits",
+    "payload_inertia": "inertia of the load on the wrist within its limits",
     "collision": "no collision",
     "grip_depth": "holders no deeper in the part than their grip",
     "mount_depth": "tools no deeper in the arm than their mounting",
@@ -333,8 +338,8 @@ def _clearance_figure(record: Record) -> Record:
     required = f"required {_small(record['required_clearance_mm'])} mm"
     figure = {"label": "Smallest clearance", "value": _floored(whole["minimum_mm"]), "unit": "mm", "detail": required}
     if whole["minimum_mm"] is not None:
-        where = " and ".join(whole["pair"] or ())
-        figure["detail"] = f"{where} at {_fixed(whole['at_s'], 3)} s; {required}"
+        where, rests_on = " and ".join(whole["pair"] or ()), good_to(whole["pair"] or (), whole["accuracies_mm"])
+        figure["detail"] = f"{where} at {_fixed(whole['at_s'], 3)} s; {required}{f'; {rests_on}' if rests_on else ''}"
         figure["is_bad"] = whole["minimum_mm"] < record["required_clearance_mm"]
         figure["value"] = figure["value"] if whole["exact"] else f"at least {figure['value']}"
     return figure

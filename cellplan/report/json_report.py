@@ -15,6 +15,7 @@ from cellplan.report.idle_record import missing_moves
 from cellplan.report.left_out_record import left_out_record
 from cellplan.report.method import solver_record
 from cellplan.report.open_surfaces import open_surfaces_record
+from cellplan.report.payload_record import worst_loads
 from cellplan.report.record import (
     SCHEMA,
     Provenance,
@@ -29,6 +30,7 @@ from cellplan.report.record import (
     report_record,
     status,
 )
+from cellplan.report.rests_on import rests_on_record, with_accuracies
 from cellplan.report.series import INDENT, series, series_text
 from cellplan.report.task_record import tasks_record
 
@@ -52,6 +54,8 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
     record = report_record(report, cell=cell, provenance=provenance)
     return record | {
         "tasks": tasks_record(report, cell),
+        "clearance": with_accuracies(record["clearance"], report.clearance.minima),
+        "rests_on": rests_on_record(cell, report.loads),
         "closest_pairs": closest_pairs_record(report.clearance),
         "clearance_proof": clearance_proof_record(report.clearance),
         "open_surfaces": open_surfaces_record(cell),
@@ -93,11 +97,12 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "closure": worst_closures_record(runs, cell),
         "joints": joints_record(merge_joint_uses(use for report in runs for use in report.joints)),
         "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
-        "clearance": clearance_record(minima),
+        "clearance": with_accuracies(clearance_record(minima), minima),
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
         "left_out": left_out_record(dict.fromkeys(each for report in runs for each in report.clearance.left_out)),
         "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
         "not_in_program": missing_moves(cell, {name: report.tasks for name, report in reports.items()}),
+        "rests_on": rests_on_record(cell, worst_loads(runs)),
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "solver": solver_record(cell.solver),

@@ -22,6 +22,8 @@ class Kind(StrEnum):
     TOOL = "tool"
     PART = "part"
     OBSTACLE = "obstacle"
+    ATTACHMENT = "attachment"
+    PEDESTAL = "pedestal"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,12 +31,15 @@ class SceneBody:
     """One solid of the cell.
 
     Attributes:
-        name: ``<robot>/<body>``, ``<robot>/tool``, ``part`` or the name of a thing in the surroundings.
+        name: ``<robot>/<body>``, ``<robot>/tool``, ``<robot>/pedestal`` or ``<robot>/<attachment>``, ``part`` or the
+            name of a thing in the surroundings.
         kind: What it belongs to.
         shape: The solid, in its own frame S.
         robot: The robot that moves it; None when it is fixed in the world.
         link: The link of that robot it is fixed to.
         X_BS: Its pose at the reference posture in the robot's base frame; in the world when no robot moves it.
+        accuracy: How far the real thing may stick out of it in [m]; None when nobody states it. What the user draws
+            (tools, part, attachments, pedestals, surroundings) is taken as exact.
     """
 
     name: str
@@ -43,6 +48,7 @@ class SceneBody:
     robot: str | None
     link: int
     X_BS: Array
+    accuracy: float | None = 0.0
 
     @property
     def is_at_rest(self) -> bool:
@@ -51,7 +57,7 @@ class SceneBody:
 
 
 def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
-    """All solids of a cell: robot by robot links before tools, then the part, then the surroundings.
+    """All solids of a cell: by robot its links, tools, attachments and pedestal, then the part and the surroundings.
 
     Robots and surroundings stand in the order of their names.
 
@@ -105,6 +111,7 @@ def _robot_bodies(robot: Robot) -> list[SceneBody]:
             robot=robot.name,
             link=body.link,
             X_BS=body.X_BS,
+            accuracy=model.accuracy_of(body),
         )
         for body in model.bodies
     ]
@@ -119,6 +126,27 @@ def _robot_bodies(robot: Robot) -> list[SceneBody]:
                 X_BS=model.X_BF @ body.X_BS,
             )
         )
+    return bodies + _mounted_bodies(robot)
+
+
+def _mounted_bodies(robot: Robot) -> list[SceneBody]:
+    """What is mounted on the links of a robot, and what it stands on."""
+    bodies = [
+        SceneBody(
+            name=f"{robot.name}/{body.name}",
+            kind=Kind.ATTACHMENT,
+            shape=body.shape,
+            robot=robot.name,
+            link=body.link,
+            X_BS=body.X_BS,
+        )
+        for body in robot.attachments
+    ]
+    below = None if robot.pedestal is None else robot.pedestal.solid(robot.X_WB)
+    if below is not None:
+        shape, X_BS = below
+        name = f"{robot.name}/pedestal"
+        bodies.append(SceneBody(name=name, kind=Kind.PEDESTAL, shape=shape, robot=robot.name, link=BASE, X_BS=X_BS))
     return bodies
 
 

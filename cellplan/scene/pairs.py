@@ -12,8 +12,11 @@ from cellplan.model.left_out import LeftOutKind
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import BASE
 from cellplan.scene.bodies import Kind, SceneBody
+from cellplan.scene.demands import demand
 from cellplan.scene.links import NO_BODY, LinkTree
 from cellplan.scene.mounting import grasp_of, left_out_kind, stand_on_each_other
+
+MOUNTED = (Kind.ATTACHMENT, Kind.PEDESTAL)  # bodies that the user puts on or below a robot: nothing excuses them
 
 
 class Rule(StrEnum):
@@ -35,6 +38,7 @@ class ScenePair:
         clearance_class: What keeps its distance from what.
         rule: What is asked of them.
         reason: Why less than the full distance is asked; empty for the rule ``clearance``.
+        demand: Distance in [m] that a pair with the rule ``clearance`` is to keep.
     """
 
     first: int
@@ -42,6 +46,7 @@ class ScenePair:
     clearance_class: ClearanceClass
     rule: Rule
     reason: str = ""
+    demand: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +76,8 @@ def sort_pairs(cell: Cell, bodies: Sequence[SceneBody]) -> tuple[list[ScenePair]
             excluded.append(Excluded(i, j, mounting, left_out_kind(bodies[i], bodies[j])))
         else:
             kind = clearance_class(bodies[i], bodies[j])
-            watched.append(ScenePair(first=i, second=j, clearance_class=kind, rule=Rule.CLEARANCE))
+            asked = demand(cell.checks, bodies[i], bodies[j])
+            watched.append(ScenePair(first=i, second=j, clearance_class=kind, rule=Rule.CLEARANCE, demand=asked))
     return watched, excluded
 
 
@@ -88,11 +94,13 @@ def clearance_class(first: SceneBody, second: SceneBody) -> ClearanceClass:
 def near_in_chain(pair: ScenePair, bodies: Sequence[SceneBody], *, cell: Cell) -> bool:
     """Whether a pair belongs to one robot and moves against each other by no more than two joints.
 
+    What the user mounts on a link or puts below the base is never near: no contact of it is the robot's own design.
+
     A bar of a linkage counts as near to every link: the loop it closes is not in the chain of joints, so the bars of a
     parallelogram meet links that are three or more joints away.
     """
     a, b = bodies[pair.first], bodies[pair.second]
-    if a.robot is None or a.robot != b.robot:
+    if a.robot is None or a.robot != b.robot or a.kind in MOUNTED or b.kind in MOUNTED:
         return False
     tree = LinkTree(cell.robot(a.robot).model)
     first, second = _joined_to(a, tree), _joined_to(b, tree)
@@ -148,11 +156,20 @@ def _mounting(a: SceneBody, b: SceneBody, *, cell: Cell, trees: Mapping[str, Lin
 def _joined(a: SceneBody, b: SceneBody, tree: LinkTree) -> str | None:
     """Why two bodies of one robot cannot come apart, or None."""
     if a.link == b.link:
-        return "fixed to the same link"
+        return "mounted on it" if a.kind in MOUNTED or b.kind in MOUNTED else "fixed to the same link"
+    if a.kind in MOUNTED or b.kind in MOUNTED:
+        return _stands_below(a, b, tree)
     if a.kind is b.kind is Kind.LINK:
         child, parent = (a, b) if tree.parent(a.link) == b.link else (b, a)
         return f"joined by joint {tree.joint_name(child.link)}" if tree.parent(child.link) == parent.link else None
     return None
+
+
+def _stands_below(a: SceneBody, b: SceneBody, tree: LinkTree) -> str | None:
+    """Whether a pedestal carries the first link of a robot whose foot has no body."""
+    pedestal, other = (a, b) if a.kind is Kind.PEDESTAL else (b, a)
+    is_first = other.kind is Kind.LINK and tree.parent(other.link) == NO_BODY
+    return "stands on it, as the foot has no body" if pedestal.kind is Kind.PEDESTAL and is_first else None
 
 
 def _joined_to(body: SceneBody, tree: LinkTree) -> int:

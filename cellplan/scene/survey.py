@@ -79,6 +79,7 @@ class Survey:
         kinds = np.array([pair.clearance_class for pair in scene.pairs])
         self._keeps_any = counts & np.array([pair.rule is Rule.CLEARANCE for pair in scene.pairs], dtype=bool)
         self._watched = {kind: counts & (kinds == kind) for kind in ClearanceClass}
+        self._raised = _raised_demands(scene) if scene.cell.checks.adds_accuracy else np.zeros(count)
         self._keeps = {kind: self._keeps_any & (kinds == kind) for kind in ClearanceClass}
 
     def rows(self, kind: ClearanceClass) -> Rows:
@@ -102,20 +103,24 @@ class Survey:
         return self._ranked().best[kind]
 
     def cutoff(self, row: int) -> float:
-        """Distance in [m] from which on a pair is neither the nearest of its class nor among the closest of all."""
+        """Distance in [m] from which on a pair is neither the nearest of its class nor among the closest of all.
+
+        Where the accuracy of bodies is added to the demand it is also no less than the demand of the pair.
+        """
         kind = self.scene.pairs[row].clearance_class
         if not self._keeps[kind][row]:
             return SURELY_APART
         ranks = self._ranked()
         is_among = self._nearest[row] <= ranks.closest[CLOSEST - 1]
         last = ranks.closest[CLOSEST if is_among else CLOSEST - 1]  # of the others
-        return max(SURELY_APART, max(ranks.best[kind], last) - SEARCH_ROOM)
+        return max(SURELY_APART, max(ranks.best[kind], last) - SEARCH_ROOM, float(self._raised[row]))
 
     def largest_cutoff(self) -> float:
         """No pair has a larger cutoff in [m], now or later: distances that are found only become smaller."""
         ranks = self._ranked()
         kept = [ranks.best[kind] for kind in ClearanceClass if self._keeps[kind].any()]
-        return max(SURELY_APART, max([ranks.closest[CLOSEST], *kept]) - SEARCH_ROOM)
+        raised = float(self._raised.max(initial=0.0))
+        return max(SURELY_APART, max([ranks.closest[CLOSEST], *kept]) - SEARCH_ROOM, raised)
 
     def remember(self, row: int) -> None:
         """Keep the smallest distance of a pair at hand; of pairs that only must not touch only the touch counts."""
@@ -163,6 +168,20 @@ class Survey:
         return points.first, points.second
 
 
+def _raised_demands(scene: Scene) -> Array:
+    """Distance in [m] that each pair is to be searched up to, whatever other pairs keep, shape (pairs,).
+
+    Where the accuracy of bodies is added to the demand, the nearest pair of a class is not always the one that keeps
+    least of what is demanded of it; so every pair is searched up to its own demand.
+    """
+    return np.array([pair.demand if pair.rule is Rule.CLEARANCE else 0.0 for pair in scene.pairs])
+
+
+def proved_distance(seen: Survey, row: int) -> float:
+    """Distance in [m] that a pair is proved to keep over the whole program; zero when it touches."""
+    return max(0.0, min(seen.distance(row), float(seen.low[row].min())))
+
+
 def lowest_bounds(seen: Survey, rows: Rows) -> Array:
     """Smallest bound of some pairs in each block in [m], shape (K,)."""
     lowest = np.full(seen.low.shape[1], np.inf)
@@ -175,5 +194,6 @@ def _nothing_found(scene: Scene, row: int, *, is_left_out: bool) -> Found:
     """What is known of a pair before anything is searched, with what is to be proved of it first."""
     if is_left_out:
         return Found(most_cuts=0)
-    demand = scene.cell.checks.clearance if scene.pairs[row].rule is Rule.CLEARANCE else 0.0
+    pair = scene.pairs[row]
+    demand = pair.demand if pair.rule is Rule.CLEARANCE else 0.0
     return Found(demand=max(SURELY_APART, demand))

@@ -35,7 +35,7 @@ def test_a_start_off_its_task_is_bad_input(cells: Path, tmp_path: Path, capsys: 
 
     out, err = capsys.readouterr()
     assert (status, out) == (2, "")
-    assert f"{path}:16: robots.kuka.start_deg" in err
+    assert f"{path}:25: robots.kuka.start_deg" in err
     assert err.count("\n") == 1
 
 

@@ -157,3 +157,16 @@ def test_distributions_are_centred_and_as_wide_as_stated():
     assert np.abs(uniform).max() <= 3.0
     assert uniform.std() == pytest.approx(3.0 / np.sqrt(3), rel=0.05)
     assert Amount(Spread.FIXED, 0.5).drawn(rng) == 0.5
+
+
+def test_what_is_mounted_on_a_link_goes_with_it_as_its_own_bodies_do(cell):
+    left = cell.robot("left")
+    twin = replace(left.model.bodies[-1], name="valve")
+    draw = draw_of(
+        cell, left={"joint_offsets": np.array([0.1, -0.2, 0.3]), "link_lengths": np.array([0.0, 0.01, 0.02])}
+    )
+
+    real = perturbed_cell(with_robot(cell, replace(left, attachments=(twin,))), draw).robot("left")
+
+    assert len(real.model.bodies) == len(left.model.bodies)
+    np.testing.assert_allclose(real.attachments[0].X_BS, real.model.bodies[-1].X_BS, atol=ROUNDING)

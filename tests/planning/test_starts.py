@@ -52,7 +52,7 @@ def test_start_outside_limits_is_named_with_its_line(cell):
     with pytest.raises(StartOutsideLimitsError) as caught:
         examine_given_starts(with_start(cell, "kuka", start), toolpaths_of(cell))
     assert str(caught.value).endswith(
-        "four_robots.yaml:16: robots.kuka.start_deg: joint 'B2' starts at 40 deg, outside its limits -155 deg .. 35 deg"
+        "four_robots.yaml:25: robots.kuka.start_deg: joint 'B2' starts at 40 deg, outside its limits -155 deg .. 35 deg"
     )
 
 

@@ -49,7 +49,9 @@ def test_names_that_scripts_rely_on_are_there(passed_run: Any) -> None:
         record["joints"]["kuka"]["B2"]
     )
     assert list(record["clearance"]) == ["whole", "robot_robot", "self", "part", "environment"]
-    assert {"minimum_mm", "pair", "at_s", "certified", "exact", "points_mm"} == set(record["clearance"]["whole"])
+    assert {"minimum_mm", "pair", "at_s", "certified", "exact", "points_mm", "accuracies_mm"} == set(
+        record["clearance"]["whole"]
+    )
 
 
 def test_units_are_degrees_and_millimetres(passed_run: Any) -> None:
@@ -69,6 +71,7 @@ def test_units_are_degrees_and_millimetres(passed_run: Any) -> None:
         "certified": True,
         "exact": True,
         "points_mm": [[1200.0, 0.0, 900.0], [1413.0, 0.0, 900.0]],
+        "accuracies_mm": None,
     }
 
 
@@ -135,7 +138,15 @@ def test_what_does_not_exist_is_null(rail_run: Any) -> None:
     assert (endless["lower"], endless["upper"], endless["margin"]) == (None, None, None)
     assert endless["worst_at_s"] == endless["peak_velocity_at_s"]
     assert record["joints"]["reis"]["D1"]["unit"] == "mm"
-    nothing = {"minimum_mm": None, "pair": None, "at_s": None, "certified": False, "exact": False, "points_mm": None}
+    nothing = {
+        "minimum_mm": None,
+        "pair": None,
+        "at_s": None,
+        "certified": False,
+        "exact": False,
+        "points_mm": None,
+        "accuracies_mm": None,
+    }
     assert record["clearance"]["environment"] == nothing
 
 

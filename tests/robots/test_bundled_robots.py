@@ -207,6 +207,13 @@ def test_flange_position_in_closed_form(
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_every_robot_says_how_good_its_bodies_are_and_who_says_so(name: str) -> None:
+    stated = load_bundled(name).body_accuracy
+    assert stated is not None
+    assert stated.source != "not stated"
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_every_link_has_a_body(name: str) -> None:
     model = load_bundled(name)
     assert {body.link for body in model.bodies} == {BASE, *range(len(model.joints))}
@@ -304,7 +311,8 @@ def test_bodies_hold_the_real_arm(name: str, shared_robots: Path) -> None:
     for link, vertices in zip(range(BASE, 6), REAL_ARMS[name](shared_robots).values(), strict=False):
         missed = np.maximum(distance_to_link(model, link, vertices / 1000.0), 0.0)
         assert np.percentile(missed, 95) < 0.030, f"link {link}"  # [m] half the width of a forearm
-        assert missed.max() < 0.050, f"link {link}"
+        assert model.body_accuracy is not None
+        assert missed.max() < model.body_accuracy.distance <= 0.050, f"link {link}"
 
 
 @pytest.mark.parametrize("name", REAL_ARMS)
@@ -318,6 +326,16 @@ def test_bodies_are_not_fatter_than_the_real_arm(name: str, shared_robots: Path)
         beyond = np.maximum((surface_of_link(model, link) @ normals.T - hull).max(axis=1), 0.0)
         assert np.percentile(beyond, 95) < 0.050, f"link {link}"  # [m] corners of boxes round rounded castings
         assert beyond.mean() < 0.012, f"link {link}"
+
+
+def test_the_flange_of_the_abb_is_as_good_as_it_says(shared_robots: Path) -> None:
+    model = load_bundled("abb_irb1600")
+    disc = next(body for body in model.bodies if body.name == "flange")
+    vertices = vertices_of(shared_robots / "abb_irb1600_8_145", "link_6", at=(815, 0, 961.5)) / 1000.0
+    before_the_wrist = vertices[vertices[:, 0] > 0.786]  # behind it the shaft runs inside the wrist
+    missed = distance_to(disc.shape, transform_points(inverse(disc.X_BS), before_the_wrist)).max()
+    assert model.accuracy_of(disc) == 0.002
+    assert missed < 0.002
 
 
 def test_real_meshes_stand_where_the_joints_of_the_table_are(shared_robots: Path) -> None:

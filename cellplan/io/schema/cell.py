@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
-from cellplan.io.schema.common import Angle, Coordinate, Entry, Name, PoseEntry, Text, by_kind, rule
+from cellplan.io.schema.common import Angle, Coordinate, Coordinates, Entry, Name, PoseEntry, Text, by_kind, rule
 from cellplan.io.schema.robot import Mass, RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
 from cellplan.io.schema.solver import SolverEntry
@@ -65,7 +65,14 @@ class PartEntry(Entry):
     at: PoseEntry | None = Field(
         default=None, description="Pose of the part frame in the world; required exactly when nobody holds the part."
     )
-    mass_kg: Mass = Field(default=0.0, description="Mass, for weights that grow with the load.")
+    mass_kg: Mass | None = Field(
+        default=None, description="Mass, for the payload and for weights that grow with the load; absent: not stated."
+    )
+    centre_mm: Coordinates | None = Field(
+        default=None,
+        description="Centre of mass in the part frame, for the payload; when absent that of the shape with uniform "
+        "density.",
+    )
 
     @model_validator(mode="after")
     def _stands_somewhere(self) -> Self:
@@ -74,6 +81,8 @@ class PartEntry(Entry):
             raise rule("unexpected key, the part is placed by the robot that holds it", "at")
         if not self.held_by and self.at is None:
             raise rule("missing, expected the pose of the part in the world, or a robot under held_by", "at")
+        if self.centre_mm is not None and self.mass_kg is None:
+            raise rule("unexpected key, a centre of mass goes with mass_kg", "centre_mm")
         if self.held_by and set(self.held_by[0].axes) != set(ALL_AXES):
             words = "unexpected key, the first holder carries the part frame; further holders may leave axes open"
             raise rule(words, "held_by[0].axes")
@@ -130,7 +139,8 @@ class ExclusionEntry(Entry):
     """A pair of bodies that the collision check leaves out."""
 
     bodies: tuple[Text, Text] = Field(
-        description="Two bodies: ROBOT/LINK, ROBOT/tool, ROBOT/tool_2, part or a name of the environment."
+        description="Two bodies: ROBOT/LINK, ROBOT/tool, ROBOT/tool_2, ROBOT/pedestal, ROBOT/ATTACHMENT, part or a "
+        "name of the environment."
     )
     reason: Text = Field(description="Why they may touch; it is repeated in the report.")
 
@@ -147,6 +157,11 @@ class ChecksEntry(Entry):
 
     clearance_mm: Annotated[float, Field(ge=0.0, le=10_000.0)] = Field(
         default=5.0, description="Smallest allowed distance between things that must not touch."
+    )
+    body_accuracy: Literal["report", "add"] = Field(
+        default="report",
+        description="What to do with the stated accuracy of link bodies: report it beside the distances, or add that "
+        "of both bodies to the demanded clearance of each pair.",
     )
     contact_zone_mm: Annotated[float, Field(ge=0.0, le=WIDEST_CONTACT_MM)] = Field(
         default=20.0, description="Radius round the tool tip within which tool and part may touch."

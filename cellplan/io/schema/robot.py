@@ -5,7 +5,8 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import Field, Tag, model_validator
 
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
-from cellplan.io.schema.common import Angle, Coordinate, Entry, PoseEntry, Text, by_kind, rule
+from cellplan.io.schema.common import Angle, Coordinate, Coordinates, Entry, PoseEntry, Size, Text, by_kind, rule
+from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
 
 LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a slip of the unit
@@ -14,6 +15,7 @@ FASTEST_MM_S: Final = 10_000.0  # 10 m/s: faster is a slip of the unit
 STEEPEST: Final = 1e9  # deg/s2 or mm/s2, as in robot files
 WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses all its digits
 HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
+ROUGHEST_MM: Final = 1_000.0  # bodies that are farther off stand for nothing
 AXIS_LIMIT: Final = 64  # joints of one robot
 
 JointAngle = Annotated[float, Field(ge=-LARGEST_JOINT_DEG, le=LARGEST_JOINT_DEG)]
@@ -21,6 +23,8 @@ TurningSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_DEG_S)]
 SlidingSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_MM_S)]
 Acceleration = Annotated[float, Field(gt=0.0, le=STEEPEST)]
 Mass = Annotated[float, Field(ge=0.0, le=HEAVIEST_KG)]
+Accuracy = Annotated[float, Field(ge=0.0, le=ROUGHEST_MM)]
+LoadFigure = Annotated[float, Field(gt=0.0, le=HEAVIEST_KG)]
 Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
 JointPosition = Annotated[float, Field(ge=-100_000.0, le=100_000.0)]
 
@@ -48,7 +52,19 @@ class ToolEntry(PoseEntry):
         default=None, description="Shape that ends at the tool tip; none when absent."
     )
     bodies: tuple[ToolBodyEntry, ...] = Field(default=(), description="Further solids, placed in the flange frame.")
-    mass_kg: Mass = Field(default=0.0, description="Mass, for weights that grow with the load.")
+    mass_kg: Mass | None = Field(
+        default=None, description="Mass, for the payload and for weights that grow with the load; absent: not stated."
+    )
+    centre_mm: Coordinates | None = Field(
+        default=None, description="Centre of mass in the flange frame, for the payload; the tool tip when absent."
+    )
+
+    @model_validator(mode="after")
+    def _weighs_what_it_balances(self) -> Self:
+        """A centre of mass goes with a mass."""
+        if self.centre_mm is not None and self.mass_kg is None:
+            raise rule("unexpected key, a centre of mass goes with mass_kg", "centre_mm")
+        return self
 
 
 class LimitsEntry(Entry):
@@ -92,6 +108,34 @@ class LimitsEntry(Entry):
         return None if not given else "mm" if any("_mm" in name for name in given) else "deg"
 
 
+class BodyAccuracyEntry(Entry):
+    """How good the link bodies of a robot are, in place of what its own file says."""
+
+    accuracy_mm: Accuracy = Field(description="Largest distance by which the real arm sticks out of its link bodies.")
+    source: Text = Field(default="stated in the cell", description="Where the figure comes from.")
+
+
+class AxisLimitEntry(Entry):
+    """What the load may do to one axis of the wrist."""
+
+    moment_nm: LoadFigure | None = Field(default=None, description="Largest moment of the load about the axis.")
+    inertia_kg_m2: LoadFigure | None = Field(
+        default=None, description="Largest moment of inertia of the load about the axis."
+    )
+
+
+class PayloadEntry(Entry):
+    """What a robot may carry on its flange, as far as it is published."""
+
+    mass_kg: LoadFigure = Field(description="Largest mass of tool and part.")
+    along_mm: Size | None = Field(
+        default=None, description="Farthest centre of the load from the flange plane, along the flange's z."
+    )
+    across_mm: Size | None = Field(default=None, description="Farthest centre of the load from the flange's z axis.")
+    axes: dict[str, AxisLimitEntry] = Field(default={}, description="Limits of axes of the wrist by joint name.")
+    source: Text = Field(default="not stated", description="Where the figures come from.")
+
+
 class RobotEntry(Entry):
     """A robot placed in the cell."""
 
@@ -108,8 +152,21 @@ class RobotEntry(Entry):
     base: PoseEntry = Field(
         default=PoseEntry(), description="Pose of the robot's base (root link of a URDF) in the world."
     )
+    bodies: BodyAccuracyEntry | None = Field(
+        default=None, description="How good its link bodies are; when absent what the robot's own file says."
+    )
+    payload: PayloadEntry | None = Field(
+        default=None, description="What it may carry; when absent what the robot's own file says."
+    )
+    pedestal: PedestalEntry | None = Field(
+        default=None,
+        description="Column or box from the floor to the base; it moves with the base and is judged like any body.",
+    )
     tool: ToolEntry = Field(
         default=ToolEntry(), description="What the robot carries; without it the flange is the tool tip."
+    )
+    attachments: tuple[AttachmentEntry, ...] = Field(
+        default=(), max_length=200, description="Solids mounted on links, such as hoses, feeders and valve blocks."
     )
     start_deg: Posture | None = Field(
         default=None,

@@ -2,7 +2,7 @@
 
 from typing import Annotated, ClassVar, Final, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, Tag, model_validator
 
 from cellplan.io.schema.common import (
     Angles,
@@ -14,14 +14,16 @@ from cellplan.io.schema.common import (
     Size,
     Text,
     Vector,
+    by_kind,
     one_of_keys,
     require_one,
     rule,
 )
-from cellplan.io.schema.robot import AXIS_LIMIT, JointAngle, SlidingSpeed, TurningSpeed
+from cellplan.io.schema.robot import AXIS_LIMIT, Accuracy, JointAngle, PayloadEntry, SlidingSpeed, TurningSpeed
 from cellplan.io.schema.shapes import SOLID_SHAPES, MeshUnit, SphereEntry
 
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+BODY_LIMIT: Final = 200  # solids of one robot
 UNIT_ROOM: Final = 1e-3  # [-] room for axes written with four digits
 TURNING_KEYS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
 SLIDING_KEYS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
@@ -113,6 +115,10 @@ class LinkBodyEntry(Entry):
     capsule: SegmentEntry | None = Field(default=None, description="Cylinder with round ends beyond the segment.")
     sphere: PlacedSphereEntry | None = Field(default=None, description="Ball.")
     mesh: PlacedMeshEntry | None = Field(default=None, description="Mesh from a file.")
+    accuracy_mm: Accuracy | None = Field(
+        default=None,
+        description="How far the real link may stick out of this solid; when absent what is stated for all of them.",
+    )
 
     @model_validator(mode="after")
     def _is_one_shape(self) -> Self:
@@ -121,6 +127,29 @@ class LinkBodyEntry(Entry):
         if self.cylinder is not None and self.cylinder.from_mm == self.cylinder.to_mm:
             raise rule("expected another point than from_mm, got the same", "cylinder.to_mm")
         return self
+
+
+class BodiesEntry(Entry):
+    """Solids of the links, with a statement on how good they are."""
+
+    accuracy_mm: Accuracy | None = Field(
+        default=None,
+        description="Largest distance by which the real arm sticks out of the solids; the report says so when absent.",
+    )
+    source: Text = Field(default="not stated", description="Where the accuracy comes from.")
+    solids: tuple[LinkBodyEntry, ...] = Field(
+        default=(),
+        max_length=BODY_LIMIT,
+        description="Solids of the links, in the base frame at the reference posture.",
+    )
+
+
+BODIES_WORDS: Final = "a list of solids or a mapping (accuracy_mm, source, solids)"
+BodiesChoice = Annotated[
+    Annotated[BodiesEntry, Tag("<mapping>")]
+    | Annotated[tuple[LinkBodyEntry, ...], Field(max_length=BODY_LIMIT), Tag("<list>")],
+    by_kind(BODIES_WORDS, mapping=dict, list=tuple),
+]
 
 
 class RobotTableDocument(Entry):
@@ -134,6 +163,21 @@ class RobotTableDocument(Entry):
     flange: PoseEntry = Field(
         description="Flange (mechanical interface) in the base frame at the reference posture, z out of the flange."
     )
-    bodies: tuple[LinkBodyEntry, ...] = Field(
-        default=(), max_length=200, description="Solids of the links, in the base frame at the reference posture."
+    bodies: BodiesChoice = Field(
+        default=(),
+        description="Solids of the links, in the base frame at the reference posture: a list of them, or a mapping "
+        "that also states how good they are.",
     )
+    payload: PayloadEntry | None = Field(
+        default=None, description="What the robot may carry; the report says so when absent."
+    )
+
+    @property
+    def solids(self) -> tuple[LinkBodyEntry, ...]:
+        """Solids of the links, in whichever way they are written."""
+        return self.bodies.solids if isinstance(self.bodies, BodiesEntry) else self.bodies
+
+    @property
+    def solids_path(self) -> tuple[str, ...]:
+        """Key path of the solids in the file."""
+        return ("bodies", "solids") if isinstance(self.bodies, BodiesEntry) else ("bodies",)

@@ -81,7 +81,7 @@ class PlaneEntry(Entry):
 
 
 MeshUnit = Literal["mm", "m", "inch"]
-_OPEN: Final = (
+OPEN_MESH: Final = (
     "Take a mesh that is not closed as a surface: touching it counts, being inside it does not. An open mesh is "
     "refused otherwise."
 )
@@ -99,7 +99,7 @@ def require_unit(entry: Entry) -> None:
         raise rule("unexpected key, open goes with a mesh only", "open")
 
 
-class _OneShape(Entry):
+class OneShape(Entry):
     """Base of entries that hold exactly one of several shapes, and the unit of a mesh."""
 
     shapes: ClassVar[tuple[str, ...]]
@@ -112,7 +112,7 @@ class _OneShape(Entry):
         return self
 
 
-class PartShapeEntry(_OneShape):
+class PartShapeEntry(OneShape):
     """Exactly one of box, cylinder, sphere and mesh."""
 
     shapes: ClassVar[tuple[str, ...]] = PART_SHAPES
@@ -127,7 +127,7 @@ class PartShapeEntry(_OneShape):
     unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
 
 
-class ToolShapeEntry(_OneShape):
+class ToolShapeEntry(OneShape):
     """Exactly one of box, cylinder, capsule, sphere and mesh; it ends at the tool tip."""
 
     shapes: ClassVar[tuple[str, ...]] = SOLID_SHAPES
@@ -145,10 +145,10 @@ class ToolShapeEntry(_OneShape):
     sphere: SphereEntry | None = Field(default=None, description="Ball that touches the tool tip from behind.")
     mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file, drawn in the flange frame.")
     unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
-    open: bool | None = Field(default=None, description=_OPEN)
+    open: bool | None = Field(default=None, description=OPEN_MESH)
 
 
-class ToolBodyEntry(_OneShape):
+class ToolBodyEntry(OneShape):
     """A further solid of a tool, given in the flange frame."""
 
     shapes: ClassVar[tuple[str, ...]] = SOLID_SHAPES
@@ -160,11 +160,11 @@ class ToolBodyEntry(_OneShape):
     sphere: SphereEntry | None = Field(default=None, description="Ball.")
     mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file.")
     unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
-    open: bool | None = Field(default=None, description=_OPEN)
+    open: bool | None = Field(default=None, description=OPEN_MESH)
     at: PoseEntry = Field(default=PoseEntry(), description="Pose of the solid in the flange frame.")
 
 
-class ObstacleEntry(_OneShape):
+class ObstacleEntry(OneShape):
     """A fixed thing in the cell: exactly one shape and its pose."""
 
     shapes: ClassVar[tuple[str, ...]] = OBSTACLE_SHAPES
@@ -177,7 +177,7 @@ class ObstacleEntry(_OneShape):
     sphere: SphereEntry | None = Field(default=None, description="Ball.")
     mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file.")
     unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
-    open: bool | None = Field(default=None, description=_OPEN)
+    open: bool | None = Field(default=None, description=OPEN_MESH)
     at: PoseEntry | None = Field(
         default=None, description="Pose of the shape in the world; the world frame when absent. Not with a plane."
     )

@@ -1,0 +1,75 @@
+"""What stands below a robot and what is mounted on its links, as it is written in a cell file."""
+
+from typing import ClassVar, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from cellplan.io.schema.common import Coordinate, Entry, Name, PoseEntry, Size, Text, one_of_keys, require_one
+from cellplan.io.schema.shapes import (
+    OPEN_MESH,
+    SOLID_SHAPES,
+    BoxEntry,
+    CapsuleEntry,
+    CylinderEntry,
+    MeshUnit,
+    OneShape,
+    SphereEntry,
+)
+
+PEDESTAL_SHAPES = ("cylinder", "box")
+
+
+class PedestalColumnEntry(Entry):
+    """A round column."""
+
+    radius_mm: Size = Field(description="Radius.")
+
+
+class PedestalBoxEntry(Entry):
+    """A box seen from above."""
+
+    size_mm: tuple[Size, Size] = Field(description="Edge lengths along the x and y of the base.")
+
+
+class PedestalEntry(Entry):
+    """What a robot stands on, from the floor to the origin of its base: exactly one of cylinder and box."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PEDESTAL_SHAPES))
+
+    cylinder: PedestalColumnEntry | None = Field(default=None, description="Upright column below the base.")
+    box: PedestalBoxEntry | None = Field(default=None, description="Upright box below the base, turned as the base is.")
+    floor_z_mm: Coordinate | None = Field(
+        default=None,
+        description="Height of the floor that it stands on; when absent the highest plane of the environment that is "
+        "not above the base.",
+    )
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Self:
+        """Exactly one shape."""
+        require_one(self, PEDESTAL_SHAPES)
+        return self
+
+
+class AttachmentEntry(OneShape):
+    """A solid mounted on a link of a robot, such as a hose, a feeder or a valve block: exactly one shape."""
+
+    shapes: ClassVar[tuple[str, ...]] = SOLID_SHAPES
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
+
+    link: Text = Field(description="Link that carries it: the word base or a joint of a robot table, a link of a URDF.")
+    name: Name | None = Field(
+        default=None, description="Name in reports, as ROBOT/NAME; attachment, attachment_2, … when absent."
+    )
+    box: BoxEntry | None = Field(default=None, description="Cuboid.")
+    cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder.")
+    capsule: CapsuleEntry | None = Field(default=None, description="Cylinder with round ends.")
+    sphere: SphereEntry | None = Field(default=None, description="Ball.")
+    mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file.")
+    unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
+    open: bool | None = Field(default=None, description=OPEN_MESH)
+    at: PoseEntry = Field(
+        default=PoseEntry(),
+        description="Pose of the solid while all joints read zero: in the base frame for a robot table, as the bodies "
+        "of the table are given; in the frame of the link for a URDF.",
+    )

@@ -1,0 +1,121 @@
+"""Payload: what a robot may carry as far as its maker publishes it, and what it carries in a run."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxisLimit:
+    """What the load may do to one axis of the wrist.
+
+    Attributes:
+        joint: Name of the joint.
+        moment: Largest moment of the load about its axis in [N m]; None when it is not published.
+        inertia: Largest moment of inertia of the load about its axis in [kg m^2]; None when it is not published.
+    """
+
+    joint: str
+    moment: float | None = None
+    inertia: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Payload:
+    """What a robot may carry on its flange.
+
+    Attributes:
+        mass: Largest mass in [kg].
+        source: Where the figures come from.
+        along: Farthest centre of the load from the flange plane in [m], along the flange's z; None when not published.
+        across: Farthest centre of the load from the flange's z axis in [m]; None when not published.
+        axes: Limits of axes of the wrist.
+    """
+
+    mass: float
+    source: str
+    along: float | None = None
+    across: float | None = None
+    axes: tuple[AxisLimit, ...] = ()
+
+    @property
+    def is_mass_only(self) -> bool:
+        """Whether nothing but the mass is published."""
+        return self.along is None and self.across is None and not self.axes
+
+    def axis(self, joint: str) -> AxisLimit:
+        """Limits of an axis; without figures when none are published."""
+        return next((limit for limit in self.axes if limit.joint == joint), AxisLimit(joint=joint))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxisUse:
+    """What the load does to one of the last axes over a run.
+
+    Attributes:
+        joint: Name of the joint.
+        static_moment: Largest moment about its axis by gravity alone in [N m].
+        static_at_s: Its instant in [s].
+        moment: Largest moment about its axis by gravity and by the accelerations of the written motion in [N m].
+        moment_at_s: Its instant in [s].
+        inertia: Largest moment of inertia about its axis in [kg m^2].
+        inertia_at_s: Its instant in [s].
+    """
+
+    joint: str
+    static_moment: float
+    static_at_s: float
+    moment: float
+    moment_at_s: float
+    inertia: float
+    inertia_at_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LoadUse:
+    """What one robot carries.
+
+    Attributes:
+        robot: Name of the robot.
+        tool_mass: Mass of its tool in [kg]; None when it is not stated.
+        part_mass: Its share of the part in [kg], 0 when it does not hold it; None when it is not stated.
+        holders: Number of robots that share the part.
+        limits: What it may carry; None when it is not stated.
+        centre_F: Centre of the load in the flange frame in [m], shape (3,); None when a mass is not stated or nothing
+            is carried.
+        felt: Largest force that moves and holds the load, as the mass in [kg] that weighs as much; None likewise.
+        felt_at_s: Its instant in [s].
+        axes: The last three turning axes; empty likewise.
+    """
+
+    robot: str
+    tool_mass: float | None
+    part_mass: float | None
+    holders: int
+    limits: Payload | None
+    centre_F: Array | None = None
+    felt: float | None = None
+    felt_at_s: float | None = None
+    axes: tuple[AxisUse, ...] = ()
+
+    @property
+    def known_mass(self) -> float:
+        """The masses that are stated, added, in [kg]."""
+        return (self.tool_mass or 0.0) + (self.part_mass or 0.0)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the masses of all that it carries are stated."""
+        return self.tool_mass is not None and self.part_mass is not None
+
+    @property
+    def across(self) -> float:
+        """Distance of the centre of the load from the flange's z axis in [m]."""
+        return 0.0 if self.centre_F is None else float(np.hypot(self.centre_F[0], self.centre_F[1]))
+
+    @property
+    def along(self) -> float:
+        """Distance of the centre of the load from the flange plane in [m]."""
+        return 0.0 if self.centre_F is None else float(abs(self.centre_F[2]))
