@@ -61,12 +61,14 @@ class HomeTrials:
             q: The configuration in [rad] or [m], shape (n,).
             room: Distance in [m] beyond the demanded one that is asked from the part and from other robots.
         """
+        own = self._tables[0].placed(q)
+        pair = self._tables[0].too_near_alone(own, room)  # what stands still is the same in every run
         for table in self._tables:
-            pair = table.too_near(q, room)
-            if pair is not None:
-                self.refused[pair] += 1
-                return True
-        return False
+            if pair is None:
+                pair = table.too_near_others(own, room)
+        if pair is not None:
+            self.refused[pair] += 1
+        return pair is not None
 
 
 class _Table:
@@ -91,17 +93,23 @@ class _Table:
         self._poses = self._scene.body_poses(self._q)
         self._order.insert(0, len(self._q) - 1)
 
-    def too_near(self, q: Array, room: float) -> tuple[str, str] | None:
-        """Names of the first pair that is nearer than it may be, or None."""
-        self._limits = self._demanded + room * self._is_roomy
+    def placed(self, q: Array) -> BodyPoses:
+        """Poses of all bodies with the robot in a configuration, at one sample; those of other robots do not matter."""
         stacked = self._q[:1].copy()
         stacked[0, self._scene.cell.columns(self._robot)] = q
-        own = self._scene.body_poses(stacked)
+        return self._scene.body_poses(stacked)
+
+    def too_near_alone(self, own: BodyPoses, room: float) -> tuple[str, str] | None:
+        """Names of the first pair nearer than it may be, of those that no other robot changes, or None."""
+        self._limits = self._demanded + room * self._is_roomy
         row = self._on_ground(own)
         if row is None:
             row = self._among(self._alone, own, sample=0)
-        if row is not None:
-            return self._scene.names(self._scene.pairs[row])
+        return None if row is None else self._scene.names(self._scene.pairs[row])
+
+    def too_near_others(self, own: BodyPoses, room: float) -> tuple[str, str] | None:
+        """The same of the other pairs, at all instants."""
+        self._limits = self._demanded + room * self._is_roomy
         self._poses.R[self._own], self._poses.p[self._own] = own.R[self._own], own.p[self._own]
         for place, sample in enumerate(self._order):
             row = self._among(self._others, self._poses, sample=sample)
