@@ -73,7 +73,7 @@ def test_starts_motion_and_verdict_are_the_same_to_the_last_digit(tmp_path: Path
     for name, q in first.items():
         np.testing.assert_array_equal(other[name], q)
     verdicts = [
-        {(check.name, check.subject, check.passed) for check in solution.runs[0].report.checks}
+        {(check.name, check.subject, check.passed, check.value) for check in solution.runs[0].report.checks}
         for solution in solutions
     ]
     assert verdicts[0] == verdicts[1]
