@@ -171,6 +171,7 @@ class Sources:
             package_dirs=folders,
             limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items()},
             locked=dict(_locked_in_si(entry)),
+            lock_units={joint: unit for joint, _, unit in (key.rpartition("_") for key in entry.locked)},
             within=self._folders,
         )
         try:
@@ -203,7 +204,8 @@ class Sources:
 
 def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, options: UrdfOptions) -> UrdfRobot:
     """Robot of a URDF; robots that say the same of the same file share one."""
-    key = (written, place, options.flange, options.package_dirs, _items(options.limits), _items(options.locked))
+    locked = _items(options.locked), _items(options.lock_units)
+    key = (written, place, options.flange, options.package_dirs, _items(options.limits), locked)
     if key not in known:
         guard = Guard(file=written, worker="the URDF reader")
         known[key] = in_child(as_here(load_urdf), place, options, guard=guard)
