@@ -19,12 +19,15 @@ the same as a JSON Schema for editors.
 - **Units are in the keys**: `_mm`, `_deg`, `_s`, `_mm_s`, `_deg_s`, `_per_s`. Everything else is a plain number.
 - **Poses** are `{xyz_mm: [x, y, z], rpy_deg: [roll, pitch, yaw]}` with angles about fixed axes, as in URDF.
 - **Names** have 1 to 40 letters, digits, `_` or `-` and do not start with `-`.
-- **Files** are named relative to the cell file and lie below its folder, or below a folder given with `--allow-dir`.
+- **Files** are named relative to the cell file and lie below its folder, or below a folder that the user allows: with
+  `--allow-dir`, for all cells with `CELLPLAN_ALLOW_DIRS` (absolute paths, parted as in `PATH`), or with
+  `allow_dirs: [...]` in `~/.config/cellplan/config.yaml`.
 - **YAML is read strictly**: unknown or duplicate keys, anchors, aliases, merges, tags, several documents, empty
   values, numbers that are not finite and words that readers understand in different ways (`010`, `1:30`, `1_000`,
   `0x10`, `no`, `on`, `2010-01-01`) are errors with file and line. Put such a word in quotes where it is meant as a
   text. Truth values are `true` and `false`.
-- **Limits**: 2 MB, 200,000 values, 32 levels, 64 robots, 200 tasks, 2,000,000 samples.
+- **Limits**: 2 MB, 200,000 values, 32 levels, 64 robots, 200 tasks, 2,000,000 samples, 10,000,000 samples times
+  joints.
 - **Bodies** are called `ROBOT/LINK`, `ROBOT/tool`, `ROBOT/tool_2`, …, `ROBOT/pedestal`, `ROBOT/NAME` for
   attachments, `part`, and by their names in the environment.
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.errors import InputError
+from cellplan.geometry.meshes import require_enclosing, require_solid
 from cellplan.geometry.shapes import Mesh
 from cellplan.io.acceleration_build import acceleration_complaints
 from cellplan.io.allowed_folders import AllowedFolders
@@ -148,12 +149,12 @@ def _read_meshes(pieces: Pieces, sources: Sources) -> None:
         shapes += [((*place, "bodies", index), body) for index, body in enumerate(robot.tool.bodies)]
         shapes += [(("robots", name, "attachments", index), it) for index, it in enumerate(robot.attachments)]
         shapes += [((*place, "geometry"), robot.tool.geometry)] if robot.tool.geometry is not None else []
-    if pieces.part is not None and pieces.part.geometry.mesh is not None and pieces.part.geometry.unit is not None:
-        sources.solid_mesh(pieces.part.geometry.mesh, pieces.part.geometry.unit, ("part", "geometry", "mesh"))
+    part = pieces.part.geometry if pieces.part is not None else None
+    if part is not None and part.mesh is not None and part.unit is not None:
+        sources.mesh(part.mesh, part.unit, ("part", "geometry", "mesh"), demand=require_solid)
     for path, shape in shapes:
         if shape.mesh is not None and shape.unit is not None:
-            read = sources.mesh if shape.open else sources.enclosing_mesh
-            read(shape.mesh, shape.unit, (*path, "mesh"))
+            sources.mesh(shape.mesh, shape.unit, (*path, "mesh"), demand=None if shape.open else require_enclosing)
 
 
 def _cell(

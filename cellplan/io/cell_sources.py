@@ -10,7 +10,7 @@ import numpy as np
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
-from cellplan.geometry.meshes import read_mesh, require_enclosing, require_solid
+from cellplan.geometry.meshes import read_mesh
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.allowed_folders import AllowedFolders
@@ -50,19 +50,20 @@ class Sources:
         self.complaints: list[Complaint] = []
         self.errors: list[InputError] = []
 
-    def mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
-        """Mesh in [m]; None after a complaint."""
+    def mesh(
+        self, written: str, unit: str, path: KeyPath, *, demand: Callable[[Mesh], None] | None = None
+    ) -> Mesh | None:
+        """Mesh in [m] that is as a demand wants it, which raises an input error otherwise; None after a complaint."""
         if (written, unit) not in self._meshes:
             self._meshes[written, unit] = self._read_mesh(written, unit, path)
-        return self._meshes[written, unit]
-
-    def solid_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
-        """Closed mesh with a volume, in [m]; None after a complaint."""
-        return self._required(require_solid, self.mesh(written, unit, path), path)
-
-    def enclosing_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
-        """Mesh that has an inside, in [m]; None after a complaint."""
-        return self._required(require_enclosing, self.mesh(written, unit, path), path)
+        mesh = self._meshes[written, unit]
+        try:
+            if mesh is not None and demand is not None:
+                demand(mesh)
+        except InputError as error:
+            self.complaints.append(self._document.complaint(path, str(error)))
+            return None
+        return mesh
 
     def targets(self, entry: str | CsvEntry, path: KeyPath) -> SampledPath | TimedPath | None:
         """Tool targets of a task; None after a complaint."""
@@ -113,16 +114,6 @@ class Sources:
             guard = Guard(file=written, worker="the mesh reader")
             mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), place, guard=guard)
             self.inputs[written] = digest_of_file(place, file=written)
-        except InputError as error:
-            self.complaints.append(self._document.complaint(path, str(error)))
-            return None
-        return mesh
-
-    def _required(self, demand: Callable[[Mesh], None], mesh: Mesh | None, path: KeyPath) -> Mesh | None:
-        """A mesh that is as it must be; None after a complaint."""
-        try:
-            if mesh is not None:
-                demand(mesh)
         except InputError as error:
             self.complaints.append(self._document.complaint(path, str(error)))
             return None
@@ -180,6 +171,7 @@ class Sources:
             package_dirs=folders,
             limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items()},
             locked=dict(_locked_in_si(entry)),
+            lock_units={joint: unit for joint, _, unit in (key.rpartition("_") for key in entry.locked)},
             within=self._folders,
         )
         try:
@@ -212,7 +204,8 @@ class Sources:
 
 def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, options: UrdfOptions) -> UrdfRobot:
     """Robot of a URDF; robots that say the same of the same file share one."""
-    key = (written, place, options.flange, options.package_dirs, _items(options.limits), _items(options.locked))
+    locked = _items(options.locked), _items(options.lock_units)
+    key = (written, place, options.flange, options.package_dirs, _items(options.limits), locked)
     if key not in known:
         guard = Guard(file=written, worker="the URDF reader")
         known[key] = in_child(as_here(load_urdf), place, options, guard=guard)

@@ -35,6 +35,7 @@ class UrdfOptions:
         package_dirs: Folders in which ``package://`` names are looked up.
         limits: Limits by joint name; they tighten the URDF's or stand in for missing ones.
         locked: Position in [rad] or [m] of joints that are held still, by name.
+        lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where nobody wrote it.
         within: Folders that its meshes must lie in; None for all.
     """
 
@@ -42,6 +43,7 @@ class UrdfOptions:
     package_dirs: tuple[Path, ...] = ()
     limits: Mapping[str, JointLimits] = field(default_factory=lambda: MappingProxyType({}))
     locked: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    lock_units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     within: AllowedFolders | None = None
 
 
@@ -74,6 +76,7 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     options = options or UrdfOptions()
     document = read_document(path)
     tree = build_tree(document)
+    _require_lock_units(document, options.lock_units)
     flange = choose_flange(tree, options.flange)
     roles = assign_roles(tree, flange, options.locked)
     _require_known_limits(document, roles, options.limits)
@@ -104,6 +107,15 @@ def _require_known_limits(document: UrdfDocument, roles: Roles, limits: Mapping[
         if name not in driven:
             reason = "is fixed" if joint.is_fixed else "follows another joint" if joint.mimic else "is locked"
             raise joint.error(f"has limits in the cell, but it {reason}")
+
+
+def _require_lock_units(document: UrdfDocument, units: Mapping[str, str]) -> None:
+    """A joint that slides is held still in millimetres, one that turns in degrees."""
+    for name, unit in units.items():
+        joint = known_joint(document, name, "locked")
+        wanted = "mm" if joint.kind == "prismatic" else "deg"
+        if unit != wanted and not joint.is_fixed:
+            raise joint.error(f"is {joint.kind}: expected to be locked in {wanted}, got {unit}")
 
 
 def _driven(joint: UrdfJoint, roles: Roles, posture: ZeroPosture, *, limits: Mapping[str, JointLimits]) -> Joint:
