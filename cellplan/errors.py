@@ -66,6 +66,10 @@ class StartOutsideLimitsError(InputError):
     """A start posture given in the cell lies outside the joint limits."""
 
 
+class HomeOutsideLimitsError(InputError):
+    """The home that is given for a robot is outside its joint limits."""
+
+
 class StartOffTaskError(InputError):
     """A start posture given in the cell does not put the tool on the start of its task."""
 
@@ -90,6 +94,10 @@ class NoSolutionError(CellplanError):
 
 class StartNotFoundError(NoSolutionError):
     """No start posture was found that reaches the task within limits and without collision."""
+
+
+class HomeNotFoundError(NoSolutionError):
+    """No configuration was found in which an idle robot stands free of everything for the whole of its runs."""
 
 
 class DivergedError(NoSolutionError):

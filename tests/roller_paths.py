@@ -63,7 +63,7 @@ def task_on(path: PathSpec, **words: Any) -> Task:
     return Task(path=path, **(plain | words))
 
 
-def clocked(*tasks: Task, duration: float = 4.0, step: float = 0.001, origin: Origin = ORIGIN) -> Cell:
+def clocked(*tasks: Task, duration: float | None = 4.0, step: float = 0.001, origin: Origin = ORIGIN) -> Cell:
     return Cell(
         name="cell",
         robots=(),

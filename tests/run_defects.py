@@ -5,6 +5,7 @@ the tables too, as somebody would who wants the run to pass: only what is recomp
 """
 
 import json
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -249,6 +250,52 @@ def robot_missing(rng, copy):
     seal(copy)
 
 
+def other_words(rng, copy):
+    """A report that says something else in words: a message, a pair, an instant, a verdict."""
+
+    def change(record: dict[str, Any]) -> None:
+        which = int(rng.integers(5))
+        check = record["checks"][int(rng.integers(len(record["checks"])))]
+        if which == 0:
+            check["message"] = "all is well"
+        elif which == 1:
+            check["message"] = (
+                "".join("9" if character.isdigit() else character for character in check["message"]) + "!"
+            )
+        elif which == 2:
+            record["clearance"]["whole"]["pair"] = ["left/A", "right/A"]
+        elif which == 3:
+            record["tasks"]["path"]["max_position_error_at_s"] = 0.123
+        else:
+            record["caution"] = "safe to run at full speed"
+
+    edit_json(copy.run / "report.json", change)
+    seal(copy)
+
+
+def other_page(rng, copy):
+    """A page that says something else: words, a figure, a mark, a script, or another picture of the same run."""
+    page = copy.run / "report.html"
+    text = page.read_text(encoding="utf-8")
+    figures = list(re.finditer(r">(\d+\.\d+)<", text))
+    figure = figures[int(rng.integers(len(figures)))]
+    forged = (
+        text.replace("passed", "excellent", 1),
+        text[: figure.start(1)] + other_digit(rng, figure[1]) + text[figure.end(1) :],
+        text.replace("</body>", "<script>document.title = 'safe'</script></body>"),
+        text.replace("Clearance", "Certified clearance", 1),
+        text.replace("<path", "<path hidden", 1),
+    )[int(rng.integers(5))]
+    assert forged != text
+    page.write_text(forged, encoding="utf-8")
+    seal(copy)
+
+
+def picture_missing(rng, copy):
+    pick(rng, sorted((copy.run / "plots").glob("*.svg"))).unlink()
+    seal(copy)
+
+
 def pretty_report(rng, copy):
     """A report that tells of other figures than there are, or of fewer."""
 
@@ -317,4 +364,7 @@ DEFECTS: dict[str, Defect] = {
     "a block moved in the copy, sealed": block_moved_in_the_copy,
     "a robot missing, sealed": robot_missing,
     "a pretty report, sealed": pretty_report,
+    "other words in the report, sealed": other_words,
+    "another page, sealed": other_page,
+    "a picture missing, sealed": picture_missing,
 }

@@ -1,14 +1,16 @@
 """Entries: arrays of numbers, found again by the digest of what they were made from and of the code that made them.
 
-An entry is never more than a saving of time. It is looked at only when it is whole, by a digest of its own; whatever
-is wrong with it, or with the folder, the work is done as if there were none. Nothing that was refused is kept, so a
-refused file is read and refused again.
+An entry is never more than a saving of time. It is used only when it is a regular file of the user's own and whole, by
+a digest of its own; whatever is wrong with it, or with the folder, the work is done as if there were none. Nothing that
+was refused is kept, so a refused file is read and refused again. The digest tells accidents, not forgery: commands that
+prove something do without the folder (see ``use``).
 """
 
 import hashlib
 import io
 import os
 import platform
+import stat
 import tempfile
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -21,7 +23,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.cache.place import cache_folder
+from cellplan.cache.place import OTHERS_MAY_WRITE, cache_folder
+from cellplan.cache.use import is_cache_used
 
 Arrays = tuple[NDArray[np.generic], ...]
 
@@ -33,8 +36,7 @@ LIBRARIES: Final = ("numpy", "trimesh", "coal")  # and what they rest on
 MAX_ENTRY: Final = 64_000_000  # [bytes]
 MAX_FOLDER: Final = 256_000_000  # [bytes]; the entries that were not used for longest go first
 MAX_RECENT: Final = 32_000_000  # [bytes] held by this process
-
-_recent: OrderedDict["Key", Arrays] = OrderedDict()
+OPEN: Final = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
 
 class Key(NamedTuple):
@@ -42,6 +44,16 @@ class Key(NamedTuple):
 
     kind: str
     digest: str
+
+
+class Held(NamedTuple):
+    """Arrays that this process holds, and whether it made them itself: others came from the folder."""
+
+    arrays: Arrays
+    is_own: bool
+
+
+_recent: OrderedDict[Key, Held] = OrderedDict()
 
 
 def key_of(kind: str, *contents: bytes) -> Key | None:
@@ -60,23 +72,20 @@ def recall(key: Key | None) -> Arrays | None:
     """The arrays that were kept under a key; None when there are none, or not whole ones. They cannot be written to."""
     if key is None:
         return None
-    if key in _recent:
+    held = _recent.get(key)
+    if held is not None and (held.is_own or is_cache_used()):
         _recent.move_to_end(key)
-        return _recent[key]
-    folder = cache_folder()
+        return held.arrays
+    folder = cache_folder() if is_cache_used() else None
     if folder is None:
         return None
-    path = _path(folder, key)
     try:
-        if path.stat().st_size > MAX_ENTRY:
-            return None
-        arrays = _unpacked(path.read_bytes())
+        packed = _read_own(_path(folder, key))
+        arrays = None if packed is None else _unpacked(packed)
     except Exception:  # noqa: BLE001 - whatever is wrong with an entry, it is made again
         return None
     if arrays is not None:
-        with suppress(OSError):
-            os.utime(path)  # it was of use
-        _remember(key, arrays)
+        _remember(key, Held(arrays, is_own=False))
     return arrays
 
 
@@ -87,8 +96,9 @@ def keep(key: Key | None, arrays: Sequence[NDArray[np.generic]]) -> None:
     own = tuple(np.array(array, order="C") for array in arrays)
     for array in own:
         array.setflags(write=False)
-    _remember(key, own)
-    folder, packed = cache_folder(), _packed(own)
+    _remember(key, Held(own, is_own=True))
+    folder = cache_folder() if is_cache_used() else None
+    packed = b"" if folder is None else _packed(own)
     if folder is not None and len(packed) <= MAX_ENTRY:
         with suppress(OSError):
             _write(_path(folder, key), packed)
@@ -100,11 +110,31 @@ def forget() -> None:
     _recent.clear()
 
 
-def _remember(key: Key, arrays: Arrays) -> None:
+def _remember(key: Key, held: Held) -> None:
     """Hold arrays for the rest of this process, as far as there is room."""
-    _recent[key] = arrays
-    while sum(array.nbytes for held in _recent.values() for array in held) > MAX_RECENT:
+    _recent[key] = held
+    while sum(array.nbytes for each in _recent.values() for array in each.arrays) > MAX_RECENT:
         _recent.popitem(last=False)
+
+
+def _read_own(path: Path) -> bytes | None:
+    """Content of an entry; None for anything but a regular file of the user's own that only the user may write to.
+
+    It is opened without following a link and without waiting for whoever may be at the other end.
+    """
+    handle = os.open(path, OPEN)
+    with os.fdopen(handle, "rb") as file:
+        status = os.fstat(handle)
+        is_mine = not hasattr(os, "getuid") or (
+            status.st_uid == os.getuid() and not status.st_mode & OTHERS_MAY_WRITE and status.st_nlink == 1
+        )
+        if not stat.S_ISREG(status.st_mode) or not is_mine or status.st_size > MAX_ENTRY:
+            return None
+        content = file.read(MAX_ENTRY + 1)
+        if os.utime in os.supports_fd:
+            with suppress(OSError):
+                os.utime(handle)  # it was of use
+    return content
 
 
 def _path(folder: Path, key: Key) -> Path:
@@ -153,7 +183,7 @@ def _make_room(folder: Path) -> None:
     for path in folder.iterdir():
         if path.suffix in (SUFFIX, ".part"):
             with suppress(OSError):
-                status = path.stat()
+                status = path.lstat()
                 found.append((status.st_mtime, path.name, status.st_size))
     total = sum(size for _, _, size in found)
     for _, name, size in sorted(found):

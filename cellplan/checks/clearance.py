@@ -11,8 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check, ClearanceClass, ClearanceMinimum, ClearanceReport, ClosePair
-from cellplan.model.task import Frame
-from cellplan.scene.bodies import Kind
+from cellplan.scene.of_run import scene_of_run
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 from cellplan.scene.survey import CLOSEST, Survey, lowest_bounds
@@ -35,9 +34,7 @@ def check_clearance(
     The tool of a robot whose task is scheduled may touch the part within ``checks.contact_zone`` of its tip, from the
     first instant to the last: before its start and after its end it dwells on the part. Such contacts are listed as
     allowed, and the distance between that tool and the part is no matter of clearance. What of the tool lies outside
-    the zone must not touch. A robot whose task is not scheduled stands idle where its task starts, at the part; it is
-    to be withdrawn before the program is run, so what it has in the way of the part is listed, at the samples, but
-    fails no check.
+    the zone must not touch. Robots whose tasks are not scheduled are idle and keep away from everything, the part too.
 
     Args:
         scene: The cell made computable.
@@ -48,17 +45,17 @@ def check_clearance(
     Returns:
         The distances, never above the truth and within 0.1 mm of it, and a verdict on each class.
     """
-    idle = _idle_exclusions(scene, schedule)
-    rows = [row for row in range(len(scene.pairs)) if row not in idle]
+    scene = scene_of_run(scene, [scheduled.task.name for scheduled in schedule.tasks])
+    rows = range(len(scene.pairs))
     asked = scene.engine.distance_queries, scene.engine.contact_queries
-    found = survey(scene, q, left_out=tuple(idle), progress=progress, stage=STAGE)
-    contacts, open_rows = find_contacts(found, schedule.times, idle=idle), uncertified(found, idle=idle)
+    found = survey(scene, q, progress=progress, stage=STAGE)
+    contacts, open_rows = find_contacts(found, schedule.times), uncertified(found)
     minima = {kind: _minimum(found, schedule.times, kind, open_rows=open_rows) for kind in ClearanceClass}
     curve_times, curves = _curves(found, schedule.times, minima)
     report = ClearanceReport(
         minima=minima,
         contacts=contacts,
-        exclusions=(*scene.exclusions, *_stated(scene, rows), *((*scene.names(scene.pairs[r]), idle[r]) for r in idle)),
+        exclusions=(*scene.exclusions, *_stated(scene, rows)),
         pair_count=len(rows),
         curve_times=curve_times,
         curves=curves,
@@ -78,19 +75,6 @@ def check_clearance(
     checks += [_clearance_check(scene.cell, kind, minima[kind]) for kind in classes if minima[kind].minimum is not None]
     progress(STAGE, 1.0)
     return report, tuple(checks)
-
-
-def _idle_exclusions(scene: Scene, schedule: Schedule) -> dict[int, str]:
-    """Pairs of the part with robots whose task is not worked on now, and what is said of them."""
-    at_work = {scheduled.task.robot for scheduled in schedule.tasks}
-    idle = {task.robot for task in scene.cell.tasks if task.relative_to is Frame.PART} - at_work
-    left_out = {}
-    for row, pair in enumerate(scene.pairs):
-        ends = [scene.bodies[pair.first], scene.bodies[pair.second]]
-        robots = {body.robot for body in ends if body.kind in (Kind.LINK, Kind.TOOL)} & idle
-        if robots and any(body.kind is Kind.PART for body in ends):
-            left_out[row] = f"{robots.pop()} stands idle in this run: withdraw it from the part before running it"
-    return left_out
 
 
 def _minimum(seen: Survey, times: Array, kind: ClearanceClass, *, open_rows: Sequence[int]) -> ClearanceMinimum:

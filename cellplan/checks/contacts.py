@@ -1,6 +1,6 @@
 """Contacts: what touches from when to when, what of it is allowed, and the verdict on each pair."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -18,23 +18,21 @@ OUTSIDE_ZONE: Final = {
 }
 
 
-def find_contacts(survey: Survey, times: Array, *, idle: Mapping[int, str]) -> tuple[Contact, ...]:
-    """All contacts: forbidden ones first, then those of tools at work, then those of idle robots.
+def find_contacts(survey: Survey, times: Array) -> tuple[Contact, ...]:
+    """All contacts: forbidden ones first, then those of tools at work.
 
     Args:
         survey: What was found.
         times: Instants of the samples in [s], shape (N,).
-        idle: What is said of pairs whose contacts fail no check.
     """
     touched = [row for row, found in enumerate(survey.found) if found.touches]
-    forbidden = [contact for row in touched if row not in idle for contact in _of_pair(survey, times, row)]
-    in_the_way = [contact for row in touched if row in idle for contact in _of_pair(survey, times, row, idle[row])]
-    return (*forbidden, *_at_work(survey, times), *in_the_way)
+    forbidden = [contact for row in touched for contact in _of_pair(survey, times, row)]
+    return (*forbidden, *_at_work(survey, times))
 
 
-def uncertified(survey: Survey, *, idle: Mapping[int, str]) -> list[int]:
+def uncertified(survey: Survey) -> list[int]:
     """Pairs that could neither be proved to be free nor found to touch."""
-    return [row for row, found in enumerate(survey.found) if found.unproved and row not in idle]
+    return [row for row, found in enumerate(survey.found) if found.unproved]
 
 
 def seconds(times: Array, instants: Array) -> Array:
@@ -60,7 +58,7 @@ def collision_checks(
     return [_collision(str(kind), passed=True, length_s=0.0, at_s=None, message=message)]
 
 
-def _of_pair(survey: Survey, times: Array, row: int, idle: str | None = None) -> list[Contact]:
+def _of_pair(survey: Survey, times: Array, row: int) -> list[Contact]:
     """Contacts of one pair in the order of time."""
     pair = survey.scene.pairs[row]
     reason = OUTSIDE_ZONE.get(pair.rule, "")
@@ -70,8 +68,8 @@ def _of_pair(survey: Survey, times: Array, row: int, idle: str | None = None) ->
             clearance_class=pair.clearance_class,
             first_s=first,
             last_s=last,
-            is_allowed=idle is not None,
-            reason=idle or reason,
+            is_allowed=False,
+            reason=reason,
         )
         for first, last in _spans(seconds(times, np.unique(survey.found[row].touches)), times)
     ]

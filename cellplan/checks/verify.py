@@ -8,6 +8,7 @@ import numpy as np
 from cellplan.checks.clearance import UNKNOWN, check_clearance
 from cellplan.checks.closure import check_closure, closure_accuracy
 from cellplan.checks.conditioning import conditioning
+from cellplan.checks.idle import check_idle
 from cellplan.checks.limits import check_joints, joint_uses
 from cellplan.checks.locked import check_locked, told_with_failures
 from cellplan.checks.mounting import check_mounting
@@ -61,6 +62,7 @@ def verify(
     drift = repeatability(cell, schedule, q)
     checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
     checks += check_locked(cell, schedule.times, q)
+    checks += check_idle(cell, schedule, q)
     report = Report(
         cell=cell.name,
         mode=str(cell.motion.mode),

@@ -42,16 +42,21 @@ def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_d
 def _record(result: CellCheck) -> dict[str, Any]:
     """What was found, in printed units."""
     from cellplan.report.left_out_record import left_out_record
+    from cellplan.report.open_surfaces import open_surface_lines, open_surfaces_record
     from cellplan.report.record import check_record, number
 
+    open_surfaces = open_surfaces_record(result.cell)
     return {
         "cell": result.cell.name,
         "status": "passed" if result.passed else "failed",
         "start": {robot.name: _start(robot) for robot in result.cell.robots},
         "start_found": list(result.found),
+        "start_choice": result.choice,
         "path_length_mm": {name: number(1e3 * length) for name, length in result.path_lengths.items()},
         "checks": [check_record(each) for each in result.checks],
         "left_out": left_out_record(result.left_out),
+        "open_surfaces": open_surfaces,
+        "remarks": [f"{result.cell.origin.at(key)}: {line}" for key, line in open_surface_lines(open_surfaces)],
     }
 
 
@@ -77,6 +82,8 @@ def _lines(record: dict[str, Any]) -> list[str]:
     for robot, start in record["start"].items():
         posture = ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
         lines.append(f"  start of {robot} ({'found' if robot in record['start_found'] else 'given'}): {posture}")
+    lines += [f"  {record['start_choice']}"] if record["start_choice"] else []
     lines += [f"  task {name}: path of {length:.4g} mm" for name, length in record["path_length_mm"].items()]
+    lines += [f"  note: {remark}" for remark in record["remarks"]]
     lines += [f"  {'' if each['passed'] else 'FAILED '}{each['message']}" for each in record["checks"]]
     return lines + left_out_lines(record)

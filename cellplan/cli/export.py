@@ -8,13 +8,17 @@ import typer
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
-from cellplan.errors import ExitStatus
+from cellplan.errors import ExitStatus, InputError
 
 SCHEMA = "cellplan.exported/1"
 
 Format = Annotated[str, typer.Option("--format", metavar="NAME", help="What to write: csv.", show_default=False)]
 Output = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder (default: RUN/programs/<format>).")
+]
+WithoutCell = Annotated[
+    bool,
+    typer.Option("--without-cell", help="Rest on the run's own copy of the cell; nothing tells whether that is yours."),
 ]
 
 
@@ -23,6 +27,7 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
     form: Format,
     output: Output = None,
     cell: OriginalCell = None,
+    without_cell: WithoutCell = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
@@ -37,6 +42,7 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.gate import open_gate
 
         require_format(form)
+        _require_choice(cell, without_cell=without_cell)
         folder = output or default_folder(run, form)
         refuse_unless_exportable(folder, run)
         with progress_listener(quiet=quiet) as progress:
@@ -49,3 +55,18 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
         return
     lines = [f"{verified.cell.name}: exported", *(f"  note: {remark}" for remark in verified.remarks)]
     say("\n".join([*lines, f"programs: {folder}"]))
+
+
+def _require_choice(cell: Path | None, *, without_cell: bool) -> None:
+    """Refuse to guess whether a run is to be compared with the cell file that was solved.
+
+    Raises:
+        InputError: Neither or both were asked for.
+    """
+    if cell is None and not without_cell:
+        raise InputError(
+            "--cell: expected the cell file that was solved, so that it and its files are compared with the run, got "
+            "none; say --without-cell to rest on the run's own copy of it"
+        )
+    if cell is not None and without_cell:
+        raise InputError("--without-cell: unexpected option beside --cell")

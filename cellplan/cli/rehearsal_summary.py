@@ -32,6 +32,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
         *_repeatability_lines(record["tasks"]),
         *_round_lines(record["runs"]),
         *(f"  FAILED {check['message']}" for check in record["checks"] if not check["passed"]),
+        *(f"  {line}" for line in record["not_in_program"]),
         f"report: {folder / 'rehearsal.html'}",
         *([f"tables: {folder / 'tables'}"] if record["tables_released"] else []),
     ]

@@ -85,4 +85,6 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "report": record})
     else:
         say("\n".join(summary_lines(record, folder)))
+        if solution.remark:
+            say(solution.remark)
     raise typer.Exit(status)

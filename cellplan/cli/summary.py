@@ -7,6 +7,7 @@ from typing import Any
 
 from cellplan.report.left_out_record import grips_told, told_left_out
 from cellplan.report.method import USUAL_METHOD
+from cellplan.report.open_surfaces import open_surface_lines
 
 Record = dict[str, Any]
 
@@ -23,7 +24,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
         f"{record['cell']}: {record['status']}",
         *figure_lines(record),
         *_failure_lines(record["checks"]),
-        *(f"  before you run it: {line}" for line in record.get("before_you_run", [])),
+        *(f"  {line}" for line in record.get("not_in_program", [])),
         *_place_lines(record, folder),
     ]
 
@@ -31,7 +32,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
 def figure_lines(record: Record) -> list[str]:
     """The worst figures of a run."""
     return [
-        f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_method_word(record['solver'])}",
+        f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_clock_word(record)}{_method_word(record['solver'])}",
         *_task_lines(record["tasks"]),
         *_closure_lines(record.get("closure", {})),
         *_margin_lines(record["joints"]),
@@ -40,6 +41,7 @@ def figure_lines(record: Record) -> list[str]:
         *_clearance_lines(record["clearance"]["whole"]),
         *_slack_lines(record["solver"]["slack"]),
         *_fallback_lines(record["solver"]),
+        *(f"  note: {line}" for _, line in open_surface_lines(record.get("open_surfaces", []))),
         *(f"  grip: {line}" for line in grips_told(record)),
         *left_out_lines(record),
     ]
@@ -48,6 +50,11 @@ def figure_lines(record: Record) -> list[str]:
 def left_out_lines(record: Record) -> list[str]:
     """One line for each kind of pairs that were not judged in full."""
     return [f"  {line}" for line in told_left_out(record)]
+
+
+def _clock_word(record: Record) -> str:
+    """What decides the length of the clock, unless the cell file states it."""
+    return " (no motion.duration_s: the clock ends with the last task)" if record["clock_from"] == "tasks" else ""
 
 
 def _method_word(solver: Record) -> str:
@@ -124,7 +131,9 @@ def _fallback_lines(solver: Record) -> Iterator[str]:
     """Where the accurate mode found no way on."""
     resolution = solver.get("resolution")
     if resolution and solver["integrator"] == "accurate" and resolution["euler_from_s"] is not None:
-        yield f"  no accurate way on: Euler steps from {resolution['euler_from_s']:.3f} s"
+        lost = resolution.get("lost")
+        reason = f"; {lost['message']}" if lost else ""
+        yield f"  no accurate way on: Euler steps from {resolution['euler_from_s']:.3f} s{reason}"
 
 
 def _failure_lines(checks: list[Record]) -> Iterator[str]:

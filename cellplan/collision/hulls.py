@@ -46,6 +46,14 @@ def convex_hull(mesh: Mesh) -> Mesh:
     raise InputError(f"{mesh.source}: expected a mesh with a convex hull, got one too ill-shaped for it")
 
 
+def is_hull(hull: Mesh, points: Array) -> bool:
+    """Whether a mesh, wherever it comes from, is closed, convex, and holds all points, shape (N, 3), as a hull does."""
+    if not hull.is_closed or not count_edges(hull.faces).is_closed:
+        return False
+    with np.errstate(invalid="ignore", divide="ignore"):  # a triangle without area has no normal: nothing is held
+        return _holds(hull, hull.vertices) and _holds(hull, points)
+
+
 def _holds(hull: Mesh, points: Array) -> bool:
     """Whether all points, shape (N, 3), lie behind every face of a hull, up to 1e-7 of their extent."""
     return _sticking_out(hull, points) <= HULL_ROOM * float(np.ptp(points, axis=0).max())

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cellplan.cache import key_of
-from cellplan.collision.hulls import convex_hull
+from cellplan.collision.hulls import convex_hull, is_hull
 from cellplan.geometry.kept_meshes import keep_mesh, recall_mesh
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
@@ -12,7 +12,7 @@ from cellplan.guard import Guard, in_child
 def hull_of(mesh: Mesh) -> Mesh:
     """Smallest convex mesh that holds a mesh, as ``convex_hull`` finds it.
 
-    One that was kept was proved to hold these very vertices by the very same code.
+    One that was kept is proved once more to be convex and to hold these very vertices: that is cheap.
 
     Raises:
         InputError: The mesh is flat.
@@ -20,7 +20,7 @@ def hull_of(mesh: Mesh) -> Mesh:
     """
     key = key_of("hull", np.ascontiguousarray(mesh.vertices).tobytes())
     kept = recall_mesh(key, source=mesh.source)
-    if kept is not None and kept.is_closed:
+    if kept is not None and is_hull(kept, mesh.vertices):
         return kept
     guard = Guard(file=mesh.source, worker="the search for the hull")
     found: Mesh = in_child(convex_hull, mesh, guard=guard)

@@ -1,46 +1,38 @@
-"""Triangle meshes as surfaces: welding, lost area, open edges, outward orientation, volume and winding numbers."""
+"""Triangle meshes as surfaces: made of loose triangles by welding, with lost area accounted for and outside outside."""
 
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
+from cellplan.geometry.mesh_counts import (
+    EdgeCount,
+    Indices,
+    components,
+    count_edges,
+    face_volumes,
+    winding_numbers,
+)
+from cellplan.geometry.mesh_healing import encloses, oriented_alike, turn_outward, without_repeats
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 
-Indices = NDArray[np.int64]
+__all__ = ["EdgeCount", "components", "count_edges", "make_mesh", "mesh_volume", "winding_numbers"]
+
 FaceArray = np.ndarray[tuple[int, int], np.dtype[np.int64]]
 
 WELD_SHARE: Final = 1e-7  # [-] of the extent: vertices written in single precision differ by no more than this
+GRID_SHIFTS: Final = (0.0, 0.5, 0.25)  # [-] of a cell of the grid that vertices are rounded to
 AREA_SHARE: Final = 1e-12  # [-] of the longest side squared: thinner triangles have no usable normal
 LOST_SHARE: Final = 0.5  # [-] of the triangles that may be without area before the mesh counts as damaged
-PAIR_CHUNK: Final = 1_000_000  # point-triangle pairs worked on at once: about 150 MB
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EdgeCount:
-    """How well the triangles of a surface fit together.
-
-    Attributes:
-        open: Edges with a triangle on one side only.
-        crowded: Edges shared by more than two triangles.
-        turned: Edges whose two triangles disagree about which side is outside.
-    """
-
-    open: int
-    crowded: int
-    turned: int
-
-    @property
-    def is_closed(self) -> bool:
-        """Whether every edge is shared by exactly two triangles that run through it in opposite directions."""
-        return self.open == self.crowded == self.turned == 0
 
 
 def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
     """Mesh from loose triangles: equal vertices welded, triangles without area dropped, outside made outside.
+
+    Triangles that are there twice are taken once, and those that face the other way than their neighbours turned over;
+    nothing is moved or filled in.
 
     Args:
         vertices: Corner points in [m], finite, shape (V, 3).
@@ -48,31 +40,21 @@ def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
         source: File name for messages.
 
     Raises:
-        InputError: More than half of the triangles have no area.
+        InputError: More than half of the triangles have no area; a closed surface is in thousands of pieces.
     """
     welded, corners = _weld(vertices, faces)
     whole = corners[_has_three_corners(corners)]
-    is_closed = count_edges(whole).is_closed
+    if count_edges(whole).crowded:
+        whole = without_repeats(whole)
+    whole = oriented_alike(whole)
+    is_closed = encloses(whole)
     kept = whole[_has_area(welded, whole)]
-    _account_for(len(faces) - len(kept), total=len(faces), source=source)
+    flat = len(faces) - int(np.sum(_has_three_corners(corners))) + len(whole) - len(kept)
+    _account_for(flat, total=len(faces), source=source)
     if is_closed:
-        kept = _turn_outward(welded, kept, shells=_shells(whole, len(welded)))
+        kept = turn_outward(welded, kept, source=source)
     used, compact = np.unique(kept, return_inverse=True)
     return Mesh(vertices=welded[used], faces=_as_faces(compact), source=source, is_closed=is_closed)
-
-
-def count_edges(faces: Indices) -> EdgeCount:
-    """Count the edges that do not join exactly two triangles in opposite directions; faces of shape (M, 3)."""
-    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    low, high = np.minimum(a, b), np.maximum(a, b)
-    keys, group = np.unique(low * (high.max(initial=0) + 1) + high, return_inverse=True)
-    triangles = np.bincount(group, minlength=len(keys))
-    balance = np.bincount(group, weights=np.where(a < b, 1.0, -1.0), minlength=len(keys))
-    return EdgeCount(
-        open=int(np.sum(triangles == 1)),
-        crowded=int(np.sum(triangles > 2)),
-        turned=int(np.sum((triangles == 2) & (balance != 0.0))),
-    )
 
 
 def mesh_volume(mesh: Mesh) -> float:
@@ -83,52 +65,19 @@ def mesh_volume(mesh: Mesh) -> float:
     return _volume(mesh.vertices, mesh.faces)
 
 
-def winding_numbers(triangles: Array, points: Array) -> Array:
-    r"""How often a surface winds round each point: 1 inside a closed outward surface, 0 outside, shape (N,).
-
-    The solid angles of all triangles are summed by the formula of Van Oosterom and Strackee,
-
-    .. math:: \tan(\Omega/2) = \frac{a \cdot (b \times c)}{abc + (a \cdot b) c + (b \cdot c) a + (c \cdot a) b}
-
-    Args:
-        triangles: Corner points in [m], shape (M, 3, 3).
-        points: Shape (N, 3), in the frame of the mesh.
-    """
-    winding = np.zeros(len(points))
-    step = max(1, PAIR_CHUNK // max(1, len(triangles)))
-    for first in range(0, len(points), step):
-        chosen = slice(first, first + step)
-        corner = triangles[None] - points[chosen, None, None, :]
-        a, b, c = corner[:, :, 0], corner[:, :, 1], corner[:, :, 2]
-        la, lb, lc = (np.sqrt(_dot(side, side)) for side in (a, b, c))
-        below = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
-        winding[chosen] = np.arctan2(_dot(a, np.cross(b, c)), below).sum(axis=1) / (2.0 * np.pi)
-    return winding
-
-
-def components(count: int, pairs: Indices) -> Indices:
-    """Smallest member of the connected group of each of ``count`` things, joined by pairs of shape (K, 2)."""
-    label = np.arange(count)
-    a, b = pairs[:, 0], pairs[:, 1]
-    while True:
-        root_a, root_b = label[a], label[b]
-        apart = root_a != root_b
-        if not np.any(apart):
-            return label
-        a, b = a[apart], b[apart]
-        np.minimum.at(label, np.maximum(root_a, root_b)[apart], np.minimum(root_a, root_b)[apart])
-        while not np.array_equal(jumped := label[label], label):
-            label = jumped
-
-
 def _weld(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
     """Merge equal vertices; where that leaves open edges, those that differ by rounding to single precision."""
     points, corners = _merge(vertices + 0.0, faces, key=vertices + 0.0)  # + 0.0 makes -0 and 0 equal
-    if count_edges(corners[_has_three_corners(corners)]).is_closed:
+    if not count_edges(corners[_has_three_corners(corners)]).open:
         return points, corners
     grid = WELD_SHARE * float(np.ptp(points, axis=0).max())
-    near, joined = _merge(points, corners, key=np.round(points / grid))
-    return (near, joined) if count_edges(joined[_has_three_corners(joined)]).is_closed else (points, corners)
+    for shift in GRID_SHIFTS:  # two vertices that one grid tells apart lie in one cell of another
+        near, joined = _merge(points, corners, key=np.round(points / grid + shift))
+        if len(near) == len(points):
+            break  # no two vertices are that near: the file is not one that rounds
+        if not count_edges(joined[_has_three_corners(joined)]).open:
+            return near, joined
+    return points, corners
 
 
 def _merge(vertices: Array, faces: Indices, *, key: Array) -> tuple[Array, Indices]:
@@ -162,40 +111,9 @@ def _account_for(lost: int, *, total: int, source: str) -> None:
         raise InputError(f"{source}: expected triangles with an area, got {lost} of {total} without: is it damaged?")
 
 
-def _shells(faces: Indices, count: int) -> Indices:
-    """Label of the connected shell each of ``count`` vertices belongs to."""
-    return components(count, np.concatenate([faces[:, :2], faces[:, 1:]]))
-
-
-def _turn_outward(vertices: Array, faces: Indices, *, shells: Indices) -> Indices:
-    """Flip the whole if it faces inward, then each shell that does and stands alone: the walls of a cavity stay."""
-    if _volume(vertices, faces) < 0.0:
-        faces = faces[:, ::-1]
-    label = shells[faces[:, 0]]
-    turned = faces.copy()
-    for name in np.flatnonzero(np.bincount(label, weights=_face_volumes(vertices, faces)) < 0.0):
-        others = vertices[faces[label != name]]
-        if winding_numbers(others, vertices[[name]])[0] < 0.5:
-            turned[label == name] = faces[label == name][:, ::-1]
-    return turned
-
-
 def _volume(vertices: Array, faces: Indices) -> float:
     """Signed volume in [m³]."""
-    return float(_face_volumes(vertices, faces).sum())
-
-
-def _face_volumes(vertices: Array, faces: Indices) -> Array:
-    """Signed volume of the tetrahedron of each triangle and the middle of the mesh, shape (M,)."""
-    corner = vertices[faces] - 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    volumes: Array = _dot(corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6.0
-    return volumes
-
-
-def _dot(a: Array, b: Array) -> Array:
-    """Row-wise scalar product over the last axis."""
-    product: Array = np.einsum("...i,...i->...", a, b)
-    return product
+    return float(face_volumes(vertices, faces).sum())
 
 
 def _as_faces(indices: NDArray[Any]) -> FaceArray:

@@ -11,6 +11,7 @@ from cellplan.cache import key_of
 from cellplan.errors import InputError
 from cellplan.geometry.kept_meshes import keep_mesh, recall_mesh
 from cellplan.geometry.mesh_files import FORMATS, parse_mesh, require_likely_count
+from cellplan.geometry.mesh_healing import require_few_pieces
 from cellplan.geometry.mesh_rays import RayHits, ray_hits
 from cellplan.geometry.mesh_topology import components, count_edges, make_mesh, mesh_volume, winding_numbers
 from cellplan.geometry.shapes import Mesh
@@ -25,8 +26,10 @@ __all__ = [
     "is_flat",
     "make_mesh",
     "mesh_volume",
+    "open_edges",
     "ray_hits",
     "read_mesh",
+    "require_enclosing",
     "require_solid",
     "tessellate",
 ]
@@ -76,7 +79,9 @@ def _checked_mesh(data: bytes, name: str, *, scale: float | ArrayLike) -> Mesh:
         vertices = vertices * factors
     _require_likely_size(vertices[np.unique(faces)], name)
     outward = faces if np.prod(np.sign(factors)) > 0.0 else faces[:, ::-1]
-    return make_mesh(vertices, outward, source=name)
+    mesh = make_mesh(vertices, outward, source=name)
+    require_few_pieces(mesh.faces, source=name)
+    return mesh
 
 
 def require_solid(mesh: Mesh) -> None:
@@ -85,14 +90,26 @@ def require_solid(mesh: Mesh) -> None:
     Raises:
         InputError: The surface is open or encloses nothing.
     """
-    if not mesh.is_closed:
-        edges = count_edges(mesh.faces)
-        raise InputError(
-            f"{mesh.source}: expected a closed surface, got {edges.open} open edges, {edges.crowded} edges of more "
-            f"than two triangles and {edges.turned} edges whose triangles face opposite ways: repair the mesh"
-        )
+    if not mesh.is_closed or count_edges(mesh.faces).crowded:
+        raise InputError(f"{_not_closed(mesh)}: repair the mesh")
     if is_flat(mesh) or mesh_volume(mesh) <= 0.0:
         raise InputError(f"{mesh.source}: expected a solid, got a surface that encloses no volume")
+
+
+def require_enclosing(mesh: Mesh) -> None:
+    """Refuse a mesh of which nobody can say what lies inside it.
+
+    Raises:
+        InputError: The surface is open.
+    """
+    if not mesh.is_closed:
+        raise InputError(f"{_not_closed(mesh)}: repair the mesh, or say open: true, and nothing counts as inside it")
+
+
+def open_edges(mesh: Mesh) -> int:
+    """Edges at which a surface does not go on as that of a solid does."""
+    edges = count_edges(mesh.faces)
+    return edges.open + edges.crowded + edges.turned
 
 
 def is_flat(mesh: Mesh) -> bool:
@@ -131,6 +148,15 @@ def contains(mesh: Mesh, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bo
     """
     inside = winding_numbers(mesh.vertices[mesh.faces], points) > 0.5
     return np.asarray(inside, dtype=np.bool_)
+
+
+def _not_closed(mesh: Mesh) -> str:
+    """What is wrong with a surface that is not that of one solid."""
+    edges = count_edges(mesh.faces)
+    return (
+        f"{mesh.source}: expected a closed surface, got {edges.open} open edges, {edges.crowded} edges of more "
+        f"than two triangles and {edges.turned} edges whose triangles face opposite ways"
+    )
 
 
 def _read_bytes(path: Path) -> bytes:

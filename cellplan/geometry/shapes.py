@@ -52,13 +52,16 @@ class Mesh:
         vertices: Corner points in [m], shape (V, 3).
         faces: Corner indices of each triangle, counter-clockwise from outside, shape (M, 3).
         source: File name for messages.
-        is_closed: Whether the surface encloses a volume (every edge shared by exactly two triangles).
+        is_closed: Whether the surface encloses a volume: it is that of a solid, or of several that share edges.
+        is_leaky: Whether it stands for a solid although it is not closed, as meshes of links often do: what its
+            triangles wind round by more than one half, either way, counts as inside.
     """
 
     vertices: Array
     faces: np.ndarray[tuple[int, int], np.dtype[np.int64]]
     source: str
     is_closed: bool
+    is_leaky: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.cell_rules import needs_surface
-from cellplan.io.robot_rules import start_posture
+from cellplan.io.robot_rules import home_configuration, start_posture
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry
-from cellplan.io.schema.robot import RobotEntry, ToolEntry
+from cellplan.io.schema.robot import ToolEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.task import (
     BlendEntry,
@@ -57,16 +57,25 @@ PLANE_NORMAL: Final = {"xy": "z", "yz": "x", "xz": "y"}
 TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> its file, read
 
 
-def build_robot(name: str, entry: RobotEntry, model: RobotModel, read_mesh: MeshReader) -> Robot:
-    """A robot placed in the cell."""
+def build_robot(name: str, whole: CellDocument, model: RobotModel, read_mesh: MeshReader) -> Robot:
+    """A robot placed in the cell.
+
+    One that has nothing to do in the cell, and of which nothing but the start is given, stands there: it is its home.
+    """
+    entry = whole.robots[name]
     weights = np.ones(len(model.joints)) if entry.weights is None else np.array(entry.weights)
+    start, home = start_posture(entry, model), home_configuration(entry, model)
+    at_work = {task.robot for task in whole.tasks.values()} | {grasp.robot for grasp in whole.part.held_by}
+    if name not in at_work and entry.home_deg is None and entry.home is None:
+        home = start
     return Robot(
         name=name,
         model=model,
         X_WB=pose_from_entry(entry.base),
         tool=_tool(entry.tool, read_mesh),
-        start=start_posture(entry, model),
+        start=start,
         weights=weights,
+        home=home,
     )
 
 
@@ -115,7 +124,6 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
     path = _path(name, entry.path, read_targets)
-    has_own_time = entry.duration_s is not None or entry.feed_mm_s is not None or isinstance(path, TimedPath)
     law = entry.time_law or motion.time_law
     corners = entry.corners or motion.corners
     return Task(
@@ -133,7 +141,7 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
             position=entry.tolerance.position_mm / MM, orientation=float(np.deg2rad(entry.tolerance.orientation_deg))
         ),
         start=entry.begins_s,
-        duration=entry.duration_s if has_own_time else motion.duration_s - entry.begins_s - entry.leaving_s,
+        duration=entry.duration_s,
         feed=None if entry.feed_mm_s is None else entry.feed_mm_s / MM,
         time_law=_time_law(law),
         blend=corners.blend_mm / MM if isinstance(corners, BlendEntry) else None,
@@ -193,17 +201,15 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         timed: Names of the tasks whose path brings its own clock.
     """
     values = document.model_dump(exclude_none=True)
-    motion, dumped_motion = document.motion, values["motion"]
+    motion = values["motion"]
     for name, task in document.tasks.items():
         entry = values["tasks"][name]
         tool_axis, entry["tool_x"] = tool_directions(task)
         entry["start_s"] = task.begins_s
         entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
         if name not in timed:
-            entry.setdefault("time_law", dumped_motion["time_law"])
-            entry.setdefault("corners", dumped_motion["corners"])
-            if task.duration_s is None and task.feed_mm_s is None:
-                entry["duration_s"] = motion.duration_s - task.begins_s - task.leaving_s
+            entry.setdefault("time_law", motion["time_law"])
+            entry.setdefault("corners", motion["corners"])
         if task.path.is_planar and task.path.project is None:
             entry["path"].setdefault("offset_mm", 0.0)
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}

@@ -22,10 +22,11 @@ from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, raise_compl
 from cellplan.io.robot_rules import robot_complaints
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.pieces import Pieces, read_pieces
-from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry, ToolBodyEntry, ToolShapeEntry
+from cellplan.io.schema.shapes import ObstacleEntry, ToolBodyEntry, ToolShapeEntry
 from cellplan.io.solver_build import build_solver
 from cellplan.io.solver_rules import solver_complaints
 from cellplan.io.target_rules import Targets, target_complaints
+from cellplan.io.user_folders import user_folders
 from cellplan.io.yaml_reader import YamlDocument, read_yaml
 from cellplan.model.cell import Cell, Origin
 from cellplan.model.robot import RobotModel
@@ -39,7 +40,8 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
 
     Args:
         path: The cell file.
-        allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+        allow_dirs: Folders, beside the cell's own and those that the user allows for every cell, that the files it
+            names may lie in.
         folder: The folder that its names start from; None for the one it lies in.
 
     Raises:
@@ -54,9 +56,9 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
     if pieces.is_too_large:
         raise_complaints(file, complaints)
     complaints += rule_complaints(pieces, document)
-    sources = Sources(
-        document, AllowedFolders(folder=folder or path.parent, allowed=tuple(Path(allowed) for allowed in allow_dirs))
-    )
+    start = folder or path.parent
+    allowed = (*(Path(each) for each in allow_dirs), *user_folders(start))
+    sources = Sources(document, AllowedFolders(folder=start, allowed=allowed))
     sources.inputs[path.name] = document.digest
     models = _models(pieces, document, sources)
     for name, model in models.items():
@@ -128,7 +130,7 @@ def _part_extent(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
         yield document.complaint(("part", "geometry"), text)
 
 
-Meshed = PartShapeEntry | ToolShapeEntry | ToolBodyEntry | ObstacleEntry
+Meshed = ToolShapeEntry | ToolBodyEntry | ObstacleEntry
 
 
 def _read_meshes(pieces: Pieces, sources: Sources) -> None:
@@ -142,7 +144,8 @@ def _read_meshes(pieces: Pieces, sources: Sources) -> None:
         sources.solid_mesh(pieces.part.geometry.mesh, pieces.part.geometry.unit, ("part", "geometry", "mesh"))
     for path, shape in shapes:
         if shape.mesh is not None and shape.unit is not None:
-            sources.mesh(shape.mesh, shape.unit, (*path, "mesh"))
+            read = sources.mesh if shape.open else sources.enclosing_mesh
+            read(shape.mesh, shape.unit, (*path, "mesh"))
 
 
 def _cell(
@@ -165,7 +168,7 @@ def _cell(
     timed = {name for name, path in targets.items() if isinstance(path, TimedPath)}
     return Cell(
         name=whole.name,
-        robots=tuple(build_robot(name, entry, models[name], mesh) for name, entry in whole.robots.items()),
+        robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
         part=build_part(whole.part, mesh),
         tasks=tuple(build_task(name, whole, targets.__getitem__) for name in whole.tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),

@@ -11,6 +11,7 @@ from cellplan.io.yaml_reader import YamlDocument
 
 TIME_ROOM: Final = 1e-9  # [-] of the duration: rounding of start_s + duration_s
 ORIENTATION_AXES: Final = frozenset({"rx", "ry", "rz"})
+MEANS_ELSE: Final = {"part": "the workpiece", "world": "the frame that everything stands in"}
 ANGLE_RANGES: Final = ("base", "start_deg", "start")
 
 
@@ -36,6 +37,10 @@ def _clashing_names(pieces: Pieces, document: YamlDocument) -> Iterator[Complain
             if other != name:
                 text = f"expected a name that differs from '{other}' by more than upper and lower case"
                 yield document.key_complaint((section, name), text)
+    for name in pieces.names["robots"]:
+        if name.lower() in MEANS_ELSE:
+            text = f"expected another name, '{name.lower()}' means {MEANS_ELSE[name.lower()]}"
+            yield document.key_complaint(("robots", name), text)
     if "part" in pieces.names["environment"]:
         yield document.key_complaint(("environment", "part"), "expected another name, 'part' means the workpiece")
 
@@ -110,6 +115,11 @@ def _times(pieces: Pieces, document: YamlDocument, name: str) -> Iterator[Compla
     if pieces.motion is None:
         return
     task, clock = pieces.tasks[name], pieces.motion.duration_s
+    if clock is None:
+        if task.duration_s is None and task.feed_mm_s is None and task.path.csv is None:
+            text = "missing duration_s: expected duration_s or feed_mm_s, as motion.duration_s is not given either"
+            yield document.complaint(("tasks", name), text)
+        return
     start, leaving = task.begins_s, task.leaving_s
     if start + leaving >= clock:
         also = f" and retract_s = {leaving:g}" if leaving else ""

@@ -2,14 +2,15 @@
 
 import os
 import posixpath
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from functools import partial
 from pathlib import Path, PurePosixPath
 
 import numpy as np
 
+from cellplan.cache import as_here
 from cellplan.errors import InputError
-from cellplan.geometry.meshes import read_mesh, require_solid
+from cellplan.geometry.meshes import read_mesh, require_enclosing, require_solid
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.allowed_folders import AllowedFolders
@@ -57,14 +58,11 @@ class Sources:
 
     def solid_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
         """Closed mesh with a volume, in [m]; None after a complaint."""
-        mesh = self.mesh(written, unit, path)
-        try:
-            if mesh is not None:
-                require_solid(mesh)
-        except InputError as error:
-            self.complaints.append(self._document.complaint(path, str(error)))
-            return None
-        return mesh
+        return self._required(require_solid, self.mesh(written, unit, path), path)
+
+    def enclosing_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
+        """Mesh that has an inside, in [m]; None after a complaint."""
+        return self._required(require_enclosing, self.mesh(written, unit, path), path)
 
     def targets(self, entry: str | CsvEntry, path: KeyPath) -> SampledPath | TimedPath | None:
         """Tool targets of a task; None after a complaint."""
@@ -113,8 +111,18 @@ class Sources:
             return None
         try:
             guard = Guard(file=written, worker="the mesh reader")
-            mesh = in_child(partial(read_mesh, scale=MESH_UNITS[unit]), place, guard=guard)
+            mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), place, guard=guard)
             self.inputs[written] = digest_of_file(place, file=written)
+        except InputError as error:
+            self.complaints.append(self._document.complaint(path, str(error)))
+            return None
+        return mesh
+
+    def _required(self, demand: Callable[[Mesh], None], mesh: Mesh | None, path: KeyPath) -> Mesh | None:
+        """A mesh that is as it must be; None after a complaint."""
+        try:
+            if mesh is not None:
+                demand(mesh)
         except InputError as error:
             self.complaints.append(self._document.complaint(path, str(error)))
             return None
@@ -172,6 +180,7 @@ class Sources:
             package_dirs=folders,
             limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items()},
             locked=dict(_locked_in_si(entry)),
+            within=self._folders,
         )
         try:
             robot = _read_urdf(self._urdfs, entry.model, place, options=options)
@@ -205,7 +214,8 @@ def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, o
     """Robot of a URDF; robots that say the same of the same file share one."""
     key = (written, place, options.flange, options.package_dirs, _items(options.limits), _items(options.locked))
     if key not in known:
-        known[key] = in_child(load_urdf, place, options, guard=Guard(file=written, worker="the URDF reader"))
+        guard = Guard(file=written, worker="the URDF reader")
+        known[key] = in_child(as_here(load_urdf), place, options, guard=guard)
     return known[key]
 
 

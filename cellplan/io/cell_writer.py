@@ -1,4 +1,4 @@
-"""The cell that was solved as a cell file: every default written out, start postures filled in."""
+"""The cell that was solved as a cell file: every default written out, start postures and homes filled in."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -7,6 +7,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, pose, rpy_from_rotation
 from cellplan.io.robot_rules import start_keys
+from cellplan.io.schema.cell import MotionEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml_writer import yaml_text
 from cellplan.model.cell import Cell, CheckSettings, Part, Robot
@@ -14,6 +15,7 @@ from cellplan.model.robot import RobotModel
 from cellplan.model.solver import Integrator, SolverSettings
 from cellplan.model.task import SampledPath, Task, TimedPath
 
+CONFIGURATIONS: Final = frozenset({"start", "start_deg", "home", "home_deg"})
 NEIGHBOURS: Final = 3  # units in the last place round the quotient in which the written number is sought
 MM: Final = 1000.0  # [mm/m]
 
@@ -67,20 +69,22 @@ def as_written(model: RobotModel, q: Array) -> Array:
 
 
 def _robot(entry: Mapping[str, Any], robot: Robot, found: Array | None) -> dict[str, Any]:
-    """A robot with its weights and start posture written out."""
-    written = {key: value for key, value in entry.items() if key not in {"start", "start_deg", "weights"}}
+    """A robot with its weights, start posture and home written out."""
+    written = {key: value for key, value in entry.items() if key not in CONFIGURATIONS}
     written["base"] = _pose(entry["base"], robot.X_WB)
-    posture = robot.start if robot.start is not None else found
-    as_list = all(joint.is_revolute for joint in robot.model.joints)
-    if posture is None:
-        written["start_deg" if as_list else "start"] = "auto"
-    elif as_list:
-        written["start_deg"] = _in_file_units(robot.model, posture)
-    else:
-        values = _in_file_units(robot.model, posture)
-        written["start"] = dict(zip(start_keys(robot.model), values, strict=True))
+    written |= _configuration("start", robot.model, robot.start if robot.start is not None else found)
+    written |= _configuration("home", robot.model, robot.home)
     written["weights"] = [float(weight) for weight in robot.weights]
     return {key: written[key] for key in RobotEntry.model_fields if key in written}
+
+
+def _configuration(key: str, model: RobotModel, q: Array | None) -> dict[str, Any]:
+    """A start posture or a home under the key that suits the robot's joints."""
+    as_list = all(joint.is_revolute for joint in model.joints)
+    if q is None:
+        return {f"{key}_deg" if as_list else key: "auto"}
+    values = _in_file_units(model, q)
+    return {f"{key}_deg": values} if as_list else {key: dict(zip(start_keys(model), values, strict=True))}
 
 
 def _part(entry: Mapping[str, Any], part: Part) -> dict[str, Any]:
@@ -95,7 +99,7 @@ def _part(entry: Mapping[str, Any], part: Part) -> dict[str, Any]:
 
 
 def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
-    """A task with its times as they are now."""
+    """A task with its start as it is now; one without a time of its own goes on filling the clock."""
     written = {**entry, "start_s": task.start}
     if task.duration is not None:
         written["duration_s"] = task.duration
@@ -125,14 +129,10 @@ def _checks(entry: Mapping[str, Any], checks: CheckSettings) -> dict[str, Any]:
 
 
 def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:
-    """The motion; its clock holds all tasks, also those with a time of their own that is longer."""
-    ends = []
-    for task in cell.tasks:
-        own = task.repeat * task.path.duration if isinstance(task.path, TimedPath) else task.duration
-        leaving = task.retract.duration if task.retract else 0.0
-        ends += [] if own is None else [task.start + own + leaving]
-    duration = max([cell.motion.duration, *ends])
-    return {**entry, "mode": str(cell.motion.mode), "duration_s": duration, "step_s": cell.motion.step}
+    """The motion with the mode and clock of the cell; a clock that ends with the last task has no length."""
+    written = {**entry, "mode": str(cell.motion.mode), "step_s": cell.motion.step}
+    written["duration_s"] = cell.motion.duration
+    return {key: written[key] for key in MotionEntry.model_fields if written.get(key) is not None}
 
 
 def _pose(entry: Mapping[str, Any], X: Array) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from cellplan.io.yaml_reader import YamlDocument
 from cellplan.model.robot import Joint, RobotModel
 
 FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference posture: farther is a slip of the unit
+Given = tuple[float, ...] | dict[str, Any] | None  # a configuration in the units of a file; None: to be found
+
 ROOM: Final = 1e-9  # [rad] or [m]: degrees in a cell do not read back to the last bit
 
 
@@ -24,7 +26,16 @@ def start_keys(model: RobotModel) -> tuple[str, ...]:
 
 def start_posture(entry: RobotEntry, model: RobotModel) -> Array | None:
     """Start posture in [rad] or [m] as written; None when it is to be found."""
-    given = entry.given_start
+    return _configuration(entry.given_start, model)
+
+
+def home_configuration(entry: RobotEntry, model: RobotModel) -> Array | None:
+    """Home in [rad] or [m] as written; None when it is to be found."""
+    return _configuration(entry.given_home, model)
+
+
+def _configuration(given: Given, model: RobotModel) -> Array | None:
+    """Joint positions in [rad] or [m] from those of a file, shape (n,)."""
     if given is None:
         return None
     values = [given[key] for key in start_keys(model)] if isinstance(given, dict) else given
@@ -44,7 +55,9 @@ def limits_in_si(entry: LimitsEntry) -> JointLimits:
 
 def robot_complaints(name: str, entry: RobotEntry, model: RobotModel, document: YamlDocument) -> Iterator[Complaint]:
     """Everything a cell says about a robot that its model contradicts."""
-    yield from _start_complaints(("robots", name), entry, model, document)
+    path = ("robots", name)
+    yield from _configuration_complaints((*path, "start"), entry.given_start, model, document)
+    yield from _configuration_complaints((*path, "home"), entry.given_home, model, document)
     yield from _unit_complaints(("robots", name), entry, model, document)
     count = len(model.joints)
     if entry.weights is not None and len(entry.weights) != count:
@@ -60,31 +73,32 @@ def robot_complaints(name: str, entry: RobotEntry, model: RobotModel, document: 
         yield document.complaint(("robots", name, "tool", "xyz_mm"), text)
 
 
-def _start_complaints(
-    path: tuple[str, str], entry: RobotEntry, model: RobotModel, document: YamlDocument
+def _configuration_complaints(
+    path: tuple[str, str, str], given: Given, model: RobotModel, document: YamlDocument
 ) -> Iterator[Complaint]:
-    """A start posture has one value for each joint, in the joint's unit."""
-    given = entry.given_start
+    """A start posture or a home has one value for each joint, in the joint's unit."""
     if given is None:
         return
+    *robot, key = path
     keys = start_keys(model)
     if isinstance(given, dict):
-        for key in given:
-            if key not in keys:
-                text = f"unknown key{did_you_mean(key, keys)}; allowed: {listed(keys)}"
-                yield document.key_complaint((*path, "start", key), text)
-        missing = [key for key in keys if key not in given]
+        for joint in given:
+            if joint not in keys:
+                text = f"unknown key{did_you_mean(joint, keys)}; allowed: {listed(keys)}"
+                yield document.key_complaint((*path, joint), text)
+        missing = [joint for joint in keys if joint not in given]
         if missing:
-            yield document.complaint((*path, "start"), f"missing, expected one value per joint: add {listed(missing)}")
+            yield document.complaint(path, f"missing, expected one value per joint: add {listed(missing)}")
         return
+    as_list = (*robot, f"{key}_deg")
     sliding = [joint.name for joint in model.joints if not joint.is_revolute]
     if sliding:
-        wanted = ", ".join(f"{key}: …" for key in keys)
-        text = f"unexpected key, '{sliding[0]}' is a prismatic joint: use start: {{{wanted}}}"
-        yield document.key_complaint((*path, "start_deg"), text)
+        wanted = ", ".join(f"{joint}: …" for joint in keys)
+        text = f"unexpected key, '{sliding[0]}' is a prismatic joint: use {key}: {{{wanted}}}"
+        yield document.key_complaint(as_list, text)
     elif len(given) != len(keys):
         text = f"expected {len(keys)} angles, one per joint ({listed(model.joint_names)}), got {len(given)}"
-        yield document.complaint((*path, "start_deg"), text)
+        yield document.complaint(as_list, text)
 
 
 def _unit_complaints(

@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from cellplan.cache import as_here
 from cellplan.errors import InputError
 from cellplan.geometry.meshes import read_mesh
 from cellplan.geometry.shapes import Mesh
@@ -114,13 +115,13 @@ class _Meshes:
             return None
         try:
             guard = Guard(file=written, worker="the mesh reader")
-            mesh = in_child(partial(read_mesh, scale=MESH_UNITS[unit]), path, guard=guard)
+            mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), path, guard=guard)
         except InputError as error:
             self.complaints.append(self._document.complaint(("bodies", index, "mesh", "file"), str(error)))
             return None
         self.files[written] = path
-        self._read[written, unit] = mesh
-        return mesh
+        self._read[written, unit] = replace(mesh, is_leaky=not mesh.is_closed)
+        return self._read[written, unit]
 
     def known(self, written: str, unit: str, *, index: int) -> Mesh:
         """A mesh that was read before."""

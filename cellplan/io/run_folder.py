@@ -1,44 +1,34 @@
 """Run folder: the files of one run, which appear on disk whole or not at all.
 
-Files are collected in a hidden folder beside the final one, each forced to the disk, and the folder is renamed into
-place at the end. A folder that cellplan did not write is never replaced.
+Files are collected in a hidden folder beside the final one, each forced to the disk, and the folder takes the place of
+an older run at the end: in one step where the system knows how. A folder that cellplan did not write, or that holds
+anything else at any depth, is never replaced.
 """
 
 import errno
-import json
 import os
 import shutil
 from pathlib import Path, PurePosixPath
 from types import TracebackType
 from typing import Self
-from uuid import uuid4
 
 from cellplan.errors import InputError
+from cellplan.io.drafts import hidden_folders, put_right
+from cellplan.io.exchange import exchange
 from cellplan.io.input_files import digest
+from cellplan.io.run_content import (
+    EXPORT,
+    MANIFEST,
+    PROGRAMS,
+    REHEARSAL,
+    foreign_entry,
+    foreign_within,
+    is_run_folder,
+)
+
+__all__ = ["EXPORT", "MANIFEST", "PROGRAMS", "REHEARSAL", "RunFolder", "is_run_folder", "refuse_unless_replaceable"]
 
 NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})  # from file systems that cannot sync folders
-MARK = '"schema": "cellplan.'  # stands in the first lines of every report.json and rehearsal.json
-MARK_WITHIN = 200  # [bytes]
-REPORTS = ("report.json", "rehearsal.json", "export.json")
-REHEARSAL = "rehearsal"  # folder of a rehearsal, inside the run folder of its cell
-PROGRAMS = "programs"  # folder of exported programs, inside the run folder that they were made from
-EXPORT = "export.json"  # what was exported, in the folder that holds it
-MANIFEST = "manifest.json"
-OWN_NAMES = frozenset(
-    {
-        "cell.yaml",
-        MANIFEST,
-        "plots",
-        PROGRAMS,
-        "rehearsal.html",
-        "rejected",
-        "report.html",
-        *REPORTS,
-        "tables",
-        "view.html",
-        ".DS_Store",
-    }
-)
 
 
 class RunFolder:
@@ -56,8 +46,7 @@ class RunFolder:
         """Name the folder; nothing is touched before the ``with`` statement begins."""
         self.path = path
         self.written: dict[str, tuple[int, str]] = {}
-        self._draft = path.parent / f".{path.name}.{uuid4().hex[:12]}.partial"
-        self._aside = self._draft.with_suffix(".replaced")  # where the older run waits for its end
+        self._draft, self._aside = hidden_folders(path)  # aside is where the older run waits for its end
         self._made_parents: list[Path] = []
 
     def __enter__(self) -> Self:
@@ -121,23 +110,42 @@ class RunFolder:
             _remove_empty(self._made_parents)
 
     def _put_into_place(self) -> None:
-        """Rename the older run aside and the new one into place; undo the first when the second fails."""
+        """Let the new run and the older one change places; undo it when the older one holds something foreign.
+
+        Where the system cannot do it in one step, the older run is renamed aside first.
+        """
         refuse_unless_replaceable(self.path)  # again: planning took a while
         for folder in (self._draft, *(path for path in self._draft.rglob("*") if path.is_dir())):
             _sync_folder(folder)
-        try:
-            if self.path.exists():
-                self.path.rename(self._aside)
+        if not self.path.exists():
             self._draft.rename(self.path)
-        except BaseException:
+        elif exchange(self._draft, self.path):
+            foreign = foreign_within(self._draft)
+            if foreign:  # somebody put it there since
+                exchange(self._draft, self.path)
+                raise _holds_foreign(self.path, foreign)
+        else:
+            self._put_aside_first()
+        _sync_folder(self.path.parent)
+
+    def _put_aside_first(self) -> None:
+        """Rename the older run aside and the new one into place; undo the first when the second fails."""
+        try:
+            self.path.rename(self._aside)
+            foreign = foreign_within(self._aside)
+            if not foreign:
+                self._draft.rename(self.path)
+        finally:
             if self._aside.exists() and not self.path.exists():
                 self._aside.rename(self.path)
-            raise
-        _sync_folder(self.path.parent)
+        if foreign:
+            raise _holds_foreign(self.path, foreign)
 
 
 def refuse_unless_replaceable(path: Path) -> None:
     """Refuse a place that cellplan must not write to; call it early, before any long work.
+
+    What processes that were killed left beside it is removed or put back first.
 
     Raises:
         InputError: When the path is a symbolic link, a file, the working folder or a folder with other things in it.
@@ -146,6 +154,7 @@ def refuse_unless_replaceable(path: Path) -> None:
         for link in (path, path.parent):
             if link.is_symlink():
                 raise InputError(f"{path}: output is never written through a symbolic link, and '{link}' is one")
+        put_right(path.parent)
         if not path.exists():
             _refuse_unless_writable(path)
             return
@@ -154,59 +163,11 @@ def refuse_unless_replaceable(path: Path) -> None:
         if Path.cwd().resolve().is_relative_to(path.resolve()):
             raise InputError(f"{path}: the output needs a folder of its own, not the one you are working in")
         _refuse_unless_writable(path)
-        foreign = _foreign_entry(path)
+        foreign = foreign_entry(path)
     except OSError as error:
         raise _cannot_write(path, error) from error
     if foreign:
-        raise InputError(
-            f"{path}: holds '{foreign}', which cellplan did not write; choose another folder or empty this one"
-        )
-
-
-def is_run_folder(path: Path) -> bool:
-    """Whether a folder holds a report that cellplan wrote."""
-    return any(_is_own_report(path / name) for name in REPORTS)
-
-
-def _is_own_report(report: Path) -> bool:
-    """Whether a file is a report that cellplan wrote."""
-    if report.is_symlink() or not report.is_file():
-        return False
-    with report.open("rb") as file:
-        return MARK.encode() in file.read(MARK_WITHIN)
-
-
-def _foreign_entry(path: Path) -> str | None:
-    """The first thing in a folder that is not part of a run; None when the folder is empty or a run.
-
-    A folder that holds nothing but the rehearsal of its cell is to become a run.
-    """
-    entries = sorted(path.iterdir())
-    if entries and not is_run_folder(path):
-        if [entry.name for entry in entries] == [REHEARSAL] and _is_run_entry(entries[0]):
-            return None
-        return entries[0].name
-    own = OWN_NAMES | _exported_names(path / EXPORT)
-    for entry in entries:
-        if entry.is_symlink() or (entry.name not in own and not _is_run_entry(entry)):
-            return entry.name
-    return None
-
-
-def _exported_names(record: Path) -> set[str]:
-    """What stands beside a record of exported programs by the record's own word; nothing when there is none."""
-    if not _is_own_report(record):
-        return set()
-    try:
-        files = json.loads(record.read_bytes())["files"]
-        return {PurePosixPath(name).parts[0] for name in files}
-    except (ValueError, KeyError, TypeError, IndexError, RecursionError):
-        return set()
-
-
-def _is_run_entry(entry: Path) -> bool:
-    """Whether something in a folder is a run folder of its own."""
-    return entry.is_dir() and not entry.is_symlink() and is_run_folder(entry)
+        raise _holds_foreign(path, foreign)
 
 
 def _refuse_unless_writable(path: Path) -> None:
@@ -268,3 +229,9 @@ def _sync_folder(folder: Path) -> None:
 
 def _cannot_write(path: Path, error: OSError) -> InputError:
     return InputError(f"{path}: cannot write the output: {(error.strerror or str(error)).lower()}")
+
+
+def _holds_foreign(path: Path, foreign: str) -> InputError:
+    return InputError(
+        f"{path}: holds '{foreign}', which cellplan did not write; choose another folder or empty this one"
+    )

@@ -73,8 +73,12 @@ def solver_complaints(pieces: Pieces, models: Mapping[str, RobotModel], document
     for index, lock in enumerate(motion.locked_joints if motion else ()):
         path: KeyPath = ("motion", "locked_joints", index)
         yield from _joint(path, lock.robot, lock.joint, pieces=pieces, models=models, document=document)
-        if motion is not None and lock.from_s >= motion.duration_s:
-            text = f"expected an instant before the end at {motion.duration_s:g} s, got {lock.from_s:g}"
+        earlier = [(other.robot, other.joint) for other in (motion.locked_joints if motion else ())[:index]]
+        if (lock.robot, lock.joint) in earlier:
+            yield document.complaint(path, f"expected every joint once, got '{lock.robot}/{lock.joint}' again")
+        clock = None if motion is None else motion.duration_s
+        if clock is not None and lock.from_s >= clock:
+            text = f"expected an instant before the end at {clock:g} s, got {lock.from_s:g}"
             yield document.complaint((*path, "from_s"), text)
     if solver is None:
         return

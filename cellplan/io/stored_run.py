@@ -49,6 +49,21 @@ class StoredRun:
         """Path of a file of one run as messages show it."""
         return str(self.folder / place / name)
 
+    def content(self, place: str, name: str) -> bytes:
+        """Content of a file of one run, which is still as it was written.
+
+        Raises:
+            InputError: It is missing, or was changed meanwhile.
+        """
+        return _content(self.folder, _at(place, name), self.manifest)
+
+    def drawings(self, place: str) -> dict[str, bytes]:
+        """The SVG pictures of one run by file name, in the order of the manifest."""
+        plots = PurePosixPath(_at(place, "plots"))
+        names = [PurePosixPath(name) for name in self.manifest.files]
+        found = [path.name for path in names if path.parent == plots and path.suffix == ".svg"]
+        return {name: self.content(place, f"plots/{name}") for name in found}
+
 
 def read_stored_run(folder: Path) -> StoredRun:
     """Read a run folder and compare every file with the manifest.

@@ -57,7 +57,7 @@ def _clock(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Compl
 
 def _end(task: TaskEntry, path: TimedPath, pieces: Pieces, *, document: YamlDocument, name: str) -> Iterator[Complaint]:
     """A trajectory ends within the common clock."""
-    if pieces.motion is None:
+    if pieces.motion is None or pieces.motion.duration_s is None:
         return
     clock, end = pieces.motion.duration_s, task.begins_s + task.repeat * path.duration + task.leaving_s
     if end > clock * (1.0 + TIME_ROOM):

@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from cellplan.errors import CellplanError
 from cellplan.geometry.transforms import Array
+from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.urdf_bodies import MeshShelf, link_bodies
 from cellplan.io.urdf_document import UrdfDocument, UrdfJoint, read_document
 from cellplan.io.urdf_limits import JointLimits, joint_range
@@ -25,12 +26,14 @@ class UrdfOptions:
         package_dirs: Folders in which ``package://`` names are looked up.
         limits: Limits by joint name; they tighten the URDF's or stand in for missing ones.
         locked: Position in [rad] or [m] of joints that are held still, by name.
+        within: Folders that its meshes must lie in; None for all.
     """
 
     flange: str | None = None
     package_dirs: tuple[Path, ...] = ()
     limits: Mapping[str, JointLimits] = field(default_factory=lambda: MappingProxyType({}))
     locked: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    within: AllowedFolders | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,7 +69,7 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     roles = assign_roles(tree, flange, options.locked)
     _require_known_limits(document, roles, options.limits)
     posture = zero_posture(tree, roles)
-    shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs)
+    shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
     model = RobotModel(
         name=document.name,
         source=path.name,

@@ -1,6 +1,6 @@
 """Link bodies of a URDF: mesh files looked up and read, every collision element turned into one body."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 from urllib.parse import unquote
@@ -8,6 +8,7 @@ from urllib.parse import unquote
 from cellplan.errors import InputError
 from cellplan.geometry.meshes import is_flat, read_mesh
 from cellplan.geometry.shapes import Mesh, Solid
+from cellplan.io.allowed_folders import AllowedFolders
 from cellplan.io.complaints import listed
 from cellplan.io.urdf_document import UrdfLink, UrdfMesh, UrdfSolid
 from cellplan.io.urdf_tree import UrdfTree, ZeroPosture, links_in_order
@@ -24,11 +25,13 @@ class MeshShelf:
     Attributes:
         folder: Folder of the URDF.
         package_dirs: Folders that hold packages (or are one).
+        within: Folders that a mesh must lie in to be looked at; None for all.
         files: Mesh files read so far, in the order of first use.
     """
 
     folder: Path
     package_dirs: tuple[Path, ...]
+    within: AllowedFolders | None = None
     files: list[Path] = field(default_factory=list)
     _read: dict[tuple[Path, tuple[float, float, float]], Mesh] = field(default_factory=dict)
 
@@ -38,13 +41,13 @@ class MeshShelf:
         Raises:
             InputError: It is not found, cannot be read, or is flat.
         """
-        path = find_mesh(wanted.uri, self.folder, package_dirs=self.package_dirs)
+        path = find_mesh(wanted.uri, self.folder, package_dirs=self.package_dirs, within=self.within)
         key = (path, wanted.scale)
         if key not in self._read:
             mesh = read_mesh(path, scale=wanted.scale)
             if is_flat(mesh):
                 raise InputError(f"{path.name}: expected a body with a volume, got a flat one")
-            self._read[key] = mesh
+            self._read[key] = replace(mesh, is_leaky=not mesh.is_closed)
             if path not in self.files:
                 self.files.append(path)
         return self._read[key]
@@ -68,12 +71,12 @@ def link_bodies(tree: UrdfTree, posture: ZeroPosture, shelf: MeshShelf) -> tuple
     return tuple(bodies)
 
 
-def find_mesh(uri: str, folder: Path, *, package_dirs: tuple[Path, ...]) -> Path:
+def find_mesh(uri: str, folder: Path, *, package_dirs: tuple[Path, ...], within: AllowedFolders | None = None) -> Path:
     """File that a mesh name means: ``package://NAME/…``, or relative to the URDF.
 
     ``package://NAME/rest`` is looked up as ``DIR/NAME/rest``, then in a DIR that is itself called NAME, then in the
     folder of the URDF and those above it, in the same two ways. Absolute paths and ``file://`` count only below the
-    URDF's folder or a package folder.
+    URDF's folder or a package folder. Nothing outside the folders ``within`` is even looked for.
 
     Raises:
         InputError: There is no such file; the message names every place that was tried.
@@ -85,9 +88,14 @@ def find_mesh(uri: str, folder: Path, *, package_dirs: tuple[Path, ...]) -> Path
     else:
         tried = [_plain_place(uri, folder, package_dirs=package_dirs)]
         cure = ""
-    found = next((place for place in tried if _is_file(place)), None)
+    inside = [place for place in tried if within is None or within.holds(place)]
+    if tried and not inside:
+        raise InputError(
+            "expected a mesh below the folder of the cell file, got one elsewhere; allow it with --allow-dir"
+        )
+    found = next((place for place in inside if _is_file(place)), None)
     if found is None:
-        raise InputError(f"no such mesh file, tried {listed(str(place) for place in tried)}{cure}")
+        raise InputError(f"no such mesh file, tried {listed(str(place) for place in inside)}{cure}")
     return found
 
 

@@ -17,7 +17,7 @@ from cellplan.io.urdf_xml import Element, origin_of, read_xml
 MAX_LINKS: Final = 200
 MAX_MOVABLE: Final = 64
 MAX_SIZE: Final = 20.0  # [m] larger bodies are slips of the unit
-NAME: Final = re.compile(r"[^\x00-\x1f\x7f-\x9f,\"'#<>&;\\]{1,80}")  # safe in tables, reports and messages
+NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,39}")  # the same everywhere: safe in tables and file names
 MOVABLE: Final = ("revolute", "continuous", "prismatic")
 REFUSED: Final = ("floating", "planar")
 LINK_CHILDREN: Final = ("inertial", "visual", "collision")
@@ -159,10 +159,10 @@ def _require_nothing_hidden(root: Element, links: dict[str, UrdfLink], joints: d
 
 
 def _name(element: Element) -> str:
-    """Name of a link or joint."""
+    """Name of a link, a joint or the robot."""
     name = element.text("name", element.tag)
     if not NAME.fullmatch(name):
-        what = "a name of up to 80 characters without quotes, commas and the like"
+        what = "a name of 1 to 40 letters, digits, '_' or '-' that does not start with '-'"
         raise element.error(f"{element.tag}: expected {what}, got {shown(name)}")
     return name
 

@@ -16,6 +16,7 @@ from cellplan.io.input_files import read_regular_file
 
 MAX_BYTES: Final = 5_000_000
 MAX_DEPTH: Final = 64  # nesting of elements: a URDF needs seven
+MAX_TURN: Final = 4.0 * np.pi  # [rad] larger angles of a frame are slips of the unit
 MAX_OFFSET: Final = 20.0  # [m] longer steps between frames are slips of the unit
 
 
@@ -98,7 +99,11 @@ def origin_of(element: Element, owner: str) -> Array:
     if np.linalg.norm(xyz) > MAX_OFFSET:
         far = float(np.linalg.norm(xyz))
         raise origin.error(f"{owner}: expected an origin within {MAX_OFFSET:g} m, got {far:.6g} m: is the unit mm?")
-    return pose(xyz, origin.numbers("rpy", 3, owner=owner, default=(0.0, 0.0, 0.0)))
+    rpy = origin.numbers("rpy", 3, owner=owner, default=(0.0, 0.0, 0.0))
+    if np.max(np.abs(rpy)) > MAX_TURN:
+        most = f"angles of at most two turns ({MAX_TURN:.4g} rad)"
+        raise origin.error(f"{owner}: expected {most}, got {shown(origin.attributes['rpy'])}: is the unit deg?")
+    return pose(xyz, rpy)
 
 
 class _Builder:

@@ -69,6 +69,7 @@ class Robot:
         tool: What it carries.
         start: Start posture in [rad] or [m], shape (n,); None when it is to be found.
         weights: Joint weights, positive, shape (n,): a larger one moves that joint less.
+        home: Where it stands while it is idle in [rad] or [m], shape (n,); None when that is to be found.
     """
 
     name: str
@@ -77,6 +78,7 @@ class Robot:
     tool: Tool
     start: Array | None
     weights: Array
+    home: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -161,14 +163,14 @@ class MotionSettings:
 
     Attributes:
         mode: Who moves.
-        duration: Length of the common clock in [s].
+        duration: Length of the common clock in [s]; None when it ends with the last task.
         step: Time between two instants in [s].
         cyclic: Whether all joints are to end where they started.
         locked: Joints that fail on the way.
     """
 
     mode: Mode
-    duration: float
+    duration: float | None
     step: float
     cyclic: bool = False
     locked: tuple[LockedJoint, ...] = ()
@@ -263,6 +265,11 @@ class Cell:
                 return slice(first, last)
             first = last
         raise KeyError(robot)
+
+    def joint_at(self, column: int) -> tuple[str, str]:
+        """Names of the robot and of its joint at a place in the stacked joint vector."""
+        names = [(robot.name, joint) for robot in self.robots for joint in robot.model.joint_names]
+        return names[column]
 
     @property
     def joint_count(self) -> int:

@@ -53,6 +53,31 @@ class Schedule:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class NearestSingular:
+    """The robot that is nearest to a singular configuration.
+
+    Attributes:
+        robot: Its name.
+        task: Name of its task or grasp.
+        smallest: Smallest singular value of its own Jacobian in the rows that the task constrains.
+        stack: Smallest singular value of the Jacobian of all robots and tasks together.
+    """
+
+    robot: str
+    task: str
+    smallest: float
+    stack: float
+
+    @property
+    def words(self) -> str:
+        """The same as the end of a sentence."""
+        return (
+            f"nearest to a singular configuration is '{self.robot}' on '{self.task}': smallest singular value "
+            f"{self.smallest:.2g}, of all robots together {self.stack:.2g}"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Resolution:
     """How finely a motion was resolved, and what that took.
 
@@ -65,6 +90,7 @@ class Resolution:
         error_between: Bound of the tool error at the nodes and between them, in [m] or [rad]; None when nobody looked,
             as with Euler's steps.
         euler_from: Instant in [s] from which on Euler's steps had to be taken; None when they never had to.
+        lost: The robot that is nearest to a singular configuration at that instant; None when none is.
     """
 
     integrator: Integrator
@@ -74,6 +100,7 @@ class Resolution:
     solves: int
     error_between: float | None = None
     euler_from: float | None = None
+    lost: NearestSingular | None = None
 
     def __post_init__(self) -> None:
         """Check at the door that every figure is one."""

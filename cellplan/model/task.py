@@ -173,7 +173,8 @@ class Task:
         is_spin_free: Whether rotation about the tool's own axis is left open.
         tolerance: Largest allowed error.
         start: Start of the path on the common clock in [s]; an approach ends then.
-        duration: Time for the whole path in [s], all cycles together; None when the feed or a trajectory decides.
+        duration: Time for the whole path in [s], all cycles together; None when the feed, a trajectory or the common
+            clock decides.
         feed: Largest speed along the path on the surface in [m/s]; None when the duration decides.
         time_law: Law of each stretch between stops.
         blend: Corner rounding distance in [m]; None means that the tool stops at every corner.
@@ -207,6 +208,21 @@ class Task:
     approach: StraightMove | None = None
     retract: StraightMove | None = None
     relative_to: Frame = Frame.PART
+
+    @property
+    def leaving(self) -> float:
+        """Time in [s] after the end of the path that a retreat takes."""
+        return self.retract.duration if self.retract else 0.0
+
+    def time_for_path(self, clock: float | None) -> float | None:
+        """Time for the whole path in [s]: its own, or what the common clock leaves; None when neither is given.
+
+        Args:
+            clock: Length of the common clock in [s]; None when the clock follows the tasks.
+        """
+        if self.duration is not None or self.feed is not None or isinstance(self.path, TimedPath):
+            return self.duration
+        return None if clock is None else clock - self.start - self.leaving
 
     @property
     def judged_from(self) -> float:

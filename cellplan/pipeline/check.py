@@ -4,15 +4,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cellplan.checks.mounting import check_mounting
+from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOut
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
 from cellplan.pipeline.solve import with_start
 from cellplan.planning.given_starts import examine_given_starts
+from cellplan.planning.modes import plan_runs, standing
+from cellplan.planning.run_pairs import present_pairs
 from cellplan.planning.schedule import examine_times
-from cellplan.planning.start_search import find_start
+from cellplan.planning.start_search import choose_start
 from cellplan.planning.toolpaths import build_toolpath
+from cellplan.scene.of_run import scene_of_run
 from cellplan.scene.scene import Scene
 
 
@@ -23,6 +27,7 @@ class CellCheck:
     Attributes:
         cell: The cell with every start posture filled in.
         found: Names of the robots whose start posture was searched for.
+        choice: How the start was chosen, in words; None when all of it was given.
         path_lengths: Length of each task's path on the surface in [m].
         checks: The verified statements.
         left_out: What was not judged in full, but for two links of one robot's file.
@@ -30,6 +35,7 @@ class CellCheck:
 
     cell: Cell
     found: tuple[str, ...]
+    choice: str | None
     path_lengths: Mapping[str, float]
     checks: tuple[Check, ...]
     left_out: tuple[LeftOut, ...]
@@ -51,8 +57,9 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
     examine_times(cell, tuple(toolpaths.values()))
     examine_given_starts(cell, toolpaths)
-    start = find_start(scene, toolpaths, progress=progress)
-    pair = scene.touching(start)
+    choice = choose_start(scene, toolpaths, progress=progress)
+    start = choice.start
+    pair = _touching_at_start(scene, start)
     found = tuple(robot.name for robot in cell.robots if robot.start is None)
     words = "nothing touches at the start" if pair is None else f"'{pair[0]}' touches '{pair[1]}' at the start"
     at_start = Check(
@@ -68,7 +75,18 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
     return CellCheck(
         cell=with_start(cell, start),
         found=found,
+        choice=choice.words,
         path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
         checks=(at_start, *check_mounting(scene, start[None])),
         left_out=scene.left_out,
     )
+
+
+def _touching_at_start(scene: Scene, start: Array) -> tuple[str, str] | None:
+    """The first two bodies that touch at the start of a run; idle robots stand at their homes, as far as known."""
+    for plan in plan_runs(scene.cell):
+        of_run = scene_of_run(scene, plan.tasks)
+        pair = of_run.touching(standing(scene.cell, plan, start), among=present_pairs(of_run, plan))
+        if pair is not None:
+            return pair
+    return None

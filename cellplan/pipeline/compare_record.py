@@ -6,10 +6,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from cellplan.pipeline.same_words import is_same
+
 Record = Mapping[str, Any]
 
-RELATIVE: Final = 1e-6  # [-] figures have seven digits at least
-ABSOLUTE: Final = 1e-7  # [-] in printed units; below it stands the noise of the arithmetic
+INSTANT: Final = "at_s"  # ends the names of instants
+WORDS: Final = frozenset({"message", "pair", "axis", "joint", "sliding_joint", "busiest_joint"})
 COMPARED_ELSEWHERE: Final = frozenset({"inputs", "versions", "digests"})
 KNOWN_TO_THE_PLANNER: Final = frozenset(  # what the planner's steps and nodes took cannot be seen in the tables
     {
@@ -20,19 +22,18 @@ KNOWN_TO_THE_PLANNER: Final = frozenset(  # what the planner's steps and nodes t
         ("series", "slack"),
     }
 )
-INSTANT: Final = "at_s"  # ends the names of instants; of two extremes that are alike, the noise picks one
-WORDS: Final = frozenset({"message", "pair", "axis", "joint", "sliding_joint", "busiest_joint"})  # likewise of words
 
 
 def differences(said: Record, found: Record, *, same_program: bool) -> Iterator[tuple[str, Any, Any]]:
     """Key paths at which a report differs from what was found, with both values.
 
-    Figures are the same when they agree to seven digits. Instants, and words that go with them, are not compared.
+    Figures are the same when they agree to seven digits, words when they do so with the figures in them.
 
     Args:
         said: The report on disk.
         found: What was computed from the tables.
-        same_program: Whether both were made by the same version of cellplan, so that they must have the same keys.
+        same_program: Whether both were made by the same version of cellplan, so that they must have the same keys and
+            the same words; between versions only the figures of common keys are compared.
     """
     yield from _compare(said, found, (), same_program=same_program)
 
@@ -41,7 +42,7 @@ def _compare(said: Any, found: Any, path: tuple[str, ...], *, same_program: bool
     if isinstance(found, Mapping) and isinstance(said, Mapping):
         keys = dict.fromkeys([*found, *said]) if same_program else [key for key in found if key in said]
         for key in keys:
-            if _is_left_out(path, key):
+            if _is_left_out(path, key) or (not same_program and _is_of_a_tie(key)):
                 continue
             if key not in said or key not in found:
                 yield ".".join((*path, key)), said.get(key, "nothing"), found.get(key, "nothing")
@@ -52,23 +53,18 @@ def _compare(said: Any, found: Any, path: tuple[str, ...], *, same_program: bool
     elif isinstance(found, list) and isinstance(said, list) and len(found) == len(said):
         for index, (left, right) in enumerate(zip(said, found, strict=True)):
             yield from _compare(left, right, (*path[:-1], f"{path[-1]}[{index}]"), same_program=same_program)
-    elif not _is_same(said, found):
+    elif not is_same(said, found):
         yield ".".join(path), said, found
 
 
 def _is_left_out(path: tuple[str, ...], key: str) -> bool:
     """Whether a key is not compared here."""
-    if not path and key in COMPARED_ELSEWHERE:
-        return True
-    return (*path, key) in KNOWN_TO_THE_PLANNER or key.endswith(INSTANT) or key in WORDS
+    return (not path and key in COMPARED_ELSEWHERE) or (*path, key) in KNOWN_TO_THE_PLANNER
 
 
-def _is_same(said: Any, found: Any) -> bool:
-    """Whether two single values are the same up to rounding; a number is never the same as a word."""
-    are_numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (said, found))
-    if are_numbers:
-        return math.isclose(said, found, rel_tol=RELATIVE, abs_tol=ABSOLUTE)
-    return type(said) is type(found) and bool(said == found)
+def _is_of_a_tie(key: str) -> bool:
+    """Whether a key says when or where an extreme is: another version may choose another one of two that are alike."""
+    return key.endswith(INSTANT) or key in WORDS
 
 
 def _compare_series(said: Any, found: np.ndarray[Any, Any], key: str) -> Iterator[tuple[str, Any, Any]]:
@@ -77,7 +73,7 @@ def _compare_series(said: Any, found: np.ndarray[Any, Any], key: str) -> Iterato
         yield key, said, f"a list of {len(found)}"
         return
     expected = [value if math.isfinite(value) else None for value in found.tolist()]
-    other = (i for i, pair in enumerate(zip(said, expected, strict=True)) if not _is_same(*pair))
+    other = (i for i, pair in enumerate(zip(said, expected, strict=True)) if not is_same(*pair))
     first = next(other, None)
     if first is not None:
         yield f"{key}[{first}]", said[first], expected[first]

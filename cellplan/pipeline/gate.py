@@ -7,22 +7,26 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.cache import nothing_kept
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.io.complaints import listed, shown
-from cellplan.io.stored_run import StoredRun, read_stored_run
+from cellplan.io.stored_run import CELL, StoredRun, read_stored_run
 from cellplan.io.tables import TableHeader, parse_header, parse_table, program_digest, table_body
 from cellplan.model.cell import Cell
+from cellplan.model.idle import not_in_program
 from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.model.verified_run import SEAL, VerifiedMotion, VerifiedRun
+from cellplan.pipeline.compare_page import other_pictures, page_complaints
 from cellplan.pipeline.compare_record import differences
 from cellplan.pipeline.stored_cell import load_stored_cell
 from cellplan.pipeline.write_run import versions
-from cellplan.planning.modes import RunPlan, plan_runs
+from cellplan.planning.modes import RunPlan, homeless, plan_runs
 from cellplan.planning.schedule import schedule_tasks
 from cellplan.planning.toolpaths import build_toolpath
+from cellplan.report.idle_record import missing_moves
 from cellplan.report.json_report import run_record, summary_record
 from cellplan.report.record import Provenance, Record
 from cellplan.report.series import series
@@ -50,15 +54,23 @@ def open_gate(
         InputError: The folder is not a whole, unchanged run, or an input has changed.
         NotVerifiedError: The run failed, or a check fails now.
     """
+    with nothing_kept():  # a proof rests on the files themselves
+        return _opened(folder, cell=cell, allow_dirs=allow_dirs, progress=progress)
+
+
+def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], progress: Progress) -> VerifiedRun:
+    """The run, once everything in it was found to be true."""
     stored = read_stored_run(folder)
     _refuse_failed(stored)
     source = load_stored_cell(stored, cell=cell, allow_dirs=allow_dirs)
     scene = Scene.from_cell(source.cell)
-    motions = tuple(_verified(scene, stored, plan, progress=progress) for plan in _plans(source.cell, stored))
+    plans = _plans(source.cell, stored)
+    motions = tuple(_verified(scene, stored, plan, progress=progress) for plan in plans)
     _refuse_failing(stored, motions)
-    for motion in motions:
-        _refuse_other_start(stored, motion.name or "", source.cell, tables=motion.tables)
+    for plan, motion in zip(plans, motions, strict=True):
+        _refuse_other_start(stored, plan, source.cell, tables=motion.tables)
     _refuse_other_report(stored, source.cell, motions)
+    of_pages = _refuse_other_pages(stored, source.cell, motions)
     return VerifiedRun(
         folder=folder,
         digest=stored.digest,
@@ -66,7 +78,12 @@ def open_gate(
         motions=motions,
         file_count=len(stored.manifest.files),
         inputs_compared=source.compared,
-        remarks=(*source.remarks, *_other_versions(stored)),
+        remarks=(
+            *source.remarks,
+            *_other_versions(stored),
+            *of_pages,
+            *missing_moves(source.cell, {plan.name: plan.tasks for plan in plans}),
+        ),
         seal=SEAL,
     )
 
@@ -89,6 +106,12 @@ def _plans(cell: Cell, stored: StoredRun) -> tuple[RunPlan, ...]:
     if tasks != every and (len(tasks) != 1 or tasks[0] not in every):
         raise InputError(f"{file}: tasks: expected {listed(every)} or one of them, got {listed(map(str, tasks))}")
     plans = plan_runs(cell, only=None if tasks == every else tasks[0])
+    unknown = sorted({name for plan in plans for name in homeless(cell, plan)})
+    if unknown:
+        raise InputError(
+            f"{stored.file('', CELL)}: robots: expected the home of every idle robot written out, got auto for "
+            f"{listed(unknown)}"
+        )
     places = [plan.name or "" for plan in plans]
     if places != list(stored.records):
         raise InputError(f"{file}: expected the runs of the mode {cell.motion.mode}, got {listed(stored.records)}")
@@ -99,14 +122,15 @@ def _verified(scene: Scene, stored: StoredRun, plan: RunPlan, *, progress: Progr
     """Read the tables of one run back and make all checks again."""
     cell, place = scene.cell, plan.name or ""
     schedule = schedule_tasks(cell, [build_toolpath(cell.task(name), cell.part, cell.origin) for name in plan.tasks])
-    tables = _tables(cell, stored, place)
+    tables = _tables(cell, stored, plan)
     _refuse_other_clock(stored, place, schedule, tables=tables)
     report = verify(scene, schedule, list(tables.values()), moving=plan.moving, progress=progress)
     return VerifiedMotion(name=plan.name, moving=plan.moving, schedule=schedule, tables=tables, report=report)
 
 
-def _tables(cell: Cell, stored: StoredRun, place: str) -> dict[str, JointTable]:
+def _tables(cell: Cell, stored: StoredRun, plan: RunPlan) -> dict[str, JointTable]:
     """The joint tables of one run, each under the header it must have."""
+    place = plan.name or ""
     texts = stored.tables[place]
     names = [robot.name for robot in cell.robots]
     if sorted(texts) != sorted(names):
@@ -120,6 +144,7 @@ def _tables(cell: Cell, stored: StoredRun, place: str) -> dict[str, JointTable]:
         mode=str(cell.motion.mode),
         verdict="passed",
         digests={"cell": manifest.inputs[manifest.cell_file], "program": program},
+        remark=not_in_program(cell, plan.tasks),
     )
     found = {}
     for name, text in texts.items():
@@ -163,11 +188,12 @@ def _refuse_other_clock(stored: StoredRun, place: str, schedule: Schedule, *, ta
             raise InputError(f"{file}:{line}: time_s: expected {wanted!r} as the cell's clock has, got {got!r}")
 
 
-def _refuse_other_start(stored: StoredRun, place: str, cell: Cell, *, tables: Mapping[str, JointTable]) -> None:
-    """Refuse a table that does not begin at the start posture of the cell."""
+def _refuse_other_start(stored: StoredRun, plan: RunPlan, cell: Cell, *, tables: Mapping[str, JointTable]) -> None:
+    """Refuse a table that does not begin at the start posture of the cell; those of idle robots were checked."""
+    place = plan.name or ""
     for robot in cell.robots:
         off = np.abs(tables[robot.name].q[0] - robot.start)
-        if not np.all(off <= START_ROOM):
+        if robot.name not in plan.idle and not np.all(off <= START_ROOM):
             joint = robot.model.joint_names[int(np.argmax(off))]
             file = stored.file(place, f"tables/{robot.name}.csv")
             line = _line(stored.tables[place][robot.name], 0)
@@ -215,16 +241,38 @@ def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[Verifi
         said[""] = stored.record
         reports = {str(motion.name): motion.report for motion in motions}
         found[""] = summary_record(reports, cell=cell, provenance=provenance)
-    is_same = stored.manifest.versions.get("cellplan") == versions()["cellplan"]
+    is_same = _is_of_this_version(stored)
     complaints = []
     for place, record in said.items():
         complaints += [
             f"{stored.file(place, 'report.json')}: {key}: {shown(old)} stands there, {shown(new)} was found"
             for key, old, new in differences(record, found[place], same_program=is_same)
         ]
+    _refuse_because(stored, complaints)
+
+
+def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> tuple[str, ...]:
+    """Refuse pages that say something else than was found; remarks about what may be rounding or another version."""
+    if not _is_of_this_version(stored):
+        return ("the page and the words of the report were not compared: another version of cellplan wrote them",)
+    _refuse_because(stored, list(page_complaints(stored, cell, motions)))
+    other = list(other_pictures(stored, cell, motions))
+    told = f"drawn here, some pictures look different, by rounding or by hand: {listed(other)}"
+    return (told,) if other else ()
+
+
+def _is_of_this_version(stored: StoredRun) -> bool:
+    """Whether this version of cellplan says of itself that it made the run."""
+    return stored.manifest.versions.get("cellplan") == versions()["cellplan"]
+
+
+def _refuse_because(stored: StoredRun, complaints: Sequence[str]) -> None:
+    """Refuse a run when there are complaints about its files, of which the first are told."""
     if complaints:
         more = len(complaints) - MOST_DIFFERENCES
-        told = complaints[:MOST_DIFFERENCES] + ([f"{stored.folder}: and {more} more differences"] if more > 0 else [])
+        told = list(complaints[:MOST_DIFFERENCES]) + (
+            [f"{stored.folder}: and {more} more differences"] if more > 0 else []
+        )
         raise InvalidFileError([InputError(complaint) for complaint in told])
 
 

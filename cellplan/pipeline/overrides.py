@@ -11,7 +11,7 @@ from cellplan.model.cell_errors import CellErrors
 from cellplan.model.solver import ACCURATE_METHODS, NULL_SPACE_METHODS, Integrator, MethodName
 
 FARTHEST_MM = 10_000.0  # as in the cell file
-SHORTEST = 1e-3  # [s] shorter cycles are slips of the pen
+LONGEST = 1e6  # [s] as in the cell file
 
 
 def with_overrides(
@@ -30,7 +30,7 @@ def with_overrides(
         mode: Who moves.
         method: Resolution method. A cell that does not name its integrator takes the one that goes with the method.
         integrator: How joint speeds become positions.
-        duration: Length of the common clock in [s], for tasks without a time or feed of their own.
+        duration: Length of the common clock in [s]: the same as ``motion.duration_s`` in the cell file.
         clearance_mm: Smallest allowed distance in [mm] between things that must not touch.
 
     Raises:
@@ -129,18 +129,13 @@ def _with_fitting_integrator(cell: Cell) -> Cell:
 
 
 def _with_duration(cell: Cell, duration: float) -> Cell:
-    """The cell on a clock of another length; tasks that filled the old clock fill the new one."""
-    if not SHORTEST <= duration < float("inf"):
-        raise InputError(f"--duration: expected a number of seconds of at least {SHORTEST:g}, got {duration:g}")
-    old = cell.motion.duration
-    tasks = []
-    for task in cell.tasks:
-        around = task.start + (task.retract.duration if task.retract else 0.0)
-        fills_clock = task.duration is not None and abs(around + task.duration - old) <= 1e-9 * old
-        if fills_clock and around >= duration:
-            raise InputError(f"--duration: task '{task.name}' starts at {task.start:g} s, after {duration:g} s")
-        tasks.append(replace(task, duration=duration - around) if fills_clock else task)
-    return replace(cell, tasks=tuple(tasks), motion=replace(cell.motion, duration=duration))
+    """The cell on a clock of another length, as if the cell file gave it as ``motion.duration_s``."""
+    step = cell.motion.step
+    if not step <= duration <= LONGEST:
+        raise InputError(
+            f"--duration: expected a number of seconds from {step:g} (motion.step_s) to {LONGEST:g}, got {duration:g}"
+        )
+    return replace(cell, motion=replace(cell.motion, duration=duration))
 
 
 def _known(option: str, given: str, allowed: Iterable[str]) -> str:

@@ -35,10 +35,12 @@ class Solution:
     Attributes:
         cell: The cell that was solved, with every start posture filled in.
         runs: One run, or one per task in the pairwise mode.
+        remark: What to know of the start that was chosen when no trial of one was without fault.
     """
 
     cell: Cell
     runs: tuple[Run, ...]
+    remark: str | None = None
 
     @property
     def passed(self) -> bool:

@@ -15,7 +15,7 @@ from cellplan.io.stored_run import CELL, StoredRun
 from cellplan.model.cell import Cell
 
 ANY: Final = "*"
-FOUND: Final = frozenset({"start", "start_deg"})  # written ``auto`` in a cell whose start was to be found
+FOUND: Final = frozenset({"start", "start_deg", "home", "home_deg"})  # written ``auto`` where they were to be found
 METHOD: Final = ("solver", "method")
 INTEGRATOR: Final = ("solver", "integrator")
 ASKED: Final = (  # what the command line may have chosen instead of the cell file
@@ -23,7 +23,6 @@ ASKED: Final = (  # what the command line may have chosen instead of the cell fi
     ("motion", "duration_s"),
     METHOD,
     INTEGRATOR,
-    ("tasks", ANY, "duration_s"),
 )
 
 

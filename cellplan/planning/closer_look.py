@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
+from cellplan.model.name_order import NameOrder
 from cellplan.model.progress import Progress, silent
 from cellplan.planning.accurate.accurate_run import AccurateRun
 from cellplan.planning.resolve import resolve
@@ -33,15 +34,22 @@ def resolve_closely(
     show more than is allowed, it becomes an end of panels, and the run is resolved again. What the motion says of the
     error between its nodes holds for these instants as well.
 
+    Robots and tasks are resolved in the order of their names, so that the order in which a file lists them changes
+    nothing, not even where a search goes from joint to joint.
+
     The arguments and errors are those of `resolve`.
     """
+    order = NameOrder.of(cell)
+    cell, start = order.cell, order.sorted(start)
+    timed = replace(timed, paths=tuple(sorted(timed.paths, key=lambda path: path.task.name)))
+    schedule = replace(schedule, tasks=tuple(sorted(schedule.tasks, key=lambda each: each.task.name)))
     for _ in range(LOOKS):
         motion = resolve(cell, timed, schedule, start=start, moving=moving, progress=progress)
         seen, closer = _looked_at(motion, cell, timed, schedule, moving=moving)
         if not len(closer):
             break
         timed = replace(timed, looked_at=distinct(np.concatenate([timed.looked_at, closer])))
-    return seen
+    return replace(seen, q=order.as_listed(seen.q))
 
 
 def _looked_at(

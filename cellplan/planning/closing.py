@@ -9,6 +9,7 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Grasp, Relation
 from cellplan.model.motion import Schedule
+from cellplan.planning.singularity import singular_words
 from cellplan.planning.tracking_problem import TrackingProblem
 
 CLOSED: Final = 1e-9  # [rad] or [m] of drift in the null space per cycle that counts as none
@@ -96,10 +97,12 @@ def closing_drift(
         gained = found - drift
         B += np.outer(change - B @ gained, change @ B) / (change @ B @ gained)
         u, drift = u + change, found
+    left = np.abs(N @ drift)
+    robot, joint = problem.cell.joint_at(int(np.argmax(left)))
     raise NoSolutionError(
-        f"{problem.cell.origin.at('motion.cyclic')}: the joint motion does not close, a joint is still "
-        f"{np.degrees(np.max(np.abs(drift))):.3g} deg away after {ROUNDS} tries; another start posture may help, or "
-        "no goal that keeps off obstacles"
+        f"{problem.cell.origin.at('motion.cyclic')}: the joint motion does not close, joint '{joint}' of '{robot}' is "
+        f"still {np.degrees(left.max(initial=0.0)):.3g} deg away after {ROUNDS} tries"
+        f"{singular_words(problem, instant, start)}; another start may help, or no goal that keeps off obstacles"
     )
 
 

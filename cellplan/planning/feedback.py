@@ -10,14 +10,15 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.errors import DivergedError, NoSolutionError
+from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_exp, rotation_vector
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.task import Task
 from cellplan.planning.cooperation import pose_errors, reference_frames
-from cellplan.planning.follow import LARGEST_STEP, follow
+from cellplan.planning.follow import follow, refuse_leap
 from cellplan.planning.methods import method_named
+from cellplan.planning.singularity import singular_words
 from cellplan.planning.tracking_problem import TrackingProblem
 
 SETTLING_STEPS: Final = 60  # Newton steps from one start posture to the next; a few are enough away from singularities
@@ -123,11 +124,12 @@ def follow_measured(cell: Cell, wanted: Schedule, *, start: Array, moving: Seque
             seen, told = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
             problem.wanted[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=told)
         try:
-            q[k + 1] = advance(k, q[k]).q
+            step = advance(k, q[k])
+            refuse_leap(cell, q[k], step)
         except NoSolutionError as error:
-            raise type(error)(f"{cell.origin.at('motion')}: at {wanted.times[k]:.3f} s {error}") from None
-        if not np.max(np.abs(q[k + 1] - q[k])) < LARGEST_STEP:
-            raise DivergedError(f"{cell.origin.at('motion')}: at {wanted.times[k]:.3f} s a joint leaps")
+            singular = singular_words(problem, k, q[k])
+            raise type(error)(f"{cell.origin.at('motion')}: at {wanted.times[k]:.3f} s {error}{singular}") from None
+        q[k + 1] = step.q
     return Motion(times=wanted.times, q=q)
 
 

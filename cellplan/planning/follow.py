@@ -12,6 +12,7 @@ from cellplan.model.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.planning.closing import close
 from cellplan.planning.methods import method_named
+from cellplan.planning.singularity import singular_words
 from cellplan.planning.tracking_problem import Advance, TrackingProblem
 
 TOLD_EVERY: Final = 200  # [samples] between two words on progress
@@ -56,20 +57,26 @@ def carry(problem: TrackingProblem, start: Array, *, first: int = 0, last: int, 
     for k in range(first, last):
         try:
             step = advance(k, q[k])
-            _refuse_leap(q[k], step)
+            refuse_leap(cell, q[k], step)
         except NoSolutionError as error:
-            raise type(error)(f"{cell.origin.at('motion')}: at {problem.times[k]:.3f} s {error}") from None
+            singular = singular_words(problem, k, q[k])
+            raise type(error)(f"{cell.origin.at('motion')}: at {problem.times[k]:.3f} s {error}{singular}") from None
         q[k + 1], iterations[k], slack[k] = step.q, step.iterations, step.slack
         if k % TOLD_EVERY == 0:
             progress("planning", k / len(q))
     return Motion(times=problem.times[: last + 1], q=q, iterations=iterations, slack=slack)
 
 
-def _refuse_leap(q: Array, step: Advance) -> None:
-    """Stop when a step is no number, or so long that the first order says nothing about it any more."""
-    longest = float(np.max(np.abs(step.q - q), initial=0.0))
-    if not longest < LARGEST_STEP:  # also for what is not a number
+def refuse_leap(cell: Cell, q: Array, step: Advance) -> None:
+    """Stop when a step is no number, or so long that the first order says nothing about it any more.
+
+    Raises:
+        DivergedError: A joint would turn by half a turn, or slide as many metres, in one step.
+    """
+    moves = np.abs(step.q - q)
+    if not float(np.max(moves, initial=0.0)) < LARGEST_STEP:  # also for what is not a number
+        robot, joint = cell.joint_at(int(np.argmax(np.where(np.isfinite(moves), moves, np.inf))))
         raise DivergedError(
-            "a joint would leap by half a turn or more in one step: shorten motion.step_s, lower the gain or allow "
-            "damping (auto)"
+            f"joint '{joint}' of '{robot}' would leap by half a turn or more in one step: shorten motion.step_s, lower "
+            "the gain or allow damping (auto)"
         )

@@ -1,10 +1,11 @@
 """Start postures given in the cell are examined before anything is solved: within limits, tool on the task's start."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from cellplan.errors import (
+    HomeOutsideLimitsError,
     InputError,
     InvalidFileError,
     StartOffGraspError,
@@ -26,22 +27,32 @@ def start_place(cell: Cell, robot: Robot) -> str:
     return cell.origin.at(by_joint if by_joint in cell.origin.lines else as_list)
 
 
+def home_key(robot: Robot) -> str:
+    """Key of a robot's home: a list of angles, or a mapping where a joint slides."""
+    return "home_deg" if all(joint.is_revolute for joint in robot.model.joints) else "home"
+
+
+def home_place(cell: Cell, robot: Robot) -> str:
+    """Where a robot's home stands in the cell file, or would stand."""
+    by_joint = f"robots.{robot.name}.home"
+    return cell.origin.at(by_joint if by_joint in cell.origin.lines else f"robots.{robot.name}.{home_key(robot)}")
+
+
 def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
-    """Refuse start postures that no solve could be right with.
+    """Refuse start postures and homes that no solve could be right with.
 
     Args:
-        cell: The cell; starts that are to be found are passed over.
+        cell: The cell; starts and homes that are to be found are passed over.
         toolpaths: Toolpath of every task, by task name.
 
     Raises:
         StartOutsideLimitsError: A joint starts outside its limits.
+        HomeOutsideLimitsError: A joint is outside its limits at home.
         StartOffGraspError: A further holder's tool is not where it holds the part.
         StartOffTaskError: A tool does not start on its task.
         InvalidFileError: More than one of these.
     """
-    complaints: list[InputError] = [
-        complaint for robot in cell.robots if robot.start is not None for complaint in _outside(cell, robot)
-    ]
+    complaints: list[InputError] = [complaint for robot in cell.robots for complaint in _outside(cell, robot)]
     if not complaints:
         complaints += [complaint for grasp in cell.closures for complaint in _off_grasp(cell, grasp)]
         complaints += [complaint for task in cell.tasks for complaint in _off_task(cell, task, toolpaths[task.name])]
@@ -63,19 +74,77 @@ def part_pose(cell: Cell, holder_start: Array | None) -> Array | None:
     return pose
 
 
+def tool_distance(
+    chain: ScrewChain, relation: Relation, q: Array, X_PT_wanted: Array, *, X_WR: Array
+) -> tuple[float, float]:
+    """How far a configuration, shape (n,), puts a tool from where it is wanted, in [m] and [rad].
+
+    Args:
+        chain: The robot.
+        relation: The task or grasp, which says which components of the pose count.
+        q: The configuration.
+        X_PT_wanted: Wanted tool tip, shape (4, 4), in the frame that the relation refers to.
+        X_WR: That frame in the world, shape (4, 4).
+    """
+    X_PT, wanted = inverse(X_WR) @ chain.tool_poses(q[None]), X_PT_wanted[None]
+    rows = constraint_rows(relation, wanted)[0]
+    error = rows.T @ (rows @ pose_errors(wanted, X_PT, [relation.is_spin_free])[0])
+    return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
+
+
+def is_off(cell: Cell, relation: Relation, off: tuple[float, float]) -> bool:
+    """Whether a tool is farther, in [m] or [rad], from where it is wanted at the start than is allowed."""
+    position, orientation = _allowed(cell, relation)
+    return off[0] > position or off[1] > orientation
+
+
+def off_words(cell: Cell, relation: Relation, off: tuple[float, float], *, at_best: str = "") -> str:
+    """One line on a given start that is off its task or its grasp, in [m] and [rad].
+
+    Args:
+        cell: The cell.
+        relation: The task or grasp.
+        off: Distance and angle.
+        at_best: Words before them where they are the smallest of several.
+    """
+    goal = f"the start of task '{relation.name}'"
+    if isinstance(relation, Grasp):
+        goal = f"its grasp on the part that '{cell.positioners[0]}' carries"
+    position, orientation = _allowed(cell, relation)
+    return (
+        f"{start_place(cell, cell.robot(relation.robot))}: the tool of '{relation.robot}' is {at_best}"
+        f"{1e3 * off[0]:.3f} mm and {np.degrees(off[1]):.4f} deg from {goal}, allowed are {1e3 * position:g} mm and "
+        f"{np.degrees(orientation):g} deg; `auto` finds a configuration"
+    )
+
+
+def _allowed(cell: Cell, relation: Relation) -> tuple[float, float]:
+    """Largest distance in [m] and angle in [rad] of a given start from its task or grasp."""
+    if isinstance(relation, Grasp):
+        return cell.checks.closure_position, cell.checks.closure_orientation
+    return relation.tolerance.position, relation.tolerance.orientation
+
+
 def _outside(cell: Cell, robot: Robot) -> list[InputError]:
-    """One complaint for each joint that starts outside its limits."""
-    start = robot.start
-    if start is None:
-        return []
-    return [
-        StartOutsideLimitsError(
-            f"{start_place(cell, robot)}: joint '{joint.name}' starts at {_shown(joint, position)}, outside "
-            f"its limits {_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}"
-        )
-        for joint, position in zip(robot.model.joints, start, strict=True)
-        if not joint.lower <= position <= joint.upper
+    """One complaint for each joint that is outside its limits at the start or at home."""
+    found: list[InputError] = [
+        StartOutsideLimitsError(f"{start_place(cell, robot)}: joint '{joint.name}' starts at {words}")
+        for joint, words in _outside_limits(robot, robot.start)
     ]
+    if found and robot.home is not None and np.array_equal(robot.home, np.asarray(robot.start)):
+        return found  # a parked robot, whose start is its home
+    return found + [
+        HomeOutsideLimitsError(f"{home_place(cell, robot)}: joint '{joint.name}' stands at {words}")
+        for joint, words in _outside_limits(robot, robot.home)
+    ]
+
+
+def _outside_limits(robot: Robot, q: Array | None) -> Iterator[tuple[Joint, str]]:
+    """Joints that are outside their limits, each with its position and limits in words."""
+    for joint, position in zip(robot.model.joints, () if q is None else q, strict=q is not None):
+        if not joint.lower <= position <= joint.upper:
+            limits = f"{_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}"
+            yield joint, f"{_shown(joint, position)}, outside its limits {limits}"
 
 
 def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
@@ -83,35 +152,18 @@ def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
 
     A task that gives its tool time to settle may start beside its path.
     """
-    robot = cell.robot(task.robot)
     off = _distance(cell, task, toolpath.X_PT_start)
-    if off is None or task.settle > 0.0:
+    if off is None or task.settle > 0.0 or not is_off(cell, task, off):
         return []
-    distance, angle = off
-    if distance <= task.tolerance.position and angle <= task.tolerance.orientation:
-        return []
-    return [
-        StartOffTaskError(
-            f"{start_place(cell, robot)}: the tool is {1e3 * distance:.3f} mm and {np.degrees(angle):.4f} deg "
-            f"from the start of task '{task.name}', allowed are {1e3 * task.tolerance.position:g} mm and "
-            f"{np.degrees(task.tolerance.orientation):g} deg; `auto` finds a posture"
-        )
-    ]
+    return [StartOffTaskError(off_words(cell, task, off))]
 
 
 def _off_grasp(cell: Cell, grasp: Grasp) -> list[InputError]:
     """A complaint when a given start does not put a further holder's tool on its grasp, within the allowed closure."""
     off = _distance(cell, grasp, grasp.X_PT)
-    if off is None or (off[0] <= cell.checks.closure_position and off[1] <= cell.checks.closure_orientation):
+    if off is None or not is_off(cell, grasp, off):
         return []
-    return [
-        StartOffGraspError(
-            f"{start_place(cell, cell.robot(grasp.robot))}: the tool is {1e3 * off[0]:.3f} mm and "
-            f"{np.degrees(off[1]):.4f} deg from its grasp on the part that '{cell.positioners[0]}' carries, allowed "
-            f"are {1e3 * cell.checks.closure_position:g} mm and {np.degrees(cell.checks.closure_orientation):g} deg; "
-            "`auto` finds a posture"
-        )
-    ]
+    return [StartOffGraspError(off_words(cell, grasp, off))]
 
 
 def _distance(cell: Cell, task: Relation, X_PT_wanted: Array) -> tuple[float, float] | None:
@@ -126,10 +178,7 @@ def _distance(cell: Cell, task: Relation, X_PT_wanted: Array) -> tuple[float, fl
         X_WR = at_start
     if robot.start is None:
         return None
-    X_PT, wanted = inverse(X_WR) @ ScrewChain(robot).tool_poses(robot.start[None]), X_PT_wanted[None]
-    rows = constraint_rows(task, wanted)[0]
-    error = rows.T @ (rows @ pose_errors(wanted, X_PT, [task.is_spin_free])[0])
-    return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
+    return tool_distance(ScrewChain(robot), task, robot.start, X_PT_wanted, X_WR=X_WR)
 
 
 def _shown(joint: Joint, position: float) -> str:

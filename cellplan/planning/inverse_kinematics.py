@@ -58,7 +58,7 @@ def reaching_postures(chain: ScrewChain, task: Relation, X_PT: Array, *, X_WP: A
         going_on = (largest >= CLOSED) & ((largest < FAR) | (iteration < TRIAL))
         if not going_on.any():
             break
-        J = rows @ _tip_jacobian(screws_W[going_on], X_WT[going_on, :3, 3], R_PW)
+        J = rows @ tip_jacobian(screws_W[going_on], X_WT[going_on, :3, 3], R_PW)
         q = q[going_on] + _damped_move(J, error[going_on])
     return np.concatenate(arrived)
 
@@ -76,23 +76,31 @@ def _damped_move(J: Array, error: Array) -> Array:
 def within_limits(model: RobotModel, q: Array) -> Array:
     """Turn joints by whole turns as near to mid-range as they go and drop postures out of limits, shape (K, n)."""
     lower, upper = finite_limits(model)
-    turning = np.array([joint.is_revolute for joint in model.joints])
-    middle = 0.5 * (lower + upper)
-    turns = np.where(turning, np.round((q - middle) / (2 * np.pi)), 0.0)
-    q = q - 2 * np.pi * turns
+    q = on_nearest_turns(model, q)
     inside = q[np.all((q >= lower) & (q <= upper), axis=1)]
     return _distinct(inside)
 
 
+def on_nearest_turns(model: RobotModel, q: Array) -> Array:
+    """Postures with joints turned by whole turns as near to mid-range as they go, shape (B, n)."""
+    lower, upper = finite_limits(model)
+    turning = np.array([joint.is_revolute for joint in model.joints])
+    middle = 0.5 * (lower + upper)
+    turned: Array = q - 2 * np.pi * np.where(turning, np.round((q - middle) / (2 * np.pi)), 0.0)
+    return turned
+
+
 def margin_shares(model: RobotModel, q: Array) -> Array:
     """Smallest distance to a joint limit as share of half the range, shape (...): 1 in the middle, 0 on a limit."""
-    lower, upper = model.lower, model.upper
-    bounded = np.isfinite(lower) & np.isfinite(upper)
-    if not bounded.any():
-        return np.ones(q.shape[:-1])
-    q, lower, upper = q[..., bounded], lower[bounded], upper[bounded]
-    shares: Array = (np.minimum(q - lower, upper - q) / (0.5 * (upper - lower))).min(axis=-1)
+    shares: Array = joint_margin_shares(model, q).min(axis=-1)
     return shares
+
+
+def joint_margin_shares(model: RobotModel, q: Array) -> Array:
+    """Distance of each joint to its nearer limit as share of half its range, 1 where it has none, shape (..., n)."""
+    bounded = np.isfinite(model.lower) & np.isfinite(model.upper)
+    half = np.where(bounded, 0.5 * (model.upper - model.lower), 1.0)
+    return np.where(bounded, np.minimum(q - model.lower, model.upper - q) / half, 1.0)
 
 
 def smallest_singular_values(chain: ScrewChain, task: Relation, X_PT: Array, q: Array) -> Array:
@@ -100,12 +108,12 @@ def smallest_singular_values(chain: ScrewChain, task: Relation, X_PT: Array, q: 
     X_WT = chain.tool_poses(q)
     R_PW = X_PT[:3, :3] @ np.swapaxes(X_WT[:, :3, :3], 1, 2)
     rows = constraint_rows(task, X_PT[None])[0]
-    J = rows @ _tip_jacobian(chain.flange_screws(q), X_WT[:, :3, 3], R_PW)
+    J = rows @ tip_jacobian(chain.flange_screws(q), X_WT[:, :3, 3], R_PW)
     values: Array = np.linalg.svd(J, compute_uv=False)[:, -1]
     return values
 
 
-def _tip_jacobian(screws_W: Array, p_WT: Array, R_PW: Array) -> Array:
+def tip_jacobian(screws_W: Array, p_WT: Array, R_PW: Array) -> Array:
     """Jacobians of tool tips in axes parallel to P from screws at the world origin, shape (B, 6, n)."""
     linear = screws_W[:, :3] - skew(p_WT) @ screws_W[:, 3:]
     jacobians: Array = np.concatenate([R_PW @ linear, R_PW @ screws_W[:, 3:]], axis=1)

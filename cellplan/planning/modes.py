@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Mode
+from cellplan.model.idle import idle_robots
 from cellplan.model.task import Task
 
 
@@ -15,12 +17,14 @@ class RunPlan:
     Attributes:
         name: Name of the only task in a run of its own; None when all tasks are worked on together.
         tasks: Names of the tasks worked on.
-        moving: Names of the robots that may move; all others stand still at their start posture.
+        moving: Names of the robots that may move; all others stand still.
+        idle: Names of the robots that have nothing to do and stand at their homes.
     """
 
     name: str | None
     tasks: tuple[str, ...]
     moving: tuple[str, ...]
+    idle: tuple[str, ...] = ()
 
 
 def plan_runs(cell: Cell, *, only: str | None = None) -> tuple[RunPlan, ...]:
@@ -39,16 +43,43 @@ def plan_runs(cell: Cell, *, only: str | None = None) -> tuple[RunPlan, ...]:
     _refuse_carrying_at_rest(cell, chosen)
     operators = tuple(task.robot for task in chosen)
     tasks = tuple(task.name for task in chosen)
+    idle = idle_robots(cell, tasks)
     match cell.motion.mode:
         case Mode.SIMULTANEOUS:
-            return (RunPlan(name=None, tasks=tasks, moving=_each_once(cell.positioners + operators)),)
+            return (RunPlan(name=None, tasks=tasks, moving=_each_once(cell.positioners + operators), idle=idle),)
         case Mode.PART_AT_REST:
-            return (RunPlan(name=None, tasks=tasks, moving=operators),)
+            return (RunPlan(name=None, tasks=tasks, moving=operators, idle=idle),)
         case Mode.PAIRWISE:
             return tuple(
-                RunPlan(name=task.name, tasks=(task.name,), moving=_each_once((*cell.positioners, task.robot)))
+                RunPlan(
+                    name=task.name,
+                    tasks=(task.name,),
+                    moving=_each_once((*cell.positioners, task.robot)),
+                    idle=idle_robots(cell, (task.name,)),
+                )
                 for task in chosen
             )
+
+
+def standing(cell: Cell, plan: RunPlan, q: Array) -> Array:
+    """Stacked configurations of a run with its idle robots at their homes, as far as these are known.
+
+    Args:
+        cell: The cell.
+        plan: The run.
+        q: Stacked joint positions in [rad] or [m], shape (..., nq).
+    """
+    placed = q.copy()
+    for name in plan.idle:
+        home = cell.robot(name).home
+        if home is not None:
+            placed[..., cell.columns(name)] = home
+    return placed
+
+
+def homeless(cell: Cell, plan: RunPlan) -> frozenset[str]:
+    """Names of the idle robots of a run whose homes are still to be found."""
+    return frozenset(name for name in plan.idle if cell.robot(name).home is None)
 
 
 def _refuse_carrying_at_rest(cell: Cell, tasks: Sequence[Task]) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
-from cellplan.model.motion import Motion, Resolution, Schedule
+from cellplan.model.motion import Motion, NearestSingular, Resolution, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.solver import Integrator
 from cellplan.model.task import INSTANT_ROOM
@@ -15,6 +15,7 @@ from cellplan.planning.accurate.accurate_run import AccurateRun
 from cellplan.planning.accurate.closed_path import closed_path
 from cellplan.planning.accurate.joint_path import JointPath
 from cellplan.planning.follow import carry, follow
+from cellplan.planning.singularity import nearest_to_singular
 from cellplan.planning.timing import TimedTasks
 from cellplan.planning.tracking_problem import TrackingProblem
 
@@ -56,7 +57,8 @@ def resolve(
     closed = closed_path(run, problem, schedule, start=start)
     if closed is None:
         motion = follow(cell, schedule, start=start, moving=moving, progress=progress)
-        return replace(motion, resolution=_resolution(run, JointPath(start, 0.0, (), ()), euler_from=0.0))
+        lost = nearest_to_singular(problem, 0, start)
+        return replace(motion, resolution=_resolution(run, JointPath(start, 0.0, (), ()), euler_from=0.0, lost=lost))
     return _sampled(run, closed, lambda: problem, timed.times, progress)
 
 
@@ -68,14 +70,19 @@ def _sampled(
     reached = int(np.searchsorted(times, path.end + INSTANT_ROOM, side="right")) - 1
     q = path.at(times[: reached + 1])
     q[0] = path.start
+    lost = None
     if reached < last:
-        stepped = carry(problem(), q[-1], first=reached, last=last, progress=progress)
+        steps = problem()
+        lost = nearest_to_singular(steps, reached, q[-1])
+        stepped = carry(steps, q[-1], first=reached, last=last, progress=progress)
         q = np.concatenate([q, stepped.q[reached + 1 :]])
     euler_from = float(times[reached]) if reached < last else None
-    return Motion(times=times, q=q, resolution=_resolution(run, path, euler_from=euler_from))
+    return Motion(times=times, q=q, resolution=_resolution(run, path, euler_from=euler_from, lost=lost))
 
 
-def _resolution(run: AccurateRun, path: JointPath, *, euler_from: float | None) -> Resolution:
+def _resolution(
+    run: AccurateRun, path: JointPath, *, euler_from: float | None, lost: NearestSingular | None
+) -> Resolution:
     """What the run took in all, and the path that came of it."""
     return Resolution(
         integrator=Integrator.ACCURATE,
@@ -85,6 +92,7 @@ def _resolution(run: AccurateRun, path: JointPath, *, euler_from: float | None) 
         solves=run.collocation.solves,
         error_between=path.worst if path.panels else None,
         euler_from=euler_from,
+        lost=lost,
     )
 
 

@@ -11,6 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.task import INSTANT_ROOM, Task
 from cellplan.model.toolpath import Toolpath, Trajectory
+from cellplan.planning.sample_room import require_room
 from cellplan.planning.stand_off import stand_off
 from cellplan.planning.time_laws import reached_at
 from cellplan.planning.timing import MOST_SAMPLES, ClockedPath, TimedTasks, clock_path
@@ -28,7 +29,9 @@ def schedule_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> Schedule:
 
 
 def time_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> TimedTasks:
-    """Put toolpaths on the common clock ``t = k step``, k = 0..n, long enough for the last task to end.
+    """Put toolpaths on the common clock ``t = k step``, k = 0..n, which is as long as the cell says.
+
+    A cell that gives no duration has a clock that ends with its last task.
 
     Each stretch between two stops takes its own start and stop of the task's time law: with a duration given in
     proportion to its length, with a feed in the time that brings its fastest moment to the feed. A path that is gone
@@ -36,11 +39,11 @@ def time_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> TimedTasks:
     own times. Before its start and after its end a tool rests on the part, or off it where the task says so.
 
     Args:
-        cell: The cell; its tasks give times and laws, its motion the step and the default duration.
+        cell: The cell; its tasks give times and laws, its motion the step and the length of the clock.
         toolpaths: The paths to work on, named after their tasks.
 
     Raises:
-        InputError: A task has no time left, or the clock would have more than two million instants.
+        InputError: A task does not fit the clock, or the clock would have more than two million instants.
     """
     paths = tuple(clock_path(cell, cell.task(toolpath.name), toolpath) for toolpath in toolpaths)
     times = np.round(np.arange(_step_count(cell, paths) + 1) * cell.motion.step, TIME_DECIMALS)
@@ -60,7 +63,11 @@ def examine_times(cell: Cell, toolpaths: Sequence[Toolpath]) -> None:
             settles for as long as it lasts.
     """
     paths = [clock_path(cell, cell.task(toolpath.name), toolpath) for toolpath in toolpaths]
-    _step_count(cell, paths)
+    end = _step_count(cell, paths) * cell.motion.step
+    for index, lock in enumerate(cell.motion.locked):
+        if lock.since >= end:
+            where = cell.origin.at(f"motion.locked_joints[{index}].from_s")
+            raise InputError(f"{where}: expected an instant before the end at {end:g} s, got {lock.since:g}")
     least = FEWEST_STEPS * cell.motion.step
     for path in paths:
         task, whole = path.task, path.end - path.start
@@ -81,15 +88,41 @@ def examine_times(cell: Cell, toolpaths: Sequence[Toolpath]) -> None:
 
 
 def _step_count(cell: Cell, paths: Sequence[ClockedPath]) -> int:
-    """Steps of the common clock; the last does not end before the last task."""
-    cycle = max((path.over for path in paths), default=cell.motion.duration)
+    """Steps of the common clock; the last one is a whole step, also when the clock is no multiple of the step."""
+    for path in paths:
+        _examine_end(cell, path)
+    clock = cell.motion.duration
+    cycle = max((path.over for path in paths), default=cell.motion.step) if clock is None else clock
     steps = np.ceil(cycle / cell.motion.step - STEP_ROOM)
     if not steps < MOST_SAMPLES:
         raise InputError(
             f"{cell.origin.at('motion.step_s')}: expected a step that makes at most {MOST_SAMPLES} samples, "
             f"got {cell.motion.step:g} s for a cycle of {cycle:g} s; make the step longer"
         )
+    require_room(cell, int(steps) + 1)
     return max(int(steps), 1)
+
+
+def _examine_end(cell: Cell, path: ClockedPath) -> None:
+    """Refuse a task that ends after the clock, with the time that it needs."""
+    clock, task, length = cell.motion.duration, path.task, path.toolpath.length * path.task.repeat
+    if clock is None or path.over <= clock * (1.0 + STEP_ROOM):
+        return
+    key, why = "duration_s", ""
+    if task.feed is not None:
+        key, why = "feed_mm_s", f" ({1e3 * length:.4g} mm at up to {1e3 * task.feed:g} mm/s)"
+    elif isinstance(path.toolpath, Trajectory):
+        key, why = "path", " (by the instants of its file)"
+    raise InputError(
+        f"{cell.origin.at(f'tasks.{task.name}.{key}')}: expected an end within the clock of {clock:g} s "
+        f"(motion.duration_s), got an end at {path.over:.6g} s{why}; give the clock at least "
+        f"{_rounded_up(path.over):g} s, or leave motion.duration_s out and it ends with the last task"
+    )
+
+
+def _rounded_up(seconds: float) -> float:
+    """A time in [s] in milliseconds, never shorter than it is."""
+    return float(np.ceil(1e3 * seconds - STEP_ROOM) / 1e3)
 
 
 def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:

@@ -56,7 +56,7 @@ class ClockedPath:
     @property
     def over(self) -> float:
         """Instant in [s] from which on the tool rests: it is out of the way."""
-        return self.end + (self.task.retract.duration if self.task.retract else 0.0)
+        return self.end + self.task.leaving
 
     @property
     def breaks(self) -> Array:
@@ -260,13 +260,16 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
     if task.feed is not None:
         fastest: Array = task.start + peak_rate(task.time_law) / task.feed * behind
         return fastest
-    leaving = task.retract.duration if task.retract else 0.0
-    duration = cell.motion.duration - task.start - leaving if task.duration is None else task.duration
-    if not duration > 0.0:
-        where = cell.origin.at(f"tasks.{task.name}.start_s")
+    duration = task.time_for_path(cell.motion.duration)
+    if duration is None:
         raise InputError(
-            f"{where}: expected a start before the end of the motion at {cell.motion.duration:g} s, "
-            f"got {task.start:g}; give the task its own duration_s or feed_mm_s to go on for longer"
+            f"{cell.origin.at(f'tasks.{task.name}')}: missing duration_s: expected duration_s or feed_mm_s, as "
+            "motion.duration_s is not given either"
+        )
+    if not duration > 0.0:
+        raise InputError(
+            f"{cell.origin.at(f'tasks.{task.name}.start_s')}: expected a start before the end of the clock at "
+            f"{cell.motion.duration:g} s, got {task.start:g}; make motion.duration_s longer"
         )
     corners: Array = task.start + duration * (behind / behind[-1])
     return corners

@@ -14,6 +14,7 @@ from cellplan.model.task import Task, TimedPath
 from cellplan.model.toolpath import Toolpath, Trajectory
 from cellplan.planning.path_drawing import draw_path
 from cellplan.planning.path_laying import lay_path
+from cellplan.planning.path_size import refuse_unlikely_path
 from cellplan.planning.path_words import in_mm
 from cellplan.planning.tool_frames import orient_tool
 
@@ -36,8 +37,9 @@ def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
     """
     drawing = draw_path(task, origin)
     laid = lay_path(drawing, task, part, origin)
-    orientation = orient_tool(task, drawing, laid, origin)
     arc = measure(laid.tip)
+    refuse_unlikely_path(laid.tip, arc, task=task, part=part, where=origin.at(f"tasks.{task.name}.path"))
+    orientation = orient_tool(task, drawing, laid, origin)
     is_timed = isinstance(task.path, TimedPath)
     if not is_timed:
         _refuse_standstill(laid.tip, arc, origin.at(f"tasks.{task.name}.path"))

@@ -141,6 +141,13 @@ class TrackingProblem:
         mobile: Array = (self._may_move & (self.times[k] < self._locked_since)).astype(float)
         return mobile
 
+    def rows(self, k: int, q: Array) -> list[Array]:
+        """Rows of the cooperation Jacobian that each task constrains at instant k and posture q, shape (m, nq) each."""
+        state = self.state(q)
+        X_WT, X_WR = state.X_WT[self.operators], reference_frames(state, self.tasks)
+        J = cooperation_jacobian(state, X_WT[:, :3, 3], self.signs * self.mobile(k), X_WR=X_WR)
+        return [rows[k] @ block for rows, block in zip(self._rows, J, strict=True)]
+
     def first_order(self, k: int, q: Array) -> FirstOrder:
         """The tasks at instant k and posture q, to first order.
 

@@ -14,6 +14,7 @@ from cellplan.model.report import Check, Report
 from cellplan.report.json_report import run_record, summary_record
 from cellplan.report.left_out_record import grips_told, told_left_out
 from cellplan.report.method import method_lines
+from cellplan.report.open_surfaces import open_surface_lines
 from cellplan.report.palette import ROBOTS, robot_colours
 from cellplan.report.record import Provenance, Record, rounded_down
 from cellplan.report.rehearsal_record import rehearsal_record
@@ -76,7 +77,13 @@ def report_html(
         plots: SVG pictures by file name, as ``draw_plots`` returns them; others are ignored.
         motion: The motion as it was planned, for what its steps took; None when it is not at hand.
     """
-    record = run_record(report, cell=cell, provenance=provenance, motion=motion)
+    return report_page(
+        run_record(report, cell=cell, provenance=provenance, motion=motion), report.checks, cell=cell, plots=plots
+    )
+
+
+def report_page(record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes]) -> str:
+    """The page of a run whose record, as ``run_record`` gives it, and checks are at hand; see ``report_html``."""
     return _render(
         "report.html",
         record,
@@ -85,9 +92,10 @@ def report_html(
             "figures": _figures(record),
             "left_out": told_left_out(record),
             "grips": grips_told(record),
-            "check_groups": _check_groups(report.checks),
+            "check_groups": _check_groups(checks),
             "shares": _shares(record),
             "excluded": _by_reason(record["exclusions"]),
+            "open_surfaces": [line for _, line in open_surface_lines(record["open_surfaces"])],
             "method": list(method_lines(record["solver"], record["step_s"])),
             "plots": _inline_plots(plots),
         },
@@ -96,7 +104,11 @@ def report_html(
 
 def overview_html(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> str:
     """The page of a job done in several runs, with a link to the page of each; see ``summary_record``."""
-    record = summary_record(reports, cell=cell, provenance=provenance)
+    return overview_page(summary_record(reports, cell=cell, provenance=provenance), cell=cell)
+
+
+def overview_page(record: Record, *, cell: Cell) -> str:
+    """The page of a job of several runs whose record is at hand; see ``overview_html``."""
     parts = {"figures": _figures(record), "left_out": told_left_out(record), "grips": grips_told(record)}
     return _render("overview.html", record, cell, parts)
 
@@ -201,13 +213,18 @@ def _speed_share(joint: Record) -> float:
     return math.inf if share is None else float(share)
 
 
+def _clock_word(record: Record) -> str:
+    """What decides the length of the clock, unless the cell file states it."""
+    return "; the clock ends with the last task" if record["clock_from"] == "tasks" else ""
+
+
 def _figures(record: Record) -> list[Record]:
     """The key figures: what is worst, where and when."""
     cycle = {
         "label": "Cycle time",
         "value": _fixed(record["cycle_time_s"], 2),
         "unit": "s",
-        "detail": f"{record['samples']} samples, {_small(1e3 * record['step_s'])} ms apart"
+        "detail": f"{record['samples']} samples, {_small(1e3 * record['step_s'])} ms apart{_clock_word(record)}"
         if "samples" in record
         else f"{len(record['runs'])} runs, one after another",
     }

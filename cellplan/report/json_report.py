@@ -10,14 +10,17 @@ from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, JointUse, Report
 from cellplan.report.clearance_record import clearance_proof_record, closest_pairs_record
 from cellplan.report.closure_record import closures_record, worst_closures_record
+from cellplan.report.idle_record import missing_moves
 from cellplan.report.left_out_record import left_out_record
 from cellplan.report.method import solver_record
+from cellplan.report.open_surfaces import open_surfaces_record
 from cellplan.report.record import (
     SCHEMA,
     Provenance,
     Record,
     check_record,
     clearance_record,
+    clock_from,
     joints_record,
     number,
     origin_record,
@@ -25,7 +28,6 @@ from cellplan.report.record import (
     report_record,
     status,
     tasks_record,
-    withdrawals,
 )
 from cellplan.report.series import INDENT, series, series_text
 
@@ -51,6 +53,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
         "closest_pairs": closest_pairs_record(report.clearance),
         "clearance_proof": clearance_proof_record(report.clearance),
         "left_out": left_out_record(report.clearance.left_out),
+        "open_surfaces": open_surfaces_record(cell),
         "closure": closures_record(report, cell),
         "solver": solver_record(cell.solver, motion),
     }
@@ -80,8 +83,10 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "status": "passed" if all(report.passed for report in runs) else "failed",
         "mode": runs[0].mode,
         "cycle_time_s": number(sum(report.cycle_time for report in runs)),
+        "clock_from": clock_from(cell),
         "runs": {name: _run_record(name, report, cell) for name, report in reports.items()},
         "tasks": {name: record for report in runs for name, record in tasks_record(report, cell).items()},
+        "open_surfaces": open_surfaces_record(cell),
         "closure": worst_closures_record(runs, cell),
         "joints": joints_record(merge_joint_uses(use for report in runs for use in report.joints)),
         "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
@@ -89,7 +94,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "required_clearance_mm": number(1e3 * cell.checks.clearance),
         "left_out": left_out_record(dict.fromkeys(each for report in runs for each in report.clearance.left_out)),
         "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
-        "before_you_run": [f"{name}: {line}" for name, report in reports.items() for line in withdrawals(report, cell)],
+        "not_in_program": missing_moves(cell, {name: report.tasks for name, report in reports.items()}),
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "solver": solver_record(cell.solver),

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.motion import Motion
+from cellplan.model.motion import Motion, NearestSingular
 from cellplan.model.solver import Integrator, MethodName, SolverSettings
 from cellplan.report.record import Record, number
 
@@ -103,7 +103,12 @@ def _way_lines(record: Record, step: str) -> Iterator[str]:
         counts = f"{_counted(resolution['nodes'], 'node')} in {_counted(resolution['panels'], 'panel')}"
         yield f"Resolved accurately: {counts}{within}."
     if resolution["euler_from_s"] is not None:
-        yield (f"From {resolution['euler_from_s']:.3f} s on Euler steps of {step} had to be taken instead; {feedback}.")
+        lost = resolution.get("lost")
+        reason = f" ({lost['message']})" if lost else ""
+        yield (
+            f"From {resolution['euler_from_s']:.3f} s on Euler steps of {step} had to be taken instead{reason}; "
+            f"{feedback}."
+        )
 
 
 def _counted(count: int, what: str) -> str:
@@ -179,6 +184,18 @@ def _resolution_record(motion: Motion) -> Record | None:
         "solves": made.solves,
         "error_between_nodes_mm": None if made.error_between is None else number(1e3 * made.error_between),
         "euler_from_s": number(made.euler_from),
+        "lost": None if made.lost is None else _lost_record(made.lost),
+    }
+
+
+def _lost_record(lost: NearestSingular) -> Record:
+    """The robot that is nearest to a singular configuration where the accurate mode gave up."""
+    return {
+        "robot": lost.robot,
+        "task": lost.task,
+        "smallest_singular_value": number(lost.smallest),
+        "stack_smallest_singular_value": number(lost.stack),
+        "message": lost.words,
     }
 
 

@@ -17,13 +17,13 @@ from cellplan.model.report import (
     ClearanceMinimum,
     ClearanceReport,
     Conditioning,
-    Contact,
     JointUse,
     Repeatability,
     Report,
     RobotSpeed,
     TaskAccuracy,
 )
+from cellplan.report.idle_record import idle_record
 
 Record = dict[str, Any]
 
@@ -46,6 +46,11 @@ class Provenance:
     digests: Mapping[str, str]
 
 
+def clock_from(cell: Cell) -> str:
+    """What decides the length of the common clock: the cell file, or the last task to end."""
+    return "tasks" if cell.motion.duration is None else "motion.duration_s"
+
+
 def report_record(report: Report, *, cell: Cell, provenance: Provenance) -> Record:
     """Everything that is known about one run."""
     return {
@@ -54,6 +59,7 @@ def report_record(report: Report, *, cell: Cell, provenance: Provenance) -> Reco
         "status": status(report),
         "mode": report.mode,
         "cycle_time_s": number(report.cycle_time),
+        "clock_from": clock_from(cell),
         "samples": len(report.times),
         "step_s": number(report.cycle_time / (len(report.times) - 1)),
         "tasks": tasks_record(report, cell),
@@ -69,7 +75,7 @@ def report_record(report: Report, *, cell: Cell, provenance: Provenance) -> Reco
         "motion_share": _motion_share_record(report, cell),
         "speeds": {robot: _speed_record(speed) for robot, speed in report.speeds.items()},
         "checks": [check_record(check) for check in report.checks],
-        "before_you_run": withdrawals(report, cell),
+        **idle_record(cell, report.tasks),
         **origin_record(cell, provenance),
         "caution": CAUTION,
     }
@@ -318,27 +324,6 @@ def contacts_record(clearance: ClearanceReport) -> list[Record]:
         }
         for contact in clearance.contacts
     ]
-
-
-def withdrawals(report: Report, cell: Cell) -> list[str]:
-    """One line for each robot that stands idle in the way of the part and must be withdrawn before the run."""
-    at_work = {accuracy.robot for accuracy in report.accuracy}
-    lines = []
-    for robot in [task.robot for task in cell.tasks if task.robot not in at_work]:
-        touches = [contact for contact in report.clearance.contacts if _is_part_against(robot, contact)]
-        if touches:
-            first, last = min(contact.first_s for contact in touches), max(contact.last_s for contact in touches)
-            lines.append(
-                f"withdraw {robot}: it stands idle at its own task and would touch the part "
-                f"between {first:.3f} s and {last:.3f} s"
-            )
-    return lines
-
-
-def _is_part_against(robot: str, contact: Contact) -> bool:
-    """Whether an allowed contact is between the part and a body of a robot."""
-    names = set(contact.pair)
-    return contact.is_allowed and "part" in names and any(name.startswith(f"{robot}/") for name in names)
 
 
 def exclusions_record(clearance: ClearanceReport) -> list[Record]:

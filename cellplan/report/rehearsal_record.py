@@ -13,6 +13,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.cell_errors import Draw
 from cellplan.model.rehearsal import Correction, IsoFigures, PathFigures, PoseFigures, Rehearsal, RunRehearsal, Trial
 from cellplan.model.report import CAUTION, TaskAccuracy
+from cellplan.report.idle_record import missing_moves
 from cellplan.report.record import AXES, Provenance, Record, check_record, number
 
 SCHEMA = "cellplan.rehearsal/1"
@@ -64,7 +65,7 @@ def rehearsal_record(rehearsal: Rehearsal, *, provenance: Provenance) -> Record:
         "tasks": {name: record for run in rehearsal.runs for name, record in _tasks_record(cell, run).items()},
         "runs": [_run_record(cell, run) for run in rehearsal.runs],
         "checks": [check_record(check) for check in rehearsal.checks],
-        "before_you_run": [],
+        "not_in_program": missing_moves(cell, {run.name: run.before for run in rehearsal.runs}),
         "inputs": {**cell.inputs, **({PurePath(errors.file).name: errors.digest} if errors.digest else {})},
         "digests": dict(provenance.digests),
         "versions": dict(provenance.versions),

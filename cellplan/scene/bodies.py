@@ -11,6 +11,7 @@ from cellplan.geometry.shapes import HalfSpace, Shape
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screws import ScrewChain
 from cellplan.model.cell import Cell, Grasp, Part, Robot
+from cellplan.model.name_order import NameOrder
 from cellplan.model.robot import BASE
 
 
@@ -52,12 +53,15 @@ class SceneBody:
 def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
     """All solids of a cell: robot by robot links before tools, then the part, then the surroundings.
 
+    Robots and surroundings stand in the order of their names.
+
     Raises:
         InputError: Two bodies have the same name.
     """
-    bodies = [body for robot in cell.robots for body in _robot_bodies(robot)]
+    named = NameOrder.of(cell).cell  # the order of a file does not decide which pairs are looked at first
+    bodies = [body for robot in named.robots for body in _robot_bodies(robot)]
     bodies.append(part_body(cell, cell.part, *cell.part.held_by[:1]))
-    bodies += [_fixed(thing.name, Kind.OBSTACLE, shape=thing.shape, X_WS=thing.X_WS) for thing in cell.obstacles]
+    bodies += [_fixed(thing.name, Kind.OBSTACLE, shape=thing.shape, X_WS=thing.X_WS) for thing in named.obstacles]
     seen: set[str] = set()
     for body in bodies:
         if body.name in seen:

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cellplan.cache import entries, keep, key_of, recall
+from cellplan.cache import as_here, entries, keep, key_of, nothing_kept, recall
 from cellplan.cache.entries import forget
+from cellplan.guard import Guard, door, in_child
 
 ARRAYS = (np.arange(12.0).reshape(4, 3), np.array([[0, 1, 2]]), np.array(True))
 
@@ -162,3 +163,64 @@ def test_two_processes_that_write_the_same_entry_do_not_disturb_each_other(own_c
 
     assert [process.wait() for process in processes] == [0, 0]
     assert sorted(path.suffix for path in own_cache.iterdir()) == [".entry"] * 5
+
+
+def kept_entry(folder: Path) -> Path:
+    keep(key_of("thing", b"content"), ARRAYS)
+    forget()
+    return only_entry(folder)
+
+
+def test_a_pipe_in_the_place_of_an_entry_is_not_waited_for(own_cache: Path) -> None:
+    path = kept_entry(own_cache)
+    path.unlink()
+    os.mkfifo(path)
+
+    assert recall(key_of("thing", b"content")) is None
+
+
+def test_a_link_in_the_place_of_an_entry_is_not_followed(own_cache: Path, tmp_path: Path) -> None:
+    path = kept_entry(own_cache)
+    path.rename(tmp_path / "elsewhere")
+    path.symlink_to(tmp_path / "elsewhere")
+
+    assert recall(key_of("thing", b"content")) is None
+
+
+def test_an_entry_that_others_may_write_is_not_used(own_cache: Path) -> None:
+    path = kept_entry(own_cache)
+    path.chmod(0o666)
+    assert recall(key_of("thing", b"content")) is None
+
+    path.chmod(0o600)
+    assert_same(recall(key_of("thing", b"content")))
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only the superuser can give a file away")
+def test_an_entry_of_somebody_else_is_not_used(own_cache: Path) -> None:
+    os.chown(kept_entry(own_cache), 4711, -1)
+
+    assert recall(key_of("thing", b"content")) is None
+
+
+def test_without_the_cache_only_what_this_process_made_is_used(own_cache: Path) -> None:
+    kept_entry(own_cache)
+    assert_same(recall(key_of("thing", b"content")))  # held from now on, but it came from the folder
+
+    with nothing_kept():
+        assert recall(key_of("thing", b"content")) is None
+        keep(key_of("thing", b"other"), ARRAYS)
+        assert_same(recall(key_of("thing", b"other")))
+
+    assert_same(recall(key_of("thing", b"content")))
+    assert len(list(own_cache.iterdir())) == 1
+
+
+def test_a_child_process_does_without_the_cache_where_its_parent_does(own_cache: Path) -> None:
+    guard = Guard(file="thing", worker="the worker")
+    kept_entry(own_cache)
+    door._end_child()  # the next one knows this cache
+
+    with nothing_kept():
+        assert in_child(as_here(recall), key_of("thing", b"content"), guard=guard) is None
+    assert in_child(as_here(recall), key_of("thing", b"content"), guard=guard) is not None

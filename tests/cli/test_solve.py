@@ -92,8 +92,16 @@ def test_rejected_tables_are_kept_on_request(
         ("--task", "circel", "error: --task: expected one of circle, rhombus, rectangle, got 'circel'"),
         ("--method", "magic", "error: --method: expected one of "),
         ("--integrator", "rk4", "error: --integrator: expected one of accurate, euler, got 'rk4'"),
-        ("--duration", "-4", "error: --duration: expected a number of seconds of at least 0.001, got -4"),
-        ("--duration", "nan", "error: --duration: expected a number of seconds of at least 0.001, got nan"),
+        (
+            "--duration",
+            "-4",
+            "error: --duration: expected a number of seconds from 0.005 (motion.step_s) to 1e+06, got -4",
+        ),
+        (
+            "--duration",
+            "nan",
+            "error: --duration: expected a number of seconds from 0.005 (motion.step_s) to 1e+06, got nan",
+        ),
     ],
 )
 def test_a_wrong_choice_is_refused_before_anything_is_done(

@@ -60,13 +60,19 @@ def test_a_method_of_ones_own_choice_and_what_it_gave_up_are_told(record: dict[s
 
 
 def test_where_the_accurate_mode_gave_up_is_told(record: dict[str, Any], tmp_path: Path) -> None:
-    record["solver"] |= {"integrator": "accurate", "resolution": {"panels": 3, "euler_from_s": 1.25}}
+    record["solver"] |= {"integrator": "accurate", "resolution": {"panels": 3, "euler_from_s": 1.25, "lost": None}}
     told = summary_lines(record, tmp_path)
     record["solver"]["resolution"]["euler_from_s"] = None
 
     assert [line for line in told if line not in summary_lines(record, tmp_path)] == [
         "  no accurate way on: Euler steps from 1.250 s"
     ]
+
+    record["solver"]["resolution"] |= {"euler_from_s": 1.25, "lost": {"message": "nearest to a singular one is 'arm'"}}
+
+    assert "  no accurate way on: Euler steps from 1.250 s; nearest to a singular one is 'arm'" in summary_lines(
+        record, tmp_path
+    )
 
 
 def test_every_failed_check_has_a_line_and_no_tables_are_offered(record: dict[str, Any], tmp_path: Path) -> None:

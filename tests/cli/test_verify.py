@@ -61,11 +61,12 @@ def test_a_check_that_fails_ends_with_one(copy: Copy, capsys: pytest.CaptureFixt
     out, err = capsys.readouterr()
     assert (status, out) == (1, "")
     assert "joint idle/" in err
+    assert "idle robot idle: joint " in err
     assert not (copy.run / "programs").exists()
 
     assert run(["verify", str(copy.run), "--cell", str(copy.cell), "--json"]) == 1
     told = json.loads(capsys.readouterr().out)
-    assert (told["status"], told["exit"], len(told["errors"])) == ("failed", 1, 1)
+    assert (told["status"], told["exit"], len(told["errors"])) == ("failed", 1, 2)
 
 
 def test_a_stale_input_ends_with_two(copy: Copy, capsys: pytest.CaptureFixture[str]) -> None:
@@ -89,6 +90,22 @@ def test_programs_are_written_into_the_run(copy: Copy, capsys: pytest.CaptureFix
     assert (status, err, out) == (0, "", f"small-pair: exported\nprograms: {place}\n")
     assert sorted(path.name for path in place.iterdir()) == ["export.json", "idle.csv", "left.csv", "right.csv"]
     assert run(["verify", str(copy.run), "--cell", str(copy.cell)]) == 0
+
+
+def test_an_export_without_the_cell_must_be_asked_for_by_name(
+    copy: Copy, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    words = ["export", str(copy.run), "--format", "csv", "-o", str(tmp_path / "programs")]
+
+    assert run(words) == 2
+    err = capsys.readouterr().err
+    assert "--cell: expected the cell file that was solved" in err
+    assert "--without-cell" in err
+    assert run([*words, "--cell", str(copy.cell), "--without-cell"]) == 2
+    assert capsys.readouterr().err == "error: --without-cell: unexpected option beside --cell\n"
+    assert run([*words, "--without-cell"]) == 2  # files beside the cell cannot be found without it
+    assert "name the cell file 'small.yaml' with --cell" in capsys.readouterr().err
+    assert not (tmp_path / "programs").exists()
 
 
 @pytest.mark.parametrize("name", ["krl", "rapid", "CSV", ""])

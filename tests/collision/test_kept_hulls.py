@@ -60,3 +60,22 @@ def test_a_flat_mesh_is_refused_each_time(own_cache: Path) -> None:
         with pytest.raises(InputError, match="expected a body with a volume, got a flat one"):
             hull_of(cloud(flat))
     assert not own_cache.exists() or not list(own_cache.iterdir())
+
+
+@pytest.mark.parametrize("move", [0.0, 0.5], ids=["too small", "moved"])
+def test_a_kept_hull_that_does_not_hold_the_points_is_found_anew(move: float) -> None:
+    hull = convex_hull(cloud(POINTS))
+    keep_mesh(
+        key_of("hull", POINTS.tobytes()), replace(hull, vertices=(0.9 if not move else 1.0) * hull.vertices + move)
+    )
+
+    assert_same(hull_of(cloud(POINTS)), hull)
+
+
+def test_a_kept_surface_with_a_dent_is_no_hull() -> None:
+    hull = convex_hull(cloud(POINTS))
+    dented = 2.0 * hull.vertices
+    dented[0] *= 0.6
+    keep_mesh(key_of("hull", POINTS.tobytes()), replace(hull, vertices=dented))
+
+    assert_same(hull_of(cloud(POINTS)), hull)

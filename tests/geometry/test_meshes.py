@@ -63,12 +63,9 @@ def test_an_open_crowded_or_flat_surface_is_no_solid() -> None:
         "part.stl: expected a closed surface, got 3 open edges, 0 edges of more than two triangles and 0 edges whose "
         "triangles face opposite ways: repair the mesh"
     )
-    turned = make_mesh(BOX.vertices, np.concatenate([BOX.faces[:1, ::-1], BOX.faces[1:]]), source="part.stl")
-    with pytest.raises(InputError, match="and 3 edges whose triangles face opposite ways"):
-        require_solid(turned)
-    doubled = make_mesh(BOX.vertices, np.concatenate([BOX.faces, BOX.faces[:1]]), source="part.stl")
+    crowded = make_mesh(BOX.vertices, np.concatenate([BOX.faces, BOX.faces[:1, ::-1]]), source="part.stl")
     with pytest.raises(InputError, match="3 edges of more than two triangles"):
-        require_solid(doubled)
+        require_solid(crowded)
     sheet = Mesh(vertices=BOX.vertices * [1, 1, 0], faces=BOX.faces, source="part.stl", is_closed=True)
     assert is_flat(sheet)
     with pytest.raises(InputError, match="expected a solid, got a surface that encloses no volume"):

@@ -47,7 +47,7 @@ def test_the_base_cell_is_read_in_metres_and_radians(load: Load) -> None:
     task = cell.task("ring")
     assert task.path == CirclePath(plane=PlaneName.XY, center=(0.0, 0.0), radius=0.1)
     assert task.tool_axis is None
-    assert (task.start, task.duration, task.feed, task.blend) == (0.0, 4.0, None, None)
+    assert (task.start, task.duration, task.feed, task.blend) == (0.0, None, None, None)
     assert task.axes == (0, 1, 2, 3, 4, 5)
     assert task.tolerance.position == pytest.approx(1e-4)
     assert cell.motion.mode is Mode.SIMULTANEOUS
@@ -136,7 +136,15 @@ def test_task_settings_override_those_of_the_motion(load: Load) -> None:
 
 
 def test_a_task_without_a_duration_fills_the_clock_after_its_start(load: Load) -> None:
-    assert load(("tool_axis: normal", "start_s: 1.5")).tasks[0].duration == 2.5
+    (task,) = load(("tool_axis: normal", "start_s: 1.5")).tasks
+
+    assert (task.duration, task.time_for_path(4.0)) == (None, 2.5)
+
+
+def test_a_clock_without_a_length_follows_tasks_with_times_of_their_own(load: Load) -> None:
+    cell = load(("{duration_s: 4}", "{step_s: 0.01}"), ("tool_axis: normal", "feed_mm_s: 50"))
+
+    assert (cell.motion.duration, cell.tasks[0].feed) == (None, 0.05)
 
 
 def test_position_only_work_off_the_surface_needs_no_tool_axis(load: Load) -> None:

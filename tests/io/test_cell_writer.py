@@ -118,14 +118,32 @@ def test_a_found_start_is_written_and_a_given_one_stays(load: Load, tmp_path: Pa
 
 def test_changes_by_the_command_line_are_written(load: Load, tmp_path: Path) -> None:
     cell = load()
-    longer = dataclasses.replace(cell.tasks[0], duration=7.5)
+    longer = dataclasses.replace(cell.tasks[0], duration=5.5)
     motion = dataclasses.replace(cell.motion, mode=Mode.PAIRWISE, duration=6.0)
 
     again = reload(dataclasses.replace(cell, motion=motion, tasks=(longer,)), tmp_path)
 
     assert again.motion.mode is Mode.PAIRWISE
-    assert again.motion.duration == 7.5  # the clock holds the longest task
-    assert again.tasks[0].duration == 7.5
+    assert again.motion.duration == 6.0
+    assert again.tasks[0].duration == 5.5
+
+
+def test_a_task_that_fills_the_clock_fills_it_again(load: Load, tmp_path: Path) -> None:
+    cell = load()
+
+    again = reload(dataclasses.replace(cell, motion=dataclasses.replace(cell.motion, duration=6.0)), tmp_path)
+
+    assert (again.motion.duration, again.tasks[0].duration) == (6.0, None)
+
+
+def test_a_clock_that_follows_the_tasks_follows_them_again(load: Load, tmp_path: Path) -> None:
+    cell = load()
+    timed = dataclasses.replace(cell.tasks[0], duration=5.5)
+    motion = dataclasses.replace(cell.motion, duration=None)
+
+    again = reload(dataclasses.replace(cell, motion=motion, tasks=(timed,)), tmp_path)
+
+    assert (again.motion.duration, again.tasks[0].duration) == (None, 5.5)
 
 
 def test_a_moved_base_is_written_as_moved(load: Load, tmp_path: Path) -> None:

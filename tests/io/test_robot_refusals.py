@@ -14,7 +14,7 @@ Refuse = Callable[..., list[str]]
             "    base: {xyz",
             "    bsae: {xyz",
             "c:9: robots.worker.bsae: unknown key, did you mean 'base'?; allowed: model, package_dirs, flange, "
-            "base, tool, start_deg, start, weights, limits, locked",
+            "base, tool, start_deg, start, home_deg, home, weights, limits, locked",
         ),
         (
             "xyz_mm: [2000, 0, 0]",
@@ -172,7 +172,22 @@ Refuse = Callable[..., list[str]]
             "tool: {xyz_mm: [0, 0, 100]}",
             "tool: {geometry: {cilinder: {radius_mm: 5, length_mm: 10}}}",
             "c:10: robots.worker.tool.geometry.cilinder: unknown key, did you mean 'cylinder'?; allowed: box, "
-            "cylinder, capsule, sphere, mesh, unit",
+            "cylinder, capsule, sphere, mesh, unit, open",
+        ),
+        (
+            "rpy_deg: [0, 0, 180]",
+            "rpy_deg: [0, 0, 1800]",
+            "c:9: robots.worker.base.rpy_deg[2]: expected a number of degrees of at most 720, got 1800",
+        ),
+        (
+            "    weights: [1, 1, 1, 1, 1, 1]",
+            "    locked: {grip_deg: 0, grip_mm: 3}",
+            "c:11: robots.worker.locked.grip_mm: expected each joint once, got 'grip' in deg and in mm",
+        ),
+        (
+            "tool: {xyz_mm: [0, 0, 100]}",
+            "tool: {geometry: {sphere: {radius_mm: 5}, open: true}}",
+            "c:10: robots.worker.tool.geometry.open: unexpected key, open goes with a mesh only",
         ),
         (
             "tool: {xyz_mm: [0, 0, 100]}",
@@ -207,3 +222,11 @@ def test_a_mistake_in_a_robot_is_named_with_its_line_key_and_cure(
     refuse: Refuse, old: str, new: str, message: str
 ) -> None:
     assert refuse((old, new)) == message.splitlines()
+
+
+@pytest.mark.parametrize("name", ["part", "world", "World"])
+def test_a_robot_is_not_called_like_something_else(refuse: Refuse, base_cell: str, name: str) -> None:
+    text = base_cell.replace("worker", name)
+    meaning = {"part": "the workpiece", "world": "the frame that everything stands in"}[name.lower()]
+
+    assert refuse((base_cell, text)) == [f"c:7: robots.{name}: expected another name, '{name.lower()}' means {meaning}"]

@@ -1,16 +1,20 @@
 """Run folders: they appear whole or not at all, and nothing of anybody else's is ever lost."""
 
 import errno
+import json
 import os
 import resource
 import shutil
 import signal
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from cellplan.errors import InputError
+from cellplan.io import drafts, run_folder
 from cellplan.io.run_folder import RunFolder
 
 REPORT = '{\n  "schema": "cellplan.report/1",\n  "status": "passed"\n}\n'
@@ -94,6 +98,7 @@ def test_failure_leaves_nothing_behind_and_the_old_run_as_it_was(tmp_path: Path,
 @pytest.mark.parametrize("fails_at", [1, 2])
 def test_failing_swap_leaves_the_old_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails_at: int) -> None:
     write_run(tmp_path / "bench", tables="old")
+    monkeypatch.setattr(run_folder, "exchange", lambda *_: False)
     real, calls = Path.rename, 0
 
     def failing(self: Path, target: Path) -> Path:
@@ -205,6 +210,7 @@ def test_an_interruption_between_the_renames_leaves_one_whole_run(
 ) -> None:
     """The interruption comes right after the first or second rename, or while the older run is removed."""
     write_run(tmp_path / "bench", tables="old")
+    monkeypatch.setattr(run_folder, "exchange", lambda *_: False)
     rename, calls = Path.rename, []
 
     def rename_then_stop(source: Path, target: Path) -> Path:
@@ -263,3 +269,121 @@ def test_a_rehearsal_replaces_an_older_one(tmp_path: Path) -> None:
     write_rehearsal(tmp_path / "rehearsal")
 
     assert names_in(tmp_path / "rehearsal") == ["rehearsal.json"]
+
+
+@pytest.mark.parametrize("exchanges", [True, False], ids=["at once", "one after the other"])
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("tables/notes.txt", "tables/notes.txt"),
+        ("plots/deep/photo.jpg", "plots/deep/photo.jpg"),
+        ("mine/notes.txt", "mine"),
+        ("circle/tables/own.csv", "circle/tables/own.csv"),
+        ("programs/mine.src", "programs/mine.src"),
+    ],
+)
+def test_notes_anywhere_in_a_run_are_not_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, shown: str, exchanges: bool
+) -> None:
+    with RunFolder(tmp_path / "bench") as folder:
+        for place in ("", "circle/"):
+            folder.write_text(f"{place}report.json", REPORT)
+            folder.write_text(f"{place}tables/arm.csv", "rows")
+        listed = {name: {} for name in folder.written}
+        folder.write_text("manifest.json", json.dumps({"schema": "cellplan.manifest/1", "files": listed}))
+    note = tmp_path / "bench" / name
+    note.parent.mkdir(parents=True, exist_ok=True)
+    note.write_text("mine")
+    assert f"holds '{shown}', which cellplan did not write" in refusal(tmp_path / "bench")
+    before = everything_in(tmp_path / "bench")
+
+    if not exchanges:
+        monkeypatch.setattr(run_folder, "exchange", lambda *_: False)
+    monkeypatch.setattr(run_folder, "refuse_unless_replaceable", lambda _: None)  # it came after the question
+    with pytest.raises(InputError, match="which cellplan did not write"):
+        write_run(tmp_path / "bench")
+
+    assert everything_in(tmp_path / "bench") == before
+    assert names_in(tmp_path) == ["bench"]
+
+
+def test_a_run_is_never_missing_while_it_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_run(tmp_path / "bench", tables="old")
+    monkeypatch.setattr(Path, "rename", None)  # nothing is put aside
+
+    write_run(tmp_path / "bench", tables="new")
+
+    assert (tmp_path / "bench/tables/arm.csv").read_text() == "new"
+    assert names_in(tmp_path) == ["bench"]
+
+
+def left_behind(folder: Path, kind: str, *, by: str = "dead") -> Path:
+    """A hidden folder of a process that is no more, of this one, or of another system."""
+    path = drafts.hidden_folders(folder / "bench")[kind == ".replaced"]
+    own = f"-{os.getpid()}-{drafts._start(os.getpid())}"
+    assert own in path.name
+    system = drafts._system()
+    names = {
+        "dead": path.name.replace(own, "-999999999-123abc"),
+        "reused": path.name.replace(own, f"-{os.getpid()}-123abc"),
+        "living": path.name,
+        "elsewhere": path.name.replace(own, "-999999999-123abc").replace(system, "abcdef"),
+    }
+    left = folder / names[by]
+    left.mkdir(parents=True)
+    (left / "report.json").write_text(REPORT)
+    return left
+
+
+@pytest.mark.parametrize("by", ["dead", "reused"])
+def test_a_draft_of_a_dead_process_is_removed(tmp_path: Path, by: str) -> None:
+    left_behind(tmp_path, ".partial", by=by)
+
+    write_run(tmp_path / "other")
+
+    assert names_in(tmp_path) == ["other"]
+
+
+@pytest.mark.parametrize("by", ["living", "elsewhere"])
+def test_a_draft_of_a_process_that_may_live_is_left_alone(tmp_path: Path, by: str) -> None:
+    left = left_behind(tmp_path, ".partial", by=by)
+
+    write_run(tmp_path / "other")
+
+    assert names_in(tmp_path) == [left.name, "other"]
+
+
+def test_an_older_run_that_a_dead_process_put_aside_comes_back(tmp_path: Path) -> None:
+    left_behind(tmp_path, ".replaced")
+
+    run_folder.refuse_unless_replaceable(tmp_path / "bench")
+
+    assert everything_in(tmp_path) == ["bench", "bench/report.json"]
+
+
+def test_an_older_run_that_was_replaced_is_removed_unless_it_holds_something_foreign(tmp_path: Path) -> None:
+    write_run(tmp_path / "bench", tables="new")
+    left = left_behind(tmp_path, ".replaced")
+    (left / "notes.txt").write_text("mine")
+    run_folder.refuse_unless_replaceable(tmp_path / "bench")
+    assert (left / "notes.txt").read_text() == "mine"
+
+    (left / "notes.txt").unlink()
+    run_folder.refuse_unless_replaceable(tmp_path / "bench")
+
+    assert names_in(tmp_path) == ["bench"]
+    assert (tmp_path / "bench/tables/arm.csv").read_text() == "new"
+
+
+def test_a_killed_process_leaves_nothing_for_long(tmp_path: Path) -> None:
+    program = (
+        "import os, signal, sys; from pathlib import Path; from cellplan.io.run_folder import RunFolder\n"
+        "with RunFolder(Path(sys.argv[1])) as run:\n"
+        "    run.write_text('report.json', ''), os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    subprocess.run([sys.executable, "-c", program, str(tmp_path / "bench")], check=False)
+    assert [name.endswith(".partial") for name in names_in(tmp_path)] == [True]
+
+    write_run(tmp_path / "bench")
+
+    assert names_in(tmp_path) == ["bench"]

@@ -255,12 +255,12 @@ def test_a_link_without_collision_is_represented_by_what_is_drawn(tmp_path: Path
 def test_foreign_elements_and_text_encodings_do_no_harm(tmp_path: Path) -> None:
     extras = (
         '<transmission name="t"><joint name="a1"><hardwareInterface>x</hardwareInterface></joint></transmission>'
-        '<gazebo reference="tip"><link name="ghost"><collision/></link></gazebo><material name="grau"/>'
+        '<gazebo reference="tip"><link name="ghost"><collision/></link></gazebo><material name="grün"/>'
         '<ros2_control name="c" type="system"><joint name="a1"/></ros2_control>'
     )
     inertial = '<inertial><mass value="1"/></inertial><contact><lateral_friction value="1"/></contact>'
     dynamics = LIMIT + '<dynamics damping="1"/><safety_controller k_velocity="1"/><calibration rising="0"/>'
-    parts = (link("Fuß"), link("tip", inertial), joint("a1", "Fuß", "tip", dynamics), extras)
+    parts = (link("foot"), link("tip", inertial), joint("a1", "foot", "tip", dynamics), extras)
     plain = read_urdf(write(tmp_path, *parts))
     path = tmp_path / "latin.urdf"
     text = f'<?xml version="1.0" encoding="iso-8859-1"?><robot name="rig">{"".join(parts)}</robot>'

@@ -7,7 +7,8 @@ import pytest
 import trimesh
 from urdf_texts import ARM, refused
 
-from cellplan.io.urdf import UrdfOptions
+from cellplan.io.allowed_folders import AllowedFolders
+from cellplan.io.urdf import UrdfOptions, read_urdf
 
 
 def collision(shape: str) -> str:
@@ -90,3 +91,29 @@ def test_a_drawn_link_whose_drawing_cannot_be_read_is_not_dropped(tmp_path: Path
         "r.urdf:2: link 'base' (visual, used as it has no collision element): mesh 'a.dae': a.dae: COLLADA files are "
         "not read: convert the mesh to STL, OBJ or PLY"
     )
+
+
+def test_a_mesh_elsewhere_is_not_even_looked_for(tmp_path: Path) -> None:
+    (tmp_path / "cell").mkdir()
+    (tmp_path / "secret.stl").write_text("not for you")
+    (tmp_path / "cell" / "link.stl").symlink_to(tmp_path / "secret.stl")
+    within = UrdfOptions(within=AllowedFolders(folder=tmp_path / "cell"))
+    for uri in ("../secret.stl", "../missing.stl", "link.stl"):
+        message = refused(tmp_path / "cell", collision(f'<mesh filename="{uri}"/>'), *ARM[1:], options=within)
+        assert message == (
+            f"r.urdf:2: link 'base' (collision): mesh '{uri}': expected a mesh below the folder of the cell file, got "
+            "one elsewhere; allow it with --allow-dir"
+        )
+    wider = UrdfOptions(within=AllowedFolders(folder=tmp_path / "cell", allowed=(tmp_path,)))
+    link = collision('<mesh filename="link.stl"/>')
+    assert "link.stl: expected an STL file" in refused(tmp_path / "cell", link, *ARM[1:], options=wider)
+
+
+def test_an_angle_of_more_than_two_turns_is_a_slip_of_the_unit(tmp_path: Path) -> None:
+    origin = '<link name="base"><visual><origin rpy="0 0 {}"/><geometry><sphere radius="1"/></geometry></visual></link>'
+
+    assert refused(tmp_path, origin.format(90), *ARM[1:]) == (
+        "r.urdf:2: link 'base': expected angles of at most two turns (12.57 rad), got '0 0 90': is the unit deg?"
+    )
+    (tmp_path / "r.urdf").write_text(f'<robot name="rig">{origin.format(12.5)}{"".join(ARM[1:])}</robot>')
+    assert read_urdf(tmp_path / "r.urdf").joint_names == ("a1",)

@@ -20,7 +20,13 @@ MIMIC = '<mimic joint="{}"/>'
         ([*ARM, "<link/>"], "r.urdf:5: link: expected <link> with the attribute 'name'"),
         (
             [*ARM, '<link name="a,b"/>'],
-            "r.urdf:5: link: expected a name of up to 80 characters without quotes, commas and the like, got 'a,b'",
+            "r.urdf:5: link: expected a name of 1 to 40 letters, digits, '_' or '-' that does not start with "
+            "'-', got 'a,b'",
+        ),
+        (
+            [*ARM, '<link name="arm/1.tip"/>'],
+            "r.urdf:5: link: expected a name of 1 to 40 letters, digits, '_' or '-' that does not start with "
+            "'-', got 'arm/1.tip'",
         ),
         ([*ARM, '<link name="x"/>'], "r.urdf: expected one root link, got 2: base, x"),
         ([*ARM, joint("b", "tip", "base")], "r.urdf:4: joint 'a1': its links form a cycle: tip, base"),

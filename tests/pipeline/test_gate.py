@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,9 @@ from run_edits import edit_json
 from stored_cells import write_cell
 
 from cellplan import load_cell, open_gate, solve, write_run
+from cellplan.cache import entries
 from cellplan.errors import InputError, NotVerifiedError
+from cellplan.guard import door
 from cellplan.model.motion import Resolution
 from cellplan.model.solver import Integrator
 from cellplan.model.verified_run import SEAL, VerifiedRun
@@ -93,6 +96,10 @@ def test_every_exporter_takes_a_verified_run_and_nothing_else() -> None:
 def test_other_versions_are_told_and_do_not_matter(copy: Path) -> None:
     for name in ("manifest.json", "report.json"):
         edit_json(copy / "run" / name, lambda record: record["versions"].update(pin="3.0.0"))
+    page = copy / "run" / "report.html"
+    text = page.read_text(encoding="utf-8")
+    page.write_text(re.sub(r"(pin</(?:th|td|dt)>\s*<[^>]*>)[^<]*", r"\g<1>3.0.0", text), encoding="utf-8")
+    assert page.read_text(encoding="utf-8") != text
     seal_again(copy / "run")
 
     (remark,) = open_gate(copy / "run", cell=copy / "cell" / "small.yaml").remarks
@@ -109,7 +116,11 @@ def test_a_report_of_another_version_of_cellplan_may_have_other_keys(copy: Path)
         edit_json(copy / "run" / name, older)
     seal_again(copy / "run")
 
-    assert len(open_gate(copy / "run", cell=copy / "cell" / "small.yaml").remarks) == 1
+    remarks = open_gate(copy / "run", cell=copy / "cell" / "small.yaml").remarks
+    assert remarks[0].startswith("made with cellplan 0.0.1, verified with cellplan ")
+    assert remarks[1:] == (
+        "the page and the words of the report were not compared: another version of cellplan wrote them",
+    )
 
 
 def test_a_failed_run_is_told_with_its_reason(tmp_path: Path) -> None:
@@ -154,7 +165,6 @@ def test_what_the_command_line_chose_is_told(sound: Path, tmp_path: Path) -> Non
     assert sorted(remarks) == [
         "motion.duration_s: 1.5 was chosen on the command line; the cell file has 1",
         "motion.mode: 'part_at_rest' was chosen on the command line; the cell file has 'simultaneous'",
-        "tasks.path.duration_s: 1.5 was chosen on the command line; the cell file has 1",
     ]
 
 
@@ -235,3 +245,19 @@ def seal_again(run: Path) -> None:
             record["files"][name] = {"bytes": len(data), "sha256": digest(data)}
 
     edit_json(run / "manifest.json", change)
+
+
+def test_a_forged_cache_entry_moves_nothing_that_is_verified(copy: Path, own_cache: Path) -> None:
+    cell = copy / "cell" / "small.yaml"
+    door._end_child()  # the next one knows this cache
+    load_cell(cell)
+    for path in own_cache.iterdir():
+        vertices, *others = entries._unpacked(path.read_bytes())
+        path.write_bytes(entries._packed((vertices + 6.0, *others)))
+    entries.forget()
+    door._end_child()  # the child has read what is in the files
+    forged = load_cell(cell)
+    assert forged.obstacles[1].shape.vertices.min() > 5.0
+    write_run(solve(forged), copy / "run")
+
+    assert "closest_pairs" in refusal(copy / "run", cell)

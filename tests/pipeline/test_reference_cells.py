@@ -211,13 +211,20 @@ def test_pairwise_writes_a_subfolder_for_each_task(cells, tmp_path):
     assert json.loads((tmp_path / "run" / "circle" / "report.json").read_text())["status"] == "passed"
 
 
-def test_idle_robots_in_the_way_of_the_part_are_to_be_withdrawn(cells, tmp_path):
-    """They stand at their own tasks while the part moves; the thesis takes them out of the cell altogether."""
+def test_idle_robots_stand_at_homes_that_are_free_of_the_part(cells, tmp_path):
+    """At their own tasks two of them would be in its way; the thesis takes them out of the cell altogether."""
     cell = with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise")
-    write_run(solve(cell, task="rectangle"), tmp_path / "run")
-    lines = json.loads((tmp_path / "run" / "report.json").read_text())["before_you_run"]
-    assert [line.split(":")[1].split()[1] for line in lines] == ["kuka", "abb"]
-    assert all("would touch the part between" in line for line in lines)
+    solution = solve(cell, task="rectangle")
+    write_run(solution, tmp_path / "run")
+    record = json.loads((tmp_path / "run" / "report.json").read_text())
+    assert record["status"] == "passed"
+    assert "before_you_run" not in record
+    (line,) = record["not_in_program"]
+    assert line.startswith("rectangle: idle in this run: kuka, abb stand at their homes; moves to and from home")
+    homes = [check.subject for check in solution.runs[0].report.checks if check.name == "home" and check.passed]
+    assert homes == ["kuka", "abb"]
+    for name in homes:
+        assert not np.allclose(solution.cell.robot(name).home, cell.robot(name).start, atol=1e-3)
 
 
 def test_one_failed_run_withholds_the_tables_of_all(cells, tmp_path):

@@ -130,11 +130,17 @@ def test_an_arm_that_cannot_leave_its_singularity_stays_as_with_steps() -> None:
     np.testing.assert_allclose(tips(case, case.resolved(integrator=EULER).q)[-1], [2.0, 0.0], atol=1e-6)
 
 
+SAYS_WHY = (
+    r"motion: at \d\.\d+ s (the tool of 'arm' is .* mm from task 'task_arm'|joint 'j\d' of 'arm' would leap).*"
+    r"nearest to a singular configuration is 'arm' on 'task_arm': smallest singular value \d"
+)
+
+
 @pytest.mark.parametrize("point", [(3.5, 0.5), (9.0, 0.0)])
 def test_what_is_out_of_reach_is_lost_as_with_steps(point: tuple[float, float]) -> None:
     case = arm([point], [0.5, 0.9, -0.3])
     for integrator in Integrator:
-        with pytest.raises(DivergedError, match=r"motion: at \d\.\d+ s (the tool of 'arm' is|a joint would leap)"):
+        with pytest.raises(DivergedError, match=SAYS_WHY):
             case.resolved(integrator=integrator)
 
 

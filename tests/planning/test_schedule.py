@@ -1,5 +1,6 @@
 """The schedule keeps times, feeds and rests, and its twists are the motion of its poses."""
 
+import re
 from typing import Any
 
 import numpy as np
@@ -57,7 +58,7 @@ def task(name: str, path: PathSpec, **words: Any) -> Task:
     return Task(name=name, path=path, **(plain | words))
 
 
-def scheduled(*tasks: Task, duration: float = 4.0, step: float = 0.001) -> Schedule:
+def scheduled(*tasks: Task, duration: float | None = 4.0, step: float = 0.001) -> Schedule:
     cell = clocked(*tasks, duration=duration, step=step, origin=ORIGIN)
     return schedule_tasks(cell, [build_toolpath(one, ROLLER, ORIGIN) for one in tasks])
 
@@ -74,13 +75,48 @@ def test_the_clock_is_even_and_reads_well() -> None:
     assert [repr(float(t)) for t in times[[0, 3, 7, 4000]]] == ["0.0", "0.003", "0.007", "4.0"]
 
 
-def test_the_clock_runs_until_the_last_task_ends() -> None:
+def test_a_clock_without_a_length_ends_with_the_last_task() -> None:
     schedule = scheduled(
-        task("a", ELL, start=0.5, duration=1.0), task("b", ELL, duration=2.0005), duration=1.0, step=0.001
+        task("a", ELL, start=0.5, duration=1.0), task("b", ELL, duration=2.0005), duration=None, step=0.001
     )
 
     assert schedule.times[-1] == 2.001  # the first instant not before 2.0005
     assert [one.end for one in schedule.tasks] == pytest.approx([1.5, 2.0005], abs=1e-15)
+
+
+@pytest.mark.parametrize("own", [{"duration": 1.0}, {"feed": 0.4}])
+def test_a_clock_with_a_length_is_neither_cut_short_nor_stretched(own: dict[str, float]) -> None:
+    (one,) = (schedule := scheduled(on_roller(**own), duration=3.0)).tasks
+
+    assert schedule.times[-1] == 3.0
+    assert one.end < 3.0
+    assert np.all(one.V_PT_P[schedule.times > one.end] == 0.0)
+    assert np.ptp(one.X_PT[schedule.times > one.end], axis=0).max() == 0.0
+
+
+def test_a_task_that_needs_more_than_the_clock_is_refused_with_the_time_it_needs() -> None:
+    with pytest.raises(InputError) as caught:
+        scheduled(on_roller(feed=0.01, time_law=CONSTANT), duration=2.0)
+
+    (needed,) = scheduled(on_roller(feed=0.01, time_law=CONSTANT), duration=None).tasks
+    assert str(caught.value) == (
+        f"cell.yaml:7: tasks.a.feed_mm_s: expected an end within the clock of 2 s (motion.duration_s), got an end at "
+        f"{needed.end:.6g} s ({1e3 * needed.length:.4g} mm at up to 10 mm/s); give the clock at least "
+        f"{np.ceil(1e3 * needed.end) / 1e3:g} s, or leave motion.duration_s out and it ends with the last task"
+    )
+
+
+def test_the_time_that_a_refused_task_asks_for_is_enough() -> None:
+    with pytest.raises(InputError) as caught:
+        scheduled(on_roller(feed=0.01), duration=2.0)
+
+    enough = float(re.search(r"at least ([0-9.]+) s", str(caught.value)).group(1))  # type: ignore[union-attr]
+    assert scheduled(on_roller(feed=0.01), duration=enough).tasks[0].end <= enough
+
+
+def test_without_any_time_a_task_is_refused() -> None:
+    with pytest.raises(InputError, match=r"tasks\.a: missing duration_s: expected duration_s or feed_mm_s"):
+        scheduled(task("a", ELL), duration=None)
 
 
 def test_without_own_times_a_task_lasts_until_the_end_of_the_motion() -> None:
@@ -109,7 +145,7 @@ def test_integrating_the_twists_reproduces_the_poses(law: TimeLaw) -> None:
 
 @pytest.mark.parametrize("law", [QUINTIC, TRAPEZOID, CONSTANT], ids=lambda law: law.kind)
 def test_the_fastest_moment_runs_at_the_feed(law: TimeLaw) -> None:
-    (one,) = scheduled(on_roller(path=RECTANGLE, feed=0.2, time_law=law), step=0.0005).tasks
+    (one,) = scheduled(on_roller(path=RECTANGLE, feed=0.2, time_law=law), duration=None, step=0.0005).tasks
 
     speed = np.linalg.norm(one.V_PT_P[:, :3], axis=1)
 
@@ -129,9 +165,7 @@ def test_with_a_duration_each_side_takes_time_in_proportion_to_its_length() -> N
 
 
 def test_a_constant_law_changes_direction_at_the_corner_and_rests_from_its_end_on() -> None:
-    (one,) = scheduled(task("a", ELL, duration=4.0, start=0.5, time_law=CONSTANT), task("b", ELL, duration=6.0)).tasks[
-        :1
-    ]
+    (one,) = scheduled(task("a", ELL, duration=4.0, start=0.5, time_law=CONSTANT), duration=6.0).tasks
 
     velocity = one.V_PT_P[:, :3]
 
@@ -179,8 +213,8 @@ def test_a_task_that_starts_after_the_motion_is_refused() -> None:
         scheduled(task("a", ELL, start=4.0))
 
     assert str(caught.value) == (
-        "cell.yaml:7: tasks.a.start_s: expected a start before the end of the motion at 4 s, got 4; give the task its "
-        "own duration_s or feed_mm_s to go on for longer"
+        "cell.yaml:7: tasks.a.start_s: expected a start before the end of the clock at 4 s, got 4; make "
+        "motion.duration_s longer"
     )
 
 

@@ -93,8 +93,9 @@ def test_a_holder_off_its_grasp_is_named_with_line_distance_and_cure(planar):
 
     arm = 1e3 * 0.2 * 2.0 * np.sin(np.radians(0.5))  # the tool tip is 200 mm from the joint that was turned
     assert str(caught.value).endswith(
-        f"load_sharing_planar.yaml:16: robots.right.start_deg: the tool is {arm:.3f} mm and 1.0000 deg from its grasp "
-        "on the part that 'left' carries, allowed are 0.003 mm and 0.001 deg; `auto` finds a posture"
+        f"load_sharing_planar.yaml:16: robots.right.start_deg: the tool of 'right' is {arm:.3f} mm and 1.0000 deg "
+        "from its grasp on the part that 'left' carries, allowed are 0.003 mm and 0.001 deg; `auto` finds a "
+        "configuration"
     )
 
 
@@ -107,5 +108,7 @@ def test_a_carrier_off_the_start_of_its_path_is_named(planar):
 def test_a_grasp_out_of_reach_is_named(planar):
     right = planar.robot("right")
     far = replace(planar, robots=(planar.robots[0], replace(right, X_WB=right.X_WB @ pose((-5.0, 0.0, 0.0)))))
-    with pytest.raises(StartNotFoundError, match=r"robots\.right\..* brings the tool to its grasp on the part"):
+    with pytest.raises(
+        StartNotFoundError, match=r"robots\.right\..* brings the tool of 'right' to its grasp on the part"
+    ):
         find_start(Scene.from_cell(far), toolpaths_of(far))

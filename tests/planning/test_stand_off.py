@@ -68,8 +68,9 @@ def test_the_twist_is_the_derivative_of_the_pose(cell: Cell) -> None:
     assert np.abs(moved.V_PT_P[[0, -1]]).max() < 1e-15  # rest, but for the rounding of the last instant
 
 
-def test_the_clock_goes_on_until_the_tool_has_left(cell: Cell) -> None:
-    times, _ = scheduled(replace(cell, tasks=(replace(cell.tasks[0], duration=2.9),)))
+def test_a_clock_without_a_length_ends_when_the_tool_has_left(cell: Cell) -> None:
+    motion = replace(cell.motion, duration=None)
+    times, _ = scheduled(replace(cell, motion=motion, tasks=(replace(cell.tasks[0], duration=2.9),)))
 
     assert times[-1] == pytest.approx(4.3)
 
@@ -84,8 +85,9 @@ def test_a_program_starts_and_ends_clear_of_the_part(cell: Cell) -> None:
 
 
 def test_another_duration_leaves_time_for_the_way_back(cell: Cell) -> None:
-    filled = replace(cell, tasks=(replace(cell.tasks[0], duration=2.6),))
+    filled = replace(cell, tasks=(replace(cell.tasks[0], duration=None),))
 
-    (task,) = with_overrides(filled, duration=6.0).tasks
+    times, moved = scheduled(with_overrides(filled, duration=6.0))
 
-    assert task.duration == pytest.approx(4.6)
+    assert times[-1] == 6.0
+    assert moved.end == pytest.approx(6.0 - filled.tasks[0].leaving)

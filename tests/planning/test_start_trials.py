@@ -9,8 +9,10 @@ from cellplan import load_cell, solve
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell import Obstacle
+from cellplan.model.name_order import NameOrder
 from cellplan.pipeline.overrides import with_overrides
-from cellplan.planning.start_trials import TOUCHING, StartTrials
+from cellplan.planning.near_ties import best_first
+from cellplan.planning.start_trials import StartTrials
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.scene import Scene
 
@@ -26,7 +28,8 @@ def trials_of(cell):
 
 
 def start_of(cell):
-    return np.concatenate([robot.start for robot in cell.robots])
+    """In the order of names, as trials have it."""
+    return np.concatenate([robot.start for robot in sorted(cell.robots, key=lambda robot: robot.name)])
 
 
 def share_left_free(report, robots):
@@ -37,18 +40,23 @@ def share_left_free(report, robots):
 
 
 def test_the_coarse_clock_foretells_what_the_full_motion_leaves_free(cell):
-    quality, start = trials_of(cell).judge(start_of(cell))
+    trial = trials_of(cell).judge(start_of(cell))
 
-    np.testing.assert_array_equal(start, start_of(cell))  # given postures stay on their turn
+    np.testing.assert_array_equal(trial.start, start_of(cell))  # given postures stay on their turn
     expected = share_left_free(solve(cell).runs[0].report, {robot.name for robot in cell.robots})
-    assert quality == pytest.approx(expected, abs=0.02)  # 160 samples against 4001
+    assert trial.shares[0] == pytest.approx(expected, abs=0.02)  # 160 samples against 4001
+    assert trial.is_sound
+
+    closely = trials_of(cell).looked_at_closely([trial, trial])[0]
+
+    assert closely.shares[0] == pytest.approx(expected, abs=1e-3)
 
 
 def test_an_operator_judged_alone_is_judged_as_in_a_run_of_its_own(cell):
     task = cell.task("rectangle")
     holder = cell.robot("reis").start
 
-    quality = trials_of(cell).judge_alone(task, cell.robot("staubli").start, holder)
+    quality = trials_of(cell).judge_alone(task, cell.robot("staubli").start, holder)[0]
 
     run = solve(with_overrides(cell, mode="pairwise"), task="rectangle").runs[0]
     assert quality == pytest.approx(share_left_free(run.report, {"reis", "staubli"}), abs=0.02)
@@ -66,15 +74,20 @@ def test_a_collision_on_the_way_costs_more_than_any_limit(cell):
         obstacles=(*cell.obstacles, block),
         robots=tuple(replace(r, start=None) if r.name == "kuka" else r for r in cell.robots),
     )
-    assert Scene.from_cell(blocked).touching(start_of(cell)) is None
+    assert Scene.from_cell(blocked).touching(np.concatenate([robot.start for robot in cell.robots])) is None
 
-    free, _ = trials_of(cell).judge(start_of(cell))
-    colliding, _ = trials_of(blocked).judge(start_of(cell))
+    free = trials_of(cell).judge(start_of(cell))
+    colliding = trials_of(blocked).judge(start_of(cell))
 
-    assert colliding == pytest.approx(free - TOUCHING)
+    assert free.is_sound
+    assert not colliding.is_sound
+    np.testing.assert_array_equal(free.shares, colliding.shares)
+    assert best_first(np.array([colliding.figures, free.figures])) == [1, 0]
 
 
 def test_a_lost_path_is_worth_nothing(cell):
     start = start_of(cell)
-    start[cell.columns("kuka")] += 2.0
-    assert trials_of(cell).judge(start)[0] == -np.inf
+    start[NameOrder.of(cell).cell.columns("kuka")] += 2.0
+    trial = trials_of(cell).judge(start)
+    assert not trial.is_followed
+    assert not trial.is_sound

@@ -61,8 +61,8 @@ def test_start_off_the_task_is_named_with_distance_and_cure(cell):
     start[0] += np.radians(1.0)
     with pytest.raises(StartOffTaskError) as caught:
         examine_given_starts(with_start(cell, "abb", start), toolpaths_of(cell))
-    assert "robots.abb.start_deg: the tool is " in str(caught.value)
-    assert "from the start of task 'rhombus', allowed are 0.1 mm and 0.01 deg; `auto` finds a posture" in str(
+    assert "robots.abb.start_deg: the tool of 'abb' is " in str(caught.value)
+    assert "from the start of task 'rhombus', allowed are 0.1 mm and 0.01 deg; `auto` finds a configuration" in str(
         caught.value
     )
 
@@ -156,7 +156,7 @@ def test_arms_that_cannot_help_do_not_multiply_a_search_without_hope(tmp_path):
     scene, toolpaths = Scene.from_cell(cell), toolpaths_of(cell)
 
     began = time.process_time()
-    with pytest.raises(StartNotFoundError, match=r"without a collision, most often of 'r0/.*' with 'wall'"):
+    with pytest.raises(StartNotFoundError, match=r"robots\.r0.*: 'r0/.*' touches 'wall' in all .* of task 't0'"):
         find_start(scene, toolpaths)
 
     assert time.process_time() - began < 20.0  # some 3 s; looking at every combination takes minutes
@@ -187,10 +187,11 @@ def test_base_out_of_reach_is_named(cell):
         ),
     )
     with pytest.raises(
-        StartNotFoundError, match="no posture within the joint limits brings the tool to the start of"
+        StartNotFoundError,
+        match=r"robots\.kuka\.start_deg: no configuration within the joint limits brings the tool of 'kuka' to",
     ) as e:
         find_start(Scene.from_cell(far), toolpaths_of(cell))
-    assert "(48 starts of each arm tried)" in str(e.value)  # the posture of the positioner is given
+    assert "(48 attempts of the inverse kinematics)" in str(e.value)  # the configuration of the positioner is given
 
 
 def test_multi_start_finds_the_branches_of_a_six_axis_arm(cell):

@@ -81,8 +81,9 @@ CASES = {
 }
 
 
-def clock(task: Task, part: Part = ROLLER, *, duration: float = 5.0, step: float = 0.01) -> TimedTasks:
-    return time_tasks(clocked(task, duration=duration, step=step), [build_toolpath(task, part, clocked().origin)])
+def clock(task: Task, part: Part = ROLLER, *, step: float = 0.01) -> TimedTasks:
+    task = replace(task, duration=task.time_for_path(5.0))
+    return time_tasks(clocked(task, duration=None, step=step), [build_toolpath(task, part, clocked().origin)])
 
 
 @cache
@@ -255,7 +256,7 @@ def test_all_intervals_at_once_are_each_on_its_own() -> None:
 def test_breaks_of_all_tasks_are_joined_within_the_clock() -> None:
     first = task_on(ELL, tool_axis=-EZ, name="first", start=1.0, duration=1.0, **MOVES)
     second = task_on(circle(), project=EZ, name="second", start=0.0, duration=2.0000000001)
-    cell = clocked(first, second, duration=2.0, step=0.35)
+    cell = clocked(first, second, duration=None, step=0.35)
     tasks = time_tasks(cell, [build_toolpath(task, ROLLER, cell.origin) for task in (first, second)])
 
     assert tasks.times[-1] == pytest.approx(2.45)
@@ -274,7 +275,7 @@ def test_instants_nearer_than_rounding_are_one() -> None:
 
 def test_knots_that_nobody_counts_are_refused() -> None:
     task = task_on(sampled(RING[:-1], is_smooth=True, is_closed=True), tool_axis=-EZ, repeat=200_000)
-    (path,) = clock(task, duration=1e3, step=1e-3).paths
+    (path,) = clock(replace(task, duration=1e3), step=1e-3).paths
 
     with pytest.raises(InputError) as caught:
         _ = path.breaks

@@ -111,6 +111,7 @@ def test_the_record_says_what_the_accurate_mode_took() -> None:
         "solves": 2976,
         "error_between_nodes_mm": 2.5e-6,
         "euler_from_s": 0.5,
+        "lost": None,
     }
     assert solver_record(settings())["resolution"] is None
     assert solver_record(settings("quadratic_program"))["integrator"] == "euler"

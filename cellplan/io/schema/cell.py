@@ -94,7 +94,11 @@ class MotionEntry(Entry):
         default="simultaneous",
         description="Who moves: all robots; the positioner and one operator at a time; the operators only.",
     )
-    duration_s: Seconds = Field(description="Length of the common clock; every task ends within it.")
+    duration_s: Seconds | None = Field(
+        default=None,
+        description="Length of the common clock; every task ends within it. When absent, every task has a time of its "
+        "own (duration_s, feed_mm_s or a file with instants) and the clock ends with the last one.",
+    )
     step_s: Seconds = Field(default=0.001, description="Time between two samples.")
     time_law: TimeLawChoice = Field(default="quintic", description="Law of each stretch of path between stops.")
     corners: CornerChoice = Field(default="stop", description="Stop at corners, or round them.")
@@ -106,6 +110,8 @@ class MotionEntry(Entry):
     @model_validator(mode="after")
     def _has_a_sensible_clock(self) -> Self:
         """At least one step, and not more samples than anybody can use."""
+        if self.duration_s is None:
+            return self
         if self.step_s > self.duration_s:
             raise rule(f"expected a step of at most duration_s = {self.duration_s:g}, got {self.step_s:g}", "step_s")
         if self.duration_s / self.step_s > SAMPLE_LIMIT:

@@ -116,6 +116,15 @@ class RobotEntry(Entry):
         default=None,
         description="Start posture, one key per joint with its unit (a1_deg, rail_mm); excludes start_deg.",
     )
+    home_deg: Posture | None = Field(
+        default=None,
+        description="Configuration in which the robot stands while it is idle, one angle per joint, for robots with "
+        "revolute joints only; auto finds one near the start.",
+    )
+    home: NamedPosture | None = Field(
+        default=None,
+        description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes home_deg.",
+    )
     weights: tuple[Weight, ...] | None = Field(
         default=None,
         description="One positive weight per joint, ones when absent; a larger weight moves that joint less.",
@@ -128,16 +137,29 @@ class RobotEntry(Entry):
 
     @model_validator(mode="after")
     def _starts_once(self) -> Self:
-        """The start posture is given at most once; locked joints name their unit."""
+        """Start posture and home are given at most once each; locked joints name their unit."""
         if self.start_deg is not None and self.start is not None:
             raise rule("expected either start_deg or start, got both", "start")
+        if self.home_deg is not None and self.home is not None:
+            raise rule("expected either home_deg or home, got both", "home")
+        joints: set[str] = set()
         for key in self.locked:
-            if not key.endswith(("_deg", "_mm")):
+            joint, _, unit = key.rpartition("_")
+            if unit not in {"deg", "mm"}:
                 raise rule("expected a joint name with its unit, such as finger_mm or flap_deg", f"locked.{key}")
+            if joint in joints:
+                raise rule(f"expected each joint once, got '{joint}' in deg and in mm", f"locked.{key}")
+            joints.add(joint)
         return self
 
     @property
     def given_start(self) -> tuple[float, ...] | dict[str, Any] | None:
         """Start posture that was written down; None when it is to be found."""
         given = self.start_deg if self.start_deg is not None else self.start
+        return None if given is None or isinstance(given, str) else given
+
+    @property
+    def given_home(self) -> tuple[float, ...] | dict[str, Any] | None:
+        """Home that was written down; None when it is to be found."""
+        given = self.home_deg if self.home_deg is not None else self.home
         return None if given is None or isinstance(given, str) else given

@@ -1,6 +1,6 @@
 """Shapes of parts, tools and surroundings as they are written in a cell file."""
 
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -81,6 +81,10 @@ class PlaneEntry(Entry):
 
 
 MeshUnit = Literal["mm", "m", "inch"]
+_OPEN: Final = (
+    "Take a mesh that is not closed as a surface: touching it counts, being inside it does not. An open mesh is "
+    "refused otherwise."
+)
 _UNIT_RULE = "missing, expected the unit of the mesh: mm, m or inch"
 
 
@@ -91,6 +95,8 @@ def require_unit(entry: Entry) -> None:
         raise rule(_UNIT_RULE, "unit")
     if has_unit and not has_mesh:
         raise rule("unexpected key, a unit goes with a mesh only", "unit")
+    if getattr(entry, "open", None) is not None and not has_mesh:
+        raise rule("unexpected key, open goes with a mesh only", "open")
 
 
 class _OneShape(Entry):
@@ -139,6 +145,7 @@ class ToolShapeEntry(_OneShape):
     sphere: SphereEntry | None = Field(default=None, description="Ball that touches the tool tip from behind.")
     mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file, drawn in the flange frame.")
     unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
+    open: bool | None = Field(default=None, description=_OPEN)
 
 
 class ToolBodyEntry(_OneShape):
@@ -153,6 +160,7 @@ class ToolBodyEntry(_OneShape):
     sphere: SphereEntry | None = Field(default=None, description="Ball.")
     mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file.")
     unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
+    open: bool | None = Field(default=None, description=_OPEN)
     at: PoseEntry = Field(default=PoseEntry(), description="Pose of the solid in the flange frame.")
 
 
@@ -169,6 +177,7 @@ class ObstacleEntry(_OneShape):
     sphere: SphereEntry | None = Field(default=None, description="Ball.")
     mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file.")
     unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
+    open: bool | None = Field(default=None, description=_OPEN)
     at: PoseEntry | None = Field(
         default=None, description="Pose of the shape in the world; the world frame when absent. Not with a plane."
     )

@@ -66,8 +66,8 @@ class SearchEntry(Entry):
     sequence: tuple[SearchJointEntry, ...] | None = Field(
         default=None,
         min_length=1,
-        description="Joints in the order in which `recursive_search` moves them; all in the order of the file when "
-        "absent. Joints left out stand still.",
+        description="Joints in the order in which `recursive_search` moves them; all, robot by robot in the order of "
+        "their names, when absent. Joints left out stand still.",
     )
 
 

@@ -257,8 +257,8 @@ class TaskEntry(Entry):
     )
     duration_s: Seconds | None = Field(
         default=None,
-        description="Time for the whole path, all cycles together; the rest of the motion's duration when absent. "
-        "Excludes feed_mm_s.",
+        description="Time for the whole path, all cycles together; when absent what motion.duration_s leaves. Excludes "
+        "feed_mm_s.",
     )
     feed_mm_s: SlidingSpeed | None = Field(
         default=None, description="Largest speed along the path on the surface; excludes duration_s."

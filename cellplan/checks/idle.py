@@ -1,0 +1,47 @@
+"""Idle robots: each stands at its home, from the first row of its table to the last."""
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.idle import idle_robots
+from cellplan.model.motion import Schedule
+from cellplan.model.report import Check
+
+ROOM: Final = 1e-7  # [deg] or [mm]: tables have twelve decimals, and cells as many
+
+
+def check_idle(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> list[Check]:
+    """One check for each robot that has nothing to do: how far it is from its home at most.
+
+    Args:
+        cell: The cell; a robot without a home is held against its first row.
+        schedule: The tasks that are worked on.
+        q: Positions in [rad] or [m] by robot, shape (N, n).
+    """
+    idle = idle_robots(cell, [scheduled.task.name for scheduled in schedule.tasks])
+    return [_stands(cell.robot(name), schedule.times, q[name]) for name in idle]
+
+
+def _stands(robot: Robot, times: Array, q: Array) -> Check:
+    """Whether one robot stands at its home."""
+    units = np.array([np.degrees(1.0) if joint.is_revolute else 1e3 for joint in robot.model.joints])
+    away = np.abs(q - (q[0] if robot.home is None else robot.home)) * units
+    row, column = np.unravel_index(int(np.argmax(away)), away.shape)
+    joint, value = robot.model.joints[column], float(away[row, column])
+    unit, passed = "deg" if joint.is_revolute else "mm", value <= ROOM
+    found = f"stands at its home, {value:.2g} {unit} from it at most" if passed else ""
+    far = f"joint {joint.name} is {value:.6g} {unit} from its home at {times[row]:.3f} s, and has nothing to do"
+    return Check(
+        name="home",
+        subject=robot.name,
+        passed=passed,
+        value=value,
+        limit=ROOM,
+        unit=unit,
+        at_s=float(times[row]),
+        message=f"idle robot {robot.name}: {found or far}",
+    )

@@ -1,0 +1,29 @@
+"""Idle robots: who has nothing to do in a run, and where it stands meanwhile."""
+
+from collections.abc import Collection
+
+from cellplan.model.cell import Cell
+
+
+def idle_robots(cell: Cell, tasks: Collection[str]) -> tuple[str, ...]:
+    """Names of the robots that neither hold the part nor have one of some tasks, in the order of the cell.
+
+    Args:
+        cell: The cell.
+        tasks: Names of the tasks that are worked on in a run.
+    """
+    busy = {*cell.positioners, *(task.robot for task in cell.tasks if task.name in tasks)}
+    return tuple(robot.name for robot in cell.robots if robot.name not in busy)
+
+
+def not_in_program(cell: Cell, tasks: Collection[str]) -> str:
+    """One line on moves that a run leaves out: those of robots with a task, which is not the run's, to and from home.
+
+    Empty when there are none; a robot that has nothing to do in the whole cell never leaves its home.
+    """
+    workers = {task.robot for task in cell.tasks}
+    idle = [name for name in idle_robots(cell, tasks) if name in workers]
+    if not idle:
+        return ""
+    stand = "stands at its home" if len(idle) == 1 else "stand at their homes"
+    return f"idle in this run: {', '.join(idle)} {stand}; moves to and from home are not part of the program"
