@@ -61,8 +61,7 @@ def verify(
     checks += joint_checks
     drift = repeatability(cell, schedule, q)
     checks += check_joint_drift(drift, is_demanded=cell.motion.cyclic)
-    checks += check_locked(cell, schedule.times, q)
-    checks += check_idle(cell, schedule, q)
+    checks += [*check_locked(cell, schedule.times, q), *check_idle(cell, schedule, q)]
     report = Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
@@ -87,8 +86,8 @@ def verify(
         preview(report)
     stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
     clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
-    mounting = check_mounting(scene, stacked, schedule.times)
-    return replace(report, checks=(*checks, *mounting, *clearance_checks), clearance=clearance)
+    checks += check_mounting(scene, stacked, schedule.times)
+    return replace(report, checks=(*checks, *clearance_checks), clearance=clearance)
 
 
 def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccuracy]) -> list[Check]:
