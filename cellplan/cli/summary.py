@@ -58,7 +58,7 @@ def left_out_lines(record: Record) -> list[str]:
 
 def _clock_word(record: Record) -> str:
     """What decides the length of the clock, unless the cell file states it."""
-    return " (no motion.duration_s: the clock ends with the last task)" if record["clock_from"] == "tasks" else ""
+    return " (no motion.duration_s: the clock ends with the last task)" if record.get("clock_from") == "tasks" else ""
 
 
 def _method_word(solver: Record) -> str:

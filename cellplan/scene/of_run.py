@@ -21,13 +21,15 @@ def scene_of_run(scene: Scene, tasks: Collection[str]) -> Scene:
     """
     idle = idle_robots(scene.cell, tasks)
     pairs = list(scene.pairs)
-    watched = _watched(scene)
+    watched, judged = _watched(scene), set[tuple[str, ...]]()
     for row, pair in enumerate(pairs):
         tool = _tool_at_work(scene, pair)
         if tool is not None and scene.bodies[tool].robot in idle:
             pairs[row] = replace(pair, rule=Rule.CLEARANCE, reason="")
             watched[row] = (tool, pair.second if tool == pair.first else pair.first)
-    return _with_pairs(scene, pairs, watched)
+            judged.add(scene.names(pair))
+    left_out = tuple(each for each in scene.left_out if each.bodies not in judged)
+    return replace(_with_pairs(scene, pairs, watched), left_out=left_out)
 
 
 def scene_of_rows(scene: Scene, rows: Sequence[int]) -> Scene:
