@@ -55,8 +55,7 @@ def verify(
         task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
     )
     closures = closure_accuracy(cell, scene.chains, q, X_WP)
-    if schedule.desired is not None:
-        accuracy, closures = look_between(scene, schedule, q, accuracy=accuracy, closures=closures)
+    accuracy, closures = look_between(scene, schedule, q, accuracy=accuracy, closures=closures)
     checks = _accuracy_checks(cell, schedule, accuracy)
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
     uses, joint_checks = _joints(cell, schedule.times, q)
