@@ -24,7 +24,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report import Check, JointUse, Report, RobotSpeed, TaskAccuracy
+from cellplan.model.report import Check, ClosureAccuracy, JointUse, Report, RobotSpeed, TaskAccuracy
 from cellplan.scene.scene import Scene
 
 
@@ -56,12 +56,7 @@ def verify(
     q = _positions(cell, schedule, tables)
     progress("checking tool errors and joints", 0.0)
     X_WP = part_poses(cell, scene.chains, q)
-    accuracy = tuple(
-        task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
-    )
-    closures = closure_accuracy(cell, scene.chains, q, X_WP)
-    if schedule.desired is not None:
-        accuracy, closures = look_between(scene, schedule, q, accuracy=accuracy, closures=closures)
+    accuracy, closures = _errors(scene, schedule, q, X_WP)
     depths = tool_depths(cell, schedule, scene.chains, q)
     checks = [*_accuracy_checks(cell, schedule, accuracy), *check_depths(cell, depths)]
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
@@ -98,6 +93,17 @@ def verify(
     clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
     mounting = check_mounting(scene, stacked, schedule.times)
     return replace(report, checks=(*checks, *mounting, *clearance_checks), clearance=clearance)
+
+
+def _errors(
+    scene: Scene, schedule: Schedule, q: Mapping[str, Array], X_WP: Array
+) -> tuple[tuple[TaskAccuracy, ...], tuple[ClosureAccuracy, ...]]:
+    """Errors of all tasks and of all closures, at the rows and between them."""
+    accuracy = tuple(
+        task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
+    )
+    closures = closure_accuracy(scene.cell, scene.chains, q, X_WP)
+    return look_between(scene, schedule, q, accuracy=accuracy, closures=closures)
 
 
 def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccuracy]) -> list[Check]:

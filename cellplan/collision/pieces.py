@@ -17,7 +17,7 @@ from cellplan.collision.travel import ROUNDING, Bends, Motion, Pair
 from cellplan.geometry.shapes import Mesh, bounding_capsule
 from cellplan.geometry.transforms import Array
 
-PIECES: Final = 8  # [-] pieces that a body is taken apart into at once
+PIECES: Final = 2  # [-] pieces that a body is taken apart into at once; those that are far need no more
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -160,20 +160,19 @@ class PairMotion:
 
 
 class _Carried:
-    """What holds one body, seen from the other at all samples: the centre of a sphere, and both ends of a line."""
+    """What holds one body, seen from the other at all samples: a line and a radius round it, or a sphere."""
 
     def __init__(self, body: CollisionBody, R: Array, p: Array) -> None:
-        """Carry the three points along; poses of the body seen from the other, shapes (n, 3, 3) and (n, 3)."""
-        points = np.concatenate([body.centre[None], body.ends])
-        self._points = np.swapaxes(R @ points.T, 1, 2) + p[:, None]
-        self._radius, self._girth = body.radius, body.girth
+        """Carry both ends of the line along, or the centre; poses seen from the other, shapes (n, 3, 3) and (n, 3)."""
+        is_slender = float(np.linalg.norm(body.ends[1] - body.ends[0])) > 2.0 * body.girth
+        points, self._radius = (body.ends, body.girth) if is_slender else (body.centre[None], body.radius)
+        self._points = [R @ point + p for point in points]
 
     def displacement(self, sample: int, others: slice | Samples, turn: Array) -> Array:
         """Farthest that a point of the body moved between a sample and m others, which turned it so far, shape (m,)."""
-        moved = self._points[others] - self._points[sample]
-        length = np.sqrt(np.einsum("ijk,ijk->ij", moved, moved))
-        by_line = np.maximum(length[:, 1], length[:, 2]) + self._girth * turn
-        farthest: Array = np.minimum(length[:, 0] + self._radius * turn, by_line)
+        farthest: Array = self._radius * turn
+        squares = [np.einsum("ij,ij->i", moved, moved) for moved in (p[others] - p[sample] for p in self._points)]
+        farthest += np.sqrt(squares[0] if len(squares) == 1 else np.maximum(*squares))
         return farthest
 
 

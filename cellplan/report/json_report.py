@@ -52,8 +52,8 @@ def report_json(report: Report, *, cell: Cell, provenance: Provenance, motion: M
 def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> Record:
     """The record of one run, of its closures and of how its motion was found, without the series."""
     record = report_record(report, cell=cell, provenance=provenance)
+    record["tasks"] = tasks_record(report, cell)
     return record | {
-        "tasks": tasks_record(report, cell),
         "clearance": with_accuracies(record["clearance"], report.clearance.minima),
         "rests_on": rests_on_record(cell, report.loads),
         "closest_pairs": closest_pairs_record(report.clearance),
