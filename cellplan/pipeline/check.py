@@ -15,12 +15,12 @@ from cellplan.model.left_out import LeftOut
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
 from cellplan.model.toolpath import Toolpath, Trajectory
+from cellplan.pipeline.chosen_start import chosen_start
 from cellplan.pipeline.solve import with_start
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.modes import plan_runs, standing
 from cellplan.planning.run_pairs import present_pairs
 from cellplan.planning.schedule import examine_times
-from cellplan.planning.start_search import choose_start
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.of_run import scene_of_run
 from cellplan.scene.scene import Scene
@@ -65,7 +65,7 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
     examine_times(cell, tuple(toolpaths.values()))
     examine_given_starts(cell, toolpaths)
-    choice = choose_start(scene, toolpaths, progress=progress)
+    choice = chosen_start(scene, toolpaths, progress=progress)
     start = choice.start
     pair = _touching_at_start(scene, start)
     found = tuple(robot.name for robot in cell.robots if robot.start is None)

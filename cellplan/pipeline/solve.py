@@ -12,6 +12,7 @@ from cellplan.model.idle import not_in_program
 from cellplan.model.motion import Motion, Program
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
+from cellplan.pipeline.chosen_start import chosen_start
 from cellplan.pipeline.drawing import Drawing
 from cellplan.pipeline.homes import depends_on_homes, find_homes, with_homes
 from cellplan.pipeline.plan_run import PlannedRun, plan_run
@@ -20,7 +21,6 @@ from cellplan.pipeline.solution import Run, Solution
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.modes import plan_runs, standing
 from cellplan.planning.schedule import examine_times
-from cellplan.planning.start_search import choose_start
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.report.acceleration_record import table_line
 from cellplan.scene.scene import Scene
@@ -47,7 +47,7 @@ def solve(
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
     examine_times(cell, tuple(toolpaths.values()))
     examine_given_starts(cell, toolpaths)
-    choice = choose_start(scene, toolpaths, progress=progress)
+    choice = chosen_start(scene, toolpaths, progress=progress)
     started = with_start(cell, choice.start)
     plans = plan_runs(cell, only=task)
     planned = [plan_run(started, toolpaths, plan, progress=progress) for plan in plans]

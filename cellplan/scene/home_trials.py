@@ -120,8 +120,8 @@ class _Table:
 
     def _limit(self, row: int) -> float:
         """Distance in [m] that a pair is to keep."""
-        is_kept = self._scene.pairs[row].rule is Rule.CLEARANCE
-        return max(SURELY_APART, self._scene.cell.checks.clearance) if is_kept else SURELY_APART
+        pair = self._scene.pairs[row]
+        return max(SURELY_APART, pair.demand) if pair.rule is Rule.CLEARANCE else SURELY_APART
 
     def _on_ground(self, poses: BodyPoses) -> int | None:
         for row in self._scene.ground_rows.tolist():

@@ -36,6 +36,7 @@ class MountedPair:
         second: Index of the other; a half-space is always the second.
         mount: Why they may touch.
         limit: Greatest allowed depth in [m].
+        accuracy: Share of the limit in [m] that makes up for what is stated of the accuracy of a link's body.
         moves: Whether the one moves against the other, so that every configuration of a motion counts.
     """
 
@@ -43,6 +44,7 @@ class MountedPair:
     second: int
     mount: Mount
     limit: float
+    accuracy: float = 0.0
     moves: bool = False
 
 
@@ -92,8 +94,15 @@ def mounted_pair(a: SceneBody, b: SceneBody, ends: tuple[int, int], cell: Cell) 
     grasp = grasp_of(a, b, cell)
     if grasp is None:
         return None
-    moves = len(grasp.axes) < 6
-    return MountedPair(first=first, second=second, mount=Mount.GRIP, limit=grasp.depth, moves=moves)
+    accuracy = max((body.accuracy or 0.0) if body.kind is Kind.LINK else 0.0 for body in (a, b))
+    return MountedPair(
+        first=first,
+        second=second,
+        mount=Mount.GRIP,
+        limit=grasp.depth + accuracy,
+        accuracy=accuracy,
+        moves=len(grasp.axes) < 6,
+    )
 
 
 def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Sequence[tuple[int, Sequence[int]]]) -> None:

@@ -19,7 +19,7 @@ from cellplan.collision.points import nearest_points, point_above
 from cellplan.collision.travel import Pair
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import ClearanceClass
-from cellplan.scene.pairs import Rule
+from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 
 Rows = NDArray[np.intp]  # indices of pairs
@@ -45,40 +45,34 @@ class Survey:
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
         edges: Samples at which blocks begin and end, ascending from 0 to N - 1, shape (K + 1,).
         low: No distance of a pair is below this in a block, in [m], shape (pairs, K); zero where the pair touches; inf
-            where nothing of a tool sticks out of its contact zone. May be negative where little is proved, or nobody
-            looked: for pairs left out.
+            where nothing of a tool sticks out of its contact zone. May be negative where little is proved.
         found: What is known of each pair; instants are counted in samples.
         solid_ends: The engine's bodies of each pair of solids, by the pair.
         at_work: Pairs of a tool at work and the part.
         at_surface: First and last sample at which a tool at work is at the surface of the part, by pair.
-        left_out: Pairs of which contacts are looked for at the samples only.
     """
 
-    def __init__(self, scene: Scene, q: Array, *, left_out: Sequence[int] = ()) -> None:
+    def __init__(self, scene: Scene, q: Array) -> None:
         """Lay out the blocks.
 
         Args:
             scene: The scene.
             q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2.
-            left_out: Indices of pairs of which contacts are looked for at the samples only.
         """
         count = len(scene.pairs)
-        self.scene, self.q, self.left_out = scene, q, frozenset(left_out)
+        self.scene, self.q = scene, q
         self.edges = np.unique(np.linspace(0, len(q) - 1, min(BLOCKS, len(q) - 1) + 1).round().astype(np.intp))
         self.low = np.full((count, len(self.edges) - 1), np.inf)
-        self.found = [_nothing_found(scene, row, is_left_out=row in self.left_out) for row in range(count)]
+        self.found = [_nothing_found(pair) for pair in scene.pairs]
         self.at_surface: dict[int, tuple[int, int]] = {}
         pairs = zip(scene.solid_rows.tolist(), scene.solid_pairs.tolist(), strict=True)
         self.solid_ends: dict[int, Pair] = {row: (first, second) for row, (first, second) in pairs}
-        self.at_work = [
-            row for row, pair in enumerate(scene.pairs) if pair.rule is Rule.PROCESS and row not in left_out
-        ]
+        self.at_work = [row for row, pair in enumerate(scene.pairs) if pair.rule is Rule.PROCESS]
         self._nearest = np.full(count, np.inf)  # smallest distance found in [m], zero where a pair touches
         self._ranks: _Ranks | None = None  # of the distances found, until one of them changes
-        counts = ~np.isin(np.arange(count), left_out)
         kinds = np.array([pair.clearance_class for pair in scene.pairs])
-        self._keeps_any = counts & np.array([pair.rule is Rule.CLEARANCE for pair in scene.pairs], dtype=bool)
-        self._watched = {kind: counts & (kinds == kind) for kind in ClearanceClass}
+        self._keeps_any = np.array([pair.rule is Rule.CLEARANCE for pair in scene.pairs], dtype=bool)
+        self._watched = {kind: kinds == kind for kind in ClearanceClass}
         self._raised = _raised_demands(scene) if scene.cell.checks.adds_accuracy else np.zeros(count)
         self._keeps = {kind: self._keeps_any & (kinds == kind) for kind in ClearanceClass}
 
@@ -190,10 +184,7 @@ def lowest_bounds(seen: Survey, rows: Rows) -> Array:
     return lowest
 
 
-def _nothing_found(scene: Scene, row: int, *, is_left_out: bool) -> Found:
+def _nothing_found(pair: ScenePair) -> Found:
     """What is known of a pair before anything is searched, with what is to be proved of it first."""
-    if is_left_out:
-        return Found(most_cuts=0)
-    pair = scene.pairs[row]
     demand = pair.demand if pair.rule is Rule.CLEARANCE else 0.0
     return Found(demand=max(SURELY_APART, demand))

@@ -1,6 +1,6 @@
 """The work of a survey: stretch by stretch through the program, pair by pair, the nearest first."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -24,19 +24,16 @@ PAIR_WORK: Final = 2_000_000  # [-] pairs times blocks bounded at once: 100 MB
 FIRST_LOOKS: Final = 12  # [-] pairs of each class measured once before any search: a small distance saves much later
 
 
-def survey(
-    scene: Scene, q: Array, *, left_out: Sequence[int] = (), progress: Progress = silent, stage: str = ""
-) -> Survey:
+def survey(scene: Scene, q: Array, *, progress: Progress = silent, stage: str = "") -> Survey:
     """Search a program for contacts and for the smallest distances, at the samples and between them.
 
     Args:
         scene: The scene.
         q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2.
-        left_out: Indices of pairs of which contacts are looked for at the samples only.
         progress: Who wants to know how far it is.
         stage: What it is told.
     """
-    found = Survey(scene, q, left_out=left_out)
+    found = Survey(scene, q)
     arms = LeverArms(scene, q)
     for first, last in _stretches(found):
         motion = StraightMotion.of_cell(scene, arms, q[found.edges[first] : found.edges[last] + 1])
