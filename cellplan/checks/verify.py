@@ -63,9 +63,8 @@ def verify(
     uses, joint_checks = _joints(cell, schedule.times, q)
     accelerations = motion_accelerations(cell, scene.chains, schedule, q=q, X_WP=X_WP)
     checks += [*joint_checks, *check_accelerations(cell, accelerations)]
-    drift = repeatability(cell, schedule, q)
+    drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
-    loads = load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_idle(cell, schedule, q), *check_payload(loads)]
     report = Report(
         cell=cell.name,

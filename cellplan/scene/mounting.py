@@ -56,8 +56,11 @@ def is_of_own_file(a: SceneBody, b: SceneBody) -> bool:
 def stand_on_each_other(a: SceneBody, b: SceneBody) -> bool:
     """Whether two bodies never move and one may stand on the other: a base or a part on something of the cell's own.
 
-    The feet of two robots, and a foot and a part, keep their distance as everything else does.
+    The feet of two robots, and a foot and a part, keep their distance as everything else does. What is mounted on one
+    base, such as its pedestal, belongs together.
     """
+    if a.robot is not None and a.robot == b.robot:
+        return False
     return a.is_at_rest and b.is_at_rest and not (a.kind in WITHOUT_LEAVE and b.kind in WITHOUT_LEAVE)
 
 
@@ -125,8 +128,9 @@ def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Seque
         robot = str(bodies[links[0]].robot)
         where = cell.origin.at(_key(cell, body, robot))
         what, question = _words(body)
+        beyond = "its own" if body.kind is Kind.ATTACHMENT else "its flange"
         raise InputError(
-            f"{where}: expected {what} clear of the links of '{robot}' beyond its flange, got one that touches {named} "
+            f"{where}: expected {what} clear of the links of '{robot}' beyond {beyond}, got one that touches {named} "
             f"in every configuration: {question} If they may touch, name the pairs under checks.exclude"
         )
 
@@ -142,7 +146,8 @@ def _key(cell: Cell, body: SceneBody, robot: str) -> str:
         if tool.get("geometry") is None:
             return f"robots.{robot}.tool.bodies[{number}]"
         return f"robots.{robot}.tool.bodies[{number - 1}]" if number else f"robots.{robot}.tool.geometry"
-    return f"robots.{robot}"
+    number = [f"{robot}/{attachment.name}" for attachment in cell.robot(robot).attachments].index(body.name)
+    return f"robots.{robot}.attachments[{number}]"
 
 
 def _tool_as_written(cell: Cell, robot: str) -> Mapping[str, object]:
@@ -159,4 +164,4 @@ def _words(body: SceneBody) -> tuple[str, str]:
         return "a part", "is the grasp the right way round?"
     if body.kind is Kind.TOOL:
         return "a body of the tool", "does it lie in front of the flange, along its z?"
-    return "a body", "is it where it is mounted?"
+    return "an attachment", "is it on the right link, and placed in the frame that 'at' is given in?"

@@ -162,13 +162,13 @@ def test_text_stl_with_a_lost_line_is_refused(tmp_path: Path) -> None:
 def test_text_stl_may_hold_several_solids_whose_names_are_words_of_the_format(tmp_path: Path) -> None:
     path = write(tmp_path, "ascii.stl")
     facets = "\r".join(path.read_text().splitlines()[1:-1])
-    moved = facets.replace("vertex ", "VERTEX  ").replace(" 0.3", " +3.E-01")
+    moved = facets.replace("vertex ", "VERTEX  ").replace(" -0.3", " 7.E-01").replace(" 0.3", " +1.3")
     path.write_text(f"solid vertex solid 1 2 3\r{facets}\rendsolid vertex\rSOLID\r{moved}\rENDSOLID endsolid normal")
 
     mesh = read_mesh(path)
 
-    assert (mesh.vertices.shape, mesh.faces.shape) == ((8, 3), (24, 3))
-    assert np.ptp(mesh.vertices, axis=0) == pytest.approx([0.2, 0.4, 0.6], rel=1e-6)
+    assert (mesh.vertices.shape, mesh.faces.shape) == ((16, 3), (24, 3))
+    assert np.ptp(mesh.vertices, axis=0) == pytest.approx([0.2, 0.4, 1.6], rel=1e-6)
 
 
 def test_numbers_of_text_stl_that_slipped_from_one_line_to_another_are_refused(tmp_path: Path) -> None:

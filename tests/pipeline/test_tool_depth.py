@@ -18,7 +18,7 @@ robots:
 part: {{geometry: {{box: {{size_mm: [300, 300, 100]}}}}, at: {{xyz_mm: [1000, 0, 700]}}}}
 tasks:
   seam: {{robot: kuka, path: {path}, tool_axis: -z{more}}}
-motion: {{duration_s: 2, step_s: 0.1}}
+motion: {{duration_s: 2, step_s: 0.01}}
 """
 CIRCLE = "circle: {radius_mm: 60, plane: xy}"
 
