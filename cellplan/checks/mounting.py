@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 from cellplan.geometry.transforms import Array
@@ -68,7 +69,15 @@ def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
 
 def _all_standing(scene: Scene, standing: Sequence[FoundDepth], times: Array | None) -> list[Check]:
     """One passed check for all that stands, with the deepest; none where nothing stands."""
-    return [_check(scene, max(standing, key=lambda each: each.depth), times)] if standing else []
+    if not standing:
+        return []
+    deepest = max(standing, key=lambda each: each.depth)
+    check = _check(scene, deepest, times)
+    if deepest.depth > ROUNDING:
+        return [check]
+    limit = MM * deepest.pair.limit
+    words = f"nothing that stands reaches into what carries it, allowed are {limit:g} mm"
+    return [replace(check, subject="cell", value=0.0, message=words)]
 
 
 def _named(scene: Scene, found: FoundDepth) -> tuple[str, str]:

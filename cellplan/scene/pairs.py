@@ -14,7 +14,7 @@ from cellplan.model.robot import BASE
 from cellplan.scene.bodies import Kind, SceneBody
 from cellplan.scene.demands import demand
 from cellplan.scene.links import NO_BODY, LinkTree
-from cellplan.scene.mounting import grasp_of, left_out_kind, stand_on_each_other
+from cellplan.scene.mounting import Mount, grasp_of, left_out_kind, mounted_pair
 
 MOUNTED = (Kind.ATTACHMENT, Kind.PEDESTAL)  # bodies that the user puts on or below a robot: nothing excuses them
 
@@ -142,12 +142,12 @@ def _user_exclusions(cell: Cell, bodies: Sequence[SceneBody]) -> dict[tuple[int,
 
 def _mounting(a: SceneBody, b: SceneBody, *, cell: Cell, trees: Mapping[str, LinkTree]) -> str | None:
     """Why two bodies are joined by their mounting, or None."""
-    if stand_on_each_other(a, b):
-        return f"both stand still: may touch, at most {1e3 * cell.checks.standing_depth:g} mm deep"
-    grasp = grasp_of(a, b, cell)
-    if grasp is not None:
-        is_first = grasp is cell.part.held_by[0]
-        return f"holds the part: may touch, at most {1e3 * grasp.depth:g} mm deep" if is_first else None
+    mounted = mounted_pair(a, b, (0, 0), cell)
+    if mounted is not None and mounted.mount is Mount.STANDING:
+        return f"both stand still: may touch, at most {1e3 * mounted.limit:g} mm deep"
+    if mounted is not None:
+        is_first = grasp_of(a, b, cell) is cell.part.held_by[0]
+        return f"holds the part: may touch, at most {1e3 * mounted.limit:g} mm deep" if is_first else None
     if a.robot is None or a.robot != b.robot:
         return None
     return _joined(a, b, trees[a.robot])
