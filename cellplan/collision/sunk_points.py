@@ -12,7 +12,7 @@ from cellplan.collision.bodies import BodyPoses, CollisionBody, prepare
 from cellplan.collision.engine import Engine
 from cellplan.geometry.mesh_rays import ray_hits
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere
-from cellplan.geometry.tessellation import tessellate
+from cellplan.geometry.tessellation import halved, tessellate
 from cellplan.geometry.transforms import Array
 
 CLOSE: Final = 5e-4  # [m] points that may be deeper than the deepest known one by less are not sought
@@ -49,7 +49,7 @@ def deepest_point(guest: CollisionBody, host: CollisionBody, R_HG: Array, p_HG: 
         measured += len(open_)
         depths = _depths(probe, centres, worth=best + CLOSE - radii)
         best = max(best, float(depths.max(initial=0.0)))
-        open_ = _halved(open_[depths + radii > best + CLOSE])
+        open_ = halved(open_[depths + radii > best + CLOSE])
     return best
 
 
@@ -105,13 +105,3 @@ def _depths_in_mesh(probe: Engine, mesh: Mesh, points: Array, *, worth: Array) -
     depths[asked] = np.where(votes >= 2.0, depths[asked], -depths[asked])
     depths[~asked] = np.minimum(depths[~asked], 0.0)
     return depths
-
-
-def _halved(triangles: Array) -> Array:
-    """Each triangle cut in two through the middle of its longest side."""
-    sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
-    first = np.argmax(sides, axis=1)
-    row = np.arange(len(triangles))
-    a, b, c = (triangles[row, (first + k) % 3] for k in range(3))
-    middle = 0.5 * (a + b)
-    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])

@@ -7,7 +7,7 @@ import numpy as np
 from cellplan.collision.bodies import fine_segments
 from cellplan.geometry.mesh_topology import make_mesh
 from cellplan.geometry.shapes import Capsule, Cylinder, Mesh, Solid, Sphere
-from cellplan.geometry.tessellation import tessellate
+from cellplan.geometry.tessellation import halved, tessellate
 from cellplan.geometry.transforms import Array
 
 FINEST: Final = 1.0 / 16.0  # [-] of the zone's radius: triangles across its border are cut down to this
@@ -38,7 +38,7 @@ def outside_zone(shape: Solid, centre: Array, radius: float) -> tuple[Mesh | Non
         longest = np.linalg.norm(open_ - np.roll(open_, -1, axis=1), axis=2).max(axis=1, initial=0.0)
         across = (_distance_bound(open_, centre, longest) < radius) & (longest > FINEST * radius)
         kept.append(open_[~across])
-        open_ = _halved(open_[across])
+        open_ = halved(open_[across])
     triangles = np.concatenate(kept) if kept else np.empty((0, 3, 3))
     if not len(triangles):
         return None, is_cut
@@ -65,13 +65,3 @@ def _distance_bound(triangles: Array, centre: Array, longest: Array) -> Array:
     to_corner = np.linalg.norm(triangles - centre, axis=2).min(axis=1)
     bound: Array = np.maximum(to_plane, to_corner - longest)
     return bound
-
-
-def _halved(triangles: Array) -> Array:
-    """Each triangle cut in two through the middle of its longest side."""
-    sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
-    first = np.argmax(sides, axis=1)
-    row = np.arange(len(triangles))
-    a, b, c = (triangles[row, (first + k) % 3] for k in range(3))
-    middle = 0.5 * (a + b)
-    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])

@@ -34,6 +34,16 @@ def tessellate(shape: Solid, segments: int = 48) -> Mesh:
     return make_mesh(vertices, faces, source=type(shape).__name__.lower())
 
 
+def halved(triangles: Array) -> Array:
+    """Triangles, shape (M, 3, 3), each cut in two through the middle of its longest side, shape (2 M, 3, 3)."""
+    sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
+    first = np.argmax(sides, axis=1)
+    row = np.arange(len(triangles))
+    a, b, c = (triangles[row, (first + k) % 3] for k in range(3))
+    middle = 0.5 * (a + b)
+    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+
+
 def _box(size: Array) -> tuple[Array, np.ndarray]:
     """Eight corners and twelve triangles."""
     signs = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
