@@ -122,11 +122,13 @@ def _exact(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, reading
     points = engine.surface_points(first, second, poses, sample=sample)
     if points is None:
         return Reading(False, 0.0, True, None), False
-    n = points[1] - points[0]
-    distance = max(0.0, float(np.linalg.norm(n)) - ROUNDING)
+    apart = points[1] - points[0]
+    distance = max(0.0, float(np.linalg.norm(apart)) - ROUNDING)
     X_first, X_second = ((poses.R[body, sample], poses.p[body, sample]) for body in pair)
     a, b = engine.bodies[first], engine.bodies[second]
-    proved = separation(a.hull, b.hull, n, X_first=X_first, X_second=X_second) - a.looseness - b.looseness
+    proved = separation(a.hull, b.hull, apart, X_first=X_first, X_second=X_second)
+    proved -= a.looseness + b.looseness
+    n: Array | None = apart
     if proved < reading.bound:
         proved, n = reading.bound, reading.direction
     bound = max(distance, proved)
