@@ -102,6 +102,8 @@ class BetweenLook:
         ]
         every = [self._worst(one, kind) for one in found for kind in range(2)]
         step = min((error.longest_step for error in every if error.longest_step is not None), default=None)
+        if step is not None and _stops_at_once(tools, corners[instants > self._desired.times[-1] - INSTANT_ROOM]):
+            step = _fitting(step, float(self._desired.times[-1]))
         every = [error if error.longest_step is None else replace(error, longest_step=step) for error in every]
         results = [BetweenRows(position=a, orientation=b) for a, b in zip(every[::2], every[1::2], strict=True)]
         return results[: len(accuracy)], results[len(accuracy) :]
@@ -201,7 +203,7 @@ class BetweenLook:
         """
         times, step = self._desired.times, self._schedule.step
         instants = self._desired.jumps
-        instants = instants[(instants > times[0] + INSTANT_ROOM) & (instants < times[-1] - INSTANT_ROOM)]
+        instants = instants[(instants > times[0] + INSTANT_ROOM) & (instants <= times[-1])]
         errors = np.zeros((len(instants), len(tools), 2))
         around = [self._desired.poses(np.clip(instants + shift * step, times[0], times[-1])) for shift in AROUND]
         for place, tool in enumerate(tools):
@@ -250,7 +252,7 @@ class BetweenLook:
         if not np.any(errors > allowed) or np.any(rows >= allowed):
             return None
         corners = np.where(found.corners[:, kind] > KINK * allowed, found.corners[:, kind], 0.0)
-        corners[found.instants < times[found.tool.first]] = 0.0
+        corners[(found.instants < times[found.tool.first]) | (found.instants > times[-1] - INSTANT_ROOM)] = 0.0
         share = min(1.0, (allowed - float(rows.max())) / max(float(corners.max(initial=0.0)), allowed))
         near = np.searchsorted(times, found.instants[corners > 0.0])
         over = errors > allowed
@@ -313,6 +315,18 @@ def _subdivided(steps: Steps, jumped: Steps, share: Array) -> tuple[Steps, Array
     inner = np.arange(1, PARTS) / PARTS
     k = np.concatenate([np.repeat(steps, len(inner)), jumped])
     return k, np.concatenate([np.tile(inner, len(steps)), share])
+
+
+def _stops_at_once(tools: Sequence[_Tool], corners: Array) -> bool:
+    """Whether tools end at a speed that would be an error to be seen, were the end no row; corners there, (J, T, 2)."""
+    return bool(np.any(corners > KINK * np.array([tool.allowed for tool in tools])))
+
+
+def _fitting(step: float, duration: float) -> float:
+    """The longest step in [s] of two digits, no longer than one of two digits, with which the last row is the end."""
+    digit = 10.0 ** (math.floor(math.log10(step)) - 1)
+    steps = (float(f"{count * digit:.2g}") for count in range(round(step / digit), 0, -1))
+    return next((one for one in steps if abs(duration - one * round(duration / one)) < INSTANT_ROOM), step)
 
 
 def _shorter(step: float, share: float) -> float:

@@ -143,6 +143,7 @@ class SolidSearch(Search):
     """The search for two solids."""
 
     _finds_enclosures = True
+    _patience = MOST_LOOSE
 
     def __init__(
         self,
@@ -171,12 +172,8 @@ class SolidSearch(Search):
         self._readings: dict[int, Reading] = {}
         self._loose = 0
         self._split_bodies = sum(can_be_split(engine.bodies[index]) for index in pair)
-        self._most_loose = self._patience()
+        self._most_loose = MOST_LOOSE_BOTH if self._split_bodies == len(pair) else self._patience
         self._pieces: list[PieceSearch] = []
-
-    def _patience(self) -> int:
-        """How many loose distances are measured before a body is taken apart."""
-        return MOST_LOOSE_BOTH if self._split_bodies == len(self._pair) else MOST_LOOSE
 
     @property
     def relative(self) -> PairMotion:
@@ -295,9 +292,7 @@ class PieceSearch(SolidSearch):
     """The search for a piece of a body that is not convex, and another body."""
 
     _finds_enclosures = False
-
-    def _patience(self) -> int:
-        return MOST_LOOSE_BOTH if self._split_bodies == len(self._pair) else 1
+    _patience = 1
 
     def _measured(self, sample: int, goal: float) -> Reading:
         reading, is_proved = read_piece(self._engine, self._pair, self._motion.poses, sample=sample, goal=goal)

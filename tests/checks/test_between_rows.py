@@ -122,6 +122,20 @@ def test_a_corner_that_lies_on_a_row_by_chance_shortens_the_step_that_is_named()
     assert 0.85 * 0.1 * allowed / corner < chance <= 0.1 * allowed / corner
 
 
+def test_a_tool_that_stops_at_once_gets_a_step_of_which_the_duration_is_a_multiple() -> None:
+    end = 0.1 * (ROWS - 1)
+    tolerance = Tolerance(position=1e-4, orientation=1.0)
+
+    any_step = looked(0.1, tolerance)[0].position.longest_step
+    fitting = looked(0.1, tolerance, jumps=(end,))[0].position.longest_step
+
+    assert any_step is not None
+    assert fitting is not None
+    assert end / any_step % 1.0 > 0.1  # the row after the end lies beyond it
+    assert end / fitting == pytest.approx(round(end / fitting), abs=1e-9)
+    assert 0.5 * any_step < fitting < any_step
+
+
 def test_a_corner_that_lies_on_a_row_by_chance_fails_no_step_that_keeps_what_is_allowed() -> None:
     between, checks = looked(0.1, Tolerance(position=1.5e-3, orientation=1.0), jumps=(0.3,))
 
