@@ -37,6 +37,7 @@ WORST: Final = 20  # [-] steps with the largest errors in their middle that are 
 CHUNK: Final = 4000  # [-] instants looked at at once
 ESTIMATE: Final = 0.1  # [-] taken off a step that is estimated from a much longer one
 NEARBY: Final = 1e-4  # [-] of a step: how far on both sides of an instant a change of speed is looked for
+AROUND: Final = (-NEARBY, 0.0, NEARBY)
 KINK: Final = 0.1  # [-] of what is allowed: a smaller error by a change of speed does not count
 ROTATIONS: Final = (3, 4, 5)
 
@@ -94,14 +95,15 @@ class BetweenLook:
             for kind in range(2):
                 chosen[np.argsort(-middle[:, place, kind] * judged, kind="stable")[:WORST]] = True
         k, s = _subdivided(np.flatnonzero(chosen), self._jumped, self._share)
-        fine = self._errors(tools, k, s)
+        fine, (instants, corners) = self._errors(tools, k, s), self._corners(tools)
         found = [
-            _Found(tool, middle[:, place], bounds[place], chosen, k, s, fine[:, place])
+            _Found(tool, middle[:, place], bounds[place], chosen, k, s, fine[:, place], instants, corners[:, place])
             for place, tool in enumerate(tools)
         ]
-        smooth = self._smooth_steps(tools)
-        every = [self._worst(one, kind, smooth) for one in found for kind in range(2)]
+        every = [self._worst(one, kind) for one in found for kind in range(2)]
         step = min((error.longest_step for error in every if error.longest_step is not None), default=None)
+        if step is not None and _stops_at_once(tools, corners[instants > self._desired.times[-1] - INSTANT_ROOM]):
+            step = _fitting(step, float(self._desired.times[-1]))
         every = [error if error.longest_step is None else replace(error, longest_step=step) for error in every]
         results = [BetweenRows(position=a, orientation=b) for a, b in zip(every[::2], every[1::2], strict=True)]
         return results[: len(accuracy)], results[len(accuracy) :]
@@ -190,22 +192,27 @@ class BetweenLook:
             bound[:, 1] = np.inf
         return bound
 
-    def _smooth_steps(self, tools: Sequence[_Tool]) -> NDArray[np.bool_]:
-        """Whether no tool changes its speed at once within a step by what would be an error to be seen, shape (N - 1,).
+    def _corners(self, tools: Sequence[_Tool]) -> tuple[Array, Array]:
+        """Instants at which tools may change their speed at once, and the error of each tool there.
 
-        A change of speed by v makes an error of up to v/4 times the length of a step, which shrinks no faster than it.
+        A change of speed by v at a share s of a step of length h makes an error of ``v h s (1 - s)``. Where the rows of
+        a shorter step would lie is not asked: the error is that of a corner in the middle of a step.
+
+        Returns:
+            Instants in [s], shape (J,), and errors with the present step in [m] and [rad], shape (J, tools, 2).
         """
-        times, k = self._desired.times, self._jumped
-        smooth = np.ones(len(times) - 1, dtype=bool)
-        around = [self._wanted(k, self._share + shift) for shift in (-NEARBY, 0.0, NEARBY)]
-        for tool in tools:
+        times, step = self._desired.times, self._schedule.step
+        instants = self._desired.jumps
+        instants = instants[(instants > times[0] + INSTANT_ROOM) & (instants <= times[-1])]
+        errors = np.zeros((len(instants), len(tools), 2))
+        around = [self._desired.poses(np.clip(instants + shift * step, times[0], times[-1])) for shift in AROUND]
+        for place, tool in enumerate(tools):
             if tool.place is not None:
                 before, at, after = (poses[tool.place] for poses in around)
-                changes = _sag(after - 2.0 * at + before, tool.relation) / (4.0 * NEARBY)
-                smooth[k[np.any(changes > KINK * np.array(tool.allowed), axis=1)]] = False
-        return smooth
+                errors[:, place] = _sag(after - 2.0 * at + before, tool.relation) / (4.0 * NEARBY)
+        return instants, errors
 
-    def _worst(self, found: "_Found", kind: int, smooth: NDArray[np.bool_]) -> BetweenError:
+    def _worst(self, found: "_Found", kind: int) -> BetweenError:
         """The largest error of one kind, what bounds it, and the step that would keep what is allowed."""
         tool, allowed, times = found.tool, found.tool.allowed[kind], self._schedule.times
         count = len(times) - 1
@@ -226,13 +233,50 @@ class BetweenLook:
             largest=float(errors[worst]),
             at_s=at_s,
             bound=None if wide else max(float(errors[worst]), float(known.max(initial=0.0))),
-            longest_step=_longest_step(self._schedule.step, errors, rows, allowed=allowed, smooth=smooth[k]),
+            longest_step=self._longest_step(found, kind, errors=errors, rows=rows, k=k),
         )
+
+    def _longest_step(self, found: "_Found", kind: int, *, errors: Array, rows: Array, k: Steps) -> float | None:
+        """A step in [s] that keeps what is allowed, as all shorter ones do; None when the present one does.
+
+        Errors grow with the square of the step; near a corner they are taken to grow with the step itself.
+
+        Args:
+            found: The tool.
+            kind: 0 for its position, 1 for its orientation.
+            errors: Errors between the rows, shape (M,).
+            rows: Larger error of both rows of the step of each, shape (M,).
+            k: Their steps, shape (M,).
+        """
+        times, step, allowed = self._schedule.times, self._schedule.step, found.tool.allowed[kind]
+        if not np.any(errors > allowed) or np.any(rows >= allowed):
+            return None
+        corners = np.where(found.corners[:, kind] > KINK * allowed, found.corners[:, kind], 0.0)
+        corners[(found.instants < times[found.tool.first]) | (found.instants > times[-1] - INSTANT_ROOM)] = 0.0
+        share = min(1.0, (allowed - float(rows.max())) / max(float(corners.max(initial=0.0)), allowed))
+        near = np.searchsorted(times, found.instants[corners > 0.0])
+        over = errors > allowed
+        kept = (allowed - rows[over]) / (errors[over] - rows[over])
+        is_near = np.isin(k[over], np.concatenate([near - 1, near]))
+        share = min(share, float(np.where(is_near, kept, np.sqrt(kept)).min()))
+        return _shorter(step, share)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """What was found of one tool: in the middle of all steps, bounds, and errors at shares s of the chosen steps k."""
+    """What was found of one tool.
+
+    Attributes:
+        tool: The tool.
+        middle: Errors in the middle of all steps, shape (N - 1, 2).
+        bounds: No error in a step is larger, shape (N - 1, 2).
+        chosen: Steps that were looked at closely, shape (N - 1,).
+        k: Steps of the instants looked at, shape (M,).
+        s: Shares of these steps, shape (M,).
+        fine: Errors there, shape (M, 2).
+        instants: When the tool may change its speed at once, in [s], shape (J,).
+        corners: The largest error that each makes with a step of this length, shape (J, 2).
+    """
 
     tool: _Tool
     middle: Array
@@ -241,6 +285,8 @@ class _Found:
     k: Steps
     s: Array
     fine: Array
+    instants: Array
+    corners: Array
 
 
 def _lengths(errors: TaskAccuracy | ClosureAccuracy) -> Array:
@@ -271,24 +317,20 @@ def _subdivided(steps: Steps, jumped: Steps, share: Array) -> tuple[Steps, Array
     return k, np.concatenate([np.tile(inner, len(steps)), share])
 
 
-def _longest_step(
-    step: float, errors: Array, rows: Array, *, allowed: float, smooth: NDArray[np.bool_]
-) -> float | None:
-    """A step in [s] that keeps what is allowed: errors grow with its square, at corners with the step itself.
+def _stops_at_once(tools: Sequence[_Tool], corners: Array) -> bool:
+    """Whether tools end at a speed that would be an error to be seen, were the end no row; corners there, (J, T, 2)."""
+    return bool(np.any(corners > KINK * np.array([tool.allowed for tool in tools])))
 
-    Args:
-        step: The step that the errors belong to in [s].
-        errors: Errors between the rows, shape (M,).
-        rows: Larger error of both rows of the step of each, shape (M,).
-        allowed: What is allowed.
-        smooth: Whether the motion of the tools is smooth within the step, shape (M,).
-    """
-    over = errors > allowed
-    errors, rows = errors[over], rows[over]
-    if not len(errors) or np.any(rows >= allowed):
-        return None
-    kept = (allowed - rows) / (errors - rows)
-    share = float(np.where(smooth[over], np.sqrt(kept), kept).min())
+
+def _fitting(step: float, duration: float) -> float:
+    """The longest step in [s] of two digits, no longer than one of two digits, with which the last row is the end."""
+    digit = 10.0 ** (math.floor(math.log10(step)) - 1)
+    steps = (float(f"{count * digit:.2g}") for count in range(round(step / digit), 0, -1))
+    return next((one for one in steps if abs(duration - one * round(duration / one)) < INSTANT_ROOM), step)
+
+
+def _shorter(step: float, share: float) -> float:
+    """A share of a step in [s], with two digits; less by what an estimate from a much longer step may miss."""
     shorter = step * share * (1.0 - ESTIMATE * (1.0 - share))
     digit = 10.0 ** (math.floor(math.log10(shorter)) - 1)
     return float(f"{math.floor(shorter / digit) * digit:.2g}")

@@ -26,7 +26,8 @@ from cellplan.geometry.transforms import Array
 
 RESOLUTION: Final = 1e-6  # [m] steps in which nothing travels farther than this are not cut any more
 PARTS: Final = 8  # [-] finer steps that an open step is cut into
-MOST_LOOSE: Final = 16  # [-] distances beyond those of the hulls that are measured before a body is taken apart
+MOST_LOOSE: Final = 4  # [-] distances beyond those of the hulls that are measured before a body is taken apart
+MOST_LOOSE_BOTH: Final = 16  # [-] likewise where both bodies are not convex: pieces of the one meet those of the other
 ROUGH: Final = 2e-4  # [m] a search for the smallest distance goes half the way to it at a time, until so near
 
 
@@ -142,6 +143,7 @@ class SolidSearch(Search):
     """The search for two solids."""
 
     _finds_enclosures = True
+    _patience = MOST_LOOSE
 
     def __init__(
         self,
@@ -169,7 +171,8 @@ class SolidSearch(Search):
         self._relative: PairMotion | None = None
         self._readings: dict[int, Reading] = {}
         self._loose = 0
-        self._can_be_split = any(can_be_split(engine.bodies[index]) for index in pair)
+        self._split_bodies = sum(can_be_split(engine.bodies[index]) for index in pair)
+        self._most_loose = MOST_LOOSE_BOTH if self._split_bodies == len(pair) else self._patience
         self._pieces: list[PieceSearch] = []
 
     @property
@@ -223,7 +226,7 @@ class SolidSearch(Search):
 
     def _takes_apart(self, level: float, cutoff: float) -> bool:
         if not self._pieces:
-            if self._loose < MOST_LOOSE or not self._can_be_split:
+            if self._loose < self._most_loose or not self._split_bodies:
                 return False
             self._pieces = self._split()
         bounds, lowest = self.bounds, np.full(len(self.low), np.inf)
@@ -289,9 +292,10 @@ class PieceSearch(SolidSearch):
     """The search for a piece of a body that is not convex, and another body."""
 
     _finds_enclosures = False
+    _patience = 1
 
-    def _measured(self, sample: int, goal: float) -> Reading:  # noqa: ARG002 - always exact
-        reading, is_proved = read_piece(self._engine, self._pair, self._motion.poses, sample=sample)
+    def _measured(self, sample: int, goal: float) -> Reading:
+        reading, is_proved = read_piece(self._engine, self._pair, self._motion.poses, sample=sample, goal=goal)
         self._loose += not is_proved
         return reading
 

@@ -5,7 +5,7 @@ proposal that ``certificate`` has to prove. Poses are checked before they come h
 and results are new for each question because FCL leaves old values in them.
 """
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -45,18 +45,22 @@ class Engine:
         self.radii = np.array([body.radius for body in self.bodies])
         self.asked = Asked()
         self._objects: dict[tuple[str, int], Any] = {}  # by kind and identity of the body
-        self._parts: dict[Hashable, Engine] = {}
+        self._pieces: dict[int, tuple[CollisionBody, ...]] = {}  # by identity of the whole
+        self._parts: dict[tuple[int, int], Engine] = {}
 
     def __reduce__(self) -> tuple[type["Engine"], tuple[tuple[CollisionBody, ...]]]:
         """Leave FCL's own objects behind; the other side builds them anew."""
         return Engine, (self.bodies,)
 
-    def part(self, key: Hashable, bodies: Callable[[], Sequence[CollisionBody]]) -> "Engine":
-        """An engine for bodies that are made of this one's: built once for each key, and counted here."""
-        known = self._parts.get(key)
+    def part(self, other: int, whole: int, pieces: Callable[[CollisionBody], Sequence[CollisionBody]]) -> "Engine":
+        """An engine for one body and the pieces of another, counted here; pieces are made once for each body."""
+        key = id(self.bodies[whole])
+        if key not in self._pieces:
+            self._pieces[key] = tuple(pieces(self.bodies[whole]))
+        known = self._parts.get((other, whole))
         if known is None:
-            known = self._parts[key] = Engine(bodies())
-            known.asked, known._objects = self.asked, self._objects
+            known = self._parts[other, whole] = Engine((self.bodies[other], *self._pieces[key]))
+            known.asked, known._objects, known._pieces = self.asked, self._objects, self._pieces
         return known
 
     def sphere_centres(self, poses: BodyPoses, *, sample: int) -> Array:

@@ -12,12 +12,13 @@ import numpy as np
 from cellplan.collision.bodies import BodyPoses, CollisionBody
 from cellplan.collision.certificate import separation
 from cellplan.collision.engine import Engine
-from cellplan.collision.measure import SURELY_APART, TIGHT, TOUCHING, Reading
+from cellplan.collision.measure import SURELY_APART, TIGHT, Reading, look
 from cellplan.collision.travel import ROUNDING, Bends, Motion, Pair
 from cellplan.geometry.shapes import Mesh, bounding_capsule
 from cellplan.geometry.transforms import Array
 
-PIECES: Final = 2  # [-] pieces that a body is taken apart into at once; those that are far need no more
+SMALL: Final = 8  # [-] triangles of a piece up to which its distance is measured
+PIECES: Final = 4  # [-] pieces that a body is taken apart into at once; those that are far need no more
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,22 +91,46 @@ def split(engine: Engine, pair: Pair) -> tuple[Engine, bool]:
     sizes = [len(engine.bodies[k].core.faces) if can_be_split(engine.bodies[k]) else 0 for k in pair]
     is_first = sizes[0] > sizes[1]
     whole, other = pair if is_first else pair[::-1]
-    return engine.part(pair, lambda: (engine.bodies[other], *_pieces(engine.bodies[whole]))), is_first
+    return engine.part(other, whole, _pieces), is_first
 
 
-def read_piece(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int) -> tuple[Reading, bool]:
-    """Exact reading of a piece and another body, and whether a direction proves it."""
+def read_piece(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, goal: float) -> tuple[Reading, bool]:
+    """Reading of a piece and another body, and whether a direction proves as much as there is, or as is asked for.
+
+    Where the hulls do not prove the goal, small pieces are measured exactly; large ones are not, as their own pieces
+    are less work.
+
+    Args:
+        engine: The bodies.
+        pair: The piece and the other body, or the other way round.
+        poses: Where they are.
+        sample: The sample.
+        goal: Distance in [m] that is asked for.
+    """
+    reading = look(engine, pair, poses, sample=sample)
+    if reading.touches or reading.is_exact or reading.bound >= goal:
+        return reading, True
+    dented = [engine.bodies[k] for k in pair if can_be_split(engine.bodies[k])]
+    if len(dented) == 1 and len(dented[0].core.faces) > SMALL:
+        return reading, False
+    return _exact(engine, pair, poses, sample=sample, reading=reading)
+
+
+def _exact(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, reading: Reading) -> tuple[Reading, bool]:
+    """Exact reading of two small bodies by their surfaces, and whether a direction proves it."""
     first, second = pair
-    if engine.touch(first, second, poses, sample=sample):
-        return TOUCHING, True
     points = engine.surface_points(first, second, poses, sample=sample)
     if points is None:
         return Reading(False, 0.0, True, None), False
-    n = points[1] - points[0]
-    distance = max(0.0, float(np.linalg.norm(n)) - ROUNDING)
+    apart = points[1] - points[0]
+    distance = max(0.0, float(np.linalg.norm(apart)) - ROUNDING)
     X_first, X_second = ((poses.R[body, sample], poses.p[body, sample]) for body in pair)
     a, b = engine.bodies[first], engine.bodies[second]
-    proved = separation(a.hull, b.hull, n, X_first=X_first, X_second=X_second) - a.looseness - b.looseness
+    proved = separation(a.hull, b.hull, apart, X_first=X_first, X_second=X_second)
+    proved -= a.looseness + b.looseness
+    n: Array | None = apart
+    if proved < reading.bound:
+        proved, n = reading.bound, reading.direction
     bound = max(distance, proved)
     return Reading(False, bound, True, n if proved > SURELY_APART else None), proved >= bound - TIGHT
 

@@ -49,7 +49,9 @@ class Wanted:
         return (wanted,)
 
 
-def looked(turn: float, tolerance: Tolerance, corner: float = 0.0) -> tuple[BetweenRows, tuple[Check, ...]]:
+def looked(
+    turn: float, tolerance: Tolerance, corner: float = 0.0, jumps: tuple[float, ...] = ()
+) -> tuple[BetweenRows, tuple[Check, ...]]:
     """The arm swings by ``turn`` in each step of 0.1 s, and is wanted on the chords of its circle."""
     task = replace(work("arm"), axes=(0, 1, 2), tolerance=tolerance)
     cell = make_cell(placed("arm", swinger()), part=fixed_part(Sphere(0.01), np.eye(4)), tasks=(task,))
@@ -57,8 +59,8 @@ def looked(turn: float, tolerance: Tolerance, corner: float = 0.0) -> tuple[Betw
     rows = scene.chains["arm"].tool_poses(q)
     plain = schedule(ROWS, task)
     scheduled = replace(plain.tasks[0], X_PT=rows)
-    jumps = np.array([0.35]) if corner else np.zeros(0)
-    wanted = Wanted(times=plain.times, jumps=jumps, rows=rows, corner=corner)
+    instants = np.array([0.35] if corner else jumps)
+    wanted = Wanted(times=plain.times, jumps=instants, rows=rows, corner=corner)
     known = Schedule(times=plain.times, tasks=(scheduled,), desired=wanted)
     accuracy = task_accuracy(scheduled, scene.chains["arm"], q=q, X_WP=part_poses(cell, scene.chains, {"arm": q}))
     ((found,), _) = look_between(scene, known, {"arm": q}, accuracy=(accuracy,), closures=())
@@ -109,6 +111,36 @@ def test_a_corner_within_a_step_is_found_and_shrinks_with_the_step_itself() -> N
     assert between.position.largest == pytest.approx(4e-3, rel=1e-3)
     assert between.position.at_s == pytest.approx(0.35)
     assert between.position.longest_step == pytest.approx(0.025 * 0.925, abs=2e-3)
+
+
+def test_a_corner_that_lies_on_a_row_by_chance_shortens_the_step_that_is_named() -> None:
+    allowed, turn = 1e-4, 0.1
+    chance = looked(turn, Tolerance(position=allowed, orientation=1.0), jumps=(0.3,))[0].position.longest_step
+    corner = ARM * np.sin(0.5 * turn) ** 2  # a quarter of a step and of the change between two chords
+
+    assert chance is not None
+    assert 0.85 * 0.1 * allowed / corner < chance <= 0.1 * allowed / corner
+
+
+def test_a_tool_that_stops_at_once_gets_a_step_of_which_the_duration_is_a_multiple() -> None:
+    end = 0.1 * (ROWS - 1)
+    tolerance = Tolerance(position=1e-4, orientation=1.0)
+
+    any_step = looked(0.1, tolerance)[0].position.longest_step
+    fitting = looked(0.1, tolerance, jumps=(end,))[0].position.longest_step
+
+    assert any_step is not None
+    assert fitting is not None
+    assert end / any_step % 1.0 > 0.1  # the row after the end lies beyond it
+    assert end / fitting == pytest.approx(round(end / fitting), abs=1e-9)
+    assert 0.5 * any_step < fitting < any_step
+
+
+def test_a_corner_that_lies_on_a_row_by_chance_fails_no_step_that_keeps_what_is_allowed() -> None:
+    between, checks = looked(0.1, Tolerance(position=1.5e-3, orientation=1.0), jumps=(0.3,))
+
+    assert between.position.longest_step is None
+    assert all(check.passed for check in checks)
 
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])

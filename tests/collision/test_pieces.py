@@ -8,9 +8,9 @@ from cellplan.collision.bodies import checked_poses, prepare
 from cellplan.collision.certify import SolidSearch
 from cellplan.collision.engine import Engine
 from cellplan.collision.found import Found
-from cellplan.collision.measure import measure
+from cellplan.collision.measure import Reading, measure
 from cellplan.collision.pieces import can_be_split, read_piece, split
-from cellplan.geometry.shapes import Box, Capsule, Mesh
+from cellplan.geometry.shapes import Box, Capsule, Mesh, Sphere
 from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell import CheckSettings
@@ -44,26 +44,56 @@ def test_pieces_cover_the_surface_and_only_bodies_with_dents_are_taken_apart() -
     assert corners == {tuple(corner) for corner in body.core.vertices[body.core.faces].reshape(-1, 3)}
 
 
+def read_by_pieces(engine: Engine, pair: tuple[int, int], X: tuple[Array, Array]) -> list[Reading]:
+    """Readings of the pieces of a body and another one, finer and finer where they are not exact; poses by the pair."""
+    pieces, is_first = split(engine, pair)
+    whole, other = X if is_first else X[::-1]
+    poses = checked_poses([other[None], *[whole[None]] * (len(pieces.bodies) - 1)])
+    readings = []
+    for k in range(1, len(pieces.bodies)):
+        ends = (k, 0) if is_first else (0, k)
+        reading, _ = read_piece(pieces, ends, poses, sample=0, goal=np.inf)
+        is_done = reading.touches or reading.is_exact
+        readings += [reading] if is_done else read_by_pieces(pieces, ends, X)
+    return readings
+
+
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_the_nearest_piece_is_as_near_as_the_body(order: tuple[int, int]) -> None:
     rng = np.random.default_rng(1)
-    bodies = (prepare("bowl", bowl()), prepare("stick", Capsule(0.02, 0.2)))
-    engine = Engine(bodies)
-    pieces, is_first = split(engine, order)
-    assert is_first is (order[0] == 0)
-    for _ in range(60):
-        X = [pose()[None], random_pose(rng, reach=0.4)[None]]
-        truth = measure(engine, (0, 1), checked_poses(X), sample=0)
-        of_pieces = checked_poses([X[1], *[X[0]] * (len(pieces.bodies) - 1)])
+    engine = Engine((prepare("bowl", bowl()), prepare("stick", Capsule(0.02, 0.2))))
+    for _ in range(20):
+        X = pose(), random_pose(rng, reach=0.4)
+        truth = measure(engine, (0, 1), checked_poses([X[0][None], X[1][None]]), sample=0)
 
-        readings = [
-            read_piece(pieces, (1 + k, 0) if is_first else (0, 1 + k), of_pieces, sample=0)[0]
-            for k in range(len(pieces.bodies) - 1)
-        ]
+        readings = read_by_pieces(engine, order, X if order[0] == 0 else X[::-1])
 
         assert any(reading.touches for reading in readings) == truth.touches
         if not truth.touches:
             assert min(reading.bound for reading in readings) == pytest.approx(truth.bound, abs=EXACT / 2)
+
+
+def test_a_large_piece_proves_no_more_than_is_true_and_is_not_measured_exactly() -> None:
+    engine = Engine((prepare("bowl", bowl()), prepare("stick", Capsule(0.02, 0.2))))
+    pieces, _ = split(engine, (0, 1))
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        X = random_pose(rng, reach=0.6)
+        truth = measure(engine, (0, 1), checked_poses([pose()[None], X[None]]), sample=0)
+        poses = checked_poses([X[None], *[pose()[None]] * (len(pieces.bodies) - 1)])
+
+        readings = [read_piece(pieces, (k, 0), poses, sample=0, goal=np.inf)[0] for k in range(1, len(pieces.bodies))]
+
+        assert not any(reading.is_exact for reading in readings if not reading.touches)
+        assert min(reading.bound for reading in readings) <= truth.bound + EXACT / 2
+
+
+def test_the_pieces_of_a_body_are_made_once_for_all_its_pairs() -> None:
+    engine = Engine((prepare("bowl", bowl()), prepare("stick", Capsule(0.02, 0.2)), prepare("ball", Sphere(0.1))))
+
+    beside_stick, beside_ball = split(engine, (0, 1))[0], split(engine, (2, 0))[0]
+
+    assert all(a is b for a, b in zip(beside_stick.bodies[1:], beside_ball.bodies[1:], strict=True))
 
 
 def stirring() -> tuple[Scene, Array, tuple[int, int]]:
