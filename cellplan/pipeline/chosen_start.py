@@ -49,6 +49,11 @@ def _faults(scene: Scene, toolpaths: Mapping[str, Toolpath]) -> Iterator[str]:
         deepest = max(checks, key=lambda each: each.value)
         more = f" (and {len(checks) - 1} more of that place)" if len(checks) > 1 else ""
         yield f"{cell.origin.at(key)}: {deepest.message}{more}"
+    at_rest = [scene.bodies[pair.first].is_at_rest and scene.bodies[pair.second].is_at_rest for pair in scene.pairs]
+    touching = scene.touching(np.zeros(cell.joint_count), among=np.array(at_rest, dtype=bool))
+    if touching is not None:
+        key = _mounting_key(cell, Mount.STANDING, list(touching))
+        yield f"{cell.origin.at(key)}: '{touching[0]}' touches '{touching[1]}', and neither of them ever moves"
     yield from _deep_grasps(scene)
     for check in depths_on_paths(cell, toolpaths):
         yield f"{cell.origin.at(f'tasks.{check.subject}')}: {check.message}"
