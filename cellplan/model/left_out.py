@@ -16,6 +16,7 @@ class LeftOutKind(StrEnum):
     AT_WORK = "at_work"  # a tool that works on the part
     CONTACT_ONLY = "contact_only"  # no contact, but any distance
     ENVIRONMENT = "environment"  # things of the surroundings among themselves
+    NO_BODY = "no_body"  # a robot that has no solids
 
 
 TITLES: Final = {
@@ -26,6 +27,7 @@ TITLES: Final = {
     LeftOutKind.AT_WORK: "at work",
     LeftOutKind.CONTACT_ONLY: "contact only",
     LeftOutKind.ENVIRONMENT: "surroundings",
+    LeftOutKind.NO_BODY: "without bodies",
 }
 NOTHING: Final = "nothing was left out"
 
@@ -36,7 +38,7 @@ class LeftOut:
 
     Attributes:
         kind: Why.
-        bodies: Their names: a pair, or all things of the surroundings.
+        bodies: Their names: a pair, all things of the surroundings, or a robot whose links have none.
         reason: What is asked instead, in words.
     """
 

@@ -2,20 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
-
-import numpy as np
 
 from cellplan.checks.mounting import check_mounting
 from cellplan.checks.payload import check_payload_at_rest
-from cellplan.checks.tool_depth import check_depths, path_depth
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOut
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
-from cellplan.model.toolpath import Toolpath, Trajectory
 from cellplan.pipeline.chosen_start import chosen_start
+from cellplan.pipeline.path_depths import depths_on_paths
 from cellplan.pipeline.solve import with_start
 from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.modes import plan_runs, standing
@@ -24,8 +20,6 @@ from cellplan.planning.schedule import examine_times
 from cellplan.planning.toolpaths import build_toolpath
 from cellplan.scene.of_run import scene_of_run
 from cellplan.scene.scene import Scene
-
-POSES: Final = 1001  # [-] poses of each path at which the depth of the tool's axis is looked at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,7 +83,7 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
         checks=(
             at_start,
             *check_mounting(scene, start[None]),
-            *_depths_on_paths(cell, toolpaths),
+            *depths_on_paths(cell, toolpaths),
             *(each for each in loads if each.name == "payload" or not each.passed),
         ),
         left_out=scene.left_out,
@@ -104,17 +98,3 @@ def _touching_at_start(scene: Scene, start: Array) -> tuple[str, str] | None:
         if pair is not None:
             return pair
     return None
-
-
-def _depths_on_paths(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> list[Check]:
-    """Checks of those tools whose axis would stand too deep in the part on the desired path."""
-    found = [path_depth(cell, cell.task(name), _poses(toolpath)) for name, toolpath in toolpaths.items()]
-    checks = check_depths(cell, [depth for depth in found if depth is not None])
-    return [check for check in checks if not check.passed]
-
-
-def _poses(toolpath: Toolpath) -> Array:
-    """Desired tool poses spread over a path, shape (POSES, 4, 4)."""
-    if isinstance(toolpath, Trajectory):
-        return toolpath.at(np.linspace(0.0, toolpath.duration, POSES))[0]
-    return toolpath.poses(np.linspace(0.0, toolpath.length, POSES))

@@ -1,7 +1,7 @@
 """Start branches: the configurations of each robot from which a start of the whole cell can be put together."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -31,6 +31,7 @@ HOLDER_POSTURES: Final = 120  # the most promising of these, which are tried
 HOLDER_RANGE: Final = 0.7  # share of each joint range that they are drawn from, so that room is left to move
 TRIED_ALONE: Final = 8  # branches of each operator that are tried out without the other operators
 BRANCHES: Final = 4  # the best of these, which are combined
+ALL_AXES: Final = 6  # [-] components of a grasp that leaves nothing free
 COMFORTABLE: Final = 0.1  # smallest singular value above which more manipulability is worth no more
 
 Branch = tuple[float, Array]  # what a configuration is worth, and the configuration, shape (n,)
@@ -111,7 +112,9 @@ def branches_of(search: StartSearch, robot: Robot, holder_posture: Array | None)
         search.failures.reached(robot.name, neutral[None], holder_posture)
         return [(np.inf, neutral)]
     scored = _scored_branches(search, robot, relation, holder_posture)
-    if search.is_holder_open or isinstance(relation, Grasp):
+    if isinstance(relation, Grasp):
+        return [*_as_stated(search, robot, relation, holder_posture), *scored[:BRANCHES]]
+    if search.is_holder_open:
         return scored[:BRANCHES]
     return _tried_alone(search, relation, scored[:TRIED_ALONE], holder_posture)[:BRANCHES]
 
@@ -139,6 +142,23 @@ def _tried_alone(search: StartSearch, task: Task, branches: list[Branch], holder
     shares = np.array([search.trials.judge_alone(task, q, holder_posture) for _, q in branches])
     order = best_first(np.column_stack([shares, np.array([q for _, q in branches])]))
     return [(float(shares[index, 0]), branches[index][1]) for index in order]
+
+
+def _as_stated(search: StartSearch, robot: Robot, grasp: Grasp, holder_posture: Array | None) -> list[Branch]:
+    """Configurations that bring a tool to its grasp just as it is stated, where that leaves components free.
+
+    They are worth more than all others: with any other lean a tool may well dig into the part.
+    """
+    X_WP = part_pose(search.cell, holder_posture)
+    if len(grasp.axes) == ALL_AXES or X_WP is None:
+        return []
+    closed = replace(grasp, axes=tuple(range(ALL_AXES)))
+    seeds = search.random_postures(robot, SEEDS_PER_HOLDER if search.is_holder_open else SEEDS)
+    chain = search.chains[robot.name]
+    q = within_limits(robot.model, reaching_postures(chain, closed, grasp.X_PT, X_WP=X_WP, seeds=seeds))
+    margins = np.sort(joint_margin_shares(robot.model, q), axis=1)
+    order = best_first(np.column_stack([margins, q]))
+    return [(1.0 + float(margins[index, 0]), q[index]) for index in order[:BRANCHES]]
 
 
 def _scored_branches(

@@ -21,6 +21,8 @@ from cellplan.planning.modes import RunPlan, plan_runs, standing
 from cellplan.planning.near_ties import ALIKE
 from cellplan.planning.run_pairs import present_pairs
 from cellplan.planning.schedule import schedule_tasks, time_tasks
+from cellplan.scene.depths import mounted_depths
+from cellplan.scene.mounting import Mount
 from cellplan.scene.scene import Scene
 
 SAMPLES: Final = 160  # instants of the coarse motion that a posture is judged by
@@ -99,6 +101,8 @@ class StartTrials:
         self._cell = replace(self._once, motion=motion, solver=solver)
         self._alone: dict[str, Cell] = {}
         self._plans = plan_runs(self._cell)
+        open_grips = tuple(pair for pair in scene.mounted if pair.moves and pair.mount is Mount.GRIP)
+        self._open_grips = replace(scene, mounted=open_grips)
         self.bodies, self.pairs = scene.bodies, scene.pairs
         self.pair_names = [scene.names(pair) for pair in scene.pairs]
         is_present = np.any([present_pairs(scene, plan) for plan in self._plans], axis=0)
@@ -190,10 +194,15 @@ class StartTrials:
         return np.sort(np.concatenate([ranges[chosen], speeds[chosen]]))
 
     def _touches_on_the_way(self, plan: RunPlan, q: Array) -> bool:
-        """Whether something collides in the motion of a run, shape (N, nq), judged at a few samples."""
+        """Whether something collides in the motion of a run, shape (N, nq), judged at a few samples.
+
+        A grip that leaves components free and is too deep in the part at the start counts as well.
+        """
         instants = np.linspace(0, len(q) - 1, TOUCH_INSTANTS).astype(int)
         placed = self._order.as_listed(standing(self._cell, plan, q[instants]))
         among = self.open_pairs & present_pairs(self._scene, plan)
+        if any(grip.depth > grip.pair.limit for grip in mounted_depths(self._open_grips, placed[:1])):
+            return True
         return any(self._scene.touching(each, among=among) is not None for each in placed)
 
     def _paths(self, cell: Cell, names: Sequence[str] | None = None) -> list[Toolpath]:

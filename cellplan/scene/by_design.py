@@ -192,7 +192,9 @@ def _stands(design: Design, cell: Cell, pair: ScenePair) -> bool:
 def _own_links(design: Design, sampled: _Sampled, pair: ScenePair) -> bool:
     """Leave out two near links of one robot's file that always touch; of the others only contact is looked for."""
     if sampled.always_touch(pair, None):
-        reason = f"touch at the reference posture and at {POSTURES} random ones: it is their shape, not the motion"
+        reason = (
+            f"touch at the reference configuration and at {POSTURES} random ones: it is their shape, not the motion"
+        )
         design.excluded.append(Excluded(pair.first, pair.second, reason))
     else:
         reason = "checked for contact only: two joints apart, their distance is set by the robot's design"
@@ -224,10 +226,10 @@ def _mount_behind(design: Design, sampled: _Sampled, pair: ScenePair, holder: st
 def _relaxed(pair: ScenePair, sampled: _Sampled, holder: str | None) -> ScenePair:
     """The pair, checked for contact only where the distance between the two is a matter of their mounting."""
     nearest, farthest = sampled.distances(pair, holder)
-    if farthest < sampled.cell.checks.clearance:
-        reason = "checked for contact only: nearer than the demanded clearance in every posture by its mounting"
+    if farthest < pair.demand:
+        reason = "checked for contact only: nearer than the demanded clearance in every configuration by its mounting"
         return replace(pair, rule=Rule.CONTACT, reason=reason)
     if farthest - nearest <= HARDLY:
-        reason = "checked for contact only: the mounting sets their distance, the same in every posture"
+        reason = "checked for contact only: the mounting sets their distance, the same in every configuration"
         return replace(pair, rule=Rule.CONTACT, reason=reason)
     return pair

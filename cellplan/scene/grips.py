@@ -58,7 +58,7 @@ def grip_watch(cell: Cell, body: SceneBody, grasp: Grasp) -> GripWatch:
     watched = prepare(body.name, body.shape if surface is None or not is_in_zone else surface)
     outside = watched if is_in_zone and surface is not None else None
     if len(grasp.axes) == ALL_AXES and (outside is not None or not is_in_zone):
-        if _depth(cell, body, grasp) > grasp.depth:
+        if closed_depth(cell, body, grasp) > grasp.depth:
             outside, is_in_zone = None, True
         else:
             _require_free(cell, body, grasp, watched)
@@ -71,8 +71,8 @@ def grip_watch(cell: Cell, body: SceneBody, grasp: Grasp) -> GripWatch:
     return GripWatch(rule=Rule.GRIP, reason=reason, is_whole=False, outside=outside)
 
 
-def _depth(cell: Cell, body: SceneBody, grasp: Grasp) -> float:
-    """How deep a body is in the part in [m] when the grasp is closed."""
+def closed_depth(cell: Cell, body: SceneBody, grasp: Grasp) -> float:
+    """How deep a body of a holder is in the part in [m] where its tool stands on the part just as the grasp says."""
     solid = prepare(body.name, body.shape)  # type: ignore[arg-type] # no half-space
     engine, poses = _gripped(cell, body, grasp, solid)
     return overlap_depth(engine, (0, 1), poses, sample=0)

@@ -23,6 +23,7 @@ KIND: Final = {
     Rule.PROCESS: LeftOutKind.AT_WORK,
     Rule.GRIP: LeftOutKind.GRIP,
 }
+WITHOUT_LINKS: Final = "none of its links has a body: what its arm touches is not judged"
 AMONG_THINGS: Final = "all of them stand still: they are not judged against each other"
 
 
@@ -34,7 +35,9 @@ def left_out(
     *,
     engine: Engine,
 ) -> tuple[LeftOut, ...]:
-    """What was left out or asked less of, in the order of the bodies; the surroundings among themselves last.
+    """What was left out or asked less of, in the order of the bodies.
+
+    Then come the surroundings among themselves, and robots whose links have no bodies.
 
     Bodies that never move and keep the demanded clearance are not told: nothing was let pass there.
 
@@ -50,7 +53,10 @@ def left_out(
     found = sorted(told, key=lambda each: each[:2])
     named = [LeftOut(kind, (bodies[i].name, bodies[j].name), reason) for i, j, kind, reason in found]
     things = tuple(body.name for body in bodies if body.kind is Kind.OBSTACLE)
-    return (*named, *([LeftOut(LeftOutKind.ENVIRONMENT, things, AMONG_THINGS)] if len(things) > 1 else []))
+    among = [LeftOut(LeftOutKind.ENVIRONMENT, things, AMONG_THINGS)] if len(things) > 1 else []
+    with_links = {body.robot for body in bodies if body.kind is Kind.LINK}
+    bare = [robot.name for robot in cell.robots if robot.name not in with_links]
+    return (*named, *among, *(LeftOut(LeftOutKind.NO_BODY, (name,), WITHOUT_LINKS) for name in bare))
 
 
 class _Standing:

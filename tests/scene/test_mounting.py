@@ -192,6 +192,14 @@ def test_nothing_is_left_out_of_a_cell_without_anything_mounted() -> None:
     assert Scene.from_cell(make_cell(placed("a", arm_model()))).left_out == ()
 
 
+def test_a_robot_whose_links_have_no_bodies_is_told() -> None:
+    bare = replace(arm_model(), bodies=())
+    scene = Scene.from_cell(make_cell(placed("a", arm_model()), placed("b", bare)))
+
+    (told,) = scene.left_out
+    assert (told.kind, told.bodies) == (LeftOutKind.NO_BODY, ("b",))
+
+
 def test_the_order_of_the_robots_changes_no_verdict_on_pairs() -> None:
     model = arm_model()
     fat = replace(model, bodies=(*model.bodies, body("hose", 3, shape=Capsule(0.09, 0.25), at=(0.4, 0.1, 1.05))))

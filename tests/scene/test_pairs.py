@@ -116,7 +116,9 @@ def test_bodies_that_overlap_in_every_posture_are_left_out_and_those_that_someti
 
     scene = Scene.from_cell(make_cell(placed("a", replace(model, bodies=fat))))
 
-    assert "touch at the reference posture and at 48 random ones" in reasons(scene)[frozenset(("a/tube", "a/hand"))]
+    assert (
+        "touch at the reference configuration and at 48 random ones" in reasons(scene)[frozenset(("a/tube", "a/hand"))]
+    )
     assert frozenset(("a/forearm", "a/hand")) in watched(scene)
 
 
@@ -243,7 +245,7 @@ def test_a_tool_always_near_the_link_behind_it_is_checked_for_contact_only() -> 
     pair = watched(Scene.from_cell(make_cell(placed("a", thin, tool=stick()))))[frozenset(("a/wrist", "a/tool"))]
 
     assert pair.rule is Rule.CONTACT
-    assert "nearer than the demanded clearance in every posture" in pair.reason
+    assert "nearer than the demanded clearance in every configuration" in pair.reason
 
 
 def test_a_tool_at_a_distance_that_no_joint_changes_is_checked_for_contact_only() -> None:
@@ -251,7 +253,7 @@ def test_a_tool_at_a_distance_that_no_joint_changes_is_checked_for_contact_only(
     pair = watched(Scene.from_cell(make_cell(placed("a", arm_model(), tool=stick()))))[frozenset(("a/wrist", "a/tool"))]
 
     assert pair.rule is Rule.CONTACT
-    assert "the mounting sets their distance, the same in every posture" in pair.reason
+    assert "the mounting sets their distance, the same in every configuration" in pair.reason
 
 
 def test_a_bent_tool_whose_distance_changes_keeps_its_clearance() -> None:
