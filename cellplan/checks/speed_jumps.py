@@ -46,13 +46,14 @@ def joint_jumps(times: Array, q: Array, instants: Array) -> Array:
     jumps = np.zeros_like(q)
     rest = np.zeros_like(q[:2])
     changes = np.concatenate([rest, np.diff(np.concatenate([q[:1], q, q[-1:]]), n=2, axis=0) / step, rest])  # row + 2
-    for instant in instants:
-        first = int(np.floor(instant / step + ON_ROW))
-        last = first if abs(instant / step - first) <= ON_ROW else first + 1
-        total = np.abs(changes[first + 2 : last + 3].sum(axis=0))
-        usual = np.maximum(np.abs(changes[first + 1]), np.abs(changes[last + 3]))
-        row = min(round(instant / step), len(times) - 1)
-        jumps[row] = np.maximum(jumps[row], total - (last - first + 1) * usual)
+    place = instants / step
+    first = np.floor(place + ON_ROW).astype(np.intp)
+    is_between = np.abs(place - first) > ON_ROW
+    last = first + is_between
+    total = np.abs(changes[first + 2] + is_between[:, None] * changes[last + 2])
+    usual = np.maximum(np.abs(changes[first + 1]), np.abs(changes[last + 3]))
+    row = np.minimum(np.rint(place).astype(np.intp), len(times) - 1)
+    np.maximum.at(jumps, row, total - (1 + is_between)[:, None] * usual)
     return np.maximum(jumps, 0.0)
 
 
