@@ -9,6 +9,7 @@ import numpy as np
 
 from cellplan.checks.accelerations import jerks, joint_accelerations, point_accelerations
 from cellplan.checks.process_speed import process_speeds
+from cellplan.checks.speed_jumps import NO_INSTANTS, desired_jumps
 from cellplan.geometry.shapes import bounding_box
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screws import ScrewChain
@@ -47,8 +48,10 @@ def motion_accelerations(
     X_WT = {robot.name: chains[robot.name].tool_poses(q[robot.name]) for robot in cell.robots}
     cycles = {robot.name: robot.controller_cycle for robot in cell.robots}
     judged = _judged(cell, times)
+    jumps_at = NO_INSTANTS if schedule.desired is None else desired_jumps(schedule.desired)
+    joints = (_joints(robot, times, q[robot.name], judged=judged, jumps_at=jumps_at) for robot in cell.robots)
     return MotionAccelerations(
-        joints=tuple(use for robot in cell.robots for use in _joints(robot, times, q[robot.name], judged=judged)),
+        joints=tuple(use for uses in joints for use in uses),
         tools={name: _point(times, poses[:, None, :3, 3], window=cycles[name])[0] for name, poses in X_WT.items()},
         part=_part(cell, times, X_WP, window=cycles[cell.positioners[0]]) if cell.positioners else None,
         process=process_speeds(schedule, X_WT, X_WP),
@@ -81,10 +84,10 @@ def check_accelerations(cell: Cell, found: MotionAccelerations) -> list[Check]:
     return checks
 
 
-def _joints(robot: Robot, times: Array, q: Array, *, judged: Flags) -> Iterator[JointAcceleration]:
+def _joints(robot: Robot, times: Array, q: Array, *, judged: Flags, jumps_at: Array) -> Iterator[JointAcceleration]:
     """Every joint of one robot."""
     signed = np.where(judged[:, None], point_accelerations(times, q), 0.0)
-    rows = joint_accelerations(times, q, cycle=robot.controller_cycle)
+    rows = joint_accelerations(times, q, cycle=robot.controller_cycle, jumps_at=jumps_at)
     sizes = np.where(judged[:, None], rows.values, 0.0)
     jerk = jerks(times, signed[..., None], window=robot.controller_cycle)
     for index, joint in enumerate(robot.model.joints):
@@ -102,7 +105,7 @@ def _joints(robot: Robot, times: Array, q: Array, *, judged: Flags) -> Iterator[
             peak_jerk_at_s=float(times[m]),
             jerk_limit=None if robot.acceleration.is_unlimited else joint.jerk,
             window=robot.controller_cycle,
-            from_rest=bool(rows.is_jump[k, index]),
+            is_jump=bool(rows.is_jump[k, index]),
         )
 
 
@@ -175,7 +178,7 @@ def _check_acceleration(cell: Cell, use: JointAcceleration, limit: float) -> Che
     if is_assumed:
         index = cell.robot(use.robot).model.joint_names.index(use.joint)
         against = f"assumed {against}: full speed in {full_speed_in(cell.robot(use.robot).acceleration, index):g} s"
-    jump = "; its speed jumps out of rest or into rest" if use.from_rest and not passed else ""
+    jump = "; its speed jumps" if use.is_jump and not passed else ""
     return Check(
         name="joint_acceleration_assumed" if is_assumed else "joint_acceleration",
         subject=f"{use.robot}/{use.joint}",

@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.checks.speed_jumps import NO_INSTANTS, joint_jumps
 from cellplan.geometry.transforms import Array
 
 ROUNDING: Final = 1e-9  # [-] of a step: 4 ms are four steps of 1 ms, whatever the last digit says
@@ -17,7 +18,7 @@ class RowAccelerations:
 
     Attributes:
         values: Size of the acceleration of each column, shape (N, n).
-        is_jump: Where it is a jump of speed out of rest or into rest, shape (N, n).
+        is_jump: Where it is a jump of speed, shape (N, n).
     """
 
     values: Array
@@ -45,23 +46,26 @@ def point_accelerations(times: Array, points: Array) -> Array:
     return accelerations
 
 
-def joint_accelerations(times: Array, q: Array, *, cycle: float) -> RowAccelerations:
+def joint_accelerations(times: Array, q: Array, *, cycle: float, jumps_at: Array = NO_INSTANTS) -> RowAccelerations:
     """Sizes of the accelerations of joints at the rows; a jump of speed counts over the controller's cycle.
 
     Where a joint leaves rest, the change of speed at that row is followed by another one as large or larger when the
     joint speeds up evenly or gently. By as much as the next change falls short, the speed has jumped:
     ``v_0 - (v_1 - v_0)``, between 0 and ``v_0``. No controller spreads a jump over a long step for it, so it is divided
     by its cycle, where that is shorter than the step. The same holds backwards in time where a joint comes to rest.
+    Likewise for the jumps at instants at which the desired speed of a tool is known to jump.
 
     Args:
         times: Instants in [s], shape (N,).
         q: Positions in [rad] or [m], shape (N, n).
         cycle: Cycle of the controller in [s].
+        jumps_at: Where the desired speed of a tool jumps, in [s], shape (J,).
     """
     values = np.abs(point_accelerations(times, q))
     step = float(times[-1]) / (len(times) - 1)
     moves = np.diff(q, axis=0)
     jumps = np.maximum(_jumps(moves), _jumps(moves[::-1])[::-1])
+    jumps = np.maximum(jumps, step * joint_jumps(times, q, jumps_at))
     by_jump = jumps / (step * min(step, cycle))
     is_jump = (jumps > 0.5 * step * step * values) & (jumps > STILL)
     return RowAccelerations(values=np.maximum(values, by_jump), is_jump=is_jump)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from cellplan.cli.acceleration_summary import acceleration_lines
+from cellplan.report.clock import clock_words
 from cellplan.report.left_out_record import grips_told, told_left_out
 from cellplan.report.method import USUAL_METHOD
 from cellplan.report.open_surfaces import open_surface_lines
@@ -58,7 +59,8 @@ def left_out_lines(record: Record) -> list[str]:
 
 def _clock_word(record: Record) -> str:
     """What decides the length of the clock, unless the cell file states it."""
-    return " (no motion.duration_s: the clock ends with the last task)" if record.get("clock_from") == "tasks" else ""
+    words = clock_words(record.get("clock_from", ""))
+    return f" ({words})" if words else ""
 
 
 def _method_word(solver: Record) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from cellplan.io.complaints import Complaint, KeyPath, listed
+from cellplan.io.complaints import Complaint, KeyPath, key_text, listed
 from cellplan.io.schema.acceleration import AccelerationChoice, AccelerationRuleEntry
 from cellplan.io.schema.cell import CellDocument
 from cellplan.io.schema.pieces import Pieces
@@ -52,7 +52,7 @@ def written_rule(robot: Robot) -> Any:
 def acceleration_complaints(
     pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument
 ) -> Iterator[Complaint]:
-    """Rules that do not fit a robot: no limit stated where only stated ones count, more times than joints."""
+    """Rules that do not fit a robot: stated limits that are missing or would not count, more times than joints."""
     for name, model in models.items():
         entry = pieces.robots[name]
         choice = pieces.acceleration if entry.acceleration is None else entry.acceleration
@@ -66,9 +66,36 @@ def acceleration_complaints(
                 f"{{{missing[0].name}: {{{key}: …}}}}, or acceleration: {{full_speed_in_s: …}}"
             )
             yield document.complaint(path, text)
-        own = entry.acceleration
-        times = own.full_speed_in_s if isinstance(own, AccelerationRuleEntry) else None
-        if isinstance(times, tuple) and len(times) > len(model.joints):
-            count = len(model.joints)
-            text = f"expected at most {count} times, one per joint ({listed(model.joint_names)}), got {len(times)}"
-            yield document.complaint((*path, "full_speed_in_s"), text)
+        if _chosen(choice).is_unlimited:
+            yield from _limits_beside_unlimited(name, entry, document, where=key_text(path))
+        if entry.acceleration is not None:
+            words = f"joint ({listed(model.joint_names)})"
+            yield from _too_many_times(choice, len(model.joints), document, path=path, words=words)
+    following = [len(model.joints) for name, model in models.items() if pieces.robots[name].acceleration is None]
+    if following:
+        words = "joint of the longest arm that it counts for"
+        yield from _too_many_times(pieces.acceleration, max(following), document, path=("acceleration",), words=words)
+
+
+def _limits_beside_unlimited(
+    robot: str, entry: RobotEntry, document: YamlDocument, *, where: str
+) -> Iterator[Complaint]:
+    """Limits of accelerations and jerk in the cell itself, which `unlimited` would leave unjudged."""
+    for joint, limits in entry.limits.items():
+        for key, value in limits.model_dump(exclude_none=True).items():
+            if key.startswith(("acceleration_", "jerk_")):
+                text = (
+                    f"expected no limit, as {where} is unlimited and nothing is judged against it, got {value:g}; "
+                    f"remove it, or give robots.{robot}.acceleration: {{full_speed_in_s: …}}"
+                )
+                yield document.complaint(("robots", robot, "limits", joint, key), text)
+
+
+def _too_many_times(
+    choice: AccelerationChoice | None, joints: int, document: YamlDocument, *, path: KeyPath, words: str
+) -> Iterator[Complaint]:
+    """A list of times that is longer than the arm has joints."""
+    times = choice.full_speed_in_s if isinstance(choice, AccelerationRuleEntry) else None
+    if isinstance(times, tuple) and len(times) > joints:
+        text = f"expected at most {joints} times, one per {words}, got {len(times)}"
+        yield document.complaint((*path, "full_speed_in_s"), text)

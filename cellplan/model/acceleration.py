@@ -55,7 +55,7 @@ class JointAcceleration:
         peak_jerk_at_s: Its instant.
         jerk_limit: What is allowed; None where nothing is stated or nothing is judged.
         window: Time in [s] over which jerk is taken.
-        from_rest: Whether the peak is a jump of speed out of rest or into it.
+        is_jump: Whether the peak is a jump of speed, out of rest or at a corner.
     """
 
     robot: str
@@ -69,7 +69,7 @@ class JointAcceleration:
     peak_jerk_at_s: float
     jerk_limit: float | None
     window: float
-    from_rest: bool = False
+    is_jump: bool = False
 
     @property
     def ratio(self) -> float | None:

@@ -12,6 +12,7 @@ from cellplan.model.motion import Motion
 from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Check, Report
 from cellplan.report.acceleration_figures import acceleration_figures
+from cellplan.report.clock import clock_words
 from cellplan.report.json_report import run_record, summary_record
 from cellplan.report.left_out_record import grips_told, told_left_out
 from cellplan.report.method import method_lines
@@ -232,7 +233,8 @@ def _speed_share(joint: Record) -> float:
 
 def _clock_word(record: Record) -> str:
     """What decides the length of the clock, unless the cell file states it."""
-    return "; the clock ends with the last task" if record["clock_from"] == "tasks" else ""
+    words = clock_words(record["clock_from"])
+    return f"; {words}" if words else ""
 
 
 def _figures(record: Record) -> list[Record]:

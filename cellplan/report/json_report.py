@@ -10,6 +10,7 @@ from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, ClearanceClass, ClearanceMinimum, JointUse, Report
 from cellplan.report.acceleration_record import acceleration_parts, merge_accelerations
 from cellplan.report.clearance_record import clearance_proof_record, closest_pairs_record
+from cellplan.report.clock import clock_from
 from cellplan.report.closure_record import closures_record, worst_closures_record
 from cellplan.report.idle_record import missing_moves
 from cellplan.report.left_out_record import left_out_record
@@ -22,7 +23,6 @@ from cellplan.report.record import (
     Record,
     check_record,
     clearance_record,
-    clock_from,
     joints_record,
     number,
     origin_record,

@@ -23,6 +23,7 @@ from cellplan.model.report import (
     RobotSpeed,
     TaskAccuracy,
 )
+from cellplan.report.clock import clock_from
 from cellplan.report.idle_record import idle_record
 
 Record = dict[str, Any]
@@ -44,11 +45,6 @@ class Provenance:
 
     versions: Mapping[str, str]
     digests: Mapping[str, str]
-
-
-def clock_from(cell: Cell) -> str:
-    """What decides the length of the common clock: the cell file, or the last task to end."""
-    return "tasks" if cell.motion.duration is None else "motion.duration_s"
 
 
 def report_record(report: Report, *, cell: Cell, provenance: Provenance) -> Record:

@@ -112,6 +112,17 @@ def test_rule_and_cycle_of_every_robot_are_written_out(load: Load, words: str) -
             "(A2, B2, C2, D2, E2, F2), got 7",
         ),
         (
+            of_cell("{full_speed_in_s: [1, 1, 1, 1, 1, 1, 1]}"),
+            "c:22: acceleration.full_speed_in_s: expected at most 6 times, one per joint of the longest arm that it "
+            "counts for, got 7",
+        ),
+        (
+            of_holder("{unlimited: why}\n    limits: {A2: {jerk_deg_s3: 9000}}"),
+            "c:7: robots.holder.limits.A2.jerk_deg_s3: expected no limit, as robots.holder.acceleration is unlimited "
+            "and nothing is judged against it, got 9000; remove it, or give robots.holder.acceleration: "
+            "{full_speed_in_s: …}",
+        ),
+        (
             of_holder("{full_speed_in_s: 0}"),
             "c:6: robots.holder.acceleration.full_speed_in_s: expected a positive number of seconds, got 0",
         ),
@@ -136,3 +147,15 @@ def test_a_rule_that_does_not_fit_is_refused_with_its_cure(
     refuse: Refuse, change: tuple[str, str], message: str
 ) -> None:
     assert message in refuse(change)
+
+
+def test_a_limit_of_the_cell_beside_the_unlimited_of_the_cell_is_refused_but_not_with_a_rule_of_the_robot(
+    load: Load, refuse: Refuse
+) -> None:
+    unlimited, limit = of_cell("unlimited"), "    limits: {B2: {acceleration_deg_s2: 400, upper_deg: 30}}\n"
+
+    (message,) = refuse(unlimited, (HOLDER, HOLDER + limit))
+    assert message.startswith("c:6: robots.holder.limits.B2.acceleration_deg_s2: expected no limit, as acceleration is")
+    cell = load(unlimited, (HOLDER, f"{HOLDER}    acceleration: {{full_speed_in_s: 0.5}}\n{limit}"))
+    assert limits(cell, "holder")[1] == (400.0, LimitSource.STATED)
+    assert limits(cell, "worker")[1] == (None, LimitSource.UNLIMITED)

@@ -14,6 +14,9 @@ from cellplan.geometry.transforms import pose
 from cellplan.io.cell_file import load_cell
 from cellplan.model.cell import Cell, Mode
 from cellplan.model.task import CirclePath, Frame, PlaneName, PolygonPath, RunDirection, SampledPath, TimeLawKind
+from cellplan.pipeline.overrides import with_overrides
+from cellplan.planning.schedule import schedule_tasks
+from cellplan.planning.toolpaths import build_toolpath
 
 Load = Callable[..., Cell]
 Refuse = Callable[..., list[str]]
@@ -160,6 +163,16 @@ def test_a_clock_without_a_length_follows_tasks_with_times_of_their_own(load: Lo
     cell = load(("{duration_s: 4}", "{step_s: 0.01}"), ("tool_axis: normal", "feed_mm_s: 50"))
 
     assert (cell.motion.duration, cell.tasks[0].feed) == (None, 0.05)
+
+
+def test_a_cell_without_any_time_can_be_read_as_the_command_line_may_give_one(load: Load) -> None:
+    cell = load(("{duration_s: 4}", "{step_s: 0.01}"))
+    with pytest.raises(InputError, match=r"c:\d+: tasks\.ring: missing duration_s: expected duration_s or feed_mm_s"):
+        schedule_tasks(cell, [build_toolpath(cell.tasks[0], cell.part, cell.origin)])
+
+    cell = with_overrides(cell, duration=4.0)
+    (ring,) = schedule_tasks(cell, [build_toolpath(cell.tasks[0], cell.part, cell.origin)]).tasks
+    assert ring.end == 4.0
 
 
 def test_position_only_work_off_the_surface_needs_no_tool_axis(load: Load) -> None:

@@ -255,7 +255,8 @@ class CellDocument(Entry):
     acceleration: AccelerationChoice | None = Field(
         default=None,
         description="Accelerations that the joints of all robots are judged against, where a robot says nothing of its "
-        "own: {full_speed_in_s: [0.25, 0.25, 0.25, 0.15]} when absent. A stated limit of a joint always counts.",
+        "own: {full_speed_in_s: [0.25, 0.25, 0.25, 0.15]} when absent. A stated limit of a joint counts before it; "
+        "unlimited leaves also those unjudged that a robot file states.",
     )
     solver: SolverEntry = Field(default=SolverEntry(), description="How joint speeds are found.")
     checks: ChecksEntry = Field(default=ChecksEntry(), description="What the checks demand.")

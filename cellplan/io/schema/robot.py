@@ -192,7 +192,7 @@ class RobotEntry(Entry):
     limits: dict[str, LimitsEntry] = Field(default={}, description="Limits by joint name, beside those of the model.")
     acceleration: AccelerationChoice | None = Field(
         default=None,
-        description="Accelerations that its joints are judged against; a stated limit of a joint always counts. "
+        description="Accelerations that its joints are judged against; a stated limit of a joint counts first. "
         "The cell's when absent.",
     )
     controller_cycle_ms: CycleTime | None = Field(
