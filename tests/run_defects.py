@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from added_words import counts_beside_the_truth, misshapen_series, more_header_lines, words_in_a_picture
 from run_edits import ROBOTS, Copy, edit_field, edit_json, edit_rows, first_row, pick, replace_in, seal, sign
 
 from cellplan.io.input_files import digest
@@ -367,4 +368,8 @@ DEFECTS: dict[str, Defect] = {
     "other words in the report, sealed": other_words,
     "another page, sealed": other_page,
     "a picture missing, sealed": picture_missing,
+    "words in a picture, sealed": words_in_a_picture,
+    "more header lines, sealed": more_header_lines,
+    "a misshapen series, sealed": misshapen_series,
+    "counts beside the truth, sealed": counts_beside_the_truth,
 }

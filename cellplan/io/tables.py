@@ -9,6 +9,7 @@ import hashlib
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 
@@ -74,6 +75,21 @@ def replace_header(text: str, *, header: TableHeader) -> str:
     """Put another header above the rows of a table, which stay as they are byte for byte."""
     robot = _header_fields(text, "table")["robot"]
     return _render_header(robot, header) + table_body(text)
+
+
+def other_header_line(text: str, source: str) -> int | None:
+    """The first header line of a table, from 1, that is not what ``render_table`` writes for what the header says.
+
+    None where there is none: no line that says more, twice, or in another place.
+
+    Raises:
+        InputError: With file and line, when a header line is missing or of no known form.
+    """
+    written = replace_header(text, header=parse_header(text, source))
+    if written == text:
+        return None
+    lines = zip_longest(text.split("\n"), written.split("\n"))
+    return next(number for number, (line, other) in enumerate(lines, start=1) if line != other)
 
 
 def table_body(text: str) -> str:

@@ -1,6 +1,6 @@
 """Whether the page of a run says what was found when its tables were computed again; its pictures are those on disk."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from cellplan.io.complaints import listed, shown
@@ -8,6 +8,7 @@ from cellplan.io.stored_run import StoredRun
 from cellplan.model.cell import Cell
 from cellplan.model.verified_run import VerifiedMotion
 from cellplan.pipeline.compare_record import KNOWN_TO_THE_PLANNER
+from cellplan.pipeline.picture_words import foreign_piece
 from cellplan.pipeline.same_words import first_difference
 from cellplan.report.html import overview_page, report_page
 from cellplan.report.json_report import run_record, summary_record
@@ -15,20 +16,29 @@ from cellplan.report.plots import clearance_sheets, motion_sheets
 from cellplan.report.record import Provenance, Record
 from cellplan.report.sheets import Sheet, pictures
 
+Drawings = Mapping[str, Mapping[str, bytes]]
+
 PAGE: Final = "report.html"
 AROUND: Final = 40  # [characters] shown of a page from where it differs
 
 
-def page_complaints(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> Iterator[str]:
+def drawn_again(cell: Cell, motions: Sequence[VerifiedMotion]) -> Drawings:
+    """The pictures of what was found, by the place of the run and by file name."""
+    return {motion.name or "": pictures(_sheets(motion, cell)) for motion in motions}
+
+
+def page_complaints(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], drawn: Drawings) -> Iterator[str]:
     """Every page of a run that is not the one its tables, its report's planner facts and its pictures give.
 
     Args:
         stored: The run; its reports are known to say what was found.
         cell: Its cell.
         motions: What was found.
+        drawn: The pictures of it.
     """
     for motion in motions:
         place = motion.name or ""
+        yield from _foreign_pieces(stored, place, drawn[place])
         record = _of_the_run(stored, place, run_record(motion.report, cell=cell, provenance=_provenance(stored, place)))
         yield from _page_complaint(stored, place, cell=cell, motion=motion, record=record)
     if "runs" in stored.record:
@@ -37,16 +47,25 @@ def page_complaints(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMot
         yield from _difference(stored, "", overview_page(_of_the_run(stored, "", found), cell=cell))
 
 
-def other_pictures(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> Iterator[str]:
+def other_pictures(stored: StoredRun, drawn: Drawings) -> Iterator[str]:
     """Pictures of a run that are not, to the byte, what is drawn here of what was found.
 
     That may be rounding: curves that show nothing but the noise of the arithmetic look different on each processor.
     """
-    for motion in motions:
-        place = motion.name or ""
-        for name, picture in pictures(_sheets(motion, cell)).items():
+    for place, own in drawn.items():
+        for name, picture in own.items():
             if stored.content(place, f"plots/{name}") != picture:
                 yield f"{place}/plots/{name}" if place else f"plots/{name}"
+
+
+def _foreign_pieces(stored: StoredRun, place: str, drawn: Mapping[str, bytes]) -> Iterator[str]:
+    """Pictures of one run that hold something that cellplan does not draw; those missing ones are told elsewhere."""
+    for name, picture in stored.drawings(place).items():
+        if name in drawn:
+            foreign = foreign_piece(picture.decode("utf-8", "replace"), drawn[name].decode())
+            if foreign is not None:
+                file = stored.file(place, f"plots/{name}")
+                yield f"{file}: {foreign} stands there, which cellplan does not draw; solve the cell again"
 
 
 def _sheets(motion: VerifiedMotion, cell: Cell) -> dict[str, Sheet]:

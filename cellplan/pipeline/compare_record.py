@@ -42,6 +42,21 @@ def differences(said: Record, found: Record, *, same_program: bool) -> Iterator[
             the same words; between versions only the figures of common keys are compared.
     """
     yield from _compare(said, found, (), same_program=same_program)
+    if same_program and "series" in found:
+        yield from _misshapen_series(said.get("series"), len(found["series"]["times_s"]) - 1)
+
+
+def _misshapen_series(said: Any, steps: int) -> Iterator[tuple[str, Any, Any]]:
+    """Series that only the planner knows and that are neither null nor one figure for each step."""
+    for section, key in sorted(KNOWN_TO_THE_PLANNER):
+        if section != "series" or not isinstance(said, Mapping) or said.get(key) is None:
+            continue
+        series = said[key]
+        is_whole = isinstance(series, list) and len(series) == steps
+        if not is_whole or any(
+            isinstance(value, bool) or not isinstance(value, int | float | None) for value in series
+        ):
+            yield f"{section}.{key}", series, f"a list of {steps} numbers or null"
 
 
 def _compare(said: Any, found: Any, path: tuple[str, ...], *, same_program: bool) -> Iterator[tuple[str, Any, Any]]:

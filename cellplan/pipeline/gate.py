@@ -12,14 +12,14 @@ from cellplan.checks.verify import verify
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.io.complaints import listed, shown
 from cellplan.io.stored_run import CELL, StoredRun, read_stored_run
-from cellplan.io.tables import TableHeader, parse_header, parse_table, program_digest, table_body
+from cellplan.io.tables import TableHeader, other_header_line, parse_header, parse_table, program_digest, table_body
 from cellplan.model.cell import Cell
 from cellplan.model.idle import not_in_program
 from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.model.verified_run import SEAL, VerifiedMotion, VerifiedRun
-from cellplan.pipeline.compare_page import other_pictures, page_complaints
+from cellplan.pipeline.compare_page import drawn_again, other_pictures, page_complaints
 from cellplan.pipeline.compare_record import differences
 from cellplan.pipeline.stored_cell import load_stored_cell
 from cellplan.pipeline.write_run import versions
@@ -175,7 +175,10 @@ def _refuse_other_header(header: TableHeader, expected: TableHeader, file: str) 
 
 
 def _refuse_other_accelerations(stored: StoredRun, motion: VerifiedMotion) -> None:
-    """Refuse a table whose header names other accelerations than its rows have; older versions named none."""
+    """Refuse a table whose header names other accelerations than its rows have, or holds lines that say more.
+
+    Other versions may name no accelerations, and may have other lines.
+    """
     place = motion.name or ""
     is_same = stored.manifest.versions.get("cellplan") == versions()["cellplan"]
     for robot, text in stored.tables[place].items():
@@ -183,6 +186,9 @@ def _refuse_other_accelerations(stored: StoredRun, motion: VerifiedMotion) -> No
         said, found = parse_header(text, file).accelerations, table_line(motion.report.accelerations, robot)
         if said != found and (said or is_same):
             raise InputError(f"{file}: accelerations: expected {shown(found)}, got {shown(said)}")
+        line = other_header_line(text, file) if is_same else None
+        if line is not None:
+            raise InputError(f"{file}:{line}: is not a header line that cellplan writes there; solve the cell again")
 
 
 def _refuse_other_clock(stored: StoredRun, place: str, schedule: Schedule, *, tables: Mapping[str, JointTable]) -> None:
@@ -268,8 +274,9 @@ def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[Verifie
     """Refuse pages that say something else than was found; remarks about what may be rounding or another version."""
     if not _is_of_this_version(stored):
         return ("the page and the words of the report were not compared: another version of cellplan wrote them",)
-    _refuse_because(stored, list(page_complaints(stored, cell, motions)))
-    other = list(other_pictures(stored, cell, motions))
+    drawn = drawn_again(cell, motions)
+    _refuse_because(stored, list(page_complaints(stored, cell, motions, drawn)))
+    other = list(other_pictures(stored, drawn))
     told = f"drawn here, some pictures look different, by rounding or by hand: {listed(other)}"
     return (told,) if other else ()
 

@@ -12,12 +12,16 @@ NUMBER: Final = re.compile(r"((?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w
 def is_same(said: Any, found: Any, *, noise: float = NOISE) -> bool:
     """Whether two single values are the same up to rounding; a number is never the same as a word.
 
+    A whole number is a count: it is the same or another one.
+
     Args:
         said: The one value.
         found: The other.
         noise: Difference of numbers in their printed unit below which stands the noise of the arithmetic.
     """
     are_numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (said, found))
+    if are_numbers and isinstance(found, int):
+        return bool(said == found)
     if are_numbers:
         return math.isclose(said, found, rel_tol=RELATIVE, abs_tol=noise)
     if isinstance(said, str) and isinstance(found, str):

@@ -23,6 +23,7 @@ ASKED: Final = (  # what the command line may have chosen instead of the cell fi
     ("motion", "duration_s"),
     METHOD,
     INTEGRATOR,
+    ("checks", "clearance_mm"),
 )
 
 

@@ -383,10 +383,10 @@ def _by_reason(exclusions: Iterable[Record]) -> dict[str, list[str]]:
 def _inline_plots(plots: Mapping[str, bytes]) -> dict[str, str]:
     """SVG pictures ready to stand in the page, by file name without its ending."""
     drawings = {name.removesuffix(".svg"): data for name, data in plots.items() if name.endswith(".svg")}
-    return {name: _inline_svg(data.decode(), prefix=f"p{i}-") for i, (name, data) in enumerate(drawings.items())}
+    return {name: inline_svg(data.decode(), prefix=f"p{i}-") for i, (name, data) in enumerate(drawings.items())}
 
 
-def _inline_svg(text: str, *, prefix: str) -> str:
+def inline_svg(text: str, *, prefix: str) -> str:
     """The drawing without its file header, with names of its own so that several can share a page."""
     body = text[text.index("<svg") :]
     body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)

@@ -22,6 +22,7 @@ from cellplan.io.errors_file import load_errors
 ROOT = Path(__file__).resolve().parents[2]
 CELLS = sorted(path.relative_to(ROOT / "cells").as_posix() for path in (ROOT / "cells").rglob("*.yaml"))
 CELLS = [name for name in CELLS if not name.startswith("robots/") and "/robots/" not in name]
+MANY_KEYS = Path(__file__).with_name("many_keys.yaml")  # those of its keys that no shipped cell has
 LONGEST_S = 10.0
 RIGHT_SHARE = 0.95  # of the refusals that name the line of the injury; a forgotten bracket can hide it
 
@@ -74,7 +75,7 @@ def injury(text: str, random: Random) -> Injury | None:
 
 def is_fixed(place: Place) -> bool:
     """Whether the mapping of the place has fixed keys, not names of the user's choice."""
-    free = {"robots", "tasks", "environment", "limits", "locked", "at", "start", "vary", "grasp"}
+    free = {"robots", "tasks", "environment", "limits", "locked", "at", "start", "vary", "grasp", "axes"}
     return len(place.path) == 1 or (
         place.path[-2] not in free and not str(place.path[-2]).startswith(("joint_", "link_"))
     )
@@ -114,8 +115,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return copy
 
 
+def original(name: str) -> str:
+    """Text of a shipped cell, or of the one that has the other keys."""
+    return (MANY_KEYS if name == MANY_KEYS.name else ROOT / "cells" / name).read_text(encoding="utf-8")
+
+
 def share_of_right_lines(folder: Path, name: str, seeds: range) -> float:
-    text = (ROOT / "cells" / name).read_text(encoding="utf-8")
+    text = original(name)
     right = wrong = 0
     for seed in seeds:
         found = injury(text, Random(f"{name}/{seed}"))
@@ -128,13 +134,15 @@ def share_of_right_lines(folder: Path, name: str, seeds: range) -> float:
     return right / max(1, right + wrong)
 
 
-@pytest.mark.parametrize("name", ["four_robots.yaml", "load_sharing.yaml", "errors/four_robots_spread.yaml"])
+@pytest.mark.parametrize(
+    "name", ["four_robots.yaml", "load_sharing.yaml", "errors/four_robots_spread.yaml", MANY_KEYS.name]
+)
 def test_an_injury_is_refused_with_its_line(folder: Path, name: str) -> None:
     assert share_of_right_lines(folder, name, range(15)) >= 0.9
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", CELLS)
+@pytest.mark.parametrize("name", [*CELLS, MANY_KEYS.name])
 def test_very_many_injuries_are_refused_with_their_lines(folder: Path, name: str) -> None:
     assert share_of_right_lines(folder, name, range(1000, 1100)) >= RIGHT_SHARE
 
@@ -171,8 +179,8 @@ def test_very_many_values_anywhere_are_read_or_refused(folder: Path, data: st.Da
 
 
 def some_values_anywhere(folder: Path, data: st.DataObject) -> None:
-    name = data.draw(st.sampled_from(CELLS))
-    text = (ROOT / "cells" / name).read_text(encoding="utf-8")
+    name = data.draw(st.sampled_from([*CELLS, MANY_KEYS.name]))
+    text = original(name)
     place = data.draw(st.sampled_from(cell_mutations.places(text)))
     number = st.floats() | st.integers() | st.sampled_from([1e-300, -0.0, 1e300, 2**63, 1000.0])
     value = data.draw(number.map(repr) | st.text(max_size=30) | st.sampled_from(NEVER) | st.just("[0, 0, 0]"))
@@ -182,9 +190,9 @@ def some_values_anywhere(folder: Path, data: st.DataObject) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", CELLS)
+@pytest.mark.parametrize("name", [*CELLS, MANY_KEYS.name])
 def test_units_that_slipped_are_read_or_refused(folder: Path, name: str) -> None:
-    text = (ROOT / "cells" / name).read_text(encoding="utf-8")
+    text = original(name)
     for place in filter(needs_number, cell_mutations.places(text)):
         for factor in (1000.0, 0.001, 57.29577951308232, -1.0, 0.0):
             value = repr(factor * float(place.node.value))

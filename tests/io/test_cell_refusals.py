@@ -124,6 +124,11 @@ Refuse = Callable[..., list[str]]
         ),
         (
             "duration_s: 4",
+            "duration_s: 4, step_s: 1e-300",
+            "c:21: motion.step_s: expected at most 2000000 samples (duration_s / step_s), got 4e+300",
+        ),
+        (
+            "duration_s: 4",
             "duration_s: 4, step_s: 5",
             "c:21: motion.step_s: expected a step of at most duration_s = 4, got 5",
         ),

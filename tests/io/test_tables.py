@@ -13,6 +13,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.io.tables import (
     DECIMALS,
     TableHeader,
+    other_header_line,
     parse_header,
     parse_table,
     program_digest,
@@ -123,6 +124,26 @@ def test_header_can_be_replaced_without_touching_the_rows() -> None:
 
 def test_header_reads_back() -> None:
     assert parse_header(TEXT, "arm.csv") == HEADER
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("# cell: bench\n", "# cell: bench\n# note: safe at full speed\n", 4),
+        ("# mode: simultaneous\n# cell digest", "# cell digest", None),
+        ("# verdict: passed\n", "# verdict: passed\n# verdict of others: passed\n", 8),
+        ("# robot: arm\n# cell: bench\n", "# cell: bench\n# robot: arm\n", 2),
+        ("# robot: arm\n", "# robot:  arm\n", 2),
+    ],
+)
+def test_a_header_line_that_is_not_written_there_is_found(old: str, new: str, line: int | None) -> None:
+    assert old in TEXT
+    if line is None:
+        with pytest.raises(InputError, match="mode"):
+            other_header_line(TEXT.replace(old, new, 1), "arm.csv")
+    else:
+        assert other_header_line(TEXT.replace(old, new, 1), "arm.csv") == line
+    assert other_header_line(TEXT, "arm.csv") is None
 
 
 def test_a_remark_stands_before_the_verdict_and_reads_back() -> None:

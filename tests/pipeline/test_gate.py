@@ -158,11 +158,12 @@ def test_a_run_without_a_manifest_is_to_be_solved_again(copy: Path) -> None:
 
 def test_what_the_command_line_chose_is_told(sound: Path, tmp_path: Path) -> None:
     cell = load_cell(sound / "cell" / "small.yaml")
-    write_run(solve(with_overrides(cell, mode="part_at_rest", duration=1.5)), tmp_path / "run")
+    write_run(solve(with_overrides(cell, mode="part_at_rest", duration=1.5, clearance_mm=7)), tmp_path / "run")
 
     remarks = open_gate(tmp_path / "run", cell=sound / "cell" / "small.yaml").remarks
 
     assert sorted(remarks) == [
+        "checks.clearance_mm: 7 was chosen on the command line; the cell file has 5",
         "motion.duration_s: 1.5 was chosen on the command line; the cell file has 1",
         "motion.mode: 'part_at_rest' was chosen on the command line; the cell file has 'simultaneous'",
     ]

@@ -131,7 +131,7 @@ class MotionEntry(Entry):
             raise rule(f"expected a step of at most duration_s = {self.duration_s:g}, got {self.step_s:g}", "step_s")
         if self.duration_s / self.step_s > SAMPLE_LIMIT:
             steps = self.duration_s / self.step_s
-            raise rule(f"expected at most {SAMPLE_LIMIT} samples (duration_s / step_s), got {steps:.0f}", "step_s")
+            raise rule(f"expected at most {SAMPLE_LIMIT} samples (duration_s / step_s), got {steps:.9g}", "step_s")
         return self
 
 
