@@ -184,6 +184,11 @@ Refuse = Callable[..., list[str]]
         ),
         (
             "environment:",
+            'checks: {exclude: [{bodies: [holder/foot, floor], reason: <<}]}\nenvironment:',
+            "c:22: checks.exclude[0].reason: expected a reason in words, got '<<'",
+        ),
+        (
+            "environment:",
             "checks: {exclude: [{bodies: [floor, floor], reason: near}]}\nenvironment:",
             "c:22: checks.exclude[0].bodies[1]: expected two different bodies, got the same twice",
         ),

@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, Tag, model_validator
 
-from cellplan.io.schema.common import Entry, Text, by_kind, one_of_keys, require_one
+from cellplan.io.schema.common import Entry, Reason, by_kind, one_of_keys, require_one
 
 AXES: Final = 64  # joints of one robot
 SECONDS_WORDS: Final = "a number of seconds or a list of them"
@@ -29,7 +29,7 @@ class AccelerationRuleEntry(Entry):
         description="Time in which a joint without a stated limit is taken to reach its top speed: one for all joints, "
         "or a list along the chain whose last entry counts for all further joints.",
     )
-    unlimited: Text | None = Field(
+    unlimited: Reason | None = Field(
         default=None, description="Accelerations and jerk are reported and not judged; the reason why."
     )
 

@@ -5,7 +5,18 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
-from cellplan.io.schema.common import Angle, Coordinate, Coordinates, Entry, Name, PoseEntry, Text, by_kind, rule
+from cellplan.io.schema.common import (
+    Angle,
+    Coordinate,
+    Coordinates,
+    Entry,
+    Name,
+    PoseEntry,
+    Reason,
+    Text,
+    by_kind,
+    rule,
+)
 from cellplan.io.schema.robot import Mass, RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
 from cellplan.io.schema.solver import SolverEntry
@@ -142,7 +153,7 @@ class ExclusionEntry(Entry):
         description="Two bodies: ROBOT/LINK, ROBOT/tool, ROBOT/tool_2, ROBOT/pedestal, ROBOT/ATTACHMENT, part or a "
         "name of the environment."
     )
-    reason: Text = Field(description="Why they may touch; it is repeated in the report.")
+    reason: Reason = Field(description="Why they may touch; it is repeated in the report.")
 
     @model_validator(mode="after")
     def _names_a_pair(self) -> Self:

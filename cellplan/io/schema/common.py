@@ -40,6 +40,13 @@ def _one_line(text: str) -> str:
     return words
 
 
+def _has_words(text: str) -> str:
+    """Refuse signs without a word: a reason is repeated in reports, for people to judge."""
+    if not any(character.isalpha() for character in text):
+        raise rule(f"expected a reason in words, got '{text}'")
+    return text
+
+
 def _has_direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     """Refuse a vector too short to point anywhere."""
     if sum(component * component for component in vector) < SHORTEST_DIRECTION**2:
@@ -48,6 +55,7 @@ def _has_direction(vector: tuple[float, float, float]) -> tuple[float, float, fl
 
 
 Text = Annotated[str, AfterValidator(_one_line)]
+Reason = Annotated[Text, AfterValidator(_has_words)]
 Component = Annotated[float, Field(ge=-1e6, le=1e6)]
 Vector = Annotated[tuple[Component, Component, Component], AfterValidator(_has_direction)]
 AxisName = Literal["x", "y", "z"]
