@@ -1,4 +1,4 @@
-"""Accelerations on the screen: the joint that comes nearest to its limit, tool and part, and what was not judged."""
+"""Accelerations on the screen: the joint nearest to its limit, jerk, tool and part, and what was not judged."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -17,17 +17,23 @@ def acceleration_lines(record: Record) -> Iterator[str]:
 
 
 def _joint_lines(joints: Record) -> Iterator[str]:
-    """The joint that takes the largest share of its limit; the fastest of all where no joint has one."""
-    uses = [(robot, name, use) for robot, named in joints.items() for name, use in named.items()]
-    limited = [use for use in uses if use[2].get("acceleration_ratio") is not None]
+    """The joint that takes the largest share of its limit, or else the one that accelerates most; the largest jerk."""
+    uses = [(f"{robot} {name}", use) for robot, named in joints.items() for name, use in named.items()]
+    known = [each for each in uses if each[1].get("peak_acceleration") is not None]
+    limited = [each for each in known if each[1]["acceleration_ratio"] is not None]
     if limited:
-        robot, name, use = max(limited, key=lambda it: it[2]["acceleration_ratio"])
-        share = 100.0 * use["acceleration_ratio"]
+        joint, use = max(limited, key=lambda each: float(each[1]["acceleration_ratio"]))
         source = "assumed" if use["acceleration_limit_source"] == "assumed" else "stated"
-        yield (
-            f"  largest joint acceleration {share:.4g} % of its {source} limit: {robot} {name}"
-            f" at {use['peak_acceleration_at_s']:.3f} s"
-        )
+        figure = f"{100.0 * use['acceleration_ratio']:.4g} % of its {source} limit"
+        yield f"  largest joint acceleration {figure}: {joint} at {use['peak_acceleration_at_s']:.3f} s"
+    elif known:
+        joint, use = max(known, key=lambda each: (each[1]["unit"] == "deg", each[1]["peak_acceleration"]))
+        figure = f"{use['peak_acceleration']:.4g} {use['unit']}/s2, not limited"
+        yield f"  largest joint acceleration {figure}: {joint} at {use['peak_acceleration_at_s']:.3f} s"
+    if known:
+        joint, use = max(known, key=lambda each: (each[1]["unit"] == "deg", each[1]["peak_jerk"]))
+        figure = f"{use['peak_jerk']:.4g} {use['unit']}/s3 over {use['jerk_window_ms']:g} ms"
+        yield f"  largest joint jerk {figure}: {joint} at {use['peak_jerk_at_s']:.3f} s"
 
 
 def _world_lines(found: Record) -> Iterator[str]:

@@ -184,7 +184,7 @@ Refuse = Callable[..., list[str]]
         ),
         (
             "environment:",
-            'checks: {exclude: [{bodies: [holder/foot, floor], reason: <<}]}\nenvironment:',
+            "checks: {exclude: [{bodies: [holder/foot, floor], reason: <<}]}\nenvironment:",
             "c:22: checks.exclude[0].reason: expected a reason in words, got '<<'",
         ),
         (
