@@ -134,13 +134,13 @@ class BetweenLook:
         errors, sags = np.empty((count, len(tools), 2)), np.zeros((count, len(tools), 2))
         for begin in range(0, count, CHUNK):
             k = np.arange(begin, min(begin + CHUNK, count))
-            wanted = self._wanted(k, np.full(len(k), 0.5))
-            errors[k] = self._errors_of(tools, k, np.full(len(k), 0.5), wanted)
+            poses_desired = self._desired_poses(k, np.full(len(k), 0.5))
+            errors[k] = self._errors_of(tools, k, np.full(len(k), 0.5), poses_desired)
             for place, tool in enumerate(tools):
                 if tool.place is not None:
                     rows = self._schedule.tasks[tool.place].X_PT
                     chord = 0.5 * (rows[k] + rows[k + 1])
-                    sags[k, place] = _sag(wanted[tool.place] - chord, tool.relation)
+                    sags[k, place] = _sag(poses_desired[tool.place] - chord, tool.relation)
         return errors, sags
 
     def _errors(self, tools: Sequence[_Tool], k: Steps, s: Array) -> Array:
@@ -148,15 +148,15 @@ class BetweenLook:
         errors = np.empty((len(k), len(tools), 2))
         for begin in range(0, len(k), CHUNK):
             part = slice(begin, begin + CHUNK)
-            errors[part] = self._errors_of(tools, k[part], s[part], self._wanted(k[part], s[part]))
+            errors[part] = self._errors_of(tools, k[part], s[part], self._desired_poses(k[part], s[part]))
         return errors
 
-    def _wanted(self, k: Steps, s: Array) -> tuple[Array, ...]:
+    def _desired_poses(self, k: Steps, s: Array) -> tuple[Array, ...]:
         """Desired poses of all tasks at shares s of steps k, shape (M, 4, 4) each."""
         times = self._desired.times
         return self._desired.poses(times[k] + s * (times[k + 1] - times[k]))
 
-    def _errors_of(self, tools: Sequence[_Tool], k: Steps, s: Array, wanted: Sequence[Array]) -> Array:
+    def _errors_of(self, tools: Sequence[_Tool], k: Steps, s: Array, poses_desired: Sequence[Array]) -> Array:
         """Errors of all tools against desired poses, shape (M, tools, 2)."""
         cell, chains = self._scene.cell, self._scene.chains
         q = {name: rows[k] + s[:, None] * (rows[k + 1] - rows[k]) for name, rows in self._q.items()}
@@ -165,7 +165,7 @@ class BetweenLook:
         for place, tool in enumerate(tools):
             relation, X_WT = tool.relation, chains[tool.relation.robot].tool_poses(q[tool.relation.robot])
             if isinstance(relation, Task):
-                X_PT, desired = seen_from_task(relation, X_WT, X_WP), wanted[tool.place or 0]
+                X_PT, desired = seen_from_task(relation, X_WT, X_WP), poses_desired[tool.place or 0]
             else:
                 X_PT = inverse(X_WP) @ X_WT
                 desired = np.broadcast_to(relation.X_PT, X_PT.shape)

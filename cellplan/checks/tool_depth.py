@@ -57,14 +57,14 @@ def check_depths(cell: Cell, found: Sequence[ToolDepth]) -> list[Check]:
 
 
 def path_depth(cell: Cell, task: Task, X_PT: Array) -> ToolDepth | None:
-    """Depth of a tool's axis on its path as it is wanted, before there is a motion.
+    """Depth of a tool's axis on its desired path, before there is a motion.
 
     None where the task leaves the place or the lean of the axis open: then only the motion says how deep it is.
 
     Args:
         cell: The cell.
         task: One of its tasks.
-        X_PT: Wanted tool poses on the part, shape (N, 4, 4).
+        X_PT: Desired tool poses on the part, shape (N, 4, 4).
     """
     if task.relative_to is not Frame.PART or not set(AXIS_COMPONENTS) <= set(task.axes):
         return None

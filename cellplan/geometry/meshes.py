@@ -97,7 +97,7 @@ def require_solid(mesh: Mesh) -> None:
 
 
 def require_enclosing(mesh: Mesh) -> None:
-    """Refuse a mesh of which nobody can say what lies inside it.
+    """Refuse a mesh without a defined inside.
 
     Raises:
         InputError: The surface is open.

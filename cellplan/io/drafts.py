@@ -62,7 +62,7 @@ def _is_left_behind(found: re.Match[str]) -> bool:
 
 
 def _exists(process: int) -> bool:
-    """Whether there is a process of that number; true where nobody can tell."""
+    """Whether there is a process of that number; true where that is unknown."""
     if not hasattr(os, "getuid"):  # another system, where asking may end the process
         return True
     try:
@@ -75,7 +75,7 @@ def _exists(process: int) -> bool:
 
 
 def _start(process: int) -> str:
-    """Digest of when a process started, so that a later one of the same number is told from it; zeros if unknown."""
+    """Digest of when a process started, which distinguishes a later one of the same number; zeros if unknown."""
     try:
         words = Path(f"/proc/{process}/stat").read_bytes().rpartition(b")")[2].split()
         boot = Path("/proc/sys/kernel/random/boot_id").read_bytes()

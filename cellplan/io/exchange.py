@@ -14,7 +14,7 @@ NOT_THERE: Final = frozenset({errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.E
 
 
 def exchange(one: Path, other: Path) -> bool:
-    """Let two existing paths of one file system change places in one step; nobody ever finds either of them missing.
+    """Let two existing paths of one file system change places in one step, so that neither is ever missing.
 
     Returns:
         Whether it was done; False where the system or the file system does not know how.

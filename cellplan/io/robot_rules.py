@@ -98,8 +98,8 @@ def _configuration_complaints(
     as_list = (*robot, f"{key}_deg")
     sliding = [joint.name for joint in model.joints if not joint.is_revolute]
     if sliding:
-        wanted = ", ".join(f"{joint}: …" for joint in keys)
-        text = f"unexpected key, '{sliding[0]}' is a prismatic joint: use {key}: {{{wanted}}}"
+        expected = ", ".join(f"{joint}: …" for joint in keys)
+        text = f"unexpected key, '{sliding[0]}' is a prismatic joint: use {key}: {{{expected}}}"
         yield document.key_complaint(as_list, text)
     elif len(given) != len(keys):
         text = f"expected {len(keys)} angles, one per joint ({listed(model.joint_names)}), got {len(given)}"
