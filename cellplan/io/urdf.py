@@ -35,7 +35,7 @@ class UrdfOptions:
         package_dirs: Folders in which ``package://`` names are looked up.
         limits: Limits by joint name; they tighten the URDF's or stand in for missing ones.
         locked: Position in [rad] or [m] of joints that are held still, by name.
-        lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where nobody wrote it.
+        lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where it was not written.
         within: Folders that its meshes must lie in; None for all.
     """
 
@@ -113,9 +113,9 @@ def _require_lock_units(document: UrdfDocument, units: Mapping[str, str]) -> Non
     """A joint that slides is held still in millimetres, one that turns in degrees."""
     for name, unit in units.items():
         joint = known_joint(document, name, "locked")
-        wanted = "mm" if joint.kind == "prismatic" else "deg"
-        if unit != wanted and not joint.is_fixed:
-            raise joint.error(f"is {joint.kind}: expected to be locked in {wanted}, got {unit}")
+        required = "mm" if joint.kind == "prismatic" else "deg"
+        if unit != required and not joint.is_fixed:
+            raise joint.error(f"is {joint.kind}: expected to be locked in {required}, got {unit}")
 
 
 def _driven(joint: UrdfJoint, roles: Roles, posture: ZeroPosture, *, limits: Mapping[str, JointLimits]) -> Joint:

@@ -27,7 +27,7 @@ def user_folders(cell_folder: Path) -> tuple[Path, ...]:
         cell_folder: Folder of the cell that is about to be read.
 
     Raises:
-        InvalidFileError: The configuration is not laid out as it must be.
+        InvalidFileError: The configuration does not have the required form.
     """
     named = [Path(word) for word in os.environ.get(VARIABLE, "").split(os.pathsep)]
     return (*(folder for folder in named if folder.is_absolute()), *_configured(cell_folder))
@@ -79,7 +79,7 @@ def _may_have_come_with(cell_folder: Path, path: Path) -> bool:
 
 
 def _own_content(path: Path) -> bytes | None:
-    """Content of a regular file that belongs to the user and that nobody else may write to; None of any other."""
+    """Content of a regular file that belongs to the user and that no other user may write to; None of any other."""
     with suppress(OSError, ValueError):
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
         with os.fdopen(handle, "rb") as file:

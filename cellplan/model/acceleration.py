@@ -28,7 +28,7 @@ class AccelerationRule:
         full_speed_in: For joints without a stated limit, the seconds in which they are taken to reach their top speed,
             in the order of the joints; the last one counts for all further joints. Empty: nothing is assumed.
         is_unlimited: Whether neither accelerations nor jerk are judged.
-        reason: Why they are not; empty where nobody says so.
+        reason: Why they are not; empty where none is given.
     """
 
     full_speed_in: tuple[float, ...] = USUAL_FULL_SPEED_IN
@@ -131,7 +131,7 @@ class MotionAccelerations:
     Attributes:
         joints: One entry per joint of every robot.
         tools: The tool tip of each robot, by robot.
-        part: The part; None when nobody holds it.
+        part: The part; None when no robot holds it.
         process: Process speed by task; a task whose tool stands still has none.
         not_judged: What was left out.
     """

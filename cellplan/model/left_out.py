@@ -59,9 +59,9 @@ def left_out_lines(kinds: Iterable[tuple[str, tuple[str, ...], str]], *, most: i
         grouped.setdefault(kind, {}).setdefault(reason, []).append(" - ".join(bodies))
     lines = []
     for kind in LeftOutKind:
-        told = [f"{_listed(pairs, most)} ({reason})" for reason, pairs in grouped.get(kind, {}).items()]
-        if told:
-            lines.append(f"left out, {TITLES[kind]}: {'; '.join(told)}")
+        texts = [f"{_listed(pairs, most)} ({reason})" for reason, pairs in grouped.get(kind, {}).items()]
+        if texts:
+            lines.append(f"left out, {TITLES[kind]}: {'; '.join(texts)}")
     return lines or [NOTHING]
 
 

@@ -147,8 +147,8 @@ class RobotModel:
         joints: The driven joints, each after the one that carries it.
         followers: Joints driven through linkages; they come after all joints in link numbering.
         links: Links on which something can be mounted, by the names of the robot's file.
-        body_accuracy: How good the link bodies are that do not say it themselves; None when nobody states it.
-        payload: What it may carry; None when nobody states it.
+        body_accuracy: How good the link bodies are that do not say it themselves; None when it is not stated.
+        payload: What it may carry; None when it is not stated.
         flange_link: Index of the joint that carries the flange.
         X_BF: Flange (mechanical interface) in B at the reference posture, z out of the flange.
         bodies: Link bodies.
@@ -177,7 +177,7 @@ class RobotModel:
             raise ValueError(f"robot '{self.name}': the flange frame is not a rigid pose")
 
     def accuracy_of(self, body: Body) -> float | None:
-        """How far the real arm may stick out of one of its bodies in [m]; None when nobody states it."""
+        """How far the real arm may stick out of one of its bodies in [m]; None when it is not stated."""
         if body.accuracy is not None or self.body_accuracy is None:
             return body.accuracy
         return self.body_accuracy.distance

@@ -86,7 +86,7 @@ def _page_complaint(
     try:
         page = report_page(record, motion.report.checks, cell=cell, plots=in_order)
     except (KeyError, TypeError, ValueError, AttributeError):  # of what only the planner knows, or of a picture
-        yield f"{stored.file(place, 'report.json')}: solver: is not laid out as cellplan does; solve the cell again"
+        yield f"{stored.file(place, 'report.json')}: solver: expected cellplan's own form; solve the cell again"
         return
     yield from _difference(stored, place, page)
 

@@ -164,7 +164,7 @@ def _shortfall(search: StartSearch, robot: Robot) -> str:
     goal = goals[best]
     tip, angle = nearest_reach(robot, goal.relation, goal.X_PT, X_WP=goal.X_WP, seeds=seeds, tip_only=False)
     return (
-        f"its tool tip gets there, but not with the wanted direction, the best attempt leaves "
+        f"its tool tip gets there, but not with the desired direction, the best attempt leaves "
         f"{1e3 * tip:.1f} mm and {np.degrees(angle):.1f} deg; turn the tool or its axis, free an axis, or move its base"
     )
 

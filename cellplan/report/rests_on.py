@@ -36,7 +36,7 @@ def bodies_record(cell: Cell) -> Record:
 
 
 def unstated_bodies(cell: Cell) -> list[str]:
-    """One line on the robots of which nobody says how good their bodies are; none when all are stated."""
+    """One line on the robots whose bodies have no stated accuracy; none when all are stated."""
     models = {robot.name: robot.model for robot in cell.robots}
     unknown = [name for name, model in models.items() if any(model.accuracy_of(body) is None for body in model.bodies)]
     return [f"accuracy of bodies of {', '.join(unknown)} not stated"] if unknown else []
