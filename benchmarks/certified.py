@@ -18,11 +18,11 @@ import coal
 import numpy as np
 
 from cellplan import load_cell
-from cellplan.checks.clearance import check_clearance
+from cellplan.checks.clearance.check import check_clearance
 from cellplan.collision.bodies import BodyPoses
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Obstacle
 from cellplan.model.motion import Schedule
 from cellplan.model.report import ClearanceClass

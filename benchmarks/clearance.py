@@ -21,9 +21,9 @@ import numpy as np
 from sections import Goal, Section, table
 
 from cellplan import load_cell
-from cellplan.checks.clearance import check_clearance
+from cellplan.checks.clearance.check import check_clearance
+from cellplan.collision.distance import measure
 from cellplan.collision.engine import Engine
-from cellplan.collision.measure import measure
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule

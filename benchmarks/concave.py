@@ -17,10 +17,10 @@ import numpy as np
 from sections import Goal, table
 
 from cellplan import load_cell
-from cellplan.checks.clearance import check_clearance
+from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.shapes import Cylinder, Mesh
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Obstacle
 from cellplan.model.motion import Schedule
 from cellplan.model.robot import Body

@@ -22,18 +22,18 @@ import matplotlib as mpl
 import numpy as np
 
 from cellplan import CellplanError, load_cell
-from cellplan.checks.limits import check_joints, joint_uses
-from cellplan.checks.tracking import part_poses, task_accuracy
+from cellplan.checks.joints.limits import check_joints, joint_uses
+from cellplan.checks.tools.tracking import part_poses, task_accuracy
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.solver import NULL_SPACE_METHODS, Integrator, MethodName
-from cellplan.planning.follow import follow
+from cellplan.planning.euler.integrate import follow
 from cellplan.planning.modes import plan_runs
-from cellplan.planning.schedule import schedule_tasks
-from cellplan.planning.start_search import find_start
-from cellplan.planning.toolpaths import build_toolpath
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.start.search import find_start
+from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.scene.scene import Scene
 
 mpl.use("agg")

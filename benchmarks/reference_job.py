@@ -12,13 +12,13 @@ import numpy as np
 from job import Arm, Array, Job
 
 from cellplan import Cell, load_cell
-from cellplan.checks.tracking import errors_on_part, part_poses
+from cellplan.checks.tools.tracking import errors_on_part, part_poses
 from cellplan.geometry.transforms import inverse
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.motion import Schedule
-from cellplan.planning.follow import follow
-from cellplan.planning.schedule import schedule_tasks
-from cellplan.planning.toolpaths import build_toolpath
+from cellplan.planning.euler.integrate import follow
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import schedule_tasks
 
 CELL: Final = Path(__file__).resolve().parent.parent / "cells/four_robots.yaml"
 BETWEEN: Final = 4  # [-] places between two samples that are looked at

@@ -21,9 +21,9 @@ from generated_cells import cell_with
 from sections import Goal, Section, digits, table
 
 from cellplan import Cell, load_cell
-from cellplan.planning.resolve import resolve
-from cellplan.planning.schedule import sample, time_tasks
-from cellplan.planning.toolpaths import build_toolpath
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.plan_motion import resolve
+from cellplan.planning.timing.schedule import sample, time_tasks
 
 ROBOTS: Final = (4, 8, 16, 32)  # [-] the positioner among them
 MOST: Final = 10.0  # [-] goal: the cost per node of the largest cell, as a multiple of the smallest

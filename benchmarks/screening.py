@@ -24,10 +24,10 @@ from sections import Goal, Section, digits, table
 
 from cellplan import Cell, load_cell
 from cellplan.geometry.transforms import rotation_about
-from cellplan.planning.layouts import AT_ONCE, Candidates, Screening, screen_layouts
-from cellplan.planning.schedule import time_tasks
-from cellplan.planning.timing import TimedTasks
-from cellplan.planning.toolpaths import build_toolpath
+from cellplan.planning.layout_screening import AT_ONCE, Candidates, Screening, screen_layouts
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import time_tasks
+from cellplan.planning.timing.timed_path import TimedTasks
 
 COUNT: Final = 256  # [-] candidates
 ALONE: Final = 8  # [-] of them that are screened one by one as well

@@ -28,31 +28,33 @@ BEGUN = "CELLPLAN_BENCHMARK_BEGUN"  # the moment in [s] at which the process was
 
 STARTING, IMPORTS, REST = "starting Python", "importing libraries", "the rest"
 STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
-    "reading the cell and its robots": {"cellplan.io.cell_file": ("load_cell",)},
+    "reading the cell and its robots": {"cellplan.io.cell.load": ("load_cell",)},
     "bodies, hulls and pairs": {"cellplan.scene.scene": ("Scene.from_cell",)},
     "paths and times of the tools": {
-        "cellplan.planning.toolpaths": ("build_toolpath",),
-        "cellplan.planning.schedule": ("time_tasks", "sample", "examine_times"),
+        "cellplan.planning.path.build": ("build_toolpath",),
+        "cellplan.planning.timing.schedule": ("time_tasks", "sample", "examine_times"),
     },
     "start postures": {
-        "cellplan.planning.given_starts": ("examine_given_starts",),
-        "cellplan.planning.start_search": ("find_start",),
+        "cellplan.planning.start.given": ("examine_given_starts",),
+        "cellplan.planning.start.search": ("find_start",),
     },
-    "joint motion": {"cellplan.planning.resolve": ("resolve",)},
-    "writing and reading back the tables": {"cellplan.io.tables": ("render_table", "parse_table", "replace_header")},
+    "joint motion": {"cellplan.planning.plan_motion": ("resolve",)},
+    "writing and reading back the tables": {
+        "cellplan.io.run.joint_tables": ("render_table", "parse_table", "replace_header")
+    },
     "verifying tools, joints, conditioning": {"cellplan.checks.verify": ("verify",)},
-    "certifying the clearance": {"cellplan.checks.clearance": ("check_clearance",)},
-    "laying out the plots": {"cellplan.report.plots": ("motion_sheets", "clearance_sheets")},
+    "certifying the clearance": {"cellplan.checks.clearance.check": ("check_clearance",)},
+    "laying out the plots": {"cellplan.report.plots.run": ("motion_sheets", "clearance_sheets")},
     "waiting for the painted plots": {"concurrent.futures": ("Future.result",)},
-    "report.json": {"cellplan.report.json_report": ("report_json",)},
-    "report.html": {"cellplan.report.html": ("report_html",)},
+    "report.json": {"cellplan.report.record.write": ("report_json",)},
+    "report.html": {"cellplan.report.page.render": ("report_html",)},
     "writing the run folder": {
-        "cellplan.io.run_folder": ("RunFolder.__enter__", "RunFolder.write_bytes", "RunFolder.__exit__"),
-        "cellplan.io.cell_writer": ("render_cell",),
-        "cellplan.io.manifest": ("render_manifest",),
+        "cellplan.io.run.folder": ("RunFolder.__enter__", "RunFolder.write_bytes", "RunFolder.__exit__"),
+        "cellplan.io.cell.write": ("render_cell",),
+        "cellplan.io.run.manifest": ("render_manifest",),
         "cellplan.pipeline.write_run": ("versions",),
     },
-    "telling the result": {"cellplan.cli.summary": ("read_record", "summary_lines")},
+    "telling the result": {"cellplan.report.text.run": ("read_record", "summary_lines")},
 }
 
 

@@ -15,26 +15,26 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from cellplan.errors import CellplanError
-    from cellplan.io.cell_file import load_cell
-    from cellplan.io.errors_file import load_errors
+    from cellplan.io.cell.load import load_cell
+    from cellplan.io.cell_errors import load_errors
     from cellplan.model.cell import Cell, Part, Robot
     from cellplan.model.motion import Motion, Program
     from cellplan.model.report import Check, Report
     from cellplan.model.task import Task
     from cellplan.model.toolpath import Toolpath
     from cellplan.pipeline.export import export_program
-    from cellplan.pipeline.gate import open_gate
-    from cellplan.pipeline.rehearse import rehearse
+    from cellplan.pipeline.gate.open_gate import open_gate
+    from cellplan.pipeline.rehearsal.rehearse import rehearse
+    from cellplan.pipeline.rehearsal.write import write_rehearsal
     from cellplan.pipeline.screen import screen
     from cellplan.pipeline.solution import Solution
     from cellplan.pipeline.solve import solve
     from cellplan.pipeline.verify import verify
-    from cellplan.pipeline.write_rehearsal import write_rehearsal
     from cellplan.pipeline.write_run import write_run
-    from cellplan.planning.layouts import Candidates, Screening
+    from cellplan.planning.layout_screening import Candidates, Screening
 
 _HOME: Final = {
-    "Candidates": "planning.layouts",
+    "Candidates": "planning.layout_screening",
     "Cell": "model.cell",
     "CellplanError": "errors",
     "Check": "model.report",
@@ -43,19 +43,19 @@ _HOME: Final = {
     "Program": "model.motion",
     "Report": "model.report",
     "Robot": "model.cell",
-    "Screening": "planning.layouts",
+    "Screening": "planning.layout_screening",
     "Solution": "pipeline.solution",
     "Task": "model.task",
     "Toolpath": "model.toolpath",
     "export_program": "pipeline.export",
-    "load_cell": "io.cell_file",
-    "load_errors": "io.errors_file",
-    "open_gate": "pipeline.gate",
-    "rehearse": "pipeline.rehearse",
+    "load_cell": "io.cell.load",
+    "load_errors": "io.cell_errors",
+    "open_gate": "pipeline.gate.open_gate",
+    "rehearse": "pipeline.rehearsal.rehearse",
     "screen": "pipeline.screen",
     "solve": "pipeline.solve",
     "verify": "pipeline.verify",
-    "write_rehearsal": "pipeline.write_rehearsal",
+    "write_rehearsal": "pipeline.rehearsal.write",
     "write_run": "pipeline.write_run",
 }
 
@@ -92,3 +92,8 @@ def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module 'cellplan' has no attribute '{name}'")
     return getattr(import_module(f"cellplan.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """The public names, before they are imported too."""
+    return sorted({*globals(), *__all__})

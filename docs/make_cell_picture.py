@@ -16,13 +16,13 @@ from matplotlib.colors import to_rgb
 from PIL import Image, ImageDraw, ImageFont
 
 from cellplan import Solution, load_cell, solve
-from cellplan.geometry.mesh_topology import make_mesh
+from cellplan.geometry.mesh.tessellation import tessellate
+from cellplan.geometry.mesh.topology import make_mesh
 from cellplan.geometry.shapes import Capsule, Mesh
-from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import Array, frame_from_axes, inverse, pose_from, transform_points
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
-from cellplan.report.palette import INK, robot_colours
+from cellplan.report.plots.palette import INK, robot_colours
 from cellplan.scene.bodies import Kind, body_poses, scene_bodies
 
 ROOT: Final = Path(__file__).resolve().parent.parent

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 
-from cellplan.geometry.tessellation import tessellate
+from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.transforms import Array, transform_points
-from cellplan.io.bundled_robots import load_bundled
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.io.robots.bundled import load_bundled
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Robot, Tool
 from cellplan.model.robot import RobotModel
 

@@ -35,7 +35,7 @@ def shared_robots() -> Path:
 @pytest.fixture
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Folder of a cache that only this test uses, empty at first."""
-    from cellplan.cache.entries import forget
+    from cellplan.cache.store import forget
 
     monkeypatch.setenv("CELLPLAN_CACHE", str(tmp_path / "cache"))
     forget()
@@ -46,7 +46,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
 @pytest.fixture(scope="session")
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder with a small cell below ``cell`` and its run in ``run``; not to be changed."""
-    from stored_cells import solve_into, write_cell
+    from builders.stored_cells import solve_into, write_cell
 
     folder = tmp_path_factory.mktemp("sound")
     solve_into(write_cell(folder / "cell"), folder / "run")

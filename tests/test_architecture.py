@@ -23,14 +23,14 @@ PARAMETERS = 6
 
 # Each engine may be imported by these files only. A change of engine is then a change of one file.
 DOORS = {
-    "pinocchio": ["kinematics/combined.py"],
+    "pinocchio": ["kinematics/pinocchio_model.py"],
     "fcl": ["collision/engine.py"],
     "coal": ["collision/hulls.py"],
-    "daqp": ["planning/qp_engine.py"],
-    "trimesh": ["geometry/mesh_files.py"],
-    "matplotlib": ["report/plots_canvas.py"],
-    "jinja2": ["report/html.py"],
-    "yaml": ["io/yaml_reader.py", "io/yaml_writer.py"],
+    "daqp": ["planning/methods/support/qp_engine.py"],
+    "trimesh": ["geometry/mesh/stl_obj.py"],
+    "matplotlib": ["report/plots/canvas.py"],
+    "jinja2": ["report/page/render.py"],
+    "yaml": ["io/yaml/reader.py", "io/yaml/writer.py"],
     "pydantic": ["io/schema/*.py"],
     "pydantic_core": ["io/schema/*.py"],
     "rich": ["cli/*.py"],

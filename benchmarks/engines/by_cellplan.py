@@ -8,9 +8,9 @@ from job import Array, Job
 
 from cellplan import load_cell
 from cellplan.model.solver import Integrator
-from cellplan.planning.resolve import resolve
-from cellplan.planning.schedule import sample, time_tasks
-from cellplan.planning.toolpaths import build_toolpath
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.plan_motion import resolve
+from cellplan.planning.timing.schedule import sample, time_tasks
 
 
 def prepare(job: Job, *, accuracy_m: float) -> Callable[[], Array]:

@@ -6,9 +6,9 @@ from pathlib import Path
 from job import Array, Job
 
 from cellplan import load_cell
-from cellplan.planning.follow import follow
-from cellplan.planning.schedule import schedule_tasks
-from cellplan.planning.toolpaths import build_toolpath
+from cellplan.planning.euler.integrate import follow
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import schedule_tasks
 
 
 def prepare(job: Job) -> Callable[[], Array]:

@@ -5,20 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from cellplan.checks.acceleration_limits import check_accelerations, motion_accelerations
-from cellplan.checks.between_checks import check_closures_between, check_task_between, look_between, with_between
-from cellplan.checks.clearance import UNKNOWN, check_clearance
-from cellplan.checks.closure import check_closure, closure_accuracy
-from cellplan.checks.conditioning import conditioning
-from cellplan.checks.idle import check_idle
-from cellplan.checks.limits import check_joints, joint_uses
-from cellplan.checks.locked import check_locked, told_with_failures
-from cellplan.checks.mounting import check_mounting
-from cellplan.checks.payload import check_payload, load_uses
-from cellplan.checks.repeatability import check_joint_drift, repeatability
-from cellplan.checks.speeds import robot_speed
-from cellplan.checks.tool_depth import check_depths, tool_depths
-from cellplan.checks.tracking import check_accuracy, part_poses, task_accuracy
+from cellplan.checks.clearance.check import UNKNOWN, check_clearance
+from cellplan.checks.clearance.idle import check_idle
+from cellplan.checks.clearance.mounting import check_mounting
+from cellplan.checks.clearance.tool_depth import check_depths, tool_depths
+from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
+from cellplan.checks.joints.drift import check_joint_drift, repeatability
+from cellplan.checks.joints.limits import check_joints, joint_uses
+from cellplan.checks.joints.locked import check_locked, told_with_failures
+from cellplan.checks.joints.payload import check_payload, load_uses
+from cellplan.checks.tools.between_checks import check_closures_between, check_task_between, look_between, with_between
+from cellplan.checks.tools.closure import check_closure, closure_accuracy
+from cellplan.checks.tools.conditioning import conditioning
+from cellplan.checks.tools.speeds import robot_speed
+from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell

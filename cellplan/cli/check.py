@@ -25,7 +25,7 @@ def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_d
     Exit status: 0 sound, 1 a collision at the start, 2 bad input, 3 no start posture found, 4 internal error.
     """
     with json_failure(SCHEMA, wanted=as_json):
-        from cellplan.io.cell_file import load_cell
+        from cellplan.io.cell.load import load_cell
         from cellplan.pipeline.check import check as check_cell
 
         with progress_listener(quiet=quiet) as progress:
@@ -41,10 +41,10 @@ def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_d
 
 def _record(result: CellCheck) -> dict[str, Any]:
     """What was found, in printed units."""
-    from cellplan.report.left_out_record import left_out_record
-    from cellplan.report.open_surfaces import open_surface_lines, open_surfaces_record
-    from cellplan.report.record import check_record, number
-    from cellplan.report.task_record import direction_record
+    from cellplan.report.record.left_out import left_out_record
+    from cellplan.report.record.open_surfaces import open_surface_lines, open_surfaces_record
+    from cellplan.report.record.run import check_record, number
+    from cellplan.report.record.task import direction_record
 
     open_surfaces = open_surfaces_record(result.cell)
     return {
@@ -64,7 +64,7 @@ def _record(result: CellCheck) -> dict[str, Any]:
 
 def _start(robot: Robot) -> dict[str, float | None]:
     """Start posture by joint with its unit, as the column names of the tables have it."""
-    from cellplan.report.record import number
+    from cellplan.report.record.run import number
 
     if robot.start is None:
         return {}
@@ -78,8 +78,8 @@ def _start(robot: Robot) -> dict[str, float | None]:
 
 def _lines(record: dict[str, Any]) -> list[str]:
     """What was found, for people."""
-    from cellplan.cli.summary import left_out_lines
-    from cellplan.report.task_record import direction_words
+    from cellplan.report.record.task import direction_words
+    from cellplan.report.text.run import left_out_lines
 
     lines = [f"{record['cell']}: {'sound' if record['status'] == 'passed' else 'not sound'}"]
     for robot, start in record["start"].items():

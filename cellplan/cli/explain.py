@@ -2,9 +2,9 @@
 
 from cellplan.cli.options import AllowDirs, AsJson, CellFile
 from cellplan.cli.output import json_failure, say, say_json
-from cellplan.cli.structure import structure_lines
-from cellplan.cli.structure_record import structure_record
 from cellplan.errors import ExitStatus
+from cellplan.report.record.structure import structure_record
+from cellplan.report.text.structure import structure_lines
 
 SCHEMA = "cellplan.explain/1"
 
@@ -15,7 +15,7 @@ def explain(cell: CellFile, as_json: AsJson = False, allow_dir: AllowDirs = None
     Exit status: 0 shown, 2 bad input, 4 internal error.
     """
     with json_failure(SCHEMA, wanted=as_json):
-        from cellplan.io.cell_file import load_cell
+        from cellplan.io.cell.load import load_cell
         from cellplan.pipeline.explain import explain as explain_cell
 
         record = structure_record(explain_cell(load_cell(cell, allow_dirs=allow_dir or ())))

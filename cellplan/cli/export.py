@@ -39,7 +39,7 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
     """
     with json_failure(SCHEMA, wanted=as_json):
         from cellplan.pipeline.export import default_folder, export_program, refuse_unless_exportable, require_format
-        from cellplan.pipeline.gate import open_gate
+        from cellplan.pipeline.gate.open_gate import open_gate
 
         require_format(form)
         _require_choice(cell, without_cell=without_cell)

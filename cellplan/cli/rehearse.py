@@ -50,13 +50,13 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
     3 no solution, 4 internal error.
     """
     with json_failure(SCHEMA, wanted=as_json):
-        from cellplan.cli.rehearsal_summary import read_record, summary_lines
-        from cellplan.io.cell_file import load_cell
-        from cellplan.io.errors_file import load_errors
-        from cellplan.io.run_folder import REHEARSAL, refuse_unless_replaceable
+        from cellplan.io.cell.load import load_cell
+        from cellplan.io.cell_errors import load_errors
+        from cellplan.io.run.folder import REHEARSAL, refuse_unless_replaceable
         from cellplan.pipeline.overrides import with_draws
-        from cellplan.pipeline.rehearse import rehearse as rehearse_cell
-        from cellplan.pipeline.write_rehearsal import write_rehearsal
+        from cellplan.pipeline.rehearsal.rehearse import rehearse as rehearse_cell
+        from cellplan.pipeline.rehearsal.write import write_rehearsal
+        from cellplan.report.text.rehearsal import read_record, summary_lines
 
         asked = load_cell(cell, allow_dirs=allow_dir or ())
         stated = with_draws(load_errors(errors, asked), trials=trials, seed=seed)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cellplan.cli.joints import joint_record, limits_text
 from cellplan.cli.options import AsJson
 from cellplan.cli.output import json_failure, say, say_json
+from cellplan.report.record.joint_limits import joint_record, limits_text
 
 if TYPE_CHECKING:
     from cellplan.model.robot import RobotModel
@@ -17,7 +17,7 @@ SCHEMA = "cellplan.robots/1"
 def robots(as_json: AsJson = False) -> None:
     """List the bundled robots with reach, limits and source."""
     with json_failure(SCHEMA, wanted=as_json):
-        from cellplan.io.bundled_robots import bundled_names, load_bundled
+        from cellplan.io.robots.bundled import bundled_names, load_bundled
 
         records = [_record(name, load_bundled(name)) for name in bundled_names()]
     if as_json:
@@ -28,7 +28,7 @@ def robots(as_json: AsJson = False) -> None:
 
 def _record(name: str, model: RobotModel) -> dict[str, Any]:
     """What is known about one robot, in printed units."""
-    from cellplan.pipeline.arm_reach import arm_reach
+    from cellplan.kinematics.reach import arm_reach
 
     return {
         "name": name,

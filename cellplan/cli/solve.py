@@ -58,15 +58,15 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     from cellplan.guard import Aside
 
     with json_failure(SCHEMA, wanted=as_json), Aside() as aside:
-        from cellplan.pipeline.drawing import Drawing
+        from cellplan.pipeline.background_plots import Drawing
 
         drawing = Drawing(aside)  # the child imports what it paints with while this process imports the rest
-        from cellplan.cli.summary import read_record, summary_lines
-        from cellplan.io.cell_file import load_cell
-        from cellplan.io.run_folder import refuse_unless_replaceable
+        from cellplan.io.cell.load import load_cell
+        from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
         from cellplan.pipeline.solve import solve as solve_cell
         from cellplan.pipeline.write_run import write_run
+        from cellplan.report.text.run import read_record, summary_lines
 
         given = load_cell(cell, allow_dirs=allow_dir or ())
         asked = with_overrides(

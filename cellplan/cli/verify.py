@@ -22,8 +22,8 @@ def verify(
     Exit status: 0 verified, 1 a check fails, 2 not a run, changed or stale, 4 internal error.
     """
     with json_failure(SCHEMA, wanted=as_json):
-        from cellplan.cli.summary import figure_lines, read_record
-        from cellplan.pipeline.gate import open_gate
+        from cellplan.pipeline.gate.open_gate import open_gate
+        from cellplan.report.text.run import figure_lines, read_record
 
         try:
             with progress_listener(quiet=quiet) as progress:

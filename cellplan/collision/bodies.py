@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.collision.kept_hulls import hull_of
+from cellplan.collision.hull_cache import hull_of
 from cellplan.errors import CellplanError, InputError, OverrunError
-from cellplan.geometry.mesh_topology import components
+from cellplan.geometry.mesh.tessellation import tessellate
+from cellplan.geometry.mesh.topology import components
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, bounding_capsule, bounding_sphere
-from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import Array, is_rigid, pose_from
 
 POINT_SIZE: Final = 1e-7  # [m] size given to a point or a line, so that the engine sees a triangle: far below 0.1 mm

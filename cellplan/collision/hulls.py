@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.geometry.mesh_topology import count_edges, make_mesh
+from cellplan.geometry.mesh.topology import count_edges, make_mesh
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 

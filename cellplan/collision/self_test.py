@@ -5,13 +5,13 @@ from functools import cache
 import numpy as np
 
 from cellplan.collision.bodies import BodyPoses, checked_poses, prepare
-from cellplan.collision.certificate import heights
+from cellplan.collision.distance import measure
 from cellplan.collision.engine import Engine
-from cellplan.collision.inside import is_inside
-from cellplan.collision.measure import measure
+from cellplan.collision.overlap.containment import is_inside
+from cellplan.collision.separation import heights
 from cellplan.errors import CellplanError, SelfTestError
+from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
-from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import Array, pose
 
 ROOM = 1.5e-4  # [m] measured distances may lie below the truth by 0.1 mm

@@ -6,7 +6,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from cellplan.geometry.transforms import Array, inverse, pose, pose_from, transform_points
-from cellplan.kinematics.screws import screw_displacement
+from cellplan.kinematics.screw_chain import screw_displacement
 from cellplan.model.cell import Cell, Grasp, Robot
 from cellplan.model.cell_errors import (
     EXACT,

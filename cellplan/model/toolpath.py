@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.geometry.arc_length import ArcLength, QuickParameters
-from cellplan.geometry.curves import Curve
-from cellplan.geometry.orientations import Orientation
+from cellplan.geometry.curves.arc_length import ArcLength, QuickParameters
+from cellplan.geometry.curves.curve import Curve
+from cellplan.geometry.curves.orientation import Orientation
 from cellplan.geometry.transforms import Array, pose_from, rotation_about
 
 TOOL_Z: Final = np.array([0.0, 0.0, 1.0])

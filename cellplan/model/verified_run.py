@@ -35,7 +35,7 @@ class VerifiedMotion:
 class VerifiedRun:
     """A run folder that was read back, recomputed and found to be what its report says.
 
-    Only ``cellplan.pipeline.gate.open_gate`` makes one.
+    Only ``cellplan.pipeline.gate.open_gate.open_gate`` makes one.
 
     Attributes:
         folder: The run folder.
@@ -59,6 +59,6 @@ class VerifiedRun:
     def __post_init__(self, seal: object) -> None:
         """Refuse to be made by anybody but the gate, or of a run with a failed check."""
         if seal is not SEAL:
-            raise TypeError("a verified run is made by cellplan.pipeline.gate.open_gate only")
+            raise TypeError("a verified run is made by cellplan.open_gate only")
         if not self.motions or not all(motion.report.passed for motion in self.motions):
             raise ValueError("a verified run has motions, and all their checks passed")

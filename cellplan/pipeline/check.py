@@ -3,22 +3,22 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from cellplan.checks.mounting import check_mounting
-from cellplan.checks.payload import check_payload_at_rest
+from cellplan.certify.run_pairs import scene_of_run
+from cellplan.checks.clearance.mounting import check_mounting
+from cellplan.checks.joints.payload import check_payload_at_rest
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOut
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
-from cellplan.pipeline.chosen_start import chosen_start
-from cellplan.pipeline.path_depths import depths_on_paths
+from cellplan.pipeline.plan.path_depths import depths_on_paths
+from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.solve import with_start
-from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.modes import plan_runs, standing
-from cellplan.planning.run_pairs import present_pairs
-from cellplan.planning.schedule import examine_times
-from cellplan.planning.toolpaths import build_toolpath
-from cellplan.scene.of_run import scene_of_run
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.start.given import examine_given_starts
+from cellplan.planning.start.present_pairs import present_pairs
+from cellplan.planning.timing.schedule import examine_times
 from cellplan.scene.scene import Scene
 
 

@@ -6,15 +6,20 @@ import numpy as np
 
 from cellplan.errors import NotPlanarError
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.combined import CombinedModel
 from cellplan.kinematics.derivations.coupling import PLANE, coupling_graph
 from cellplan.kinematics.derivations.davies import network
 from cellplan.kinematics.derivations.graph import Circuit, CouplingGraph, circuits, spanning_tree
+from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Cell, Relation
 from cellplan.model.task import Frame, PlaneName
-from cellplan.planning.closures import closures
-from cellplan.planning.cooperation import column_signs, constraint_rows, cooperation_jacobian, reference_frames
 from cellplan.planning.modes import RunPlan, plan_runs
+from cellplan.planning.tracking.cooperation_jacobian import (
+    column_signs,
+    constraint_rows,
+    cooperation_jacobian,
+    reference_frames,
+)
+from cellplan.planning.tracking.targets import closures
 
 RANK_TOL = 1e-10  # [-] singular values below this share of the largest one are zero: rounding of the matrix
 

@@ -13,9 +13,9 @@ from cellplan.checks.verify import verify
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.export.csv import DECIMALS as CSV_DECIMALS
 from cellplan.export.csv import read_csv, render_csv
-from cellplan.io.complaints import did_you_mean, listed
-from cellplan.io.input_files import digest
-from cellplan.io.run_folder import EXPORT, PROGRAMS, RunFolder, refuse_unless_replaceable
+from cellplan.io.input.files import digest
+from cellplan.io.input.findings import did_you_mean, listed
+from cellplan.io.run.folder import EXPORT, PROGRAMS, RunFolder, refuse_unless_replaceable
 from cellplan.model.motion import JointTable
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import CAUTION

@@ -3,10 +3,10 @@
 from functools import reduce
 
 from cellplan.model.cell import Cell
-from cellplan.planning.layouts import Candidates, Screening, screen_layouts
+from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
 from cellplan.planning.modes import plan_runs
-from cellplan.planning.schedule import examine_times, time_tasks
-from cellplan.planning.toolpaths import build_toolpath
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import examine_times, time_tasks
 
 
 def screen(cell: Cell, candidates: Candidates, *, task: str | None = None, accuracy: float = 1e-5) -> Screening:

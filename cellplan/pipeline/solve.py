@@ -6,23 +6,23 @@ from pathlib import PurePath
 
 from cellplan.checks.verify import verify
 from cellplan.geometry.transforms import Array
-from cellplan.io.tables import TableHeader, parse_table, program_digest, render_table, replace_header
+from cellplan.io.run.joint_tables import TableHeader, parse_table, program_digest, render_table, replace_header
 from cellplan.model.cell import Cell
 from cellplan.model.idle import not_in_program
 from cellplan.model.motion import Motion, Program
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
-from cellplan.pipeline.chosen_start import chosen_start
-from cellplan.pipeline.drawing import Drawing
-from cellplan.pipeline.homes import depends_on_homes, find_homes, with_homes
-from cellplan.pipeline.plan_run import PlannedRun, plan_run
-from cellplan.pipeline.rounded import rounded
+from cellplan.pipeline.background_plots import Drawing
+from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_homes
+from cellplan.pipeline.plan.rounded import rounded
+from cellplan.pipeline.plan.run import PlannedRun, plan_run
+from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.planning.given_starts import examine_given_starts
 from cellplan.planning.modes import plan_runs, standing
-from cellplan.planning.schedule import examine_times
-from cellplan.planning.toolpaths import build_toolpath
-from cellplan.report.acceleration_record import table_line
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.start.given import examine_given_starts
+from cellplan.planning.timing.schedule import examine_times
+from cellplan.report.record.accelerations import table_line
 from cellplan.scene.scene import Scene
 
 

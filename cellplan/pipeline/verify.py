@@ -5,13 +5,13 @@ from collections.abc import Mapping
 from cellplan.cache import nothing_kept
 from cellplan.checks.verify import verify as verify_tables
 from cellplan.errors import InputError
-from cellplan.io.tables import parse_table
+from cellplan.io.run.joint_tables import parse_table
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.planning.modes import plan_runs
-from cellplan.planning.schedule import schedule_tasks
-from cellplan.planning.toolpaths import build_toolpath
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.scene.scene import Scene
 
 

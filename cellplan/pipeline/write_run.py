@@ -6,17 +6,17 @@ from pathlib import Path
 from typing import Final
 
 import cellplan
-from cellplan.io.cell_writer import render_cell
-from cellplan.io.manifest import render_manifest
-from cellplan.io.run_folder import MANIFEST, RunFolder
-from cellplan.io.tables import parse_header, program_digest, replace_header
+from cellplan.io.cell.write import render_cell
+from cellplan.io.run.folder import MANIFEST, RunFolder
+from cellplan.io.run.joint_tables import parse_header, program_digest, replace_header
+from cellplan.io.run.manifest import render_manifest
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
-from cellplan.pipeline.drawing import Drawing
+from cellplan.pipeline.background_plots import Drawing
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.report.html import overview_html, report_html
-from cellplan.report.json_report import report_json, summary_json
-from cellplan.report.record import Provenance
+from cellplan.report.page.render import overview_html, report_html
+from cellplan.report.record.run import Provenance
+from cellplan.report.record.write import report_json, summary_json
 
 ENGINES: Final = (
     "numpy",

@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import HalfSpace, Shape
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Grasp, Part, Robot
 from cellplan.model.name_order import NameOrder
 from cellplan.model.robot import BASE

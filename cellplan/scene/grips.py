@@ -6,10 +6,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.collision.bodies import BodyPoses, CollisionBody, prepare
-from cellplan.collision.depth import overlap_depth
 from cellplan.collision.engine import Engine
-from cellplan.collision.grip_zone import outside_grip
-from cellplan.collision.inside import is_inside
+from cellplan.collision.overlap.containment import is_inside
+from cellplan.collision.overlap.depth import overlap_depth
+from cellplan.collision.overlap.grip_zone import outside_grip
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import Array, inverse

@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.collision.bodies import BodyPoses
-from cellplan.collision.certificate import heights
+from cellplan.collision.distance import measure
 from cellplan.collision.engine import Engine
-from cellplan.collision.measure import measure
+from cellplan.collision.separation import heights
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOut, LeftOutKind

@@ -12,9 +12,9 @@ from cellplan.model.left_out import LeftOutKind
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import BASE
 from cellplan.scene.bodies import Kind, SceneBody
-from cellplan.scene.demands import demand
-from cellplan.scene.links import NO_BODY, LinkTree
+from cellplan.scene.link_tree import NO_BODY, LinkTree
 from cellplan.scene.mounting import Mount, grasp_of, left_out_kind, mounted_pair
+from cellplan.scene.required_distance import demand
 
 MOUNTED = (Kind.ATTACHMENT, Kind.PEDESTAL)  # bodies that the user puts on or below a robot: nothing excuses them
 

@@ -6,24 +6,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cellplan.collision.bodies import BodyPoses, CollisionBody, checked_poses, prepare
-from cellplan.collision.certificate import heights
+from cellplan.collision.continuous.motion_bound import Pair
 from cellplan.collision.engine import Engine
-from cellplan.collision.posture import Flags, PairIndices, first_touching
+from cellplan.collision.overlap.contact_zone import outside_zone
 from cellplan.collision.self_test import prove_engine
-from cellplan.collision.travel import Pair
-from cellplan.collision.zone import outside_zone
+from cellplan.collision.separation import heights
+from cellplan.collision.static_contact import Flags, PairIndices, first_touching
 from cellplan.geometry.shapes import HalfSpace, Solid
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.left_out import LeftOut, LeftOutKind
 from cellplan.model.task import Frame
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, scene_bodies
-from cellplan.scene.by_design import apply_design
 from cellplan.scene.grips import GripWatch, grip_watch
 from cellplan.scene.left_out import left_out
 from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
+from cellplan.scene.permanent_contacts import apply_design
 
 _Outside = dict[tuple[Solid, bytes], tuple[CollisionBody | None, bool]]
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cellplan import Report, solve
-from cellplan.checks.clearance import check_clearance
+from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.transforms import pose
 from cellplan.pipeline.solution import Run
 from cellplan.scene.scene import Scene

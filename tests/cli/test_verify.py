@@ -5,8 +5,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from run_defects import DEFECTS
-from run_edits import Copy, edit_rows
+from builders.run_defects import DEFECTS
+from builders.run_edits import Copy, edit_rows
 
 from cellplan.cli.main import run
 

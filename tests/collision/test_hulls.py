@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cellplan.collision.hulls import convex_hull
 from cellplan.errors import InputError
-from cellplan.geometry.meshes import (
+from cellplan.geometry.mesh.load import (
     mesh_volume,
     read_mesh,
     tessellate,

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from faulty_system import faulty
+from builders.failing_disk import faulty
 
 from cellplan.errors import InputError
-from cellplan.io.cell_file import load_cell
-from cellplan.io.run_folder import RunFolder
+from cellplan.io.cell.load import load_cell
+from cellplan.io.run.folder import RunFolder
 from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.solve import solve
 from cellplan.pipeline.write_run import write_run

@@ -5,12 +5,12 @@ import time
 from pathlib import Path
 from random import Random
 
-import hostile_files
 import pytest
+from builders import hostile_files
 
 from cellplan.cli.errors import error_lines
 from cellplan.errors import InputError, OverrunError
-from cellplan.io.cell_file import load_cell
+from cellplan.io.cell.load import load_cell
 
 LONGEST_S = 10.0
 LINE = re.compile(r"[\w./-]+(:\d+)?: \S.*")

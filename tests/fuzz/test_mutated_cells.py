@@ -8,16 +8,16 @@ import time
 from pathlib import Path
 from random import Random
 
-import cell_mutations
 import pytest
-from cell_mutations import Injury, Place
+from builders import cell_mutations
+from builders.cell_mutations import Injury, Place
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cellplan.cli.errors import error_lines
 from cellplan.errors import InputError, OverrunError
-from cellplan.io.cell_file import load_cell
-from cellplan.io.errors_file import load_errors
+from cellplan.io.cell.load import load_cell
+from cellplan.io.cell_errors import load_errors
 
 ROOT = Path(__file__).resolve().parents[2]
 CELLS = sorted(path.relative_to(ROOT / "cells").as_posix() for path in (ROOT / "cells").rglob("*.yaml"))

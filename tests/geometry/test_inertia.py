@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cellplan.geometry.inertia import centre_and_inertia
-from cellplan.geometry.mesh_topology import make_mesh
+from cellplan.geometry.mesh.tessellation import tessellate
+from cellplan.geometry.mesh.topology import make_mesh
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
-from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import pose, transform_points
 
 FINE = 96  # sides of a round mesh: it is within a thousandth of the round solid

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cellplan.geometry.line_spans import Spans, line_spans
-from cellplan.geometry.mesh_topology import make_mesh
+from cellplan.geometry.mesh.tessellation import tessellate
+from cellplan.geometry.mesh.topology import make_mesh
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
-from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import Array
 
 SOLIDS = (Box((0.2, 0.3, 0.1)), Cylinder(0.1, 0.3), Capsule(0.08, 0.2), Sphere(0.12))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Sphere, bounding_box, support, support_point
-from cellplan.geometry.tessellation import tessellate
 
 SHAPES = [Box((0.2, 0.3, 0.1)), Cylinder(0.1, 0.3), Capsule(0.08, 0.2), Sphere(0.1), tessellate(Box((0.2, 0.3, 0.1)))]
 ROUNDING = 1e-12  # [m]

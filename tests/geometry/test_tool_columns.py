@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
-from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.tool_columns import axis_depths, body_columns, depths, line_depths
 from cellplan.geometry.transforms import Array, pose
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cellplan.errors import InvalidFileError
-from cellplan.io.cell_file import load_cell
+from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell
 
 BASE = """\

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_cells import random_model, random_pose
+from builders.random_cells import random_model, random_pose
 
 from cellplan import load_cell
 from cellplan.geometry.transforms import inverse, pose
 from cellplan.kinematics.perturbed_cell import draw_errors, perturbed_cell
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Robot, Tool
 from cellplan.model.cell_errors import (
     Amount,

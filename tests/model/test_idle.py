@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from scene_builders import held_part, make_cell, placed, slide_model, work
+from builders.scene_builders import held_part, make_cell, placed, slide_model, work
 
 from cellplan.geometry.shapes import Box
 from cellplan.model.cell import Cell

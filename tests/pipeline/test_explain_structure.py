@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from jacobian_cells import planners_jacobian
-from random_cells import make_task, random_cell
+from builders.jacobian_cells import planners_jacobian
+from builders.random_cells import make_task, random_cell
 
-from cellplan.cli.structure import structure_lines
-from cellplan.cli.structure_record import structure_record
 from cellplan.model.cell import Mode
 from cellplan.pipeline.explain import explain
+from cellplan.report.record.structure import structure_record
+from cellplan.report.text.structure import structure_lines
 
 
 def with_starts(cell, q):

@@ -9,7 +9,7 @@ import pytest
 
 from cellplan import export_program, load_cell, open_gate, solve, write_run
 from cellplan.errors import InputError, NotVerifiedError
-from cellplan.io.input_files import digest
+from cellplan.io.input.files import digest
 from cellplan.pipeline import export
 from cellplan.pipeline.overrides import with_overrides
 

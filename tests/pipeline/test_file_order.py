@@ -13,8 +13,8 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.name_order import NameOrder
 from cellplan.pipeline.solution import Solution
-from cellplan.planning.start_search import find_start
-from cellplan.planning.toolpaths import build_toolpath
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.start.search import find_start
 from cellplan.scene.scene import Scene
 
 THREE_PLANAR_ARMS = """

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from run_defects import DEFECTS
-from run_edits import Copy
-from stored_cells import solve_into, write_cell
+from builders.run_defects import DEFECTS
+from builders.run_edits import Copy
+from builders.stored_cells import solve_into, write_cell
 
 from cellplan import export_program, open_gate
 from cellplan.errors import InputError, NotVerifiedError

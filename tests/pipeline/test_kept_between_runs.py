@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from cellplan.io.cell_file import load_cell
+from cellplan.io.cell.load import load_cell
 
 
 def solved(cell: Path, folder: Path, *, cache: str) -> dict[str, bytes]:

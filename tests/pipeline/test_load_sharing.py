@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from cellplan import load_cell, solve, verify, write_run
-from cellplan.cli.structure import structure_lines
-from cellplan.cli.structure_record import structure_record
-from cellplan.cli.summary import summary_lines
 from cellplan.geometry.transforms import inverse, pose
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.pipeline.explain import explain
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.solve import render_program
-from cellplan.report.html import report_html
-from cellplan.report.record import Provenance
+from cellplan.report.page.render import report_html
+from cellplan.report.record.run import Provenance
+from cellplan.report.record.structure import structure_record
+from cellplan.report.text.run import summary_lines
+from cellplan.report.text.structure import structure_lines
 
 ALLOWED_MM, ALLOWED_DEG = 0.003, 0.001
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from cellplan import load_cell, solve
-from cellplan.checks.clearance import check_clearance
+from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.transforms import pose
 from cellplan.scene.scene import Scene
 

@@ -8,7 +8,7 @@ import pytest
 
 from cellplan import Cell, load_cell
 from cellplan.errors import InputError
-from cellplan.io.cell_writer import render_cell
+from cellplan.io.cell.write import render_cell
 from cellplan.model.solver import Integrator
 from cellplan.pipeline.overrides import with_overrides
 

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from cellplan.io.cell_file import load_cell
+from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell
 from cellplan.pipeline.check import check
 from cellplan.pipeline.solve import solve
-from cellplan.report.task_record import direction_record, direction_words, tasks_record
+from cellplan.report.record.task import direction_record, direction_words, tasks_record
 
 CELL = """
 cellplan: 1

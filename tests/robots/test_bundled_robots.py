@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import trimesh
 
+from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
-from cellplan.geometry.tessellation import tessellate
 from cellplan.geometry.transforms import Array, inverse, rotation_from_rpy, transform_points
-from cellplan.io.bundled_robots import load_bundled
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.io.robots.bundled import load_bundled
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Robot, Tool
 from cellplan.model.robot import BASE, RobotModel
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from jacobian_cells import planners_jacobian
-from random_cells import random_cell
+from builders.jacobian_cells import planners_jacobian
+from builders.random_cells import random_cell
 
-from cellplan.io.urdf import read_urdf
+from cellplan.io.robots.urdf.load import read_urdf
 from cellplan.kinematics.derivations.davies import davies_cooperation_jacobian
 from cellplan.kinematics.derivations.denavit_hartenberg import dh_cooperation_jacobian
 from cellplan.kinematics.derivations.successive_screws import screw_cooperation_jacobian

@@ -11,7 +11,7 @@ import yaml
 
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array, pose_from, rotation_about
-from cellplan.io.urdf import load_urdf, read_urdf
+from cellplan.io.robots.urdf.load import load_urdf, read_urdf
 from cellplan.model.robot import BASE, FollowerJoint, Joint, RobotModel
 
 ROBOTS = [

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.scene_builders import arm_model, body, floor, make_cell, placed, stick, thing
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scene_builders import arm_model, body, floor, make_cell, placed, stick, thing
 
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Sphere

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_builders import (
+from builders.scene_builders import (
     QUARTER,
     arm_model,
     body,

@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from scene_builders import (
+from builders.scene_builders import (
     arm_model,
     displaced,
     fixed_part,
@@ -18,7 +18,7 @@ from scene_builders import (
     work,
 )
 
-from cellplan.checks.clearance import check_clearance
+from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.shapes import Box, Cylinder
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell import Cell

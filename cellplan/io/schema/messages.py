@@ -7,9 +7,9 @@ from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get
 
 from pydantic import BaseModel, Tag, ValidationError
 
-from cellplan.io.complaints import Complaint, KeyPath, did_you_mean, listed, shown
+from cellplan.io.input.findings import Complaint, KeyPath, did_you_mean, listed, shown
 from cellplan.io.schema.common import NAME_WORDS, Entry
-from cellplan.io.yaml_reader import YamlDocument
+from cellplan.io.yaml.reader import YamlDocument
 
 UNITS: Final[Mapping[str, str]] = {
     "_deg_s3": "degrees per second³",

@@ -10,7 +10,7 @@ from typing import cast
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.solver import MethodName
-from cellplan.planning.tracking_problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
 Step = Callable[[int, Array], Advance]
 Method = Callable[[TrackingProblem], Step]

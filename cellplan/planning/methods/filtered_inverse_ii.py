@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.filtered_jacobian import FilteredMotion
-from cellplan.planning.tracking_problem import Advance, TrackingProblem
+from cellplan.planning.methods.support.filtered_jacobian import FilteredMotion
+from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
 
 def filtered_inverse_ii(problem: TrackingProblem) -> Callable[[int, Array], Advance]:

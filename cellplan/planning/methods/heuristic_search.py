@@ -6,10 +6,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.joint_lines import joint_lines
-from cellplan.planning.posture_search import Bounds, Pass, PostureSearch, position_bounds
-from cellplan.planning.search_cost import NO_EFFECT, Look, SearchCost
-from cellplan.planning.tracking_problem import Advance, TrackingProblem
+from cellplan.planning.methods.support.configuration_search import Bounds, Pass, PostureSearch, position_bounds
+from cellplan.planning.methods.support.joint_line import joint_lines
+from cellplan.planning.methods.support.search_cost import NO_EFFECT, Look, SearchCost
+from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
 NEGLIGIBLE: Final = 1e-12  # share of the cost that a move must gain: below it a joint would turn for rounding errors
 HALVINGS: Final = 20  # of a move whose gain is only known to second order, before it is left out

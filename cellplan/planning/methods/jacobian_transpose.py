@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.tracking_problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
 SHORTENED: Final = 0.9  # of the step after which the error would be smallest: a little less ends the zigzag
 LEFT_OPEN: Final = 1e-3  # share of the wanted correction below which it counts as made

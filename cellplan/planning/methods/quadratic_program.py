@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.qp_engine import nearest_to_origin
-from cellplan.planning.speed_bounds import JointBounds, SpeedBounds
-from cellplan.planning.tracking_problem import Advance, FirstOrder, TrackingProblem
+from cellplan.planning.methods.support.qp_engine import nearest_to_origin
+from cellplan.planning.methods.support.speed_bounds import JointBounds, SpeedBounds
+from cellplan.planning.tracking.problem import Advance, FirstOrder, TrackingProblem
 
 STEEPEST: Final = 1e10  # largest ratio of the tasks' weight to that of joint speeds: beyond it digits are lost
 

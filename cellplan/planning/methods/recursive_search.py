@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
-from cellplan.planning.posture_search import Bounds, Pass, PostureSearch, speed_bounds
-from cellplan.planning.search_cost import NO_EFFECT, Look, SearchCost
-from cellplan.planning.tracking_problem import Advance, TrackingProblem
+from cellplan.planning.methods.support.configuration_search import Bounds, Pass, PostureSearch, speed_bounds
+from cellplan.planning.methods.support.search_cost import NO_EFFECT, Look, SearchCost
+from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
 SMALL_ANGLE: Final = 0.1  # [rad] or [m]: farther from a look its first order is not trusted at first
 ROUNDS_ON_A_LOOK: Final = (

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from jacobian_cells import model_of, planners_jacobian
-from random_cells import random_cell, sharing
+from builders.jacobian_cells import model_of, planners_jacobian
+from builders.random_cells import random_cell, sharing
 
 from cellplan import load_cell
 from cellplan.errors import InputError, NotPlanarError, PrimaryChoiceError

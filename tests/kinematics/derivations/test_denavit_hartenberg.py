@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from jacobian_cells import model_of, planners_jacobian, with_operator
-from random_cells import random_cell, random_model
+from builders.jacobian_cells import model_of, planners_jacobian, with_operator
+from builders.random_cells import random_cell, random_model
 
 from cellplan.geometry.transforms import inverse, pose, rotation_about, rotation_vector
-from cellplan.io.bundled_robots import bundled_names, load_bundled
+from cellplan.io.robots.bundled import bundled_names, load_bundled
 from cellplan.kinematics.derivations.denavit_hartenberg import dh_chain, dh_cooperation_jacobian, geometric_jacobian
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Robot, Tool
 
 FLANGE = pose([0.4, -0.3, 0.9], [0.7, -0.2, 1.4])

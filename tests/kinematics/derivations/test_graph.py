@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from builders.random_cells import random_cell
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cells import random_cell
 
 from cellplan.kinematics.derivations.coupling import coupling_graph
 from cellplan.kinematics.derivations.graph import Coupling, CouplingGraph, circuit_matrix, circuits, spanning_tree

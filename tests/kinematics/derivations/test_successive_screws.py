@@ -1,11 +1,11 @@
 """The walk from the part to a tool: its order, its directions, and where it ends."""
 
 import numpy as np
-from random_cells import random_cell
+from builders.random_cells import random_cell
 
 from cellplan.geometry.transforms import inverse
 from cellplan.kinematics.derivations.successive_screws import displaced_screws, walk_from_part
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 
 POSE_TOL = 1e-12  # [m], [-] rounding of a dozen products over a few metres
 

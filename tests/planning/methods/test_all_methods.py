@@ -5,14 +5,14 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from nasty_situations import SITUATIONS, Situation, tool_on_part
+from builders.ik_edge_cases import SITUATIONS, Situation, tool_on_part
 
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError, NoSolutionError
-from cellplan.io.tables import parse_table
+from cellplan.io.run.joint_tables import parse_table
 from cellplan.model.solver import MethodName
 from cellplan.pipeline.solve import render_program
-from cellplan.planning.follow import follow
+from cellplan.planning.euler.integrate import follow
 from cellplan.scene.scene import Scene
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.planar_arms import planar_cell, tip_jacobians, tip_schedule, tips
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_arms import planar_cell, tip_jacobians, tip_schedule, tips
 
 from cellplan.errors import NoSolutionError
 from cellplan.model.solver import DampedLeastSquaresSettings, SingularityMeasure, SolverSettings
@@ -17,8 +17,8 @@ from cellplan.planning.methods.damped_least_squares import (
     nearness,
     squared_damping,
 )
-from cellplan.planning.tracking_problem import TrackingProblem
-from cellplan.planning.weighted_inverse import WeightedInverse
+from cellplan.planning.tracking.problem import TrackingProblem
+from cellplan.planning.tracking.weighted_inverse import WeightedInverse
 
 LENGTHS = (2.0, 1.0, 1.0)
 GAIN = 5.0

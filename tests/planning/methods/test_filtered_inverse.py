@@ -5,16 +5,16 @@ from functools import cache
 
 import numpy as np
 import pytest
-from planar_arms import planar_cell, tip_jacobians, tip_schedule, tips
-from random_cells import random_cell
-from vargas_cases import TRANSIENT, vargas_run
+from builders.planar_arms import planar_cell, tip_jacobians, tip_schedule, tips
+from builders.random_cells import random_cell
+from builders.vargas_cases import TRANSIENT, vargas_run
 
 from cellplan.errors import DivergedError
 from cellplan.model.cell import LockedJoint
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.solver import FilteredInverseSettings, SolverSettings
 from cellplan.planning.methods import method_named
-from cellplan.planning.tracking_problem import TrackingProblem
+from cellplan.planning.tracking.problem import TrackingProblem
 
 METHODS = ("damped_least_squares", "filtered_inverse", "filtered_inverse_ii")
 STEPS = [pytest.param(1e-3, marks=pytest.mark.slow), pytest.param(5e-3, marks=pytest.mark.slow), 20e-3]

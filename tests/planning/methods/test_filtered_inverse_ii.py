@@ -1,14 +1,14 @@
 """Law II of the filtered inverse: its feedback never drives the error up, however bad the filter is."""
 
 import numpy as np
+from builders.planar_arms import planar_cell, tip_jacobians, tip_schedule, tips
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_arms import planar_cell, tip_jacobians, tip_schedule, tips
 
 from cellplan.model.solver import FilteredInverseSettings, SolverSettings
-from cellplan.planning.filtered_jacobian import FilteredMotion
 from cellplan.planning.methods.filtered_inverse_ii import filtered_inverse_ii
-from cellplan.planning.tracking_problem import TrackingProblem
+from cellplan.planning.methods.support.filtered_jacobian import FilteredMotion
+from cellplan.planning.tracking.problem import TrackingProblem
 
 LENGTHS = (2.0, 1.0, 1.0)
 ANGLE = st.floats(-3.0, 3.0)

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_cells import make_task, random_cell
-from search_arms import (
+from builders.random_cells import make_task, random_cell
+from builders.search_arms import (
     ANTHROPOMORPHIC,
     FOUR_LINKS,
     PUMA,
@@ -22,10 +22,10 @@ from search_arms import (
 
 from cellplan.errors import DivergedError, InputError
 from cellplan.geometry.transforms import inverse, pose_from, rotation_exp
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import LockedJoint, Origin
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.planning.follow import follow
+from cellplan.planning.euler.integrate import follow
 
 BIG = 2 * np.cos(np.pi / 6)  # [m] the published 1.7320: reach of the arm at its start
 BOTH = ["heuristic_search", "recursive_search"]

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.planar_arms import planar_cell, tip_schedule, tips
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_arms import planar_cell, tip_schedule, tips
 
 from cellplan.model.cell import LockedJoint
 from cellplan.model.solver import SolverSettings
-from cellplan.planning.follow import follow
+from cellplan.planning.euler.integrate import follow
 from cellplan.planning.methods.jacobian_transpose import (
     LEFT_OPEN,
     LONGEST_MOVE,
@@ -19,7 +19,7 @@ from cellplan.planning.methods.jacobian_transpose import (
     jacobian_transpose,
     pulled,
 )
-from cellplan.planning.tracking_problem import TrackingProblem
+from cellplan.planning.tracking.problem import TrackingProblem
 
 LENGTHS = (1.0, 0.8, 0.6)
 START = np.array([0.3, 0.9, 0.7])

@@ -5,20 +5,20 @@ from itertools import product
 
 import numpy as np
 import pytest
+from builders.planar_arm import START, circle_schedule, largest_error, planar_arm_cell
+from builders.random_cells import random_cell
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_arm import START, circle_schedule, largest_error, planar_arm_cell
-from random_cells import random_cell
 
 from cellplan.errors import DivergedError, StartOutsideLimitsError
-from cellplan.kinematics.screws import ScrewChain
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import LockedJoint
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.planning.follow import follow
+from cellplan.planning.euler.integrate import follow
 from cellplan.planning.methods.quadratic_program import bounded_speeds
-from cellplan.planning.speed_bounds import SpeedBounds
-from cellplan.planning.tracking_problem import FirstOrder
-from cellplan.planning.weighted_inverse import WeightedInverse
+from cellplan.planning.methods.support.speed_bounds import SpeedBounds
+from cellplan.planning.tracking.problem import FirstOrder
+from cellplan.planning.tracking.weighted_inverse import WeightedInverse
 
 RNG = np.random.default_rng(5)
 RHO = 1e8

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from search_arms import (
+from builders.search_arms import (
     FOUR_LINKS,
     arm_cell,
     dh_arm,

@@ -5,7 +5,7 @@ import pytest
 
 from cellplan.errors import NoSolutionError
 from cellplan.planning.methods.weighted_pseudo_inverse import LARGEST_DAMPING, SINGULAR_REGION, damped_speeds
-from cellplan.planning.weighted_inverse import WeightedInverse
+from cellplan.planning.tracking.weighted_inverse import WeightedInverse
 
 RNG = np.random.default_rng(11)
 

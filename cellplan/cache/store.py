@@ -1,0 +1,212 @@
+"""Entries: arrays of numbers, found again by the digest of what they were made from and of the code that made them.
+
+An entry is never more than a saving of time. It is used only when it is a regular file of the user's own and whole, by
+a digest of its own; whatever is wrong with it, or with the folder, the work is done as if there were none. Nothing that
+was refused is kept, so a refused file is read and refused again. The digest tells accidents, not forgery: commands that
+prove something do without the folder (see ``use``).
+"""
+
+import hashlib
+import io
+import os
+import platform
+import stat
+import tempfile
+from collections import OrderedDict
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.cache.location import OTHERS_MAY_WRITE, cache_folder
+from cellplan.cache.use import is_cache_used
+
+Arrays = tuple[NDArray[np.generic], ...]
+
+FORMAT: Final = b"cellplan cache 1\n"
+DIGEST: Final = 32  # [bytes] of a SHA-256
+SUFFIX: Final = ".entry"
+MAKERS: Final = ("cache", "geometry", "collision")  # packages whose code makes what is kept
+LIBRARIES: Final = ("numpy", "trimesh", "coal")  # and what they rest on
+MAX_ENTRY: Final = 64_000_000  # [bytes]
+MAX_FOLDER: Final = 256_000_000  # [bytes]; the entries that were not used for longest go first
+MAX_RECENT: Final = 32_000_000  # [bytes] held by this process
+OPEN: Final = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+
+
+class Key(NamedTuple):
+    """What an entry is found by: the kind of thing it is, and the digest of all that it follows from."""
+
+    kind: str
+    digest: str
+
+
+class Held(NamedTuple):
+    """Arrays that this process holds, and whether it made them itself: others came from the folder."""
+
+    arrays: Arrays
+    is_own: bool
+
+
+_recent: OrderedDict[Key, Held] = OrderedDict()
+
+
+def key_of(kind: str, *contents: bytes) -> Key | None:
+    """Key of what is made from some contents; None when it cannot be told which code makes it."""
+    code = _code()
+    if code is None:
+        return None
+    total = hashlib.sha256()
+    for content in (code, kind.encode(), *contents):
+        total.update(len(content).to_bytes(8, "little"))
+        total.update(content)
+    return Key(kind, total.hexdigest())
+
+
+def recall(key: Key | None) -> Arrays | None:
+    """The arrays that were kept under a key; None when there are none, or not whole ones. They cannot be written to."""
+    if key is None:
+        return None
+    held = _recent.get(key)
+    if held is not None and (held.is_own or is_cache_used()):
+        _recent.move_to_end(key)
+        return held.arrays
+    folder = cache_folder() if is_cache_used() else None
+    if folder is None:
+        return None
+    try:
+        packed = _read_own(_path(folder, key))
+        arrays = None if packed is None else _unpacked(packed)
+    except Exception:  # noqa: BLE001 - whatever is wrong with an entry, it is made again
+        return None
+    if arrays is not None:
+        _remember(key, Held(arrays, is_own=False))
+    return arrays
+
+
+def keep(key: Key | None, arrays: Sequence[NDArray[np.generic]]) -> None:
+    """Keep arrays under a key, in this process and in the folder; where that is not possible, they are not kept."""
+    if key is None or any(array.dtype.hasobject for array in arrays):
+        return
+    own = tuple(np.array(array, order="C") for array in arrays)
+    for array in own:
+        array.setflags(write=False)
+    _remember(key, Held(own, is_own=True))
+    folder = cache_folder() if is_cache_used() else None
+    packed = b"" if folder is None else _packed(own)
+    if folder is not None and len(packed) <= MAX_ENTRY:
+        with suppress(OSError):
+            _write(_path(folder, key), packed)
+            _make_room(folder)
+
+
+def forget() -> None:
+    """Forget what this process holds; the folder stays as it is."""
+    _recent.clear()
+
+
+def _remember(key: Key, held: Held) -> None:
+    """Hold arrays for the rest of this process, as far as there is room."""
+    _recent[key] = held
+    while sum(array.nbytes for each in _recent.values() for array in each.arrays) > MAX_RECENT:
+        _recent.popitem(last=False)
+
+
+def _read_own(path: Path) -> bytes | None:
+    """Content of an entry; None for anything but a regular file of the user's own that only the user may write to.
+
+    It is opened without following a link and without waiting for whoever may be at the other end.
+    """
+    handle = os.open(path, OPEN)
+    with os.fdopen(handle, "rb") as file:
+        status = os.fstat(handle)
+        is_mine = not hasattr(os, "getuid") or (
+            status.st_uid == os.getuid() and not status.st_mode & OTHERS_MAY_WRITE and status.st_nlink == 1
+        )
+        if not stat.S_ISREG(status.st_mode) or not is_mine or status.st_size > MAX_ENTRY:
+            return None
+        content = file.read(MAX_ENTRY + 1)
+        if os.utime in os.supports_fd:
+            with suppress(OSError):
+                os.utime(handle)  # it was of use
+    return content
+
+
+def _path(folder: Path, key: Key) -> Path:
+    """File of an entry."""
+    return folder / f"{key.kind}-{key.digest}{SUFFIX}"
+
+
+def _packed(arrays: Arrays) -> bytes:
+    """The arrays as bytes, after a digest of these bytes."""
+    body = io.BytesIO()
+    for array in arrays:
+        np.lib.format.write_array(body, array, allow_pickle=False)
+    content = body.getvalue()
+    return FORMAT + hashlib.sha256(content).digest() + content
+
+
+def _unpacked(packed: bytes) -> Arrays | None:
+    """The arrays; None when a byte is not as it was written."""
+    head, body = packed[: len(FORMAT) + DIGEST], packed[len(FORMAT) + DIGEST :]
+    if head != FORMAT + hashlib.sha256(body).digest():
+        return None
+    stream, arrays = io.BytesIO(body), []
+    while stream.tell() < len(body):
+        array = np.lib.format.read_array(stream, allow_pickle=False)
+        array.setflags(write=False)
+        arrays.append(array)
+    return tuple(arrays)
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write a file that appears whole or not at all."""
+    number, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    try:
+        with os.fdopen(number, "wb") as file:
+            file.write(content)
+        Path(name).replace(path)
+    except BaseException:
+        with suppress(OSError):
+            Path(name).unlink()
+        raise
+
+
+def _make_room(folder: Path) -> None:
+    """Remove the entries that were not used for longest, until the others fit."""
+    found = []
+    for path in folder.iterdir():
+        if path.suffix in (SUFFIX, ".part"):
+            with suppress(OSError):
+                status = path.lstat()
+                found.append((status.st_mtime, path.name, status.st_size))
+    total = sum(size for _, _, size in found)
+    for _, name, size in sorted(found):
+        if total <= MAX_FOLDER:
+            return
+        with suppress(OSError):
+            (folder / name).unlink()
+        total -= size
+
+
+@cache
+def _code() -> bytes | None:
+    """Digest of the code that makes what is kept, and of the versions it rests on; None when it cannot be read."""
+    total = hashlib.sha256(f"{platform.system()} {platform.machine()}".encode())
+    root = Path(__file__).resolve().parent.parent
+    try:
+        files = [path for package in MAKERS for path in sorted((root / package).rglob("*.py"))]
+        for path in files:
+            total.update(
+                path.relative_to(root).as_posix().encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest()
+            )
+        for library in LIBRARIES:
+            total.update(f"{library} {version(library)}".encode())
+    except (OSError, PackageNotFoundError):
+        return None
+    return total.digest() if files else None

@@ -1,0 +1,68 @@
+"""The certified lower bound of each class over time: raised until it is near the true distance, block by block."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.certify.linear_motion import StraightMotion
+from cellplan.collision.continuous.found import Found
+from cellplan.collision.continuous.interval_search import SolidSearch
+from cellplan.collision.continuous.motion_bound import Pair
+from cellplan.collision.distance import TIGHT
+from cellplan.collision.engine import Engine
+from cellplan.geometry.transforms import Array
+
+NEAR: Final = 0.05  # [-] a bound below the distance at the middle of its block by this share is drawn as it is
+ROOM: Final = 1e-3  # [m] likewise by this length
+
+Places = NDArray[np.intp]
+
+
+class CurveRefiner:
+    """One class over a stretch of blocks."""
+
+    def __init__(self, engine: Engine, motion: StraightMotion, edges: Places) -> None:
+        """Take the stretch.
+
+        Args:
+            engine: The bodies.
+            motion: How they move.
+            edges: Samples at which the blocks begin and end, from 0 to the last, shape (K + 1,).
+        """
+        self._engine, self._motion, self._edges = engine, motion, edges
+        self._middles = (edges[1:] + edges[:-1]) // 2
+
+    def raise_bounds(self, low: Array, pairs: Sequence[Pair | None]) -> None:
+        """Measure the pair with the lowest bound of a block in its middle until that is near what was measured.
+
+        Args:
+            low: Certified lower bounds by pair and block in [m], shape (P, K); raised in place.
+            pairs: The engine's bodies of each pair; None for those that need no measuring.
+        """
+        ceiling = np.full(low.shape[1], np.inf)  # [m] distance that is known to be reached in each block
+        searches: dict[int, SolidSearch] = {}
+        for block in range(low.shape[1]):
+            measured: set[int] = set()
+            while True:
+                row = int(np.argmin(low[:, block]))
+                pair = pairs[row]
+                is_near = low[row, block] >= (1.0 - NEAR) * ceiling[block] - ROOM
+                if is_near or pair is None or row in measured or low[row, block] == 0.0:
+                    break
+                measured.add(row)
+                search = searches.get(row)
+                if search is None:
+                    search = searches[row] = SolidSearch(self._engine, pair, self._motion, found=Found())
+                self._measure(search, block, ceiling)
+                bounds = np.minimum.reduceat(search.low, self._edges[:-1])
+                np.maximum(low[row], bounds, out=low[row])
+
+    def _measure(self, search: SolidSearch, block: int, ceiling: Array) -> None:
+        """Measure in the middle of a block; what is reached there is nearly reached in the blocks around."""
+        sample = int(self._middles[block])
+        reading = search.read(sample, float(ceiling[block]))
+        if reading.is_exact:
+            moved = np.minimum(*search.relative.displacement(sample, self._middles))
+            np.minimum(ceiling, reading.bound + 2.0 * TIGHT + moved, out=ceiling)

@@ -1,0 +1,164 @@
+"""Home trials: whether a robot that stands still is surely too near to something, seen at a few instants of the runs.
+
+What passes here is only likely to be free; what is refused is too near for certain. All other bodies are placed once,
+so that hundreds of configurations can be tried.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.collision.bodies import BodyPoses
+from cellplan.collision.continuous.motion_bound import Pair
+from cellplan.collision.distance import SURELY_APART, look, sharpen
+from cellplan.collision.overlap.containment import is_inside
+from cellplan.geometry.transforms import Array
+from cellplan.model.report import ClearanceClass
+from cellplan.scene.pairs import Rule
+from cellplan.scene.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Instants:
+    """Some instants of one run.
+
+    Attributes:
+        scene: The scene of the run, with those pairs only that the configuration of the robot matters to.
+        q: Stacked joint positions in [rad] or [m], shape (K, nq).
+    """
+
+    scene: Scene
+    q: Array
+
+
+class HomeTrials:
+    """One robot among what moves and stands at some instants.
+
+    Attributes:
+        refused: How often each pair was too near, by the names of its bodies.
+    """
+
+    def __init__(self, robot: str, runs: Sequence[Instants]) -> None:
+        """Place everything else.
+
+        Args:
+            robot: Name of the robot that is to stand somewhere.
+            runs: Instants of the runs in which it is idle.
+        """
+        self.refused: Counter[tuple[str, str]] = Counter()
+        self._tables = [_Table(robot, run) for run in runs]
+
+    def add(self, run: int, q: Array) -> None:
+        """Look at another instant of a run from now on, at the stacked configuration of shape (nq,)."""
+        self._tables[run].add(q)
+
+    def is_refused(self, q: Array, *, room: float = 0.0) -> bool:
+        """Whether a configuration is too near to something at one of the instants.
+
+        Args:
+            q: The configuration in [rad] or [m], shape (n,).
+            room: Distance in [m] beyond the demanded one that is asked from the part and from other robots.
+        """
+        own = self._tables[0].placed(q)
+        pair = self._tables[0].too_near_alone(own, room)  # what stands still is the same in every run
+        for table in self._tables:
+            if pair is None:
+                pair = table.too_near_others(own, room)
+        if pair is not None:
+            self.refused[pair] += 1
+        return pair is not None
+
+
+class _Table:
+    """The instants of one run."""
+
+    def __init__(self, robot: str, run: Instants) -> None:
+        """Sort the pairs of the robot into those that no other robot changes and the others."""
+        self._scene, self._robot = run.scene, robot
+        self._own = [index for index, body in enumerate(_solids(self._scene)) if body == robot]
+        self._pairs, rows = self._scene.solid_pairs, self._scene.solid_rows.tolist()
+        is_alone = np.array([not _moving_robots(self._scene, row, but=robot) for row in rows], dtype=bool)
+        self._alone, self._others = np.flatnonzero(is_alone), np.flatnonzero(~is_alone)
+        self._demanded = np.array([self._limit(row) for row in rows])
+        is_part = np.array([self._scene.pairs[row].clearance_class is ClearanceClass.PART for row in rows], dtype=bool)
+        self._is_roomy, self._limits = ~is_alone | is_part, self._demanded
+        self._q = run.q
+        self._poses = self._scene.body_poses(run.q)
+        self._order = list(range(len(run.q)))  # instants that refused something lately come first
+
+    def add(self, q: Array) -> None:
+        self._q = np.concatenate([self._q, q[None]])
+        self._poses = self._scene.body_poses(self._q)
+        self._order.insert(0, len(self._q) - 1)
+
+    def placed(self, q: Array) -> BodyPoses:
+        """Poses of all bodies with the robot in a configuration, at one sample; those of other robots do not matter."""
+        stacked = self._q[:1].copy()
+        stacked[0, self._scene.cell.columns(self._robot)] = q
+        return self._scene.body_poses(stacked)
+
+    def too_near_alone(self, own: BodyPoses, room: float) -> tuple[str, str] | None:
+        """Names of the first pair nearer than it may be, of those that no other robot changes, or None."""
+        self._limits = self._demanded + room * self._is_roomy
+        row = self._on_ground(own)
+        if row is None:
+            row = self._among(self._alone, own, sample=0)
+        return None if row is None else self._scene.names(self._scene.pairs[row])
+
+    def too_near_others(self, own: BodyPoses, room: float) -> tuple[str, str] | None:
+        """The same of the other pairs, at all instants."""
+        self._limits = self._demanded + room * self._is_roomy
+        self._poses.R[self._own], self._poses.p[self._own] = own.R[self._own], own.p[self._own]
+        for place, sample in enumerate(self._order):
+            row = self._among(self._others, self._poses, sample=sample)
+            if row is not None:
+                self._order.insert(0, self._order.pop(place))
+                return self._scene.names(self._scene.pairs[row])
+        return None
+
+    def _limit(self, row: int) -> float:
+        """Distance in [m] that a pair is to keep."""
+        pair = self._scene.pairs[row]
+        return max(SURELY_APART, pair.demand) if pair.rule is Rule.CLEARANCE else SURELY_APART
+
+    def _on_ground(self, poses: BodyPoses) -> int | None:
+        for row in self._scene.ground_rows.tolist():
+            if self._scene.ground_heights(self._scene.pairs[row], poses)[0] < self._limit(row):
+                return int(row)
+        return None
+
+    def _among(self, places: np.ndarray, poses: BodyPoses, *, sample: int) -> int | None:
+        """The first of some pairs of solids that is too near at one sample."""
+        engine, pairs = self._scene.engine, self._pairs[places]
+        centres = engine.sphere_centres(poses, sample=sample)
+        apart = centres[pairs[:, 0]] - centres[pairs[:, 1]]
+        reach = engine.radii[pairs[:, 0]] + engine.radii[pairs[:, 1]] + self._limits[places]
+        for place in places[np.einsum("ij,ij->i", apart, apart) <= reach**2]:
+            pair = (int(self._pairs[place, 0]), int(self._pairs[place, 1]))
+            if self._is_too_near(pair, poses, sample, float(self._limits[place])):
+                return int(self._scene.solid_rows[place])
+        return None
+
+    def _is_too_near(self, pair: Pair, poses: BodyPoses, sample: int, limit: float) -> bool:
+        """Whether two bodies touch, or are nearer than they may be."""
+        engine = self._scene.engine
+        reading = look(engine, pair, poses, sample=sample)
+        if reading.touches or reading.bound >= limit:
+            return reading.touches
+        if reading.bound <= SURELY_APART and is_inside(engine, pair, poses, sample=sample):
+            return True
+        return sharpen(engine, pair, poses, sample=sample, reading=reading).bound < limit
+
+
+def _solids(scene: Scene) -> list[str | None]:
+    """The robot that moves each of the engine's bodies."""
+    return [scene.carrier(index).robot for index in range(len(scene.engine.bodies))]
+
+
+def _moving_robots(scene: Scene, row: int, *, but: str) -> set[str]:
+    """Robots other than one that move a body of a pair."""
+    pair = scene.pairs[row]
+    ends = [scene.bodies[pair.first], scene.bodies[pair.second]]
+    return {str(body.robot) for body in ends if not body.is_at_rest} - {but}

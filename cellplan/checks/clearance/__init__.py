@@ -1,0 +1,1 @@
+"""Checks of bodies: certified clearance, contacts, mounted bodies, depth of tools."""

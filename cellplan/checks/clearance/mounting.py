@@ -1,0 +1,94 @@
+"""Mounting: how deep what holds, carries or stands on something else reaches into it, and whether that may be so."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from cellplan.certify.depths import FoundDepth, mounted_depths
+from cellplan.geometry.transforms import Array
+from cellplan.model.report import Check
+from cellplan.scene.bodies import Kind, is_ground
+from cellplan.scene.mounting import Mount
+from cellplan.scene.scene import Scene
+
+MM: Final = 1e3
+ROUNDING: Final = 1e-6  # [m] poses are worked out to less than that: bodies that just touch are not deep
+CURES: Final = {
+    Mount.GRIP: "is the grasp the right way round? If the grip is that deep, say so with depth_mm of the grasp",
+    Mount.MOUNT: "does the tool lie in front of the flange? If they may touch, name them under checks.exclude",
+    Mount.STANDING: "does it stand where it should? Put the one on the other, or name them under checks.exclude",
+}
+NOISE: Final = 1e-3  # [-] of 0.01 mm: a depth of 3 mm that is worked out as 3.000000001 is shown as 3
+PIT: Final = "a pit? Put the base on the ground, or name them under checks.exclude"
+
+
+def check_mounting(scene: Scene, q: Array, times: Array | None = None) -> tuple[Check, ...]:
+    """Judge the depth of all bodies that hold, carry or stand on each other.
+
+    There is one check for each body that holds the part, and one for each pair beyond its limit; what stands passes in
+    one check together.
+
+    Args:
+        scene: The scene.
+        q: Stacked joint positions in [rad] or [m], shape (N, nq).
+        times: Instants of the samples in [s], shape (N,); None where there is no motion.
+    """
+    found = mounted_depths(scene, q)
+    standing = [each for each in found if each.pair.mount is Mount.STANDING]
+    checks = [_check(scene, each, times) for each in found if each.pair.mount is not Mount.STANDING]
+    failed = [_check(scene, each, times) for each in standing if not _passed(each)]
+    return (*checks, *(failed or _all_standing(scene, standing, times)))
+
+
+def _passed(found: FoundDepth) -> bool:
+    """Whether a depth is within its limit, rounding aside."""
+    return found.depth <= found.pair.limit + ROUNDING
+
+
+def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
+    """The verdict on one pair."""
+    pair, (inner, outer) = found.pair, _named(scene, found)
+    depth, limit = MM * found.depth, MM * pair.limit
+    at_s = None if times is None or not pair.moves else float(times[found.row])
+    instant = "" if at_s is None else f" at {at_s:.3f} s"
+    share = f" ({limit - MM * pair.accuracy:g} mm beyond the accuracy of its body)" if pair.accuracy else ""
+    message = f"{inner} is {_shown(depth)} mm deep in {outer}{instant}, at most {limit:g} mm{share}"
+    passed, cure = _passed(found), PIT if is_ground(scene.bodies[pair.second]) else CURES[pair.mount]
+    return Check(
+        name=str(pair.mount),
+        subject=f"{inner} - {outer}",
+        passed=passed,
+        value=depth,
+        limit=limit,
+        unit="mm",
+        at_s=at_s,
+        message=message if passed else f"{message}: {cure}",
+    )
+
+
+def _all_standing(scene: Scene, standing: Sequence[FoundDepth], times: Array | None) -> list[Check]:
+    """One passed check for all that stands, with the deepest; none where nothing stands."""
+    if not standing:
+        return []
+    deepest = max(standing, key=lambda each: each.depth)
+    check = _check(scene, deepest, times)
+    if deepest.depth > ROUNDING:
+        return [check]
+    limit = MM * deepest.pair.limit
+    words = f"nothing that stands reaches into what carries it, allowed are {limit:g} mm"
+    return [replace(check, subject="cell", value=0.0, message=words)]
+
+
+def _named(scene: Scene, found: FoundDepth) -> tuple[str, str]:
+    """The body that reaches into the other, and the other: holders into the part, robots and the part into things."""
+    bodies = [scene.bodies[found.pair.first], scene.bodies[found.pair.second]]
+    hosts = (Kind.PART,) if found.pair.mount is Mount.GRIP else (Kind.OBSTACLE, Kind.LINK)
+    if bodies[0].kind in hosts and bodies[1].kind not in hosts:
+        bodies.reverse()
+    return bodies[0].name, bodies[1].name
+
+
+def _shown(depth_mm: float) -> str:
+    """A depth rounded up to 0.01 mm, never less than there is; four digits are enough."""
+    return f"{abs(math.ceil(100.0 * depth_mm - NOISE)) / 100.0:.4g}"

@@ -1,0 +1,185 @@
+"""Depth of tools in the part: how much of each tool is inside the part or beyond it, along the tool's own axis."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.checks.tools.tracking import part_poses
+from cellplan.geometry.shapes import Mesh
+from cellplan.geometry.tool_columns import Columns, body_columns, depths, line_depths
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.report import Check, ToolDepth
+from cellplan.model.task import Frame, SampledPath, Task, TimedPath
+
+MM: Final = 1000.0  # [mm/m]
+AXIS: Final = "axis"
+AXIS_COMPONENTS: Final = (0, 1, 2, 3, 4)  # of a task: they leave no more than the turn about one axis open
+ROOM: Final = 1e-6  # [m] tracking errors of a micrometre do not decide about a cut that is as deep as it may be
+FINE_STEP: Final = 1e-3  # [m] longer steps of a tool between two rows are looked at in between, joints moving evenly
+MOST_INSTANTS: Final = 4000  # instants to which long steps are refined; programs of more rows are taken as they are
+POSES: Final = 400  # poses of a body that are looked at, beside those round the deepest of them
+POSES_ON_MESH: Final = 100  # likewise on a mesh, where a line costs fifty times as much
+NEAR_WORST: Final = 20  # rows looked at round the deepest pose of a body
+SHARE_OF_RADIUS: Final = 0.5  # [-] of a body's radius that it moves between two poses at which it is looked at
+
+
+def tool_depths(
+    cell: Cell, schedule: Schedule, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
+) -> tuple[ToolDepth, ...]:
+    """The largest depth of the tool of every task on the part, at any instant of the program.
+
+    The axis of a tool counts from the tip back to where the flange stands beside it, and its bodies count. The axis is
+    looked at at every row, and between rows that are more than a millimetre apart. Bodies are looked at whenever the
+    tool has moved on by half of a body's radius, so that no spot that a body passes over is left out, and at the rows
+    round the deepest of these; a program that is too long for that is cut into even steps of motion.
+
+    Args:
+        cell: The cell.
+        schedule: The tasks that are worked on, and the clock.
+        chains: Kinematics of each robot.
+        q: Positions of each robot, shape (N, n).
+    """
+    return tuple(
+        _task_depth(cell, scheduled, schedule.times, chains=chains, q=q)
+        for scheduled in schedule.tasks
+        if scheduled.task.relative_to is Frame.PART
+    )
+
+
+def check_depths(cell: Cell, found: Sequence[ToolDepth]) -> list[Check]:
+    """The depth of each task's tool against what the task, or else the cell, allows."""
+    return [_check(cell.task(depth.task), depth) for depth in found]
+
+
+def path_depth(cell: Cell, task: Task, X_PT: Array) -> ToolDepth | None:
+    """Depth of a tool's axis on its desired path, before there is a motion.
+
+    None where the task leaves the place or the lean of the axis open: then only the motion says how deep it is.
+
+    Args:
+        cell: The cell.
+        task: One of its tasks.
+        X_PT: Desired tool poses on the part, shape (N, 4, 4).
+    """
+    if task.relative_to is not Frame.PART or not set(AXIS_COMPONENTS) <= set(task.axes):
+        return None
+    tool = cell.robot(task.robot).tool
+    X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone
+    along = line_depths(tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not tool.bodies)
+    return ToolDepth(
+        task=task.name, robot=task.robot, depth=float(along.max()), at_s=None, limit=task.tool_depth, body=AXIS
+    )
+
+
+def _task_depth(
+    cell: Cell, scheduled: TaskSchedule, times: Array, *, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
+) -> ToolDepth:
+    """The largest depth of one task's tool, its instant and what of the tool is so deep."""
+    task = scheduled.task
+    robot = cell.robot(task.robot)
+    instants, X_PT = _tool_on_part(cell, task, times, chains=chains, q=q)
+    X_ST = inverse(cell.part.X_PS) @ X_PT
+    tool, zone = robot.tool, cell.checks.contact_zone
+    along = line_depths(tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not tool.bodies)
+    deepest = [(AXIS, int(np.argmax(along)), float(along.max()))]
+    for body in tool.bodies:
+        columns = body_columns(body.shape, inverse(tool.X_FT) @ body.X_BS, zone)
+        deepest.append((body.name, *_deepest(columns, cell, X_ST)))
+    name, row, depth = max(deepest, key=lambda entry: entry[2])
+    return ToolDepth(
+        task=task.name,
+        robot=task.robot,
+        depth=depth,
+        at_s=float(instants[row]),
+        limit=task.tool_depth,
+        body=name,
+    )
+
+
+def _tool_on_part(
+    cell: Cell, task: Task, times: Array, *, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
+) -> tuple[Array, Array]:
+    """Instants in [s] and tool poses on the part there; long steps are cut, every joint moving evenly in them."""
+    movers = {task.robot, *(grasp.robot for grasp in cell.part.held_by[:1])}
+    own = {name: q[name] for name in sorted(movers)}
+    X_PT = inverse(part_poses(cell, chains, own)) @ chains[task.robot].tool_poses(own[task.robot])
+    longest = float(np.linalg.norm(np.diff(X_PT[:, :3, 3], axis=0), axis=1).max(initial=0.0))
+    parts = min(int(np.ceil(longest / FINE_STEP)), MOST_INSTANTS // max(1, len(times) - 1))
+    if parts < 2:
+        return times, X_PT
+    rows = np.arange(parts * (len(times) - 1) + 1) / parts
+    whole = np.minimum(rows.astype(np.intp), len(times) - 2)
+    share = (rows - whole)[:, None]
+    fine = {name: values[whole] + share * (values[whole + 1] - values[whole]) for name, values in own.items()}
+    instants = times[whole] + share[:, 0] * (times[whole + 1] - times[whole])
+    return instants, inverse(part_poses(cell, chains, fine)) @ chains[task.robot].tool_poses(fine[task.robot])
+
+
+def _deepest(columns: Columns, cell: Cell, X_ST: Array) -> tuple[int, float]:
+    """Row and depth in [m] of the deepest pose of a body: even steps of motion first, then the rows round the worst."""
+    if not len(columns.line):
+        return 0, 0.0
+    shape = cell.part.shape
+    rows = _even_steps(columns, X_ST, POSES_ON_MESH if isinstance(shape, Mesh) else POSES)
+    found = depths(columns, shape, X_ST[rows])
+    worst = int(np.argmax(found))
+    if not found[worst] > 0.0:
+        return int(rows[worst]), 0.0
+    low, high = rows[max(worst - 1, 0)], rows[min(worst + 1, len(rows) - 1)]
+    near = np.unique(np.append(np.linspace(low, high, NEAR_WORST).astype(np.intp), rows[worst]))
+    closer = depths(columns, shape, X_ST[near])
+    at = int(np.argmax(closer))
+    return int(near[at]), float(closer[at])
+
+
+def _even_steps(columns: Columns, X_ST: Array, most: int) -> NDArray[np.intp]:
+    """Rows between which no point of a body moves by more than half of its radius, or else ``most`` even steps."""
+    shift = np.linalg.norm(np.diff(X_ST[:, :3, 3], axis=0), axis=1)
+    turned = np.linalg.norm(np.diff(X_ST[:, :3, :3], axis=0), axis=(1, 2))  # chord of the angle, times sqrt(2) at most
+    moved = np.append(0.0, np.cumsum(shift + columns.reach * turned))
+    step = max(SHARE_OF_RADIUS * columns.radius, moved[-1] / most, ROOM)
+    marks = np.append(np.arange(0.0, moved[-1], step), moved[-1])
+    rows: NDArray[np.intp] = np.unique(np.append(np.searchsorted(moved, marks), len(X_ST) - 1))
+    return rows
+
+
+def _check(task: Task, found: ToolDepth) -> Check:
+    """The check of one task."""
+    depth, limit = MM * found.depth, MM * found.limit
+    passed = found.depth <= found.limit + ROOM
+    what = "its axis" if found.body == AXIS else f"{found.robot}/{found.body}"
+    when = " on its path" if found.at_s is None else f" at {found.at_s:.3f} s"
+    message = (
+        f"tool depth of task '{task.name}': {depth:.3g} mm of the tool inside the part or beyond it{when} ({what}), "
+        f"allowed {limit:g} mm"
+    )
+    return Check(
+        name="tool_depth",
+        subject=task.name,
+        passed=passed,
+        value=depth,
+        limit=limit,
+        unit="mm",
+        at_s=found.at_s,
+        message=message if passed else f"{message}; {', or '.join(_cures(task, found))}",
+    )
+
+
+def _cures(task: Task, found: ToolDepth) -> Iterator[str]:
+    """What may be wrong when a tool is too deep."""
+    if task.project is not None and task.tool_axis is not None and task.tool_axis @ task.project > 0.0:
+        yield "turn tool_axis round: it points out of the surface, so that the tool comes through the part"
+    elif task.project is None and isinstance(task.path, SampledPath | TimedPath):
+        yield "check the points and axes of the file: do they lie on the surface, do the axes point into it?"
+    elif task.project is None:
+        yield "lay the path on the surface with path.project, or check its place, the sign of offset_mm and tool_axis"
+    elif found.body == AXIS:
+        yield "check the tool's pose and the side that the path is projected from"
+    else:
+        yield "use a slimmer tool or another tool_axis: the surface is hollow or leans there"
+    yield "allow it with tool_depth_mm if the process cuts"

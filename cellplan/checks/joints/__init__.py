@@ -1,0 +1,1 @@
+"""Checks of joints: limits, locks, drift, accelerations, loads."""

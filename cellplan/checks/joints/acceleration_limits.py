@@ -1,0 +1,234 @@
+"""Accelerations and jerk of joints, tools and part, and the limits of the joints, stated or assumed."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import product
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
+from cellplan.checks.joints.speed_jumps import NO_INSTANTS, desired_jumps
+from cellplan.checks.tools.process_speed import process_speeds
+from cellplan.geometry.shapes import bounding_box
+from cellplan.geometry.transforms import Array
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.acceleration import (
+    JointAcceleration,
+    LimitSource,
+    MotionAccelerations,
+    NotJudged,
+    PartAcceleration,
+    PointAcceleration,
+    full_speed_in,
+)
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.motion import Schedule
+from cellplan.model.report import Check
+
+FAILURE_ROWS: Final = (1.5, 2.5)  # [-] steps before and after the instant at which a joint fails: not judged
+FAILURE_REASON: Final = "a joint that fails stops at once, and the others take over at once"
+
+Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+
+def motion_accelerations(
+    cell: Cell, chains: Mapping[str, ScrewChain], schedule: Schedule, *, q: Mapping[str, Array], X_WP: Array
+) -> MotionAccelerations:
+    """Accelerations, jerk and process speeds of the written tables.
+
+    Args:
+        cell: The cell.
+        chains: Kinematics by robot.
+        schedule: The clock, and the tasks that are worked on.
+        q: Positions that were read back in [rad] or [m], shape (N, n), by robot.
+        X_WP: The part in the world, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed place.
+    """
+    times = schedule.times
+    X_WT = {robot.name: chains[robot.name].tool_poses(q[robot.name]) for robot in cell.robots}
+    cycles = {robot.name: robot.controller_cycle for robot in cell.robots}
+    judged = _judged(cell, times)
+    jumps_at = NO_INSTANTS if schedule.desired is None else desired_jumps(schedule.desired)
+    joints = (_joints(robot, times, q[robot.name], judged=judged, jumps_at=jumps_at) for robot in cell.robots)
+    return MotionAccelerations(
+        joints=tuple(use for uses in joints for use in uses),
+        tools={name: _point(times, poses[:, None, :3, 3], window=cycles[name])[0] for name, poses in X_WT.items()},
+        part=_part(cell, times, X_WP, window=cycles[cell.positioners[0]]) if cell.positioners else None,
+        process=process_speeds(schedule, X_WT, X_WP),
+        not_judged=tuple(_not_judged(cell)),
+    )
+
+
+def acceleration_limit(robot: Robot, index: int) -> tuple[float | None, LimitSource]:
+    """Largest allowed acceleration of one joint in [rad/s^2] or [m/s^2], and where it comes from."""
+    joint, rule = robot.model.joints[index], robot.acceleration
+    if rule.is_unlimited:
+        return None, LimitSource.UNLIMITED
+    if joint.acceleration is not None:
+        return joint.acceleration, LimitSource.STATED
+    seconds = full_speed_in(rule, index)
+    if seconds is None:
+        return None, LimitSource.NOT_STATED
+    return joint.top_speed / seconds, LimitSource.ASSUMED
+
+
+def check_accelerations(cell: Cell, found: MotionAccelerations) -> list[Check]:
+    """Acceleration of every joint that has a limit, jerk where a limit is stated, and that of the part."""
+    checks: list[Check] = []
+    for use in found.joints:
+        checks += [] if use.limit is None else [_check_acceleration(cell, use, use.limit)]
+        checks += [] if use.jerk_limit is None else [_check_jerk(use, use.jerk_limit)]
+    limit = cell.checks.part_acceleration
+    if limit is not None and found.part is not None:
+        checks.append(_check_part(found.part.corner, limit))
+    return checks
+
+
+def _joints(robot: Robot, times: Array, q: Array, *, judged: Flags, jumps_at: Array) -> Iterator[JointAcceleration]:
+    """Every joint of one robot."""
+    signed = np.where(judged[:, None], point_accelerations(times, q), 0.0)
+    rows = joint_accelerations(times, q, cycle=robot.controller_cycle, jumps_at=jumps_at)
+    sizes = np.where(judged[:, None], rows.values, 0.0)
+    jerk = jerks(times, signed[..., None], window=robot.controller_cycle)
+    for index, joint in enumerate(robot.model.joints):
+        k, m = int(np.argmax(sizes[:, index])), int(np.argmax(jerk[:, index]))
+        limit, source = acceleration_limit(robot, index)
+        yield JointAcceleration(
+            robot=robot.name,
+            joint=joint.name,
+            is_revolute=joint.is_revolute,
+            peak=float(sizes[k, index]),
+            peak_at_s=float(times[k]),
+            limit=limit,
+            source=source,
+            peak_jerk=float(jerk[m, index]),
+            peak_jerk_at_s=float(times[m]),
+            jerk_limit=None if robot.acceleration.is_unlimited else joint.jerk,
+            window=robot.controller_cycle,
+            is_jump=bool(rows.is_jump[k, index]),
+        )
+
+
+def _judged(cell: Cell, times: Array) -> Flags:
+    """Rows that are judged, shape (N,): all but those at which a joint fails."""
+    step = float(times[-1]) / (len(times) - 1)
+    judged = np.ones(len(times), dtype=bool)
+    for lock in cell.motion.locked:
+        if lock.since > 0.0:
+            late = (times - lock.since) / step
+            judged &= (late < -FAILURE_ROWS[0]) | (late > FAILURE_ROWS[1])
+    return judged
+
+
+def _part(cell: Cell, times: Array, X_WP: Array, *, window: float) -> PartAcceleration:
+    """The centre of the part's bounding box, and the corner of it that is accelerated most."""
+    middle, half = bounding_box(cell.part.shape)
+    points_S = middle + half * np.array([(0, 0, 0), *product((-1, 1), repeat=3)])
+    points_P = points_S @ cell.part.X_PS[:3, :3].T + cell.part.X_PS[:3, 3]
+    found = [_point(times, (X_WP[:, :3, :3] @ p + X_WP[:, :3, 3])[:, None], window=window)[0] for p in points_P]
+    centre, *corners = found
+    most = max(corners, key=lambda corner: corner.peak)
+    jerk = max(corners, key=lambda corner: corner.peak_jerk)
+    most = replace(most, peak_jerk=jerk.peak_jerk, peak_jerk_at_s=jerk.peak_jerk_at_s)
+    return PartAcceleration(centre=centre, corner=most)
+
+
+def _point(times: Array, points: Array, *, window: float) -> tuple[PointAcceleration, ...]:
+    """Points in the world, shape (N, n, 3)."""
+    accelerations = point_accelerations(times, points)
+    sizes, jerk = np.linalg.norm(accelerations, axis=-1), jerks(times, accelerations, window=window)
+    found = []
+    for index in range(points.shape[1]):
+        k, m = int(np.argmax(sizes[:, index])), int(np.argmax(jerk[:, index]))
+        found.append(
+            PointAcceleration(
+                peak=float(sizes[k, index]),
+                peak_at_s=float(times[k]),
+                peak_jerk=float(jerk[m, index]),
+                peak_jerk_at_s=float(times[m]),
+                window=window,
+            )
+        )
+    return tuple(found)
+
+
+def _not_judged(cell: Cell) -> Iterator[NotJudged]:
+    """What is left out, robot by robot, then failing joints."""
+    for robot in cell.robots:
+        rule = robot.acceleration
+        missing = [joint.name for joint in robot.model.joints if joint.acceleration is None]
+        if rule.is_unlimited:
+            yield NotJudged(robot=robot.name, what="accelerations and jerk", reason=rule.reason or "no reason given")
+        elif missing and not rule.full_speed_in:
+            what = f"accelerations of {', '.join(missing)}"
+            yield NotJudged(robot=robot.name, what=what, reason="no limit is stated")
+    for lock in cell.motion.locked:
+        if lock.since > 0.0:
+            what = f"accelerations at {lock.since:.3f} s, when {lock.robot}/{lock.joint} fails"
+            yield NotJudged(robot="", what=what, reason=FAILURE_REASON)
+
+
+def _check_acceleration(cell: Cell, use: JointAcceleration, limit: float) -> Check:
+    """One joint's largest acceleration; the name says when its limit is assumed."""
+    scale, unit = joint_unit(use.is_revolute)
+    is_assumed = use.source is LimitSource.ASSUMED
+    passed = use.peak <= limit
+    verdict = "accelerates at most at" if passed else "is accelerated too much:"
+    against = f"limit {scale * limit:.5g} {unit}/s2"
+    if is_assumed:
+        index = cell.robot(use.robot).model.joint_names.index(use.joint)
+        against = f"assumed {against}: full speed in {full_speed_in(cell.robot(use.robot).acceleration, index):g} s"
+    jump = "; its speed jumps" if use.is_jump and not passed else ""
+    return Check(
+        name="joint_acceleration_assumed" if is_assumed else "joint_acceleration",
+        subject=f"{use.robot}/{use.joint}",
+        passed=passed,
+        value=scale * use.peak,
+        limit=scale * limit,
+        unit=f"{unit}/s2",
+        at_s=use.peak_at_s,
+        message=(
+            f"joint {use.robot}/{use.joint} {verdict} {scale * use.peak:.4g} {unit}/s2 "
+            f"at {use.peak_at_s:.3f} s ({against}){jump}"
+        ),
+    )
+
+
+def _check_jerk(use: JointAcceleration, limit: float) -> Check:
+    """One joint's largest jerk."""
+    scale, unit = joint_unit(use.is_revolute)
+    return Check(
+        name="joint_jerk",
+        subject=f"{use.robot}/{use.joint}",
+        passed=use.peak_jerk <= limit,
+        value=scale * use.peak_jerk,
+        limit=scale * limit,
+        unit=f"{unit}/s3",
+        at_s=use.peak_jerk_at_s,
+        message=(
+            f"joint {use.robot}/{use.joint} has a jerk of at most {scale * use.peak_jerk:.4g} {unit}/s3 over "
+            f"{1e3 * use.window:g} ms at {use.peak_jerk_at_s:.3f} s, limit {scale * limit:g} {unit}/s3"
+        ),
+    )
+
+
+def _check_part(corner: PointAcceleration, limit: float) -> Check:
+    """The part's largest acceleration."""
+    return Check(
+        name="part_acceleration",
+        subject="part",
+        passed=corner.peak <= limit,
+        value=corner.peak,
+        limit=limit,
+        unit="m/s2",
+        at_s=corner.peak_at_s,
+        message=(
+            f"part is accelerated at most at {corner.peak:.4g} m/s2 (a corner of its bounding box) "
+            f"at {corner.peak_at_s:.3f} s, allowed {limit:g} m/s2"
+        ),
+    )
+
+
+def joint_unit(is_revolute: bool) -> tuple[float, str]:
+    """Factor and unit that people read."""
+    return (float(np.degrees(1.0)), "deg") if is_revolute else (1e3, "mm")

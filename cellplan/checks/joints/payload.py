@@ -1,0 +1,268 @@
+"""Payload: what each robot carries, at rest and in the written motion, against what it may carry."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.joints.accelerations import point_accelerations
+from cellplan.geometry.inertia import centre_and_inertia
+from cellplan.geometry.transforms import Array, inverse, transform_points
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Cell, Grasp, Robot
+from cellplan.model.payload import AxisLimit, AxisUse, LoadUse, Payload
+from cellplan.model.report import Check
+from cellplan.model.robot import BASE, FollowerJoint, Joint
+
+GRAVITY: Final = 9.80665  # [m/s^2] standard gravity, downwards along the world's z
+UP: Final = np.array([0.0, 0.0, 1.0])
+WRIST: Final = 3  # [-] turning axes before the flange that are looked at
+MM: Final = 1e3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Mass:
+    """A mass on a flange: in [kg], its centre in F in [m], and its inertia about the centre in F in [kg m^2]."""
+
+    mass: float
+    centre_F: Array
+    inertia_F: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Carried:
+    """A mass on its way.
+
+    Attributes:
+        mass: In [kg].
+        points: Its centre in the world in [m], shape (N, 3).
+        force: What holds and moves it, expressed in the world in [N], shape (N, 3).
+        inertia: About its centre, expressed in the world in [kg m^2], shape (N, 3, 3).
+    """
+
+    mass: float
+    points: Array
+    force: Array
+    inertia: Array
+
+
+def load_uses(
+    cell: Cell, chains: Mapping[str, ScrewChain], times: Array, q: Mapping[str, Array]
+) -> tuple[LoadUse, ...]:
+    """What every robot carries over a run.
+
+    The part is shared equally by all that hold it. A tool weighs at its stated centre, else at its tip; the part at its
+    stated centre, else at that of its shape with uniform density, which also gives its inertia about the centre. The
+    tool's inertia about its own centre is not known and not counted.
+
+    Args:
+        cell: The cell.
+        chains: The chain of each robot.
+        times: Instants of the rows in [s], shape (N,).
+        q: Joint positions by robot in [rad] or [m], shape (N, n) each.
+    """
+    return tuple(_load_use(cell, robot, chains[robot.name], times=times, q=q[robot.name]) for robot in cell.robots)
+
+
+def check_payload(uses: tuple[LoadUse, ...]) -> list[Check]:
+    """Whether what the robots carry is within what they may carry, as far as both are stated."""
+    return [check for use in uses for check in _checks(use)]
+
+
+def check_payload_at_rest(cell: Cell, chains: Mapping[str, ScrewChain], start: Array) -> list[Check]:
+    """What the robots carry while they stand at one stacked posture of shape (nq,) in [rad] or [m]."""
+    still = {robot.name: np.tile(start[cell.columns(robot.name)], (2, 1)) for robot in cell.robots}
+    return check_payload(load_uses(cell, chains, np.array([0.0, 1.0]), still))
+
+
+def _load_use(cell: Cell, robot: Robot, chain: ScrewChain, *, times: Array, q: Array) -> LoadUse:
+    """What one robot carries."""
+    grasp = next((grasp for grasp in cell.part.held_by if grasp.robot == robot.name), None)
+    share = None if cell.part.mass is None else cell.part.mass / max(1, len(cell.positioners))
+    use = LoadUse(
+        robot=robot.name,
+        tool_mass=0.0 if robot.tool.mass is None and robot.tool.is_bare else robot.tool.mass,
+        part_mass=0.0 if grasp is None else share,
+        holders=len(cell.positioners),
+        limits=robot.model.payload,
+    )
+    if not use.is_known or use.known_mass == 0.0:
+        return use
+    masses = _masses(cell, robot, grasp, use)
+    D = chain.link_displacements(q)
+    X_WF = D[:, robot.model.flange_link + 1] @ robot.model.X_BF
+    carried = [_carried(mass, X_WF, times) for mass in masses]
+    felt = np.linalg.norm(np.sum([each.force for each in carried], axis=0), axis=1) / GRAVITY
+    return replace(
+        use,
+        centre_F=np.sum([mass.mass * mass.centre_F for mass in masses], axis=0) / use.known_mass,
+        felt=float(felt.max()),
+        felt_at_s=float(times[np.argmax(felt)]),
+        axes=tuple(_axis_use(joint, D[:, joint.parent + 1], carried, times) for joint in _wrist(robot)),
+    )
+
+
+def _masses(cell: Cell, robot: Robot, grasp: Grasp | None, use: LoadUse) -> list[_Mass]:
+    """The tool and the share of the part, as far as they weigh anything."""
+    masses, tool, part = [], robot.tool, cell.part
+    if use.tool_mass:
+        centre_F = tool.X_FT[:3, 3] if tool.centre is None else tool.centre
+        masses.append(_Mass(mass=use.tool_mass, centre_F=centre_F, inertia_F=np.zeros((3, 3))))
+    if use.part_mass and grasp is not None:
+        X_FS = tool.X_FT @ inverse(grasp.X_PT) @ part.X_PS
+        centre_S, inertia_S = centre_and_inertia(part.shape)
+        p_FC = transform_points(X_FS, centre_S[None])[0]
+        if part.centre is not None:
+            p_FC = transform_points(X_FS @ inverse(part.X_PS), part.centre[None])[0]
+        R = X_FS[:3, :3]
+        masses.append(_Mass(mass=use.part_mass, centre_F=p_FC, inertia_F=use.part_mass * R @ inertia_S @ R.T))
+    return masses
+
+
+def _carried(mass: _Mass, X_WF: Array, times: Array) -> _Carried:
+    """A mass that moves with a flange of poses of shape (N, 4, 4)."""
+    R = X_WF[:, :3, :3]
+    points = R @ mass.centre_F + X_WF[:, :3, 3]
+    force = mass.mass * (point_accelerations(times, points) + GRAVITY * UP)
+    return _Carried(mass=mass.mass, points=points, force=force, inertia=R @ mass.inertia_F @ R.transpose(0, 2, 1))
+
+
+def _wrist(robot: Robot) -> list[Joint]:
+    """The last turning axes on the way to the flange, in the order of the joints."""
+    axes: tuple[Joint | FollowerJoint, ...] = (*robot.model.joints, *robot.model.followers)
+    link, found = robot.model.flange_link, list[Joint]()
+    while link != BASE and len(found) < WRIST:
+        axis = axes[link]
+        if isinstance(axis, Joint) and axis.is_revolute:
+            found.append(axis)
+        link = axis.parent
+    return found[::-1]
+
+
+def _axis_use(joint: Joint, D: Array, carried: Sequence[_Carried], times: Array) -> AxisUse:
+    r"""What the load does to one axis: moments ``s . ((p - s0) x f)`` with ``f = m (a - g)``, and its inertia.
+
+    Args:
+        joint: The axis.
+        D: Displacements of the link that carries it, shape (N, 4, 4).
+        carried: The masses.
+        times: Instants in [s], shape (N,).
+    """
+    s = D[:, :3, :3] @ joint.axis_B
+    s0 = D[:, :3, :3] @ joint.point_B + D[:, :3, 3]
+    static, moving, inertia = np.zeros((3, len(times)))
+    for each in carried:
+        arm = each.points - s0
+        static += np.sum(s * np.cross(arm, each.mass * GRAVITY * UP), axis=1)
+        moving += np.sum(s * np.cross(arm, each.force), axis=1)
+        inertia += each.mass * np.sum(np.cross(s, arm) ** 2, axis=1) + np.einsum("ni,nij,nj->n", s, each.inertia, s)
+    static, moving = np.abs(static), np.abs(moving)
+    return AxisUse(
+        joint=joint.name,
+        static_moment=float(static.max()),
+        static_at_s=float(times[np.argmax(static)]),
+        moment=float(moving.max()),
+        moment_at_s=float(times[np.argmax(moving)]),
+        inertia=float(inertia.max()),
+        inertia_at_s=float(times[np.argmax(inertia)]),
+    )
+
+
+def _checks(use: LoadUse) -> list[Check]:
+    """The checks of one robot: its mass where that is known or too large already, the rest where all is known."""
+    limits = use.limits
+    if limits is None or (not use.is_known and use.known_mass <= limits.mass):
+        return []
+    checks = [_mass_check(use, limits)]
+    if use.centre_F is not None:
+        checks += _centre_checks(use, limits)
+        for axis in use.axes:
+            checks += _axis_checks(use, axis, limits.axis(axis.joint))
+    return checks
+
+
+def _mass_check(use: LoadUse, limits: Payload) -> Check:
+    """The mass against the payload."""
+    words = []
+    if use.tool_mass is None or use.tool_mass > 0.0:
+        words.append(f"tool {use.tool_mass:.4g} kg" if use.tool_mass is not None else "tool not stated")
+    if use.part_mass is None or use.part_mass > 0.0:
+        share = "" if use.holders < 2 else f" as one of {use.holders} holders"
+        words.append(f"part {use.part_mass:.4g} kg{share}" if use.part_mass is not None else "part not stated")
+    carried = f"carries {use.known_mass:.4g} kg" + (f" ({', '.join(words)})" if words else "")
+    return Check(
+        name="payload",
+        subject=use.robot,
+        passed=use.known_mass <= limits.mass,
+        value=use.known_mass,
+        limit=limits.mass,
+        unit="kg",
+        at_s=None,
+        message=f"payload {use.robot}: {carried}, allowed {limits.mass:g} kg",
+    )
+
+
+def _centre_checks(use: LoadUse, limits: Payload) -> list[Check]:
+    """The centre of the load against the published distances."""
+    checks = []
+    for where, words, value, limit in (
+        ("along", "from the flange plane", use.along, limits.along),
+        ("across", "from the flange axis", use.across, limits.across),
+    ):
+        if limit is not None:
+            text = f"payload {use.robot}: centre of the load {MM * value:.1f} mm {words}, allowed {MM * limit:g} mm"
+            checks.append(
+                Check(
+                    name="payload_centre",
+                    subject=f"{use.robot} {where}",
+                    passed=value <= limit,
+                    value=MM * value,
+                    limit=MM * limit,
+                    unit="mm",
+                    at_s=None,
+                    message=text,
+                )
+            )
+    return checks
+
+
+def _axis_checks(use: LoadUse, axis: AxisUse, limit: AxisLimit) -> list[Check]:
+    """Moment and inertia about one axis against what is published."""
+    subject, checks = f"{use.robot}/{axis.joint}", []
+    if limit.moment is not None:
+        worst, at_s = max((axis.moment, axis.moment_at_s), (axis.static_moment, axis.static_at_s))
+        text = (
+            f"payload {subject}: moment of the load {worst:.2f} Nm at {at_s:.3f} s "
+            f"({axis.static_moment:.2f} Nm at rest), allowed {limit.moment:g} Nm"
+        )
+        checks.append(
+            Check(
+                name="payload_moment",
+                subject=subject,
+                passed=worst <= limit.moment,
+                value=worst,
+                limit=limit.moment,
+                unit="Nm",
+                at_s=at_s,
+                message=text,
+            )
+        )
+    if limit.inertia is not None:
+        text = (
+            f"payload {subject}: inertia of the load {axis.inertia:.4f} kg m² at {axis.inertia_at_s:.3f} s, "
+            f"allowed {limit.inertia:g} kg m²"
+        )
+        checks.append(
+            Check(
+                name="payload_inertia",
+                subject=subject,
+                passed=axis.inertia <= limit.inertia,
+                value=axis.inertia,
+                limit=limit.inertia,
+                unit="kg m²",
+                at_s=axis.inertia_at_s,
+                message=text,
+            )
+        )
+    return checks

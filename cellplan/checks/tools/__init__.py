@@ -1,0 +1,1 @@
+"""Checks of tools: tracking, closure, speeds, errors between rows, conditioning."""

@@ -1,0 +1,100 @@
+"""Verdicts on what tools do between the rows of the tables."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.tools.between_rows import BetweenLook
+from cellplan.geometry.transforms import Array
+from cellplan.model.between_rows import BetweenError
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Schedule
+from cellplan.model.report import Check, ClosureAccuracy, TaskAccuracy
+from cellplan.model.task import Tolerance
+from cellplan.scene.scene import Scene
+
+BETWEEN: Final = "_between_rows"  # what the name of a check ends with
+MM, DEG = 1e3, float(np.degrees(1.0))
+
+
+def look_between(
+    scene: Scene,
+    schedule: Schedule,
+    q: Mapping[str, Array],
+    *,
+    accuracy: Sequence[TaskAccuracy],
+    closures: Sequence[ClosureAccuracy],
+) -> tuple[tuple[TaskAccuracy, ...], tuple[ClosureAccuracy, ...]]:
+    """The errors of all tasks and closures with those between the rows, where the schedule knows what is desired there.
+
+    Args:
+        scene: The cell made computable.
+        schedule: Where every tool must be.
+        q: Positions by robot in [rad] or [m], shape (N, n) each.
+        accuracy: Errors of the tasks at the rows.
+        closures: Errors of the closures at the rows.
+    """
+    if schedule.desired is None or not (accuracy or closures):
+        return tuple(accuracy), tuple(closures)
+    look = BetweenLook(scene, schedule, schedule.desired, q)
+    of_tasks, of_closures = look.errors_between(accuracy, closures)
+    return (
+        tuple(replace(errors, between=between) for errors, between in zip(accuracy, of_tasks, strict=True)),
+        tuple(replace(errors, between=between) for errors, between in zip(closures, of_closures, strict=True)),
+    )
+
+
+def check_task_between(errors: TaskAccuracy, tolerance: Tolerance) -> tuple[Check, ...]:
+    """Position and orientation error of one task between the rows against its tolerance."""
+    if errors.between is None:
+        return ()
+    of, allowed = f"of task '{errors.task}'", tolerance.between
+    return (
+        _check("position_error_between_rows", errors.between.position, errors.task, allowed=allowed[0], of=of),
+        _check("orientation_error_between_rows", errors.between.orientation, errors.task, allowed=allowed[1], of=of),
+    )
+
+
+def check_closures_between(cell: Cell, closures: Sequence[ClosureAccuracy]) -> list[Check]:
+    """Position and orientation error of every closure between the rows against what the cell allows."""
+    checks: list[Check] = []
+    for closure in closures:
+        if closure.between is None:
+            continue
+        of, robot, between = f"of '{closure.robot}' on the part", closure.robot, closure.between
+        position, orientation = cell.checks.closure_position, cell.checks.closure_orientation
+        checks += [
+            _check("closure_position_error_between_rows", between.position, robot, allowed=position, of=of),
+            _check("closure_orientation_error_between_rows", between.orientation, robot, allowed=orientation, of=of),
+        ]
+    return checks
+
+
+def with_between(at_rows: Sequence[Check], between: Sequence[Check]) -> tuple[Check, ...]:
+    """Checks at the rows and between them, but for those of errors that are too large at the rows already."""
+    failed = {(check.name, check.subject) for check in at_rows if not check.passed}
+    return (*at_rows, *(c for c in between if (c.name.removesuffix(BETWEEN), c.subject) not in failed))
+
+
+def _check(name: str, error: BetweenError, subject: str, *, allowed: float, of: str) -> Check:
+    """The largest error of one kind against its limit, with the step that would keep it."""
+    scale, unit = (MM, "mm") if "position" in name else (DEG, "deg")
+    what = name.removesuffix(BETWEEN).replace("_", " ")
+    message = (
+        f"{what} {of} between the rows of its table: {scale * error.largest:.3g} {unit} at {error.at_s:.4f} s, "
+        f"allowed {scale * allowed:g} {unit}"
+    )
+    if error.longest_step is not None:
+        message += f"; a motion.step_s of at most {error.longest_step:g} keeps what is allowed"
+    return Check(
+        name=name,
+        subject=subject,
+        passed=error.largest <= allowed,
+        value=scale * error.largest,
+        limit=scale * allowed,
+        unit=unit,
+        at_s=error.at_s,
+        message=message,
+    )

@@ -1,0 +1,336 @@
+r"""How far tools stray between the rows of the tables, where every joint moves evenly from one row to the next.
+
+Let x(s) be a tool tip seen from the part while the joints go from one row to the next, s from 0 to 1, and
+:math:`|\ddot x| \le M` (``scene.lever_arms``). In each half of the step x stays within :math:`M/32` of its chord, and
+so does the desired point within its own sag. The error is then nowhere larger than
+
+.. math:: \max(e_0, e_{1/2}, e_1) + M/32 + \sigma/2
+
+with the errors at both rows and in the middle, and the distance :math:`\sigma` of the desired point in the middle from
+the middle of both ends: a smooth path sags by a quarter of it in half a step, of which twice as much is taken.
+Rotations likewise: as chords of unit vectors, with the square of the sum of all turns in place of M. Where this bound
+is wider than what is allowed, and where the motion of a tool is not smooth, the step is looked at in ten parts.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.certify.lever_arms import LeverArms
+from cellplan.checks.tools.tracking import errors_on_part, part_poses, seen_from_task
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.model.between_rows import BetweenError, BetweenRows
+from cellplan.model.cell import Relation
+from cellplan.model.motion import DesiredMotion, Schedule
+from cellplan.model.report import ClosureAccuracy, TaskAccuracy
+from cellplan.model.task import INSTANT_ROOM, Frame, Task
+from cellplan.scene.scene import Scene
+
+Steps = NDArray[np.intp]
+
+PARTS: Final = 10  # [-] subdivisions of a step
+WORST: Final = 20  # [-] steps with the largest errors in their middle that are subdivided in any case
+CHUNK: Final = 4000  # [-] instants looked at at once
+ESTIMATE: Final = 0.1  # [-] taken off a step that is estimated from a much longer one
+NEARBY: Final = 1e-4  # [-] of a step: how far on both sides of an instant a change of speed is looked for
+AROUND: Final = (-NEARBY, 0.0, NEARBY)
+KINK: Final = 0.1  # [-] of what is allowed: a smaller error by a change of speed does not count
+ROTATIONS: Final = (3, 4, 5)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Tool:
+    """A tool that is to be somewhere relative to the part, or to the world.
+
+    Attributes:
+        relation: The task or the grasp.
+        at_rows: Position error in [m] and orientation error in [rad] at the rows, shape (N, 2).
+        allowed: Largest errors allowed between the rows.
+        place: Place of its task among those of the schedule; None for a grasp.
+        first: First row from which on it is judged.
+    """
+
+    relation: Relation
+    at_rows: Array
+    allowed: tuple[float, float]
+    place: int | None
+    first: int
+
+
+class BetweenLook:
+    """A program between its rows."""
+
+    def __init__(self, scene: Scene, schedule: Schedule, desired: DesiredMotion, q: Mapping[str, Array]) -> None:
+        """Take the program.
+
+        Args:
+            scene: The cell made computable.
+            schedule: The desired poses at the rows.
+            desired: The desired poses at any instant.
+            q: Positions by robot in [rad] or [m], shape (N, n) each.
+        """
+        self._scene, self._schedule, self._desired, self._q = scene, schedule, desired, q
+        stacked = np.concatenate([q[robot.name] for robot in scene.cell.robots], axis=1)
+        self._arms = LeverArms(scene, stacked)
+        self._moved = self._arms.steps(stacked)
+        self._jumped, self._share = _within_steps(desired.times, desired.jumps)
+
+    def errors_between(
+        self, accuracy: Sequence[TaskAccuracy], closures: Sequence[ClosureAccuracy]
+    ) -> tuple[list[BetweenRows], list[BetweenRows]]:
+        """Largest errors between the rows of every task and of every closure."""
+        tools = [*self._task_tools(accuracy), *self._closure_tools(closures)]
+        count = len(self._desired.times) - 1
+        middle, sag = self._middles(tools, count)
+        bounds = [self._bounds(tool, middle[:, place], sag[:, place]) for place, tool in enumerate(tools)]
+        chosen = np.zeros(count, dtype=bool)
+        chosen[self._jumped] = True
+        for place, tool in enumerate(tools):
+            judged = np.arange(count) >= tool.first
+            chosen |= judged & np.any(bounds[place] > tool.allowed, axis=1)
+            for kind in range(2):
+                chosen[np.argsort(-middle[:, place, kind] * judged, kind="stable")[:WORST]] = True
+        k, s = _subdivided(np.flatnonzero(chosen), self._jumped, self._share)
+        fine, (instants, corners) = self._errors(tools, k, s), self._corners(tools)
+        found = [
+            _Found(tool, middle[:, place], bounds[place], chosen, k, s, fine[:, place], instants, corners[:, place])
+            for place, tool in enumerate(tools)
+        ]
+        every = [self._worst(one, kind) for one in found for kind in range(2)]
+        step = min((error.longest_step for error in every if error.longest_step is not None), default=None)
+        if step is not None and _stops_at_once(tools, corners[instants > self._desired.times[-1] - INSTANT_ROOM]):
+            step = _fitting(step, float(self._desired.times[-1]))
+        every = [error if error.longest_step is None else replace(error, longest_step=step) for error in every]
+        results = [BetweenRows(position=a, orientation=b) for a, b in zip(every[::2], every[1::2], strict=True)]
+        return results[: len(accuracy)], results[len(accuracy) :]
+
+    def _task_tools(self, accuracy: Sequence[TaskAccuracy]) -> list[_Tool]:
+        times = self._schedule.times
+        return [
+            _Tool(
+                relation=scheduled.task,
+                at_rows=_lengths(errors),
+                allowed=scheduled.task.tolerance.between,
+                place=place,
+                first=scheduled.task.first_judged(times),
+            )
+            for place, (scheduled, errors) in enumerate(zip(self._schedule.tasks, accuracy, strict=True))
+        ]
+
+    def _closure_tools(self, closures: Sequence[ClosureAccuracy]) -> list[_Tool]:
+        checks = self._scene.cell.checks
+        allowed = checks.closure_position, checks.closure_orientation
+        return [
+            _Tool(relation=grasp, at_rows=_lengths(errors), allowed=allowed, place=None, first=0)
+            for grasp, errors in zip(self._scene.cell.closures, closures, strict=True)
+        ]
+
+    def _middles(self, tools: Sequence[_Tool], count: int) -> tuple[Array, Array]:
+        """Errors in the middle of each step, and sags of the desired tip and axes there, shape (count, tools, 2)."""
+        errors, sags = np.empty((count, len(tools), 2)), np.zeros((count, len(tools), 2))
+        for begin in range(0, count, CHUNK):
+            k = np.arange(begin, min(begin + CHUNK, count))
+            poses_desired = self._desired_poses(k, np.full(len(k), 0.5))
+            errors[k] = self._errors_of(tools, k, np.full(len(k), 0.5), poses_desired)
+            for place, tool in enumerate(tools):
+                if tool.place is not None:
+                    rows = self._schedule.tasks[tool.place].X_PT
+                    chord = 0.5 * (rows[k] + rows[k + 1])
+                    sags[k, place] = _sag(poses_desired[tool.place] - chord, tool.relation)
+        return errors, sags
+
+    def _errors(self, tools: Sequence[_Tool], k: Steps, s: Array) -> Array:
+        """Errors at shares s of steps k, shape (M, tools, 2)."""
+        errors = np.empty((len(k), len(tools), 2))
+        for begin in range(0, len(k), CHUNK):
+            part = slice(begin, begin + CHUNK)
+            errors[part] = self._errors_of(tools, k[part], s[part], self._desired_poses(k[part], s[part]))
+        return errors
+
+    def _desired_poses(self, k: Steps, s: Array) -> tuple[Array, ...]:
+        """Desired poses of all tasks at shares s of steps k, shape (M, 4, 4) each."""
+        times = self._desired.times
+        return self._desired.poses(times[k] + s * (times[k + 1] - times[k]))
+
+    def _errors_of(self, tools: Sequence[_Tool], k: Steps, s: Array, poses_desired: Sequence[Array]) -> Array:
+        """Errors of all tools against desired poses, shape (M, tools, 2)."""
+        cell, chains = self._scene.cell, self._scene.chains
+        q = {name: rows[k] + s[:, None] * (rows[k + 1] - rows[k]) for name, rows in self._q.items()}
+        X_WP = part_poses(cell, chains, q)
+        errors = np.empty((len(k), len(tools), 2))
+        for place, tool in enumerate(tools):
+            relation, X_WT = tool.relation, chains[tool.relation.robot].tool_poses(q[tool.relation.robot])
+            if isinstance(relation, Task):
+                X_PT, desired = seen_from_task(relation, X_WT, X_WP), poses_desired[tool.place or 0]
+            else:
+                X_PT = inverse(X_WP) @ X_WT
+                desired = np.broadcast_to(relation.X_PT, X_PT.shape)
+            error = errors_on_part(X_PT, desired, relation)
+            errors[:, place, 0] = np.linalg.norm(error[:, :3], axis=1)
+            errors[:, place, 1] = np.linalg.norm(error[:, 3:], axis=1)
+        return errors
+
+    def _bounds(self, tool: _Tool, middle: Array, sag: Array) -> Array:
+        """No error in a step is larger, in [m] and [rad], shape (N - 1, 2)."""
+        cell, relation = self._scene.cell, tool.relation
+        in_world = isinstance(relation, Task) and relation.relative_to is Frame.WORLD
+        holder = cell.part.held_by[0].robot if cell.part.held_by and not in_world else None
+        chain = self._arms.tool(relation.robot, seen_by=holder)
+        nearby = np.maximum(np.maximum(tool.at_rows[:-1], tool.at_rows[1:]), middle)
+        bound = np.empty_like(nearby)
+        bound[:, 0] = nearby[:, 0] + chain.bend(self._moved) / 32.0 + 0.5 * sag[:, 0]
+        chord = 2.0 * np.sin(0.5 * nearby[:, 1]) + chain.turn_bend(self._moved) / 32.0 + 0.5 * sag[:, 1]
+        bound[:, 1] = 2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord))
+        asked = sum(axis in relation.axes for axis in ROTATIONS)
+        if not asked:
+            bound[:, 1] = 0.0
+        elif asked < len(ROTATIONS) and not relation.is_spin_free:
+            bound[:, 1] = np.inf
+        return bound
+
+    def _corners(self, tools: Sequence[_Tool]) -> tuple[Array, Array]:
+        """Instants at which tools may change their speed at once, and the error of each tool there.
+
+        A change of speed by v at a share s of a step of length h makes an error of ``v h s (1 - s)``. Where the rows of
+        a shorter step would lie is not asked: the error is that of a corner in the middle of a step.
+
+        Returns:
+            Instants in [s], shape (J,), and errors with the present step in [m] and [rad], shape (J, tools, 2).
+        """
+        times, step = self._desired.times, self._schedule.step
+        instants = self._desired.jumps
+        instants = instants[(instants > times[0] + INSTANT_ROOM) & (instants <= times[-1])]
+        errors = np.zeros((len(instants), len(tools), 2))
+        around = [self._desired.poses(np.clip(instants + shift * step, times[0], times[-1])) for shift in AROUND]
+        for place, tool in enumerate(tools):
+            if tool.place is not None:
+                before, at, after = (poses[tool.place] for poses in around)
+                errors[:, place] = _sag(after - 2.0 * at + before, tool.relation) / (4.0 * NEARBY)
+        return instants, errors
+
+    def _worst(self, found: "_Found", kind: int) -> BetweenError:
+        """The largest error of one kind, what bounds it, and the step that would keep what is allowed."""
+        tool, allowed, times = found.tool, found.tool.allowed[kind], self._schedule.times
+        count = len(times) - 1
+        k = np.concatenate([np.arange(tool.first, count), found.k[found.k >= tool.first]])
+        s = np.concatenate([np.full(count - min(tool.first, count), 0.5), found.s[found.k >= tool.first]])
+        errors = np.concatenate([found.middle[tool.first :, kind], found.fine[found.k >= tool.first, kind]])
+        if not len(k):  # the last row alone is judged
+            return BetweenError(largest=0.0, at_s=float(times[-1]), bound=0.0)
+        worst = int(np.argmax(errors))
+        at_s = float(times[k[worst]] + s[worst] * (times[k[worst] + 1] - times[k[worst]]))
+        rows = np.maximum(tool.at_rows[k, kind], tool.at_rows[k + 1, kind])
+        is_plain = np.ones(count, dtype=bool)
+        is_plain[self._jumped] = False
+        judged = found.bounds[tool.first :, kind][is_plain[tool.first :]]
+        wide = bool(judged.size) and float(judged.max()) > allowed
+        known = found.bounds[tool.first :, kind][~found.chosen[tool.first :]]
+        return BetweenError(
+            largest=float(errors[worst]),
+            at_s=at_s,
+            bound=None if wide else max(float(errors[worst]), float(known.max(initial=0.0))),
+            longest_step=self._longest_step(found, kind, errors=errors, rows=rows, k=k),
+        )
+
+    def _longest_step(self, found: "_Found", kind: int, *, errors: Array, rows: Array, k: Steps) -> float | None:
+        """A step in [s] that keeps what is allowed, as all shorter ones do; None when the present one does.
+
+        Errors grow with the square of the step; near a corner they are taken to grow with the step itself.
+
+        Args:
+            found: The tool.
+            kind: 0 for its position, 1 for its orientation.
+            errors: Errors between the rows, shape (M,).
+            rows: Larger error of both rows of the step of each, shape (M,).
+            k: Their steps, shape (M,).
+        """
+        times, step, allowed = self._schedule.times, self._schedule.step, found.tool.allowed[kind]
+        if not np.any(errors > allowed) or np.any(rows >= allowed):
+            return None
+        corners = np.where(found.corners[:, kind] > KINK * allowed, found.corners[:, kind], 0.0)
+        corners[(found.instants < times[found.tool.first]) | (found.instants > times[-1] - INSTANT_ROOM)] = 0.0
+        share = min(1.0, (allowed - float(rows.max())) / max(float(corners.max(initial=0.0)), allowed))
+        near = np.searchsorted(times, found.instants[corners > 0.0])
+        over = errors > allowed
+        kept = (allowed - rows[over]) / (errors[over] - rows[over])
+        is_near = np.isin(k[over], np.concatenate([near - 1, near]))
+        share = min(share, float(np.where(is_near, kept, np.sqrt(kept)).min()))
+        return _shorter(step, share)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """What was found of one tool.
+
+    Attributes:
+        tool: The tool.
+        middle: Errors in the middle of all steps, shape (N - 1, 2).
+        bounds: No error in a step is larger, shape (N - 1, 2).
+        chosen: Steps that were looked at closely, shape (N - 1,).
+        k: Steps of the instants looked at, shape (M,).
+        s: Shares of these steps, shape (M,).
+        fine: Errors there, shape (M, 2).
+        instants: When the tool may change its speed at once, in [s], shape (J,).
+        corners: The largest error that each makes with a step of this length, shape (J, 2).
+    """
+
+    tool: _Tool
+    middle: Array
+    bounds: Array
+    chosen: NDArray[np.bool_]
+    k: Steps
+    s: Array
+    fine: Array
+    instants: Array
+    corners: Array
+
+
+def _lengths(errors: TaskAccuracy | ClosureAccuracy) -> Array:
+    """Lengths of position and orientation errors, shape (N, 2)."""
+    both = [np.linalg.norm(error, axis=1) for error in (errors.position_error, errors.orientation_error)]
+    return np.stack(both, axis=1)
+
+
+def _sag(off: Array, relation: Relation) -> Array:
+    """How far the desired tip and the desired axes are off their chords, shape (M, 2), from differences of poses."""
+    axes = [axis for axis in range(3) if axis in relation.axes]
+    turned = off[:, :3, 2:3] if relation.is_spin_free else off[:, :3, :3]
+    return np.stack([np.linalg.norm(off[:, axes, 3], axis=1), np.linalg.norm(turned, axis=(1, 2))], axis=1)
+
+
+def _within_steps(times: Array, instants: Array) -> tuple[Steps, Array]:
+    """Steps and shares of them for those instants that lie between two rows."""
+    k = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(times) - 2)
+    inside = (instants > times[k] + INSTANT_ROOM) & (instants < times[k + 1] - INSTANT_ROOM)
+    k, instants = k[inside], instants[inside]
+    return k, (instants - times[k]) / (times[k + 1] - times[k])
+
+
+def _subdivided(steps: Steps, jumped: Steps, share: Array) -> tuple[Steps, Array]:
+    """Steps and shares of them: nine inner ones of each, and those at which the motion of a tool is not smooth."""
+    inner = np.arange(1, PARTS) / PARTS
+    k = np.concatenate([np.repeat(steps, len(inner)), jumped])
+    return k, np.concatenate([np.tile(inner, len(steps)), share])
+
+
+def _stops_at_once(tools: Sequence[_Tool], corners: Array) -> bool:
+    """Whether tools end at a speed that would be an error to be seen, were the end no row; corners there, (J, T, 2)."""
+    return bool(np.any(corners > KINK * np.array([tool.allowed for tool in tools])))
+
+
+def _fitting(step: float, duration: float) -> float:
+    """The longest step in [s] of two digits, no longer than one of two digits, with which the last row is the end."""
+    digit = 10.0 ** (math.floor(math.log10(step)) - 1)
+    steps = (float(f"{count * digit:.2g}") for count in range(round(step / digit), 0, -1))
+    return next((one for one in steps if abs(duration - one * round(duration / one)) < INSTANT_ROOM), step)
+
+
+def _shorter(step: float, share: float) -> float:
+    """A share of a step in [s], with two digits; less by what an estimate from a much longer step may miss."""
+    shorter = step * share * (1.0 - ESTIMATE * (1.0 - share))
+    digit = 10.0 ** (math.floor(math.log10(shorter)) - 1)
+    return float(f"{math.floor(shorter / digit) * digit:.2g}")

@@ -1,0 +1,69 @@
+"""Closure: how far the tools of further holders stray from their grasps, by the positions that were read back."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.tools.tracking import errors_on_part, worst_error
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Cell
+from cellplan.model.report import Check, ClosureAccuracy
+
+CURE: Final = (
+    "a shorter motion.step_s or a slower motion keeps the grasps better, and so does a way round singularities"
+)
+
+
+def closure_accuracy(
+    cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Array], X_WP: Array
+) -> tuple[ClosureAccuracy, ...]:
+    """Closure errors of every holder but the first ([Ribeiro2010]_ 4.5), in P; open components are zero.
+
+    A rigid part cannot give way: what is an error here is force between the robots in the shop. Holders that stand
+    still are looked at as well.
+
+    Args:
+        cell: The cell.
+        chains: Kinematics of each robot.
+        q: Positions of each robot, shape (N, n).
+        X_WP: The part as the first holder carries it, shape (N, 4, 4) or (1, 4, 4).
+    """
+    found = []
+    for grasp in cell.closures:
+        X_PT = inverse(X_WP) @ chains[grasp.robot].tool_poses(q[grasp.robot])
+        error = errors_on_part(X_PT, np.broadcast_to(grasp.X_PT, X_PT.shape), grasp)
+        found.append(
+            ClosureAccuracy(
+                robot=grasp.robot, axes=grasp.axes, position_error=error[:, :3], orientation_error=error[:, 3:]
+            )
+        )
+    return tuple(found)
+
+
+def check_closure(cell: Cell, times: Array, closures: Sequence[ClosureAccuracy]) -> list[Check]:
+    """Position and orientation error of every closure against what the cell allows."""
+    checks = []
+    for closure in closures:
+        of = f"of '{closure.robot}' on the part"
+        checks += [
+            worst_error(
+                "closure_position_error",
+                times,
+                1e3 * np.linalg.norm(closure.position_error, axis=1),
+                subject=closure.robot,
+                limit=1e3 * cell.checks.closure_position,
+                words=("mm", of),
+            ),
+            worst_error(
+                "closure_orientation_error",
+                times,
+                np.degrees(np.linalg.norm(closure.orientation_error, axis=1)),
+                subject=closure.robot,
+                limit=float(np.degrees(cell.checks.closure_orientation)),
+                words=("deg", of),
+            ),
+        ]
+    return [check if check.passed else replace(check, message=f"{check.message}; {CURE}") for check in checks]

@@ -1,0 +1,147 @@
+"""Tool error on the part, from the joint positions that were read back."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Cell, Relation
+from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.report import Check, TaskAccuracy
+from cellplan.model.task import Frame, Task
+
+
+def part_poses(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> Array:
+    """The part frame in the world at every instant, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed place."""
+    if not cell.part.held_by:
+        if cell.part.X_WP is None:
+            raise ValueError("a part that nobody holds needs a pose in the world")
+        return cell.part.X_WP[None]
+    grasp = cell.part.held_by[0]
+    poses: Array = chains[grasp.robot].tool_poses(q[grasp.robot]) @ inverse(grasp.X_PT)
+    return poses
+
+
+def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP: Array) -> TaskAccuracy:
+    """Errors of one task in P, or in W for a task in the world; components that the task leaves open are zero.
+
+    Args:
+        scheduled: Wanted tool poses.
+        chain: The operator.
+        q: The operator's positions, shape (N, n).
+        X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
+    """
+    X_WT = chain.tool_poses(q)
+    return pose_accuracy(scheduled, seen_from_task(scheduled.task, X_WT, X_WP))
+
+
+def seen_from_task(task: Task, X_WT: Array, X_WP: Array) -> Array:
+    """Tool poses relative to what a task is given in: the part, or the world, shape (N, 4, 4)."""
+    return X_WT if task.relative_to is Frame.WORLD else inverse(X_WP) @ X_WT
+
+
+def pose_accuracy(scheduled: TaskSchedule, X_PT: Array) -> TaskAccuracy:
+    """Errors of one task in P, from its tool poses on the part, shape (N, 4, 4); open components are zero."""
+    task = scheduled.task
+    error = errors_on_part(X_PT, scheduled.X_PT, task)
+    return TaskAccuracy(
+        task=task.name,
+        robot=task.robot,
+        position_error=error[:, :3],
+        orientation_error=error[:, 3:],
+        path_length=scheduled.length,
+        end_s=scheduled.end,
+    )
+
+
+def errors_on_part(X_PT: Array, wanted: Array, relation: Relation) -> Array:
+    """Position errors in [m], then rotation vectors in [rad], wanted against actual, in P, shape (N, 6).
+
+    Args:
+        X_PT: Tool poses, shape (N, 4, 4).
+        wanted: Wanted ones, shape (N, 4, 4).
+        relation: The task or grasp; components that it leaves open are zero.
+    """
+    position = wanted[:, :3, 3] - X_PT[:, :3, 3]
+    if relation.is_spin_free:
+        orientation = _turn_between(X_PT[:, None, :3, 2], wanted[:, None, :3, 2])
+    else:
+        orientation = _turn_between(np.swapaxes(X_PT[:, :3, :3], 1, 2), np.swapaxes(wanted[:, :3, :3], 1, 2))
+    error = np.concatenate([position, orientation], axis=1)
+    error[:, [axis for axis in range(6) if axis not in relation.axes]] = 0.0
+    return error
+
+
+def check_accuracy(schedule: Schedule, accuracy: TaskAccuracy, task: Task) -> tuple[Check, Check]:
+    """Position and orientation error of one task against its tolerance, from the instant on that it has settled."""
+    position = np.linalg.norm(accuracy.position_error, axis=1)
+    orientation = np.linalg.norm(accuracy.orientation_error, axis=1)
+    first, allowed = task.first_judged(schedule.times), task.tolerance
+    checks = (
+        worst_error(
+            "position_error",
+            schedule.times[first:],
+            1e3 * position[first:],
+            subject=task.name,
+            limit=1e3 * allowed.position,
+            words=("mm", f"of task '{task.name}'"),
+        ),
+        worst_error(
+            "orientation_error",
+            schedule.times[first:],
+            np.degrees(orientation[first:]),
+            subject=task.name,
+            limit=float(np.degrees(allowed.orientation)),
+            words=("deg", f"of task '{task.name}'"),
+        ),
+    )
+    since = f", judged from {task.judged_from:g} s" if task.settle > 0.0 else ""
+    position_check, orientation_check = (replace(check, message=f"{check.message}{since}") for check in checks)
+    return position_check, orientation_check
+
+
+def worst_error(name: str, times: Array, error: Array, *, subject: str, limit: float, words: tuple[str, str]) -> Check:
+    """The worst instant of one error against its limit.
+
+    Args:
+        name: What is checked.
+        times: Instants in [s] at which it is judged, shape (N,).
+        error: Lengths of the error in the unit of the limit, shape (N,).
+        subject: Task or robot that is looked at.
+        limit: What is allowed.
+        words: Unit, and whose error it is.
+    """
+    worst = int(np.argmax(error))
+    value, at_s = float(error[worst]), float(times[worst])
+    unit, of = words
+    return Check(
+        name=name,
+        subject=subject,
+        passed=value <= limit,
+        value=value,
+        limit=limit,
+        unit=unit,
+        at_s=at_s,
+        message=f"{name.replace('_', ' ')} {of}: {value:.3g} {unit} at {at_s:.3f} s, allowed {limit:g} {unit}",
+    )
+
+
+def _turn_between(axes: Array, wanted: Array) -> Array:
+    """Rotation vectors in P that lay unit axes on the wanted ones, shape (N, k, 3) each to (N, 3).
+
+    The direction is that of ``sum a_i x d_i``; the angle follows from the chord ``sum |d_i - a_i|^2``, which loses no
+    digits at the small angles that matter: three axes turn by ``4 (1 - cos) = 8 sin^2(angle / 2)``, a single one by
+    ``2 (1 - cos)``.
+    """
+    across = np.cross(axes, wanted).sum(axis=1)
+    chord = ((wanted - axes) ** 2).sum(axis=(1, 2))
+    per_half_sine = 8.0 if axes.shape[1] == 3 else 4.0
+    angle = 2.0 * np.arcsin(np.minimum(1.0, np.sqrt(chord / per_half_sine)))
+    length = np.linalg.norm(across, axis=1)
+    safe = np.where(length > 0.0, length, 1.0)
+    turn: Array = across * np.where(length > 0.0, angle / safe, 0.0)[:, None]
+    undirected = (length == 0.0) & (angle > 0.0)
+    turn[undirected, 0] = angle[undirected]
+    return turn

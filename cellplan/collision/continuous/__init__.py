@@ -1,0 +1,1 @@
+"""Continuous collision: bounds on the distance of two bodies while they move."""

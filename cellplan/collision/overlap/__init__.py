@@ -1,0 +1,1 @@
+"""Overlap of solids: containment, depth, zones in which contact is meant."""

@@ -1,0 +1,35 @@
+"""Whether one body lies wholly inside another without touching its surface; the engine would call that free."""
+
+import numpy as np
+
+from cellplan.collision.bodies import BodyPoses, CollisionBody
+from cellplan.collision.engine import Engine
+from cellplan.geometry.mesh.topology import winding_numbers
+from cellplan.geometry.shapes import Mesh
+from cellplan.geometry.transforms import Array
+
+
+def is_inside(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int) -> bool:
+    """Say whether a piece of one body lies inside the mesh of the other at a sample, either way round."""
+    for inner, outer in (pair, pair[::-1]):
+        host, guest = engine.bodies[outer], engine.bodies[inner]
+        if not _has_inside(host):
+            continue
+        in_world = guest.witnesses @ poses.R[inner, sample].T + poses.p[inner, sample]
+        if _any_within(host, (in_world - poses.p[outer, sample]) @ poses.R[outer, sample]):
+            return True
+    return False
+
+
+def _has_inside(body: CollisionBody) -> bool:
+    """Whether the engine knows only the surface of a body that encloses a volume."""
+    return isinstance(body.shape, Mesh) and (body.shape.is_closed or body.shape.is_leaky)
+
+
+def _any_within(host: CollisionBody, points: Array) -> bool:
+    """Say whether any of some points, shape (C, 3) in the host's frame, is wound round by its surface, either way."""
+    mesh = host.core
+    near = np.linalg.norm(points - host.centre, axis=1) <= host.radius
+    if not np.any(near):
+        return False
+    return bool(np.any(np.abs(winding_numbers(mesh.vertices[mesh.faces], points[near])) > 0.5))

@@ -1,0 +1,25 @@
+"""Which of many pairs of bodies touches first in a single posture."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.collision.bodies import BodyPoses
+from cellplan.collision.distance import SURELY_APART, look
+from cellplan.collision.engine import Engine
+from cellplan.collision.overlap.containment import is_inside
+
+PairIndices = NDArray[np.intp]
+Flags = NDArray[np.bool_]
+
+
+def first_touching(engine: Engine, pairs: PairIndices, poses: BodyPoses, *, sample: int) -> int | None:
+    """Place of the first of the pairs, shape (P, 2), that touches at one sample, or None."""
+    centres = engine.sphere_centres(poses, sample=sample)
+    apart = centres[pairs[:, 0]] - centres[pairs[:, 1]]
+    reach = engine.radii[pairs[:, 0]] + engine.radii[pairs[:, 1]]
+    for place in np.flatnonzero(np.einsum("ij,ij->i", apart, apart) <= (reach + SURELY_APART) ** 2):
+        pair = (int(pairs[place, 0]), int(pairs[place, 1]))
+        reading = look(engine, pair, poses, sample=sample)
+        if reading.touches or (reading.bound <= SURELY_APART and is_inside(engine, pair, poses, sample=sample)):
+            return int(place)
+    return None

@@ -1,0 +1,1 @@
+"""Curves: splines, arc length, patches of surfaces, orientations along a curve."""

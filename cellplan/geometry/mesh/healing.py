@@ -1,0 +1,127 @@
+"""What of a surface can be put right without moving it: triangles that face opposite ways, shells turned inside out."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.errors import InputError
+from cellplan.geometry.mesh.counts import Indices, components, count_edges, face_volumes, shells, winding_numbers
+from cellplan.geometry.transforms import Array
+
+MAX_PIECES: Final = 5000  # [-] an assembly with its screws has some hundreds
+PROBES: Final = 64  # [-] vertices of a shell that are asked whether they lie inside the others
+
+
+def require_few_pieces(faces: Indices, *, source: str) -> None:
+    """Refuse a heap of loose triangles: each piece would have to be asked for itself what it lies inside of.
+
+    Raises:
+        InputError: There are more than 5000 connected pieces.
+    """
+    pieces = len(np.unique(shells(faces, int(faces.max(initial=-1)) + 1)[faces[:, 0]]))
+    if pieces > MAX_PIECES:
+        raise InputError(
+            f"{source}: expected a surface of at most {MAX_PIECES} pieces that hang together, got {pieces}: "
+            "join its triangles at common vertices"
+        )
+
+
+def encloses(faces: Indices) -> bool:
+    """Whether a surface has an inside: it is closed, or it is made of closed surfaces that share edges.
+
+    Through each edge the triangles must run as often one way as the other: then the winding number of every point is
+    a whole number. Triangles that are there twice, once in each direction, enclose nothing.
+    """
+    edges = count_edges(faces)
+    if edges.is_closed:
+        return len(faces) > 0
+    return edges.unbalanced == 0 and not count_edges(rest := _without_twins(faces)).open and len(rest) > 0
+
+
+def without_repeats(faces: Indices) -> Indices:
+    """The triangles in their order, each once: one that is there twice, facing the same way, adds nothing."""
+    keys = np.column_stack([np.sort(faces, axis=1), _parity(faces)])
+    _, first = np.unique(keys, axis=0, return_index=True)
+    return faces[np.sort(first)]
+
+
+def oriented_alike(faces: Indices) -> Indices:
+    """The triangles, some of them turned over, so that neighbours face the same way as far as that is possible.
+
+    Every triangle stands for two nodes of a graph, as it is and turned over. Nodes are joined across each edge of
+    exactly two triangles where they face the same way. A patch on which a triangle is joined to itself turned over
+    has one side only and is left as it is.
+    """
+    if count_edges(faces).turned == 0:
+        return faces
+    count = len(faces)
+    first, second, is_turned = _neighbours(faces)
+    same, other = np.where(is_turned, second + count, second), np.where(is_turned, second, second + count)
+    label = components(2 * count, np.concatenate([np.stack([first, same], 1), np.stack([first + count, other], 1)]))
+    is_flipped = label[:count] > label[count:]
+    return np.where(is_flipped[:, None], faces[:, ::-1], faces)
+
+
+def turn_outward(vertices: Array, faces: Indices, *, source: str) -> Indices:
+    """Flip the whole if it faces inward, then each shell that does and stands alone: the walls of a cavity stay.
+
+    Raises:
+        InputError: There are more shells than can be looked at.
+    """
+    require_few_pieces(faces, source=source)
+    if face_volumes(vertices, faces).sum() < 0.0:
+        faces = faces[:, ::-1]
+    names, label = np.unique(shells(faces, len(vertices))[faces[:, 0]], return_inverse=True)
+    inward = np.flatnonzero(np.bincount(label, weights=face_volumes(vertices, faces)) < 0.0)
+    low, high = _boxes(vertices, faces, label, count=len(names))
+    turned = faces.copy()
+    for shell in inward:
+        is_own = label == shell
+        holders = np.all(low <= low[shell], axis=1) & np.all(high >= high[shell], axis=1)
+        holders[shell] = False
+        around = vertices[faces[holders[label]]]
+        if not len(around) or not _all_within(around, vertices[np.unique(faces[is_own])]):
+            turned[is_own] = faces[is_own][:, ::-1]
+    return turned
+
+
+def _all_within(around: Array, points: Array) -> bool:
+    """Whether a surface, triangles of shape (M, 3, 3), winds round all of some points, as far as a few of them tell."""
+    step = max(1, len(points) // PROBES)
+    return all(winding_numbers(around, points[k : k + 1])[0] >= 0.5 for k in range(0, len(points), step))
+
+
+def _boxes(vertices: Array, faces: Indices, label: Indices, *, count: int) -> tuple[Array, Array]:
+    """Lowest and highest coordinates of each shell, shape (count, 3)."""
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, label, vertices[faces].min(axis=1))
+    np.maximum.at(high, label, vertices[faces].max(axis=1))
+    return low, high
+
+
+def _neighbours(faces: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]]:
+    """Both triangles of each edge that has exactly two, and whether they run through it in the same direction."""
+    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    keys = np.minimum(a, b) * (int(faces.max(initial=0)) + 1) + np.maximum(a, b)
+    order = np.argsort(keys, kind="stable")
+    _, start, size = np.unique(keys[order], return_index=True, return_counts=True)
+    left = order[start[size == 2]]
+    right = order[start[size == 2] + 1]
+    return left // 3, right // 3, (a < b)[left] == (a < b)[right]
+
+
+def _without_twins(faces: Indices) -> Indices:
+    """The triangles without those pairs that have the same corners and face opposite ways."""
+    keys, group = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
+    balance = np.bincount(group.ravel(), weights=_parity(faces), minlength=len(keys))
+    kept = np.repeat(keys, np.abs(balance).astype(np.int64), axis=0)
+    sign = np.repeat(balance > 0.0, np.abs(balance).astype(np.int64))
+    return np.where(sign[:, None], kept, kept[:, ::-1])
+
+
+def _parity(faces: Indices) -> Indices:
+    """1 for triangles whose corners stand in an even order, -1 for an odd one: which way they face, shape (M,)."""
+    a, b, c = faces.T
+    parity: Indices = np.sign(b - a) * np.sign(c - b) * np.sign(c - a)
+    return parity

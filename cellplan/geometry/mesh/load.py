@@ -1,0 +1,208 @@
+"""Meshes: read from files, checked to be sound, and asked where a ray meets them and what lies inside."""
+
+import stat
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cellplan.cache import key_of
+from cellplan.errors import InputError
+from cellplan.geometry.mesh.cache import keep_mesh, recall_mesh
+from cellplan.geometry.mesh.healing import require_few_pieces
+from cellplan.geometry.mesh.rays import RayHits, ray_hits
+from cellplan.geometry.mesh.stl_obj import FORMATS, parse_mesh, require_likely_count
+from cellplan.geometry.mesh.tessellation import tessellate
+from cellplan.geometry.mesh.topology import components, count_edges, make_mesh, mesh_volume, winding_numbers
+from cellplan.geometry.shapes import Mesh
+from cellplan.geometry.transforms import Array
+
+__all__ = [
+    "FORMATS",
+    "RayHits",
+    "contains",
+    "corner_normals",
+    "is_flat",
+    "make_mesh",
+    "mesh_volume",
+    "open_edges",
+    "ray_hits",
+    "read_mesh",
+    "require_enclosing",
+    "require_solid",
+    "tessellate",
+]
+
+MAX_BYTES: Final = 100_000_000
+MIN_EXTENT: Final = 1e-3  # [m] smaller things in a robot cell are slips of the unit
+MAX_EXTENT: Final = 20.0  # [m] larger ones as well
+FLAT_SHARE: Final = 1e-6  # [-] of the extent: thinner than this is a sheet without inside
+CREASE: Final = np.radians(30.0)  # [rad] sharper edges stay edges when normals are smoothed
+
+
+def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
+    """Read an STL, OBJ or PLY file and check that nothing of it got lost.
+
+    What was read once is found again by the bytes of the file, as long as they and the reading code are the same.
+
+    Args:
+        path: The file; its suffix tells the format.
+        scale: Metres per unit of the file, one number or one for each axis; negative ones mirror.
+
+    Returns:
+        The mesh in [m]: equal vertices welded, triangles without area dropped, outward facing when it is closed.
+
+    Raises:
+        InputError: The file cannot be read, is damaged, too large, not finite or of an unlikely size.
+    """
+    data = _read_bytes(path)
+    key = key_of("mesh", data, path.suffix.lower().encode(), np.asarray(scale, dtype=float).tobytes())
+    kept = recall_mesh(key, source=path.name)
+    if kept is not None:
+        return kept
+    mesh = _checked_mesh(data, path.name, scale=scale)
+    keep_mesh(key, mesh)
+    return mesh
+
+
+def _checked_mesh(data: bytes, name: str, *, scale: float | ArrayLike) -> Mesh:
+    """Mesh in [m] from the bytes of a file."""
+    vertices, faces = parse_mesh(data, name)
+    require_likely_count(len(faces), name)
+    if not np.all(np.isfinite(vertices)):
+        raise InputError(f"{name}: expected finite coordinates, got {int(np.sum(~np.isfinite(vertices)))} others")
+    factors = np.broadcast_to(np.asarray(scale, dtype=float), (3,))
+    if not np.all(np.isfinite(factors)) or np.any(factors == 0.0):
+        raise InputError(f"{name}: expected scale factors that are finite and not zero, got {factors.tolist()}")
+    with np.errstate(over="ignore"):
+        vertices = vertices * factors
+    _require_likely_size(vertices[np.unique(faces)], name)
+    outward = faces if np.prod(np.sign(factors)) > 0.0 else faces[:, ::-1]
+    mesh = make_mesh(vertices, outward, source=name)
+    require_few_pieces(mesh.faces, source=name)
+    return mesh
+
+
+def require_solid(mesh: Mesh) -> None:
+    """Refuse a mesh that does not enclose a volume.
+
+    Raises:
+        InputError: The surface is open or encloses nothing.
+    """
+    if not mesh.is_closed or count_edges(mesh.faces).crowded:
+        raise InputError(f"{_not_closed(mesh)}: repair the mesh")
+    if is_flat(mesh) or mesh_volume(mesh) <= 0.0:
+        raise InputError(f"{mesh.source}: expected a solid, got a surface that encloses no volume")
+
+
+def require_enclosing(mesh: Mesh) -> None:
+    """Refuse a mesh without a defined inside.
+
+    Raises:
+        InputError: The surface is open.
+    """
+    if not mesh.is_closed:
+        raise InputError(f"{_not_closed(mesh)}: repair the mesh, or say open: true, and nothing counts as inside it")
+
+
+def open_edges(mesh: Mesh) -> int:
+    """Edges at which a surface does not go on as that of a solid does."""
+    edges = count_edges(mesh.faces)
+    return edges.open + edges.crowded + edges.turned
+
+
+def is_flat(mesh: Mesh) -> bool:
+    """Whether all vertices lie in one plane, up to a millionth of the extent."""
+    centred = mesh.vertices - mesh.vertices.mean(axis=0)
+    spread = np.linalg.eigvalsh(centred.T @ centred)
+    return bool(spread[0] <= FLAT_SHARE**2 * spread[2])
+
+
+def corner_normals(mesh: Mesh, crease: float = CREASE) -> Array:
+    """Unit outward normal at each corner of each triangle, shape (M, 3, 3).
+
+    Neighbours that meet at less than ``crease`` in [rad] share their normals at the common vertices, weighted by the
+    angle of each triangle there; sharper edges stay sharp.
+    """
+    corner = mesh.vertices[mesh.faces]
+    ahead = np.roll(corner, -1, axis=1) - corner
+    behind = np.roll(corner, 1, axis=1) - corner
+    normals = np.cross(ahead[:, 0], behind[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    angles = np.arctan2(np.linalg.norm(np.cross(ahead, behind), axis=2), np.sum(ahead * behind, axis=2))
+    group = components(mesh.faces.size, _smooth_corners(mesh.faces, normals, crease=crease))
+    summed = np.zeros((mesh.faces.size, 3))
+    np.add.at(summed, group, (angles[..., None] * normals[:, None, :]).reshape(-1, 3))
+    length = np.linalg.norm(summed, axis=1, keepdims=True)
+    flat = np.repeat(normals, 3, axis=0)
+    shared = length[group] > FLAT_SHARE  # the normals round a spike can cancel: there the triangle's own one stands
+    smooth: Array = np.where(shared, summed[group] / np.where(shared, length[group], 1.0), flat)
+    return smooth.reshape(-1, 3, 3)
+
+
+def contains(mesh: Mesh, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Say which points, shape (N, 3), lie inside the mesh: those its surface winds round, shape (N,).
+
+    A few open edges do no harm. Points on the surface itself may be told either way.
+    """
+    inside = winding_numbers(mesh.vertices[mesh.faces], points) > 0.5
+    return np.asarray(inside, dtype=np.bool_)
+
+
+def _not_closed(mesh: Mesh) -> str:
+    """What is wrong with a surface that is not that of one solid."""
+    edges = count_edges(mesh.faces)
+    return (
+        f"{mesh.source}: expected a closed surface, got {edges.open} open edges, {edges.crowded} edges of more "
+        f"than two triangles and {edges.turned} edges whose triangles face opposite ways"
+    )
+
+
+def _read_bytes(path: Path) -> bytes:
+    """Bytes of a regular file of acceptable size."""
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(f"{path.name}: expected a regular file")
+        if status.st_size > MAX_BYTES:
+            raise InputError(
+                f"{path.name}: expected at most {MAX_BYTES // 10**6} MB, got {status.st_size / 1e6:.0f} MB"
+            )
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path.name}: the mesh file cannot be read: {reason.lower()}") from None
+
+
+def _require_likely_size(vertices: Array, name: str) -> None:
+    """Refuse meshes that are too small or too large for a robot cell, with a hint at the unit."""
+    extent = float(np.ptp(vertices, axis=0).max())
+    if not extent <= MAX_EXTENT:
+        raise InputError(f"{name}: expected an extent of at most {MAX_EXTENT:g} m, got {extent:.6g} m: is the unit mm?")
+    if extent < MIN_EXTENT:
+        raise InputError(f"{name}: expected an extent of at least 1 mm, got {extent:.6g} m: is the unit m or inch?")
+    if not float(np.abs(vertices).max()) <= MAX_EXTENT:
+        far = float(np.abs(vertices).max())
+        raise InputError(f"{name}: expected a mesh within {MAX_EXTENT:g} m of its origin, got a vertex at {far:.6g} m")
+
+
+def _smooth_corners(faces: np.ndarray, normals: Array, *, crease: float) -> np.ndarray:
+    """Pairs of corners, numbered ``3 face + place``, that meet at a vertex across an edge that is no crease."""
+    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    corner = np.arange(faces.size)
+    after = 3 * (corner // 3) + (corner + 1) % 3
+    low_corner, high_corner = np.where(a < b, corner, after), np.where(a < b, after, corner)
+    order = np.lexsort((high, low))
+    first, second = order[:-1], order[1:]
+    joined = (low[first] == low[second]) & (high[first] == high[second])
+    cosine = np.sum(normals[first // 3] * normals[second // 3], axis=1)
+    smooth = joined & (cosine > np.cos(crease))
+    first, second = first[smooth], second[smooth]
+    return np.concatenate(
+        [
+            np.stack([low_corner[first], low_corner[second]], axis=1),
+            np.stack([high_corner[first], high_corner[second]], axis=1),
+        ]
+    )

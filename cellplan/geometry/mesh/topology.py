@@ -1,0 +1,121 @@
+"""Triangle meshes as surfaces: made of loose triangles by welding, with lost area accounted for and outside outside."""
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.errors import InputError
+from cellplan.geometry.mesh.counts import (
+    EdgeCount,
+    Indices,
+    components,
+    count_edges,
+    face_volumes,
+    winding_numbers,
+)
+from cellplan.geometry.mesh.healing import encloses, oriented_alike, turn_outward, without_repeats
+from cellplan.geometry.shapes import Mesh
+from cellplan.geometry.transforms import Array
+
+__all__ = ["EdgeCount", "components", "count_edges", "make_mesh", "mesh_volume", "winding_numbers"]
+
+FaceArray = np.ndarray[tuple[int, int], np.dtype[np.int64]]
+
+WELD_SHARE: Final = 1e-7  # [-] of the extent: vertices written in single precision differ by no more than this
+GRID_SHIFTS: Final = (0.0, 0.5, 0.25)  # [-] of a cell of the grid that vertices are rounded to
+AREA_SHARE: Final = 1e-12  # [-] of the longest side squared: thinner triangles have no usable normal
+LOST_SHARE: Final = 0.5  # [-] of the triangles that may be without area before the mesh counts as damaged
+
+
+def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
+    """Mesh from loose triangles: equal vertices welded, triangles without area dropped, outside made outside.
+
+    Triangles that are there twice are taken once, and those that face the other way than their neighbours turned over;
+    nothing is moved or filled in.
+
+    Args:
+        vertices: Corner points in [m], finite, shape (V, 3).
+        faces: Corner indices, in range, shape (M, 3).
+        source: File name for messages.
+
+    Raises:
+        InputError: More than half of the triangles have no area; a closed surface is in thousands of pieces.
+    """
+    welded, corners = _weld(vertices, faces)
+    whole = corners[_has_three_corners(corners)]
+    if count_edges(whole).crowded:
+        whole = without_repeats(whole)
+    whole = oriented_alike(whole)
+    is_closed = encloses(whole)
+    kept = whole[_has_area(welded, whole)]
+    flat = len(faces) - int(np.sum(_has_three_corners(corners))) + len(whole) - len(kept)
+    _account_for(flat, total=len(faces), source=source)
+    if is_closed:
+        kept = turn_outward(welded, kept, source=source)
+    used, compact = np.unique(kept, return_inverse=True)
+    return Mesh(vertices=welded[used], faces=_as_faces(compact), source=source, is_closed=is_closed)
+
+
+def mesh_volume(mesh: Mesh) -> float:
+    """Enclosed volume in [m³] by the divergence theorem; positive when the triangles face outward.
+
+    An open mesh encloses nothing: the figure then only tells how its triangles lean.
+    """
+    return _volume(mesh.vertices, mesh.faces)
+
+
+def _weld(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
+    """Merge equal vertices; where that leaves open edges, those that differ by rounding to single precision."""
+    points, corners = _merge(vertices + 0.0, faces, key=vertices + 0.0)  # + 0.0 makes -0 and 0 equal
+    if not count_edges(corners[_has_three_corners(corners)]).open:
+        return points, corners
+    grid = WELD_SHARE * float(np.ptp(points, axis=0).max())
+    for shift in GRID_SHIFTS:  # two vertices that one grid tells apart lie in one cell of another
+        near, joined = _merge(points, corners, key=np.round(points / grid + shift))
+        if len(near) == len(points):
+            break  # no two vertices are that near: the file is not one that rounds
+        if not count_edges(joined[_has_three_corners(joined)]).open:
+            return near, joined
+    return points, corners
+
+
+def _merge(vertices: Array, faces: Indices, *, key: Array) -> tuple[Array, Indices]:
+    """One vertex for each distinct key, shape (V, 3)."""
+    order = np.lexsort((key[:, 2], key[:, 1], key[:, 0]))
+    is_new = np.ones(len(order), dtype=bool)
+    is_new[1:] = np.any(np.diff(key[order], axis=0) != 0.0, axis=1)
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.cumsum(is_new) - 1
+    return vertices[order[is_new]], place[faces]
+
+
+def _has_three_corners(faces: Indices) -> NDArray[np.bool_]:
+    """Which triangles still have three different corners."""
+    distinct: NDArray[np.bool_] = np.all(faces != np.roll(faces, -1, axis=1), axis=1)
+    return distinct
+
+
+def _has_area(vertices: Array, faces: Indices) -> NDArray[np.bool_]:
+    """Which triangles have an area, against their longest side."""
+    corner = vertices[faces]
+    double_area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    longest = np.sum((corner - np.roll(corner, -1, axis=1)) ** 2, axis=2).max(axis=1, initial=0.0)
+    large: NDArray[np.bool_] = double_area > AREA_SHARE * longest
+    return large
+
+
+def _account_for(lost: int, *, total: int, source: str) -> None:
+    """A few triangles without area are usual; many mean that the file is damaged."""
+    if lost > LOST_SHARE * total:
+        raise InputError(f"{source}: expected triangles with an area, got {lost} of {total} without: is it damaged?")
+
+
+def _volume(vertices: Array, faces: Indices) -> float:
+    """Signed volume in [m³]."""
+    return float(face_volumes(vertices, faces).sum())
+
+
+def _as_faces(indices: NDArray[Any]) -> FaceArray:
+    """Index array in the form that meshes keep."""
+    return np.ascontiguousarray(indices, dtype=np.int64).reshape(-1, 3)

@@ -1,0 +1,65 @@
+"""The parent's side of the guard: one child process for all jobs, started at the first, replaced after a crash."""
+
+import atexit
+import contextlib
+import os
+import threading
+from collections.abc import Callable
+from typing import TypeVar
+
+from cellplan.errors import CellplanError, OverrunError
+from cellplan.guard.worker import Job
+from cellplan.guard.worker_process import ChildProcess, Guard
+
+Value = TypeVar("Value")
+
+
+def in_child(function: Callable[..., Value], *arguments: object, guard: Guard) -> Value:
+    """Result of ``function(*arguments)``, worked out in the child process.
+
+    Args:
+        function: A function of a module; the child imports it from there.
+        *arguments: Plain data.
+        guard: Names for messages, and limits.
+
+    Raises:
+        OverrunError: The work crashed, or took too long or too much memory.
+        CellplanError: What the function itself raises; other exceptions are told as internal errors.
+    """
+    with _lock:
+        answer = _child().ask(_job(function, arguments, guard), guard)
+    if answer.error is not None:
+        raise answer.error
+    if answer.is_out_of_memory:
+        raise OverrunError(f"{guard.file}: {guard.worker} needed more than {guard.megabytes} MB")
+    if answer.surprise is not None:
+        raise CellplanError(f"{guard.file}: {guard.worker} failed: {answer.surprise}")
+    value: Value = answer.value
+    return value
+
+
+def _job(function: Callable[..., object], arguments: tuple[object, ...], guard: Guard) -> Job:
+    """A job for the child, in the folder where this process stands."""
+    folder = None
+    with contextlib.suppress(OSError):  # it may have been removed
+        folder = os.getcwd()  # noqa: PTH109 - a text crosses
+    return Job(function, arguments, folder, guard.seconds, guard.megabytes)
+
+
+_lock = threading.Lock()
+_running: list[ChildProcess] = []
+
+
+def _child() -> ChildProcess:
+    """The running child; a new one when there is none."""
+    if not _running or not _running[0].is_usable:
+        _end_child()
+        _running.append(ChildProcess())
+    return _running[0]
+
+
+@atexit.register
+def _end_child() -> None:
+    """End the child, if there is one."""
+    while _running:
+        _running.pop().end()

@@ -1,0 +1,122 @@
+"""A child process that does one job after the other, and the pipes to it."""
+
+import contextlib
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+from dataclasses import dataclass
+from typing import Final
+
+from cellplan.errors import OverrunError
+from cellplan.guard.worker import Answer, Job
+
+# The child begins without the folder it stands in, or a file called pickle.py there would be run.
+OPENING: Final = (
+    "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer); from cellplan.guard.worker import serve; serve()"
+)
+ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # each more takes address space
+PATIENCE_S: Final = 0.5  # [s] an idle process ends at once when its pipe is closed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guard:
+    """Whose work is guarded, and how much it may take.
+
+    Attributes:
+        file: The file at fault when it goes wrong, as messages name it.
+        worker: Who works, as messages name it, as in "the mesh reader".
+        seconds: Longest time, of the clock and of the processor.
+        megabytes: Largest address space of the child, what Python and its libraries take included.
+    """
+
+    file: str
+    worker: str
+    seconds: float = 60.0
+    megabytes: int = 1500
+
+
+class ChildProcess:
+    """The process and the pipes to it."""
+
+    def __init__(self) -> None:
+        """Start the process."""
+        self.owner = os.getpid()
+        self._process = subprocess.Popen(  # noqa: S603 - our own interpreter
+            [sys.executable, "-I", "-c", OPENING],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, **dict.fromkeys(ONE_THREAD, "1")},
+        )
+        self._has_path = False
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the process runs and belongs to this one; a fork has pipes that are not its own."""
+        return self.owner == os.getpid() and self._process.poll() is None
+
+    def ask(self, job: Job, guard: Guard) -> Answer:
+        """Answer to a job; the process is ended when there is none, and after an interruption."""
+        late = threading.Event()
+        clock = threading.Timer(guard.seconds, self._end_late, [late])
+        clock.start()
+        try:
+            return self._exchange(job)
+        except (OSError, EOFError, pickle.UnpicklingError):
+            self.end()
+            raise self._overrun(guard, is_late=late.is_set()) from None
+        except BaseException:
+            self.end()
+            raise
+        finally:
+            clock.cancel()
+
+    def kill(self) -> None:
+        """End the process in the middle of a job; whoever waits for its answer is told that it crashed."""
+        if self.owner == os.getpid():
+            self._process.kill()
+
+    def end(self) -> None:
+        """End the process and its pipes."""
+        if self.owner != os.getpid():
+            return
+        for pipe in (self._process.stdin, self._process.stdout):
+            with contextlib.suppress(OSError):
+                if pipe is not None:
+                    pipe.close()
+        try:
+            self._process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _exchange(self, job: Job) -> Answer:
+        """Send a job and wait for its answer."""
+        if self._process.stdin is None or self._process.stdout is None:
+            raise EOFError
+        if not self._has_path:
+            pickle.dump(sys.path, self._process.stdin)
+            self._has_path = True
+        pickle.dump(job, self._process.stdin)
+        self._process.stdin.flush()
+        answer: Answer = pickle.load(self._process.stdout)  # noqa: S301 - our own child's words
+        return answer
+
+    def _end_late(self, late: threading.Event) -> None:
+        """End a process that takes too long."""
+        late.set()
+        self._process.kill()
+
+    def _overrun(self, guard: Guard, *, is_late: bool) -> OverrunError:
+        """What to say of a process that ended without an answer."""
+        status = self._process.returncode
+        if is_late or status == -getattr(signal, "SIGXCPU", 0):
+            return OverrunError(f"{guard.file}: {guard.worker} took longer than {guard.seconds:g} s")
+        try:
+            how = signal.Signals(-(status or 0)).name
+        except ValueError:
+            how = f"exit status {status}"
+        return OverrunError(f"{guard.file}: {guard.worker} crashed ({how})")

@@ -1,0 +1,1 @@
+"""Cell files: read, checked, converted to the model and written."""

@@ -1,0 +1,330 @@
+"""Entries of a cell file, in millimetres and degrees, become the cell's frozen data in metres and radians."""
+
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.io.cell.build_accelerations import acceleration_rule, controller_cycle
+from cellplan.io.cell.build_mounting import build_attachments, build_pedestal, floor_height_mm
+from cellplan.io.cell.rules import needs_surface
+from cellplan.io.robots.rules import home_configuration, start_posture
+from cellplan.io.schema import CellDocument
+from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry
+from cellplan.io.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
+from cellplan.io.schema.robot import ToolEntry
+from cellplan.io.schema.shapes import ObstacleEntry
+from cellplan.io.schema.task import (
+    BlendEntry,
+    PathEntry,
+    PolylineEntry,
+    TaskEntry,
+    ToleranceEntry,
+    TrapezoidEntry,
+)
+from cellplan.io.shapes import MM, MeshReader, centred_solid, obstacle_shape, pose_from_entry, tool_solid
+from cellplan.model.cell import (
+    CheckSettings,
+    Exclusion,
+    Grasp,
+    LockedJoint,
+    Mode,
+    MotionSettings,
+    Obstacle,
+    Part,
+    Robot,
+    Tool,
+)
+from cellplan.model.robot import BASE, Body, RobotModel
+from cellplan.model.task import (
+    CirclePath,
+    Frame,
+    PathSpec,
+    PlaneName,
+    PolygonPath,
+    RunDirection,
+    SampledPath,
+    SpacePolylinePath,
+    StraightMove,
+    Task,
+    TimedPath,
+    TimeLaw,
+    TimeLawKind,
+    Tolerance,
+)
+
+COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
+PLANE_NORMAL: Final = {"xy": "z", "yz": "x", "xz": "y"}
+
+TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> its file, read
+
+
+def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh: MeshReader) -> Robot:
+    """A robot placed in the cell, with the cell's settings where it has none of its own.
+
+    The home of a robot that has nothing to do in the cell, and of which nothing but the start is given, is its start.
+    """
+    entry = document.robots[name]
+    weights = np.ones(len(model.joints)) if entry.weights is None else np.array(entry.weights)
+    start, home = start_posture(entry, model), home_configuration(entry, model)
+    at_work = {task.robot for task in document.tasks.values()} | {grasp.robot for grasp in document.part.held_by}
+    if name not in at_work and entry.home_deg is None and entry.home is None:
+        home = start
+    return Robot(
+        name=name,
+        model=model,
+        X_WB=pose_from_entry(entry.base),
+        tool=_tool(entry.tool, read_mesh),
+        start=start,
+        weights=weights,
+        home=home,
+        acceleration=acceleration_rule(entry, document.acceleration, joints=len(model.joints)),
+        controller_cycle=controller_cycle(entry, document),
+        attachments=build_attachments(entry.attachments, model, read_mesh),
+        pedestal=build_pedestal(entry, document.environment),
+    )
+
+
+def _tool(entry: ToolEntry, read_mesh: MeshReader) -> Tool:
+    """A tool; its bodies are named ``tool``, ``tool_2``, …."""
+    X_FT = pose_from_entry(entry)
+    placed = [] if entry.geometry is None else [tool_solid(entry.geometry, X_FT, read_mesh)]
+    for body in entry.bodies:
+        solid, X_AS = centred_solid(body, read_mesh)
+        placed.append((solid, pose_from_entry(body.at) @ X_AS))
+    bodies = [
+        Body(name="tool" if number == 1 else f"tool_{number}", link=BASE, shape=solid, X_BS=X_FS)
+        for number, (solid, X_FS) in enumerate(placed, start=1)
+    ]
+    return Tool(X_FT=X_FT, bodies=tuple(bodies), mass=entry.mass_kg, centre=_centre(entry.centre_mm))
+
+
+def _centre(centre_mm: tuple[float, float, float] | None) -> Array | None:
+    """A centre of mass in [m]."""
+    return None if centre_mm is None else np.divide(centre_mm, MM)
+
+
+def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
+    """The workpiece."""
+    shape, X_PS = centred_solid(entry.geometry, read_mesh)
+    return Part(
+        shape=shape,
+        X_PS=X_PS,
+        held_by=tuple(
+            Grasp(
+                robot=grasp.robot,
+                X_PT=pose_from_entry(grasp.at),
+                axes=_axis_numbers(grasp.axes),
+                depth=grasp.depth_mm / MM,
+            )
+            for grasp in entry.held_by
+        ),
+        X_WP=None if entry.at is None else pose_from_entry(entry.at),
+        mass=entry.mass_kg,
+        centre=_centre(entry.centre_mm),
+    )
+
+
+def build_obstacle(name: str, entry: ObstacleEntry, read_mesh: MeshReader) -> Obstacle:
+    """A fixed thing."""
+    shape, X_WS = obstacle_shape(entry, read_mesh)
+    return Obstacle(name=name, shape=shape, X_WS=X_WS)
+
+
+def build_task(name: str, document: CellDocument, read_targets: TargetReader) -> Task:
+    """One operator's work, with the motion's settings where it has none of its own."""
+    entry, motion = document.tasks[name], document.motion
+    tool_axis, tool_x = tool_directions(entry)
+    path = _path(name, entry.path, read_targets)
+    law = entry.time_law or motion.time_law
+    corners = entry.corners or motion.corners
+    return Task(
+        name=name,
+        robot=entry.robot,
+        path=path,
+        project=None if entry.path.project is None else direction(entry.path.project),
+        plane_offset=(entry.path.offset_mm or 0.0) / MM,
+        tool_axis=None if tool_axis is None else direction(tool_axis),
+        tool_x=direction(tool_x),
+        turn=float(np.deg2rad(entry.tool_turn_deg)),
+        axes=_axis_numbers(entry.axes),
+        is_spin_free="spin" in entry.free,
+        tolerance=_tolerance(entry.tolerance),
+        start=entry.begins_s,
+        duration=entry.duration_s,
+        feed=None if entry.feed_mm_s is None else entry.feed_mm_s / MM,
+        time_law=_time_law(law),
+        blend=corners.blend_mm / MM if isinstance(corners, BlendEntry) else None,
+        settle=entry.settle_s,
+        repeat=entry.repeat,
+        approach=_straight_move(entry.approach_mm, entry.approach_s),
+        retract=_straight_move(entry.retract_mm, entry.retract_s),
+        relative_to=Frame(entry.relative_to),
+        tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm) / MM,
+    )
+
+
+def _straight_move(distance_mm: float, duration: float) -> StraightMove | None:
+    """An approach or a retreat; none over no distance."""
+    return StraightMove(distance=distance_mm / MM, duration=duration) if distance_mm else None
+
+
+def _axis_numbers(words: Sequence[str]) -> tuple[int, ...]:
+    """Components of a twist by number, in its order."""
+    return tuple(sorted(COMPONENTS.index(axis) for axis in words))
+
+
+Direction = str | tuple[float, float, float]
+
+
+def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
+    """Tool axis (None for the normal) and tool x of a task, as words or vectors.
+
+    A task that prescribes positions only, on a path that is used as drawn, needs no axis; the tool then looks against
+    the normal of the path's plane.
+    """
+    if entry.tool_axis not in {None, "normal"}:
+        return entry.tool_axis, entry.tool_x
+    path = entry.path
+    if needs_surface(entry) or path.project is not None or path.csv is not None:
+        return None, entry.tool_x
+    shape = path.circle or path.rectangle or path.rhombus or path.polyline
+    normal = PLANE_NORMAL[(shape.plane if shape else None) or "xy"]
+    is_default = "tool_x" not in entry.model_fields_set
+    return f"-{normal}", "+y" if is_default and normal == "x" else entry.tool_x
+
+
+def direction(written: Direction) -> Array:
+    """Unit vector of a word such as ``+x`` or of a vector of any length."""
+    if isinstance(written, str):
+        vector = np.zeros(3)
+        vector["xyz".index(written[-1])] = -1.0 if written.startswith("-") else 1.0
+        return vector
+    unit: Array = np.array(written) / np.linalg.norm(written)
+    return unit
+
+
+def _tolerance(entry: ToleranceEntry) -> Tolerance:
+    """Allowed tool errors in [m] and [rad]."""
+    return Tolerance(
+        position=entry.position_mm / MM,
+        orientation=float(np.deg2rad(entry.orientation_deg)),
+        position_between=(entry.between_rows_mm or entry.position_mm) / MM,
+        orientation_between=float(np.deg2rad(entry.between_rows_deg or entry.orientation_deg)),
+    )
+
+
+def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict[str, Any]:
+    """The file as plain values in its own units, with every default that follows from other entries filled in.
+
+    Args:
+        document: The file.
+        timed: Names of the tasks whose path brings its own clock.
+    """
+    values = document.model_dump(exclude_none=True)
+    motion = values["motion"]
+    for name, task in document.tasks.items():
+        entry = values["tasks"][name]
+        tool_axis, entry["tool_x"] = tool_directions(task)
+        entry["start_s"] = task.begins_s
+        entry["tolerance"].setdefault("between_rows_mm", task.tolerance.position_mm)
+        entry["tolerance"].setdefault("between_rows_deg", task.tolerance.orientation_deg)
+        if task.relative_to == "part":
+            entry.setdefault("tool_depth_mm", document.checks.tool_depth_mm)
+        entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
+        if name not in timed:
+            entry.setdefault("time_law", motion["time_law"])
+            entry.setdefault("corners", motion["corners"])
+        if task.path.is_planar and task.path.project is None:
+            entry["path"].setdefault("offset_mm", 0.0)
+        values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}
+    for name, robot in document.robots.items():
+        if robot.pedestal is not None:
+            values["robots"][name]["pedestal"]["floor_z_mm"] = floor_height_mm(robot, document.environment)
+    for grasp in values["part"]["held_by"][:1]:
+        del grasp["axes"]  # the first holder has no choice
+    return values
+
+
+def _path(name: str, entry: PathEntry, read_targets: TargetReader) -> PathSpec:
+    """Geometry of a path in [m]."""
+    if entry.circle is not None:
+        return _circle(entry.circle)
+    if entry.rectangle is not None:
+        return _polygon(entry.rectangle, entry.rectangle.sides_mm, ((1, 1), (-1, 1), (-1, -1), (1, -1)))
+    if entry.rhombus is not None:
+        return _polygon(entry.rhombus, entry.rhombus.diagonals_mm, ((1, 0), (0, 1), (-1, 0), (0, -1)))
+    return read_targets(name) if entry.polyline is None else _polyline(entry.polyline)
+
+
+def _circle(entry: CircleEntry) -> CirclePath:
+    """A circle with a unit direction to its start."""
+    u, v = entry.center_mm
+    toward = start_direction(entry.start_at, entry.plane)
+    size = float(np.hypot(*toward))
+    return CirclePath(
+        plane=PlaneName(entry.plane),
+        center=(u / MM, v / MM),
+        radius=entry.radius_mm / MM,
+        start=(toward[0] / size, toward[1] / size),
+        direction=RunDirection(entry.direction),
+    )
+
+
+def _polygon(
+    entry: RectangleEntry | RhombusEntry, extents_mm: tuple[float, float], signs: tuple[tuple[int, int], ...]
+) -> PolygonPath:
+    """Corners of a centred shape, turned and moved in its plane, from its start on."""
+    start = tuple(int(np.sign(part)) for part in start_direction(entry.start_at, entry.plane))
+    first = signs.index((start[0], start[1]))
+    signs = (*signs[first:], *signs[:first])
+    angle = np.deg2rad(entry.angle_deg)
+    R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    corners = np.array(signs) * (0.5 * np.array(extents_mm)) @ R.T + np.array(entry.center_mm)
+    return PolygonPath(
+        plane=PlaneName(entry.plane),
+        corners=tuple((float(u) / MM, float(v) / MM) for u, v in corners),
+        is_closed=True,
+        direction=RunDirection(entry.direction),
+    )
+
+
+def _polyline(entry: PolylineEntry) -> PathSpec:
+    """Points in a plane or in space."""
+    points = [tuple(value / MM for value in point) for point in entry.points_mm]
+    if entry.plane is None:
+        return SpacePolylinePath(points=tuple((x, y, z) for x, y, z in points), is_closed=entry.closed)
+    return PolygonPath(plane=PlaneName(entry.plane), corners=tuple((u, v) for u, v in points), is_closed=entry.closed)
+
+
+def _time_law(law: str | TrapezoidEntry) -> TimeLaw:
+    """A time law with its ramp."""
+    if isinstance(law, TrapezoidEntry):
+        return TimeLaw(kind=TimeLawKind.TRAPEZOID, ramp=law.trapezoid.ramp)
+    return TimeLaw(kind=TimeLawKind(law))
+
+
+def build_motion(entry: MotionEntry) -> MotionSettings:
+    """Mode, clock, and joints that fail."""
+    return MotionSettings(
+        mode=Mode(entry.mode),
+        duration=entry.duration_s,
+        step=entry.step_s,
+        cyclic=entry.cyclic,
+        locked=tuple(LockedJoint(robot=it.robot, joint=it.joint, since=it.from_s) for it in entry.locked_joints),
+    )
+
+
+def build_checks(entry: ChecksEntry) -> CheckSettings:
+    """Demands."""
+    return CheckSettings(
+        clearance=entry.clearance_mm / MM,
+        adds_accuracy=entry.body_accuracy == "add",
+        contact_zone=entry.contact_zone_mm / MM,
+        exclusions=tuple(Exclusion(bodies=pair.bodies, reason=pair.reason) for pair in entry.exclude),
+        closure_position=entry.closure_mm / MM,
+        closure_orientation=float(np.deg2rad(entry.closure_deg)),
+        standing_depth=entry.standing_depth_mm / MM,
+        part_acceleration=entry.part_acceleration_m_s2,
+    )

@@ -1,0 +1,91 @@
+"""The solver's entries, in millimetres and degrees, become frozen settings in metres and radians."""
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from cellplan.io.cell.solver_rules import keys_against_accurate
+from cellplan.io.robots.rules import start_keys
+from cellplan.io.schema.solver import PostureGoalEntry, SecondaryEntry, SolverEntry
+from cellplan.io.shapes import MM
+from cellplan.model.robot import RobotModel
+from cellplan.model.solver import (
+    DampedLeastSquaresSettings,
+    FilteredInverseSettings,
+    GoalKind,
+    Integrator,
+    QuadraticProgramSettings,
+    SearchSettings,
+    SecondaryGoal,
+    SingularityMeasure,
+    SolverSettings,
+    WeightingSettings,
+)
+
+HALF_FEEDBACK: Final = 0.5  # gain_per_s * step_s by default: a quarter of where Euler's steps begin to swing
+
+
+def build_solver(entry: SolverEntry, step: float, models: Mapping[str, RobotModel]) -> SolverSettings:
+    """Method, gains and goals; the gain follows from the step in [s] when it is not given."""
+    damped, filtered, search, program = (
+        entry.damped_least_squares,
+        entry.filtered_inverse,
+        entry.search,
+        entry.quadratic_program,
+    )
+    joints = None if search.sequence is None else tuple((joint.robot, joint.joint) for joint in search.sequence)
+    return SolverSettings(
+        method=entry.method,
+        gain=HALF_FEEDBACK / step if entry.gain_per_s is None else entry.gain_per_s,
+        damping=None if isinstance(entry.damping, str) else entry.damping,
+        seed=entry.seed,
+        damped_least_squares=DampedLeastSquaresSettings(
+            measure=SingularityMeasure(damped.measure), region=damped.region, shapes_gain=damped.shape_gain
+        ),
+        filtered_inverse=FilteredInverseSettings(gain=filtered.gain_per_s, starts_at_zero=filtered.start == "zero"),
+        search=SearchSettings(
+            tolerance=search.tolerance_mm / MM,
+            orientation_weight=search.orientation_weight_m2,
+            rounds=search.rounds,
+            brakes=search.brakes,
+            sequence=joints,
+        ),
+        quadratic_program=QuadraticProgramSettings(slack_weight=program.slack_weight, ramp=program.ramp_s),
+        weighting=WeightingSettings(near_limits=entry.weighting.near_limits, load=entry.weighting.load),
+        goals=_goals(entry.secondary, models),
+        integrator=_integrator(entry),
+        accuracy=entry.accuracy_mm / MM,
+    )
+
+
+def _integrator(entry: SolverEntry) -> Integrator:
+    """The integrator that is asked for; the accurate one wherever it goes when nothing is said."""
+    if entry.integrator is not None:
+        return Integrator(entry.integrator)
+    return Integrator.EULER if keys_against_accurate(entry) else Integrator.ACCURATE
+
+
+def _goals(entry: SecondaryEntry, models: Mapping[str, RobotModel]) -> tuple[SecondaryGoal, ...]:
+    """The goals that are given, in the order of the format."""
+    goals: list[SecondaryGoal] = []
+    if entry.manipulability is not None:
+        goals.append(SecondaryGoal(kind=GoalKind.MANIPULABILITY, gain=entry.manipulability.gain))
+    if entry.joint_limits is not None:
+        goals.append(SecondaryGoal(kind=GoalKind.JOINT_LIMITS, gain=entry.joint_limits.gain))
+    if entry.obstacles is not None:
+        within = entry.obstacles.within_mm / MM
+        goals.append(SecondaryGoal(kind=GoalKind.OBSTACLES, gain=entry.obstacles.gain, within=within))
+    if entry.posture is not None:
+        goals.append(_posture_goal(entry.posture, models))
+    return tuple(goals)
+
+
+def _posture_goal(entry: PostureGoalEntry, models: Mapping[str, RobotModel]) -> SecondaryGoal:
+    """A wanted posture in [rad] and [m]."""
+    postures = {}
+    for robot, given in entry.at.items():
+        values = [given[key] for key in start_keys(models[robot])]
+        turns = [joint.is_revolute for joint in models[robot].joints]
+        postures[robot] = np.where(turns, np.deg2rad(values), np.divide(values, MM))
+    return SecondaryGoal(kind=GoalKind.POSTURE, gain=entry.gain, postures=postures)

@@ -1,0 +1,224 @@
+"""Files that a cell names: robots, meshes and toolpaths, each read once and known by its digest."""
+
+import os
+import posixpath
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from functools import partial
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from cellplan.cache import as_here
+from cellplan.errors import InputError
+from cellplan.geometry.mesh.load import read_mesh
+from cellplan.geometry.shapes import Mesh
+from cellplan.guard import Guard, in_child
+from cellplan.io.cell.toolpath_csv import read_toolpath_csv
+from cellplan.io.input.allowed_folders import AllowedFolders
+from cellplan.io.input.files import digest_of_file
+from cellplan.io.input.findings import Complaint, KeyPath, shown
+from cellplan.io.robots.bundled import load_bundled_table
+from cellplan.io.robots.joint_table import MESH_UNITS, RobotTable, load_robot_table
+from cellplan.io.robots.rules import limits_in_si, tightened
+from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot, load_urdf
+from cellplan.io.schema.robot import RobotEntry
+from cellplan.io.schema.task import CsvEntry
+from cellplan.io.yaml.reader import YamlDocument
+from cellplan.model.robot import RobotModel
+from cellplan.model.task import SampledPath, TimedPath
+
+URDF_SUFFIXES = frozenset({".urdf"})
+TABLE_SUFFIXES = frozenset({".yaml", ".yml"})
+
+
+class Sources:
+    """Reads what a cell names and gathers what is wrong with it.
+
+    Attributes:
+        inputs: SHA-256 of every file that was read, by the path as written.
+        complaints: About the names in the cell file.
+        errors: About the files themselves.
+    """
+
+    def __init__(self, document: YamlDocument, folders: AllowedFolders) -> None:
+        """Remember where to look and where to complain."""
+        self._document = document
+        self._folders = folders
+        self._meshes: dict[tuple[str, str], Mesh | None] = {}
+        self._urdfs: dict[Hashable, UrdfRobot] = {}
+        self.inputs: dict[str, str] = {}
+        self.complaints: list[Complaint] = []
+        self.errors: list[InputError] = []
+
+    def mesh(
+        self, written: str, unit: str, path: KeyPath, *, demand: Callable[[Mesh], None] | None = None
+    ) -> Mesh | None:
+        """Mesh in [m] that is as a demand wants it, which raises an input error otherwise; None after a complaint."""
+        if (written, unit) not in self._meshes:
+            self._meshes[written, unit] = self._read_mesh(written, unit, path)
+        mesh = self._meshes[written, unit]
+        try:
+            if mesh is not None and demand is not None:
+                demand(mesh)
+        except InputError as error:
+            self.complaints.append(self._document.complaint(path, str(error)))
+            return None
+        return mesh
+
+    def targets(self, entry: str | CsvEntry, path: KeyPath) -> SampledPath | TimedPath | None:
+        """Tool targets of a task; None after a complaint."""
+        settings = CsvEntry(file=entry) if isinstance(entry, str) else entry
+        place = self._file(settings.file, path if isinstance(entry, str) else (*path, "file"))
+        if place is None:
+            return None
+        try:
+            sampled = read_toolpath_csv(
+                place, is_smooth=settings.smooth, is_closed=settings.closed, source=settings.file
+            )
+            self.inputs[settings.file] = digest_of_file(place, file=settings.file)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return sampled
+
+    def robot(self, name: str, entry: RobotEntry) -> RobotModel | None:
+        """Model of a robot within the limits of the cell; None after a complaint."""
+        suffix = PurePosixPath(entry.model).suffix.lower()
+        if suffix in URDF_SUFFIXES:
+            return self._urdf(name, entry)
+        self.complaints += self._only_for_urdf(name, entry)
+        model = self._table(name, entry, is_file=suffix in TABLE_SUFFIXES)
+        if model is None:
+            return None
+        model, complaints = tightened(("robots", name), entry, model, self._document)
+        self.complaints += complaints
+        return None if complaints else model
+
+    def look_for_model(self, name: str, written: str) -> None:
+        """Complain about a model that does not exist, for a robot that is not understood for other reasons."""
+        path = ("robots", name, "model")
+        if PurePosixPath(written).suffix.lower() in URDF_SUFFIXES | TABLE_SUFFIXES:
+            self._file(written, path)
+            return
+        try:
+            load_bundled_table(written)
+        except InputError as error:
+            self.complaints.append(self._document.complaint(path, str(error)))
+
+    def _read_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
+        """Mesh in [m]; None after a complaint."""
+        place = self._file(written, path)
+        if place is None:
+            return None
+        try:
+            guard = Guard(file=written, worker="the mesh reader")
+            mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), place, guard=guard)
+            self.inputs[written] = digest_of_file(place, file=written)
+        except InputError as error:
+            self.complaints.append(self._document.complaint(path, str(error)))
+            return None
+        return mesh
+
+    def _file(self, written: str, path: KeyPath) -> Path | None:
+        """Path of a named file; None after a complaint."""
+        try:
+            return self._folders.file(written)
+        except InputError as error:
+            self.complaints.append(self._document.complaint(path, str(error)))
+            return None
+
+    def _only_for_urdf(self, name: str, entry: RobotEntry) -> Iterator[Complaint]:
+        """Keys that say something about a URDF."""
+        for key in ("package_dirs", "flange", "locked"):
+            if getattr(entry, key):
+                yield self._document.key_complaint(("robots", name, key), "unexpected key, it goes with a URDF only")
+
+    def _table(self, name: str, entry: RobotEntry, *, is_file: bool) -> RobotModel | None:
+        """Model from a joint-axis table, bundled or in a file."""
+        path = ("robots", name, "model")
+        table: RobotTable
+        if not is_file:
+            try:
+                table = load_bundled_table(entry.model)
+            except InputError as error:
+                self.complaints.append(self._document.complaint(path, str(error)))
+                return None
+            self.inputs[f"bundled:{entry.model}"] = table.digest
+            return table.model
+        place = self._file(entry.model, path)
+        if place is None:
+            return None
+        try:
+            folders = AllowedFolders(folder=place.parent, allowed=(self._folders.folder, *self._folders.allowed))
+            table = load_robot_table(place, file=str(place), folders=folders)
+            self.inputs[entry.model] = table.digest
+            for written, mesh in table.mesh_files.items():
+                key = posixpath.join(posixpath.dirname(entry.model), written)
+                self.inputs[key] = digest_of_file(mesh, file=written)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return table.model
+
+    def _urdf(self, name: str, entry: RobotEntry) -> RobotModel | None:
+        """Model from a URDF and its meshes."""
+        path = ("robots", name, "model")
+        place, folders = self._file(entry.model, path), self._package_dirs(name, entry)
+        if place is None or folders is None:
+            return None
+        options = UrdfOptions(
+            flange=entry.flange,
+            package_dirs=folders,
+            limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items()},
+            locked=dict(_locked_in_si(entry)),
+            lock_units={joint: unit for joint, _, unit in (key.rpartition("_") for key in entry.locked)},
+            within=self._folders,
+        )
+        try:
+            robot = _read_urdf(self._urdfs, entry.model, place, options=options)
+            self.inputs[entry.model] = digest_of_file(place, file=entry.model)
+            for mesh in robot.mesh_files:
+                if not self._folders.holds(mesh):
+                    text = f"expected meshes below the folder of the cell file, got {shown(mesh.name)} from elsewhere"
+                    self.complaints.append(self._document.complaint(path, f"{text}; allow it with --allow-dir"))
+                    return None
+                way = os.path.relpath(mesh.resolve(), place.parent.resolve()).replace(os.sep, "/")
+                key = posixpath.normpath(posixpath.join(posixpath.dirname(entry.model), way))
+                self.inputs[key] = digest_of_file(mesh, file=mesh.name)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return robot.model
+
+    def _package_dirs(self, name: str, entry: RobotEntry) -> tuple[Path, ...] | None:
+        """Folders for ``package://``; None after a complaint."""
+        found: list[Path] = []
+        for index, written in enumerate(entry.package_dirs):
+            try:
+                found.append(self._folders.directory(written))
+            except InputError as error:
+                path = ("robots", name, "package_dirs", index)
+                self.complaints.append(self._document.complaint(path, str(error)))
+        return tuple(found) if len(found) == len(entry.package_dirs) else None
+
+
+def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, options: UrdfOptions) -> UrdfRobot:
+    """Robot of a URDF; robots that say the same of the same file share one."""
+    locked = _items(options.locked), _items(options.lock_units)
+    key = (written, place, options.flange, options.package_dirs, _items(options.limits), locked)
+    if key not in known:
+        guard = Guard(file=written, worker="the URDF reader")
+        known[key] = in_child(as_here(load_urdf), place, options, guard=guard)
+    return known[key]
+
+
+def _items(table: Mapping[str, Hashable]) -> Hashable:
+    """What a table says, as part of a key."""
+    return tuple(sorted(table.items(), key=lambda item: item[0]))
+
+
+def _locked_in_si(entry: RobotEntry) -> Iterator[tuple[str, float]]:
+    """Positions of locked joints in [rad] or [m], by joint name."""
+    for key, value in entry.locked.items():
+        joint, _, unit = key.rpartition("_")
+        yield joint, float(np.deg2rad(value)) if unit == "deg" else value / 1000.0

@@ -1,0 +1,166 @@
+"""Rules between the entries of a cell file: names that must exist, times that must fit, what goes with what."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from cellplan.io.cell.solver_rules import accurate_complaints, feedback_complaints
+from cellplan.io.input.findings import Complaint, KeyPath, did_you_mean, listed, shown
+from cellplan.io.schema.partial import Pieces
+from cellplan.io.schema.task import TaskEntry
+from cellplan.io.yaml.reader import YamlDocument
+
+TIME_ROOM: Final = 1e-9  # [-] of the duration: rounding of start_s + duration_s
+ORIENTATION_AXES: Final = frozenset({"rx", "ry", "rz"})
+MEANS_ELSE: Final = {"part": "the workpiece", "world": "the frame that everything stands in"}
+ANGLE_RANGES: Final = ("base", "start_deg", "start")
+
+
+def rule_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """Everything in a cell file that contradicts something else in it."""
+    yield from _clashing_names(pieces, document)
+    yield from _holders(pieces, document)
+    yield from _operators(pieces, document)
+    for name, task in pieces.tasks.items():
+        yield from _times(pieces, document, name)
+        yield from _tool_axis(task, document, name)
+    yield from feedback_complaints(pieces, document)
+    yield from accurate_complaints(pieces, document)
+    yield from _layout(pieces, document)
+
+
+def _clashing_names(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """Names of files and folders that some systems cannot tell apart, and names that mean two bodies."""
+    for section in ("robots", "tasks"):
+        seen: dict[str, str] = {}
+        for name in pieces.names[section]:
+            other = seen.setdefault(name.lower(), name)
+            if other != name:
+                text = f"expected a name that differs from '{other}' by more than upper and lower case"
+                yield document.key_complaint((section, name), text)
+    for name in pieces.names["robots"]:
+        if name.lower() in MEANS_ELSE:
+            text = f"expected another name, '{name.lower()}' means {MEANS_ELSE[name.lower()]}"
+            yield document.key_complaint(("robots", name), text)
+    if "part" in pieces.names["environment"]:
+        yield document.key_complaint(("environment", "part"), "expected another name, 'part' means the workpiece")
+
+
+def _holders(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """The part is held by robots of the cell, each once."""
+    seen: set[str] = set()
+    for path, robot in _holders_as_written(document):
+        yield from _known_robot(robot, pieces, document, path)
+        if robot in seen:
+            yield document.complaint(path, f"expected a robot that does not hold the part already, got '{robot}' twice")
+        seen.add(robot)
+
+
+def _operators(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """Each task has a robot of its own: one that does not hold the part, or the one that carries it."""
+    holders = [robot for _, robot in _holders_as_written(document)]
+    busy: dict[str, str] = {}
+    for name, path, robot in _operators_as_written(document):
+        yield from _known_robot(robot, pieces, document, path)
+        if robot in holders:
+            is_in_world = document.root["tasks"][name].get("relative_to") == "world"
+            text = _wrong_holder(robot, holders, pieces, is_in_world=is_in_world)
+            if text:
+                yield document.complaint(path, text)
+        other = busy.setdefault(robot, name)
+        if other != name:
+            text = f"expected a robot without another task, got '{robot}', which does '{other}'"
+            yield document.complaint(path, text)
+
+
+def _wrong_holder(robot: str, holders: Sequence[str], pieces: Pieces, *, is_in_world: bool) -> str | None:
+    """What is wrong with a task of a robot that holds the part; None for one that may carry it along a path."""
+    if not is_in_world:
+        return f"expected a robot that does not hold the part, got the positioner '{robot}'"
+    if robot != holders[0]:
+        return f"expected the first holder '{holders[0]}', which carries the part frame, got '{robot}'"
+    if pieces.motion is not None and pieces.motion.mode == "part_at_rest":
+        return f"expected a robot that does not hold the part in the mode part_at_rest, got the positioner '{robot}'"
+    return None
+
+
+def _holders_as_written(document: YamlDocument) -> Iterator[tuple[KeyPath, str]]:
+    """Robots that hold the part, also of a part that is wrong in other ways."""
+    part = document.root.get("part")
+    grasps = part.get("held_by") if isinstance(part, dict) else None
+    for index, grasp in enumerate(grasps if isinstance(grasps, tuple) else ()):
+        robot = grasp.get("robot") if isinstance(grasp, dict) else None
+        if isinstance(robot, str):
+            yield ("part", "held_by", index, "robot"), robot
+
+
+def _operators_as_written(document: YamlDocument) -> Iterator[tuple[str, KeyPath, str]]:
+    """Robots of the tasks, also of tasks that are wrong in other ways."""
+    tasks = document.root.get("tasks")
+    for name, task in tasks.items() if isinstance(tasks, dict) else ():
+        robot = task.get("robot") if isinstance(task, dict) else None
+        if isinstance(robot, str):
+            yield name, ("tasks", name, "robot"), robot
+
+
+def _known_robot(robot: str, pieces: Pieces, document: YamlDocument, path: KeyPath) -> Iterator[Complaint]:
+    """A robot that the cell has."""
+    known = pieces.names["robots"]
+    if robot not in known:
+        hint = did_you_mean(robot, known)
+        yield document.complaint(path, f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{hint}")
+
+
+def _times(pieces: Pieces, document: YamlDocument, name: str) -> Iterator[Complaint]:
+    """A task starts and ends within the common clock."""
+    if pieces.motion is None:
+        return
+    task, clock = pieces.tasks[name], pieces.motion.duration_s
+    if clock is None:  # the command line may give one
+        return
+    start, leaving = task.begins_s, task.leaving_s
+    if start + leaving >= clock:
+        also = f" and retract_s = {leaving:g}" if leaving else ""
+        text = f"expected a start before the end of the clock (motion.duration_s = {clock:g}){also}, got {start:g}"
+        yield document.complaint(("tasks", name, "start_s"), text)
+    elif task.duration_s is not None and start + task.duration_s + leaving > clock * (1.0 + TIME_ROOM):
+        words = "start_s + duration_s + retract_s" if leaving else "start_s + duration_s"
+        text = (
+            f"expected an end within the clock (motion.duration_s = {clock:g}), "
+            f"got {words} = {start + task.duration_s + leaving:g}"
+        )
+        yield document.complaint(("tasks", name, "duration_s"), text)
+
+
+def needs_surface(task: TaskEntry) -> bool:
+    """Whether the tool's axis can come from nothing but the part's surface or the file of the path."""
+    turns = ORIENTATION_AXES & set(task.axes)
+    return task.tool_axis == "normal" or (task.tool_axis is None and bool(turns))
+
+
+def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Complaint]:
+    """A normal needs a surface; of a file it is known only later whether it brings orientations."""
+    if needs_surface(task) and task.path.project is None and task.path.csv is None:
+        cure = "give tool_axis a direction"
+        if task.relative_to == "part":
+            cure = f"add project: +z (or another side), or {cure}"
+        text = f"tool_axis: normal needs a path that is laid on the part: {cure}"
+        key = "path" if task.tool_axis is None else "tool_axis"
+        yield document.complaint(("tasks", name, key), text)
+
+
+def _layout(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+    """What a layout search may change exists."""
+    for key, value in (pieces.layout.vary if pieces.layout else {}).items():
+        path = ("layout", "vary", key)
+        robot, _, what = key.rpartition(".")
+        if what not in ANGLE_RANGES or not robot:
+            text = f"expected ROBOT.base, ROBOT.start_deg or ROBOT.start{did_you_mean(what, ANGLE_RANGES)}"
+            yield document.key_complaint(path, text)
+        elif robot not in pieces.names["robots"]:
+            known = pieces.names["robots"]
+            hint = did_you_mean(robot, known)
+            yield document.key_complaint(
+                path, f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{hint}"
+            )
+        elif (what == "base") == (value is True):
+            yield document.complaint(path, "expected ranges for a base and true for a start posture")

@@ -1,0 +1,70 @@
+"""Rules between a task and the file of its path, once the file was read: who gives orientations and times."""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from cellplan.io.cell.rules import TIME_ROOM, needs_surface
+from cellplan.io.input.findings import Complaint, KeyPath
+from cellplan.io.schema.partial import Pieces
+from cellplan.io.schema.task import CsvEntry, TaskEntry
+from cellplan.io.yaml.reader import YamlDocument
+from cellplan.model.task import SampledPath, TimedPath
+
+Targets = Mapping[str, SampledPath | TimedPath]  # what was read of the files of paths, by task
+
+OWN_CLOCK: Final = ("duration_s", "feed_mm_s", "time_law", "corners")  # what a trajectory decides by itself
+
+
+def target_complaints(pieces: Pieces, targets: Targets, document: YamlDocument) -> Iterator[Complaint]:
+    """Everything in the tasks that contradicts the files of their paths."""
+    for name, path in targets.items():
+        task = pieces.tasks[name]
+        yield from _axes(task, path, document, name)
+        if isinstance(path, TimedPath):
+            yield from _clock(task, document, name)
+            yield from _end(task, path, pieces, document=document, name=name)
+
+
+def _axes(task: TaskEntry, path: SampledPath | TimedPath, document: YamlDocument, name: str) -> Iterator[Complaint]:
+    """A file without orientations, not laid on the part, has no normals."""
+    has_axes = path.axes is not None or path.rotations is not None
+    if needs_surface(task) and task.path.project is None and not has_axes:
+        project = "" if task.relative_to == "world" else "add project: +z (or another side), "
+        text = (
+            "tool_axis: normal needs axes or quaternions in the file, or a path that is laid on the part: "
+            f"add columns i,j,k, {project}or give tool_axis a direction"
+        )
+        yield document.complaint(("tasks", name, "tool_axis" if task.tool_axis else "path"), text)
+
+
+def _clock(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Complaint]:
+    """A trajectory has its own times, its own smoothness and its own place."""
+    for key in OWN_CLOCK:
+        if getattr(task, key) is not None:
+            yield document.key_complaint(
+                ("tasks", name, key), "unexpected key, the column t_s of the path's file decides"
+            )
+    if task.tool_turn_deg != 0.0:
+        text = "expected no turn on a path with a column t_s; give the turn as qw,qx,qy,qz in the file"
+        yield document.complaint(("tasks", name, "tool_turn_deg"), text)
+    if task.path.project is not None:
+        text = "unexpected key, a path with a column t_s is used as it stands in the file"
+        yield document.key_complaint(("tasks", name, "path", "project"), text)
+    if isinstance(task.path.csv, CsvEntry) and not task.path.csv.smooth:
+        text = "expected true for a file with a column t_s: straight sides would jump in speed, got false"
+        yield document.complaint(("tasks", name, "path", "csv", "smooth"), text)
+
+
+def _end(task: TaskEntry, path: TimedPath, pieces: Pieces, *, document: YamlDocument, name: str) -> Iterator[Complaint]:
+    """A trajectory ends within the common clock."""
+    if pieces.motion is None or pieces.motion.duration_s is None:
+        return
+    clock, end = pieces.motion.duration_s, task.begins_s + task.repeat * path.duration + task.leaving_s
+    if end > clock * (1.0 + TIME_ROOM):
+        cycles = f"{task.repeat} cycles of " if task.repeat > 1 else ""
+        place: KeyPath = ("tasks", name, "path", "csv")
+        text = (
+            f"expected an end within the clock (motion.duration_s = {clock:g}), got start_s + {cycles}"
+            f"{path.duration:g} s of {path.source} = {end:g}"
+        )
+        yield document.complaint(place, text)

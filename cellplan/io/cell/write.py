@@ -1,0 +1,172 @@
+"""The cell that was solved as a cell file: every default written out, start postures and homes filled in."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array, pose, rpy_from_rotation
+from cellplan.io.cell.build_accelerations import written_rule
+from cellplan.io.robots.rules import start_keys
+from cellplan.io.schema.cell import MotionEntry
+from cellplan.io.schema.robot import RobotEntry
+from cellplan.io.yaml.writer import yaml_text
+from cellplan.model.cell import Cell, CheckSettings, Part, Robot
+from cellplan.model.robot import RobotModel
+from cellplan.model.solver import Integrator, SolverSettings
+from cellplan.model.task import SampledPath, Task, TimedPath
+
+CONFIGURATIONS: Final = frozenset({"start", "start_deg", "home", "home_deg"})
+NEIGHBOURS: Final = 3  # units in the last place round the quotient in which the written number is sought
+MM: Final = 1000.0  # [mm/m]
+
+
+def render_cell(cell: Cell, starts: Mapping[str, Array] | None = None) -> str:
+    """The cell as a cell file that loads to the same cell again.
+
+    Files are named as in the original, so the text loads only from a folder from which these names lead to them. Mode,
+    method, durations and the choice of tasks are those of the cell, which the command line may have changed.
+
+    Args:
+        cell: The cell, as ``load_cell`` gave it or changed since.
+        starts: Start postures that were found, by robot, in [rad] or [m]; those written in the cell stay.
+
+    Raises:
+        ValueError: The cell was not read from a file.
+    """
+    return yaml_text(written_document(cell, starts))
+
+
+def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> dict[str, Any]:
+    """The cell as plain values in the units of a cell file, every default filled in; see ``render_cell``."""
+    if not cell.origin.document:
+        raise ValueError("a cell that was not read from a file has no words to write")
+    document: dict[str, Any] = dict(cell.origin.document)
+    found = starts or {}
+    robots, tasks = document["robots"], document["tasks"]
+    document["robots"] = {robot.name: _robot(robots[robot.name], robot, found.get(robot.name)) for robot in cell.robots}
+    document["part"] = _part(document["part"], cell.part)
+    document["tasks"] = {task.name: _task(tasks[task.name], task) for task in cell.tasks}
+    document["motion"] = _motion(document["motion"], cell)
+    document["solver"] = _solver(document["solver"], cell.solver)
+    document["checks"] = _checks(document["checks"], cell.checks)
+    return document
+
+
+def as_written(model: RobotModel, q: Array) -> Array:
+    """The posture that is read back after ``q`` was written; at most a unit in the last place away from it.
+
+    Not every number of radians is the image of a number of degrees. A solver that starts from this posture can be
+    repeated from the written cell to the last bit.
+
+    Args:
+        model: The robot.
+        q: Posture in [rad] or [m], shape (n,).
+    """
+    written = _in_file_units(model, q)
+    turns = [joint.is_revolute for joint in model.joints]
+    posture: Array = np.where(turns, np.deg2rad(written), np.divide(written, MM))
+    return posture
+
+
+def _robot(entry: Mapping[str, Any], robot: Robot, found: Array | None) -> dict[str, Any]:
+    """A robot with its weights, start posture and home written out."""
+    written = {key: value for key, value in entry.items() if key not in CONFIGURATIONS}
+    written["base"] = _pose(entry["base"], robot.X_WB)
+    written |= _configuration("start", robot.model, robot.start if robot.start is not None else found)
+    written |= _configuration("home", robot.model, robot.home)
+    written["weights"] = [float(weight) for weight in robot.weights]
+    written["acceleration"] = written_rule(robot)
+    written["controller_cycle_ms"] = _file_number(robot.controller_cycle, is_revolute=False)
+    return {key: written[key] for key in RobotEntry.model_fields if key in written}
+
+
+def _configuration(key: str, model: RobotModel, q: Array | None) -> dict[str, Any]:
+    """A start posture or a home under the key that suits the robot's joints."""
+    as_list = all(joint.is_revolute for joint in model.joints)
+    if q is None:
+        return {f"{key}_deg" if as_list else key: "auto"}
+    values = _in_file_units(model, q)
+    return {f"{key}_deg": values} if as_list else {key: dict(zip(start_keys(model), values, strict=True))}
+
+
+def _part(entry: Mapping[str, Any], part: Part) -> dict[str, Any]:
+    """The part with its place written out."""
+    written = dict(entry)
+    written["held_by"] = [
+        {**old, "at": _pose(old["at"], grasp.X_PT)} for grasp, old in zip(part.held_by, entry["held_by"], strict=True)
+    ]
+    if part.X_WP is not None:
+        written["at"] = _pose(entry["at"], part.X_WP)
+    return written
+
+
+def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
+    """A task with its start as it is now; one without a time of its own goes on filling the clock."""
+    written = {**entry, "start_s": task.start}
+    if task.duration is not None:
+        written["duration_s"] = task.duration
+    if isinstance(task.path, SampledPath | TimedPath):
+        settings = {"file": task.path.source, "smooth": task.path.is_smooth, "closed": task.path.is_closed}
+        written["path"] = {**entry["path"], "csv": settings}
+    return written
+
+
+def _solver(entry: Mapping[str, Any], solver: SolverSettings) -> dict[str, Any]:
+    """The solver, its method, integrator and gain as they were used; what the cell gives besides stays."""
+    used = {
+        "method": solver.method,
+        "integrator": str(Integrator.ACCURATE if solver.is_accurate else Integrator.EULER),
+        "accuracy_mm": _file_number(solver.accuracy, is_revolute=False),
+        "gain_per_s": solver.gain,
+        "damping": "auto" if solver.damping is None else solver.damping,
+        "seed": solver.seed,
+    }
+    return used | {key: value for key, value in entry.items() if key not in used}
+
+
+def _checks(entry: Mapping[str, Any], checks: CheckSettings) -> dict[str, Any]:
+    """The demands; the clearance as it was asked for."""
+    as_read = entry["clearance_mm"] / 1e3
+    return {**entry, "clearance_mm": entry["clearance_mm"] if as_read == checks.clearance else 1e3 * checks.clearance}
+
+
+def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:
+    """The motion with the mode and clock of the cell; a clock that ends with the last task has no length."""
+    written = {**entry, "mode": str(cell.motion.mode), "step_s": cell.motion.step}
+    written["duration_s"] = cell.motion.duration
+    return {key: written[key] for key in MotionEntry.model_fields if written.get(key) is not None}
+
+
+def _pose(entry: Mapping[str, Any], X: Array) -> dict[str, Any]:
+    """A pose in the words of the file; in new words where it was changed since."""
+    written = pose(np.divide(entry["xyz_mm"], MM), np.deg2rad(entry["rpy_deg"]))
+    if np.array_equal(written, X):
+        return dict(entry)
+    xyz_mm = [_file_number(float(value), is_revolute=False) for value in X[:3, 3]]
+    rpy_deg = [_file_number(float(value), is_revolute=True) for value in rpy_from_rotation(X[:3, :3])]
+    return {"xyz_mm": xyz_mm, "rpy_deg": rpy_deg}
+
+
+def _in_file_units(model: RobotModel, q: Array) -> list[float]:
+    """A posture in degrees and millimetres."""
+    return [
+        _file_number(float(value), is_revolute=joint.is_revolute) for joint, value in zip(model.joints, q, strict=True)
+    ]
+
+
+def _file_number(value: float, *, is_revolute: bool) -> float:
+    """Number of degrees or millimetres with the fewest digits that reads back to the value, or else nearly so."""
+    quotient = float(np.rad2deg(value)) if is_revolute else value * MM
+    candidates = [float(f"{quotient:.{digits}g}") for digits in range(1, 18)]
+    above = below = quotient
+    for _ in range(NEIGHBOURS):
+        above, below = float(np.nextafter(above, np.inf)), float(np.nextafter(below, -np.inf))
+        candidates += [above, below]
+    exact = (number for number in candidates if _read_back(number, is_revolute=is_revolute) == value)
+    return next(exact, quotient)
+
+
+def _read_back(number: float, *, is_revolute: bool) -> float:
+    """What the cell reader makes of a number of degrees or millimetres."""
+    return float(np.deg2rad(number)) if is_revolute else number / MM

@@ -1,0 +1,138 @@
+"""Errors file: how the real cell differs from the written one, read and checked against the names of its cell."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.io.input.findings import Complaint, KeyPath, did_you_mean, listed, raise_complaints, shown
+from cellplan.io.schema.cell_errors import (
+    ErrorsDocument,
+    PoseErrorEntry,
+    RobotErrorsEntry,
+    ShiftSpreadEntry,
+    TurnSpreadEntry,
+)
+from cellplan.io.schema.messages import validate
+from cellplan.io.shapes import MM
+from cellplan.io.yaml.reader import YamlDocument, read_yaml
+from cellplan.model.cell import Cell
+from cellplan.model.cell_errors import SHORTEST_LINK, Amount, CellErrors, PoseAmounts, RobotErrors, Spread, link_vector
+from cellplan.model.robot import RobotModel
+
+DEG: Final = float(np.rad2deg(1.0))  # [deg/rad]
+
+Written = float | ShiftSpreadEntry | TurnSpreadEntry
+
+
+def load_errors(path: Path | str, cell: Cell) -> CellErrors:
+    """Read an errors file.
+
+    Args:
+        path: The file.
+        cell: The cell it belongs to: its robots and joints are the ones that may be named.
+
+    Raises:
+        InvalidFileError: Everything that is wrong with the file, one located line each.
+        InputError: The file cannot be read at all.
+    """
+    file = str(path)
+    document = read_yaml(Path(path), file=file)
+    whole, complaints = validate(ErrorsDocument, document)
+    complaints += document.complaints
+    complaints += _unknown_names(document, cell)
+    raise_complaints(file, complaints)
+    if whole is None:
+        raise InputError(f"{file}: the errors cannot be understood")
+    noise = whole.measurement
+    return CellErrors(
+        robots={name: _robot_errors(entry) for name, entry in whole.robots.items()},
+        grasps={name: _pose_amounts(entry) for name, entry in whole.grasp.items()},
+        position_noise=noise.position_noise_mm / MM,
+        orientation_noise=noise.orientation_noise_deg / DEG,
+        seed=whole.seed,
+        trials=whole.trials,
+        file=file,
+        digest=document.digest,
+    )
+
+
+def _unknown_names(document: YamlDocument, cell: Cell) -> Iterator[Complaint]:
+    """Robots and joints that the cell does not have, and links that cannot grow."""
+    models = {robot.name: robot.model for robot in cell.robots}
+    for name, written in _mapping(document.root, "robots").items():
+        place: KeyPath = ("robots", name)
+        if name not in models:
+            yield document.key_complaint(place, _unknown("a robot of this cell", name, list(models)))
+        elif isinstance(written, dict):
+            yield from _wrong_joints(document, place, written, models[name])
+    for name in _mapping(document.root, "grasp"):
+        if name not in cell.positioners:
+            holders = list(cell.positioners)
+            text = _unknown("a robot that holds the part", name, holders)
+            yield document.key_complaint(("grasp", name), text)
+
+
+def _wrong_joints(
+    document: YamlDocument, place: KeyPath, written: Mapping[str, object], model: RobotModel
+) -> Iterator[Complaint]:
+    """Joints that a robot does not have, that move in another unit, or before which there is no link to lengthen."""
+    kinds = {"joint_offsets_deg": True, "joint_offsets_mm": False}
+    for key in (*kinds, "link_lengths_mm"):
+        for name in _mapping(written, key):
+            path = (*place, key, name)
+            if name not in model.joint_names:
+                text = _unknown(f"a joint of '{place[-1]}'", name, list(model.joint_names))
+                yield document.key_complaint(path, text)
+                continue
+            joint = model.joint_names.index(name)
+            if key in kinds and model.joints[joint].is_revolute != kinds[key]:
+                kind, cure = ("prismatic", "joint_offsets_mm") if kinds[key] else ("revolute", "joint_offsets_deg")
+                yield document.key_complaint(path, f"joint '{name}' is {kind}: state its offset under {cure}")
+            if key == "link_lengths_mm" and np.linalg.norm(link_vector(model, joint)) < SHORTEST_LINK:
+                text = (
+                    f"the axis points of '{name}' and of the joint before it are one point, so the link has no "
+                    "direction to be lengthened in: state the error under base or tool, or move a point along its axis"
+                )
+                yield document.key_complaint(path, text)
+
+
+def _unknown(what: str, name: str, known: list[str]) -> str:
+    """A name that nobody bears."""
+    return f"expected {what} ({listed(known)}), got {shown(name)}{did_you_mean(name, known)}"
+
+
+def _mapping(root: Mapping[str, object], key: str) -> Mapping[str, object]:
+    """A section by name; nothing when it is something else: the format has complained already."""
+    section = root.get(key)
+    return section if isinstance(section, dict) else {}
+
+
+def _robot_errors(entry: RobotErrorsEntry) -> RobotErrors:
+    """Errors of one robot in [m] and [rad]."""
+    turns = {name: _amount(written, DEG) for name, written in entry.joint_offsets_deg.items()}
+    slides = {name: _amount(written, MM) for name, written in entry.joint_offsets_mm.items()}
+    return RobotErrors(
+        joint_offsets=turns | slides,
+        link_lengths={name: _amount(written, MM) for name, written in entry.link_lengths_mm.items()},
+        base=_pose_amounts(entry.base),
+        tool=_pose_amounts(entry.tool),
+    )
+
+
+def _pose_amounts(entry: PoseErrorEntry) -> PoseAmounts:
+    """A pose of amounts in [m] and [rad]."""
+    x, y, z = (_amount(written, MM) for written in entry.xyz_mm)
+    roll, pitch, yaw = (_amount(written, DEG) for written in entry.rpy_deg)
+    return PoseAmounts(xyz=(x, y, z), rpy=(roll, pitch, yaw))
+
+
+def _amount(written: Written, per_si: float) -> Amount:
+    """An amount in SI units."""
+    if isinstance(written, ShiftSpreadEntry | TurnSpreadEntry):
+        if written.normal is not None:
+            return Amount(Spread.NORMAL, written.normal / per_si)
+        return Amount(Spread.UNIFORM, (written.uniform or 0.0) / per_si)
+    return Amount(Spread.FIXED, written / per_si)

@@ -1,0 +1,1 @@
+"""Reading of files that users name: allowed folders, sizes, JSON, findings."""

@@ -1,0 +1,1 @@
+"""Robots: bundled joint tables, joint tables of the user, URDF."""

@@ -1,0 +1,41 @@
+"""Robots that come with the program, as joint-axis tables."""
+
+from pathlib import Path
+from typing import Final
+
+from cellplan.errors import InputError
+from cellplan.io.input.allowed_folders import AllowedFolders
+from cellplan.io.input.findings import did_you_mean, listed, shown
+from cellplan.io.robots.joint_table import RobotTable, load_robot_table
+from cellplan.model.robot import RobotModel
+
+FOLDER: Final = Path(__file__).resolve().parents[2] / "robots"
+
+
+def bundled_names() -> tuple[str, ...]:
+    """Names of all bundled robots, in alphabetical order."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
+
+
+def load_bundled(name: str) -> RobotModel:
+    """A bundled robot.
+
+    Raises:
+        InputError: There is none of that name.
+    """
+    return load_bundled_table(name).model
+
+
+def load_bundled_table(name: str) -> RobotTable:
+    """A bundled robot with the digest of its table.
+
+    Raises:
+        InputError: There is none of that name.
+    """
+    names = bundled_names()
+    if name not in names:
+        hint = did_you_mean(name, names)
+        raise InputError(
+            f"expected a bundled robot ({listed(names)}) or a .urdf or .yaml file, got {shown(name)}{hint}"
+        )
+    return load_robot_table(FOLDER / f"{name}.yaml", file=f"bundled:{name}", folders=AllowedFolders(folder=FOLDER))

@@ -1,0 +1,209 @@
+"""Robot from a joint-axis table: axes, limits, flange and link bodies at the reference posture."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from cellplan.cache import as_here
+from cellplan.errors import InputError
+from cellplan.geometry.mesh.load import read_mesh
+from cellplan.geometry.shapes import Mesh
+from cellplan.guard import Guard, in_child
+from cellplan.io.input.allowed_folders import AllowedFolders
+from cellplan.io.input.findings import Complaint, KeyPath, did_you_mean, listed, raise_complaints, shown
+from cellplan.io.robots.build_payload import build_payload, payload_complaints
+from cellplan.io.schema import RobotTableDocument
+from cellplan.io.schema.messages import validate
+from cellplan.io.schema.robot_table import BodiesEntry, JointEntry
+from cellplan.io.shapes import MM, link_solid, pose_from_entry
+from cellplan.io.yaml.reader import YamlDocument, read_yaml
+from cellplan.model.robot import BASE, Body, BodyAccuracy, Joint, JointKind, Link, RobotModel
+
+MESH_UNITS: Final[Mapping[str, float]] = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}  # [m]
+FOOT: Final = "base"  # word for the link that does not move
+TOOL_NAME: Final = re.compile(r"tool(_[0-9]+)?")  # these names belong to the bodies of the tool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RobotTable:
+    """A robot model and the files it was read from.
+
+    Attributes:
+        model: The robot.
+        digest: SHA-256 of the table.
+        mesh_files: Mesh files by name as written in the table.
+    """
+
+    model: RobotModel
+    digest: str
+    mesh_files: Mapping[str, Path]
+
+
+def read_robot_table(path: Path) -> RobotModel:
+    """Robot model of a joint-axis table; see `load_robot_table`."""
+    return load_robot_table(path, file=str(path), folders=AllowedFolders(folder=path.parent)).model
+
+
+def load_robot_table(path: Path, *, file: str, folders: AllowedFolders) -> RobotTable:
+    """Read a joint-axis table and its meshes.
+
+    Args:
+        path: The table.
+        file: Its name in messages.
+        folders: Where its meshes may lie.
+
+    Raises:
+        InputError: All complaints about the table at once, or what is wrong with a mesh.
+    """
+    document = read_yaml(path, file=file)
+    table, complaints = validate(RobotTableDocument, document)
+    complaints += document.complaints
+    if table is not None:
+        complaints += _rules(table, document)
+    meshes = _Meshes(document, folders, table.solids_path if table is not None else ())
+    bodies = tuple(_bodies(table, meshes)) if table is not None and not complaints else ()
+    raise_complaints(file, [*complaints, *meshes.complaints])
+    if table is None:
+        raise InputError(f"{file}: the table cannot be understood")
+    return RobotTable(model=_model(table, bodies), digest=document.digest, mesh_files=meshes.files)
+
+
+def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Complaint]:
+    """Names that must exist, and names that mean something else already."""
+    for name in table.joints:
+        if name == FOOT or TOOL_NAME.fullmatch(name):
+            text = f"expected another name, '{name}' means {'the foot' if name == FOOT else 'the tool'} of the robot"
+            yield document.key_complaint(("joints", name), text)
+    links, place = (FOOT, *table.joints), table.solids_path
+    for index, body in enumerate(table.solids):
+        if body.link not in links:
+            hint = did_you_mean(body.link, links)
+            text = f"expected a link ({listed(links)}), got {shown(body.link)}{hint}"
+            yield document.complaint((*place, index, "link"), text)
+        if body.name is not None and TOOL_NAME.fullmatch(body.name):
+            text = f"expected another name, '{body.name}' means the tool of the robot"
+            yield document.complaint((*place, index, "name"), text)
+    turning = tuple(name for name, joint in table.joints.items() if joint.type == "revolute")
+    yield from payload_complaints(("payload",), table.payload, turning, document)
+    named = [(index, body.name) for index, body in enumerate(table.solids) if body.name is not None]
+    for order, (index, name) in enumerate(named):
+        if name in {other for _, other in named[:order]}:
+            yield document.complaint((*place, index, "name"), f"expected a name of its own, got '{name}' twice")
+
+
+class _Meshes:
+    """Mesh files of a table, each read once for each unit."""
+
+    def __init__(self, document: YamlDocument, folders: AllowedFolders, place: KeyPath) -> None:
+        """Remember where to look and where to complain."""
+        self._document, self._place = document, place
+        self._folders = folders
+        self._read: dict[tuple[str, str], Mesh] = {}
+        self.files: dict[str, Path] = {}
+        self.complaints: list[Complaint] = []
+
+    def mesh(self, written: str, unit: str, *, index: int) -> Mesh | None:
+        """Mesh in [m]; None after a complaint."""
+        if (written, unit) in self._read:
+            return self._read[written, unit]
+        try:
+            path = self._folders.file(written)
+        except InputError as error:
+            self.complaints.append(self._document.complaint((*self._place, index, "mesh", "file"), str(error)))
+            return None
+        try:
+            guard = Guard(file=written, worker="the mesh reader")
+            mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), path, guard=guard)
+        except InputError as error:
+            self.complaints.append(self._document.complaint((*self._place, index, "mesh", "file"), str(error)))
+            return None
+        self.files[written] = path
+        self._read[written, unit] = replace(mesh, is_leaky=not mesh.is_closed)
+        return self._read[written, unit]
+
+    def known(self, written: str, unit: str, *, index: int) -> Mesh:
+        """A mesh that was read before."""
+        mesh = self.mesh(written, unit, index=index)
+        if mesh is None:
+            raise InputError(f"{self._document.file}: mesh {shown(written)} could not be read")
+        return mesh
+
+
+def _bodies(table: RobotTableDocument, meshes: _Meshes) -> Iterator[Body]:
+    """Link bodies; one whose mesh cannot be read is left out after its complaint."""
+    links = {FOOT: BASE, **{name: index for index, name in enumerate(table.joints)}}
+    taken = {body.name for body in table.solids if body.name is not None}
+    for index, entry in enumerate(table.solids):
+        if entry.mesh is not None and meshes.mesh(entry.mesh.file, entry.mesh.unit, index=index) is None:
+            continue
+        name = entry.name or _free_name(entry.link, taken)
+        taken.add(name)
+        shape, X_BS = link_solid(entry, partial(meshes.known, index=index))
+        accuracy = None if entry.accuracy_mm is None else entry.accuracy_mm / MM
+        yield Body(name=name, link=links[entry.link], shape=shape, X_BS=X_BS, accuracy=accuracy)
+
+
+def _free_name(link: str, taken: set[str]) -> str:
+    """Name of the link, numbered from 2 when it is taken."""
+    if link not in taken:
+        return link
+    number = 2
+    while f"{link}_{number}" in taken:
+        number += 1
+    return f"{link}_{number}"
+
+
+def _model(table: RobotTableDocument, bodies: tuple[Body, ...]) -> RobotModel:
+    """The robot in [m] and [rad]."""
+    return RobotModel(
+        name=table.robot,
+        source=table.source,
+        joints=tuple(_joint(name, entry, index - 1) for index, (name, entry) in enumerate(table.joints.items())),
+        flange_link=len(table.joints) - 1,
+        X_BF=pose_from_entry(table.flange),
+        bodies=bodies,
+        body_accuracy=_body_accuracy(table),
+        payload=build_payload(table.payload),
+        links=tuple(
+            Link(name=name, index=index - 1, X_BL=np.eye(4)) for index, name in enumerate((FOOT, *table.joints))
+        ),
+    )
+
+
+def _body_accuracy(table: RobotTableDocument) -> BodyAccuracy | None:
+    """How good the bodies are, if the table says so."""
+    bodies = table.bodies
+    if not isinstance(bodies, BodiesEntry) or bodies.accuracy_mm is None:
+        return None
+    return BodyAccuracy(distance=bodies.accuracy_mm / MM, source=bodies.source)
+
+
+def _joint(name: str, entry: JointEntry, parent: int) -> Joint:
+    """A joint; its axis was checked to be of length 1 but for the digits it was written with."""
+    kind = JointKind(entry.type)
+    is_revolute = kind == JointKind.REVOLUTE
+    words = ("deg", "deg_s", "deg_s2", "deg_s3") if is_revolute else ("mm", "mm_s", "mm_s2", "mm_s3")
+    acceleration, jerk = getattr(entry, f"acceleration_{words[2]}"), getattr(entry, f"jerk_{words[3]}")
+    axis = np.array(entry.axis)
+    return Joint(
+        name=name,
+        kind=kind,
+        parent=parent,
+        axis_B=axis / np.linalg.norm(axis),
+        point_B=np.divide(entry.point_mm, MM),
+        lower=_si(getattr(entry, f"lower_{words[0]}"), is_revolute=is_revolute),
+        upper=_si(getattr(entry, f"upper_{words[0]}"), is_revolute=is_revolute),
+        velocity=_si(getattr(entry, f"velocity_{words[1]}"), is_revolute=is_revolute),
+        acceleration=None if acceleration is None else _si(acceleration, is_revolute=is_revolute),
+        jerk=None if jerk is None else _si(jerk, is_revolute=is_revolute),
+    )
+
+
+def _si(value: float, *, is_revolute: bool) -> float:
+    """Degrees to radians, or millimetres to metres."""
+    return float(np.deg2rad(value)) if is_revolute else value / MM

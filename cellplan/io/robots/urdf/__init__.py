@@ -1,0 +1,1 @@
+"""URDF: document, tree, limits, bodies."""

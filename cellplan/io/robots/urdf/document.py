@@ -1,0 +1,324 @@
+"""URDF as it is written: links with solids, joints with limits and mimics, checked one by one and counted."""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, TypeVar
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.shapes import Box, Capsule, Cylinder, Sphere
+from cellplan.geometry.transforms import Array
+from cellplan.io.input.findings import did_you_mean, shown
+from cellplan.io.robots.urdf.xml import Element, origin_of, read_xml
+
+MAX_LINKS: Final = 200
+MAX_MOVABLE: Final = 64
+MAX_SIZE: Final = 20.0  # [m] larger bodies are slips of the unit
+NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,39}")  # the same everywhere: safe in tables and file names
+MOVABLE: Final = ("revolute", "continuous", "prismatic")
+REFUSED: Final = ("floating", "planar")
+LINK_CHILDREN: Final = ("inertial", "visual", "collision")
+JOINT_CHILDREN: Final = ("origin", "parent", "child", "axis", "limit", "mimic", "dynamics", "calibration")
+SAFETY: Final = "safety_controller"
+ATTRIBUTES: Final[Mapping[str, tuple[str, ...]]] = {
+    "origin": ("xyz", "rpy"),
+    "axis": ("xyz",),
+    "limit": ("lower", "upper", "velocity", "effort", "acceleration", "deceleration", "jerk"),
+    "mimic": ("joint", "multiplier", "offset"),
+    "mesh": ("filename", "scale"),
+}  # of the elements in which a missing attribute has a default
+FOREIGN: Final = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "group_state", "actuator"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UrdfMesh:
+    """A mesh that a geometry names: the name as written and metres per unit of the file along x, y, z."""
+
+    uri: str
+    scale: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UrdfSolid:
+    """One collision (or visual) element; ``X_LS`` is the pose of its shape in the link frame."""
+
+    element: Element
+    shape: Box | Cylinder | Capsule | Sphere | UrdfMesh
+    X_LS: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UrdfLink:
+    """A link and the solids that stand for it: its collision elements, or its visual ones when it has no others."""
+
+    name: str
+    element: Element
+    solids: tuple[UrdfSolid, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UrdfMimic:
+    """``q = multiplier q_leader + offset``."""
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UrdfLimit:
+    """Limits as far as the file gives usable ones, in [rad] or [m]."""
+
+    lower: float | None = None
+    upper: float | None = None
+    velocity: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UrdfJoint:
+    """A joint: its frame in the parent link at zero, ``X_PJ``, and its unit axis in its own frame, ``axis_J``."""
+
+    name: str
+    kind: str
+    element: Element
+    parent: str
+    child: str
+    X_PJ: Array
+    axis_J: Array
+    limit: UrdfLimit
+    mimic: UrdfMimic | None
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the joint does not move at all."""
+        return self.kind == "fixed"
+
+    def error(self, what: str) -> InputError:
+        """Complaint about this joint, with its line."""
+        return self.element.error(f"joint '{self.name}': {what}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UrdfDocument:
+    """All links and joints of a file by name, in its order."""
+
+    file: str
+    name: str
+    links: dict[str, UrdfLink]
+    joints: dict[str, UrdfJoint]
+
+
+Named = TypeVar("Named", UrdfLink, UrdfJoint)
+
+
+def read_document(path: Path) -> UrdfDocument:
+    """Read a URDF and check every element for itself.
+
+    Raises:
+        InputError: With file and line, for anything that is missing, double, misspelt, out of range or not supported.
+    """
+    root = read_xml(path)
+    if root.tag != "robot":
+        raise root.error(f"expected a URDF with the root element <robot>, got <{shown(root.tag)[1:-1]}>")
+    for element in root.walk(frozenset()):
+        if element.tag.startswith("xacro:"):
+            raise element.error(f"expected plain URDF, got <{element.tag}>: expand the xacro file first")
+    links = _by_name(_link(element) for element in root.all("link"))
+    joints = _by_name(_joint(element) for element in root.all("joint"))
+    if not 1 <= len(links) <= MAX_LINKS:
+        raise InputError(f"{path.name}: expected 1 to {MAX_LINKS} links, got {len(links)}")
+    movable = sum(joint.kind in MOVABLE for joint in joints.values())
+    if movable > MAX_MOVABLE:
+        raise InputError(f"{path.name}: expected at most {MAX_MOVABLE} movable joints, got {movable}")
+    _require_nothing_hidden(root, links, joints)
+    return UrdfDocument(file=path.name, name=_name(root), links=links, joints=joints)
+
+
+def _by_name(things: Iterable[Named]) -> dict[str, Named]:
+    """Links or joints by name; a second one of the same name is refused."""
+    found: dict[str, Named] = {}
+    for thing in things:
+        if thing.name in found:
+            first = found[thing.name].element
+            raise thing.element.error(f"{first.tag} '{thing.name}': is already defined in line {first.line}")
+        found[thing.name] = thing
+    return found
+
+
+def _require_nothing_hidden(root: Element, links: dict[str, UrdfLink], joints: dict[str, UrdfJoint]) -> None:
+    """Count links, joints and collisions wherever they stand: none may lie where the reader does not look."""
+    everywhere = [element for element in root.walk(FOREIGN) if element.tag in ("link", "joint", "collision")]
+    known = {id(link.element) for link in links.values()} | {id(joint.element) for joint in joints.values()}
+    known |= {id(solid.element) for link in links.values() for solid in link.solids}
+    for element in everywhere:
+        if id(element) not in known:
+            raise element.error(f"expected <{element.tag}> directly below its owner: here it would be lost")
+
+
+def _name(element: Element) -> str:
+    """Name of a link, a joint or the robot."""
+    name = element.text("name", element.tag)
+    if not NAME.fullmatch(name):
+        what = "a name of 1 to 40 letters, digits, '_' or '-' that does not start with '-'"
+        raise element.error(f"{element.tag}: expected {what}, got {shown(name)}")
+    return name
+
+
+def _require_known_children(element: Element, known: tuple[str, ...], owner: str) -> None:
+    """A misspelt element would be passed over in silence; extensions with other names are left alone."""
+    for child in element.children:
+        hint = "" if child.tag in known or child.tag == SAFETY else did_you_mean(child.tag, known)
+        if hint:
+            raise child.error(f"{owner}: unknown element <{child.tag}>{hint}")
+
+
+def _require_known_attributes(element: Element, owner: str) -> None:
+    """Misspelt, an attribute would leave its default in place; extensions with other names are left alone."""
+    for child in element.children:
+        known = ATTRIBUTES.get(child.tag, ())
+        for name in child.attributes:
+            hint = "" if name in known else did_you_mean(name.lower(), known)
+            if hint:
+                raise child.error(f"{owner}: unknown attribute '{name}' in <{child.tag}>{hint}")
+
+
+def _link(element: Element) -> UrdfLink:
+    """One link; a link that is drawn but has no collision body gets the drawn one."""
+    name = _name(element)
+    owner = f"link '{name}'"
+    _require_known_children(element, LINK_CHILDREN, owner)
+    drawn = element.all("collision") or element.all("visual")
+    return UrdfLink(name=name, element=element, solids=tuple(_solid(solid, owner) for solid in drawn))
+
+
+def _solid(element: Element, owner: str) -> UrdfSolid:
+    """One collision or visual element."""
+    _require_known_children(element, ("origin", "geometry", "material"), owner)
+    _require_known_attributes(element, owner)
+    geometry = element.one("geometry", owner)
+    if geometry is None or len(geometry.children) != 1:
+        count = 0 if geometry is None else len(geometry.children)
+        raise element.error(f"{owner}: expected <{element.tag}> with a <geometry> of one shape, got {count} shapes")
+    _require_known_attributes(geometry, owner)
+    return UrdfSolid(element=element, shape=_shape(geometry.children[0], owner), X_LS=origin_of(element, owner))
+
+
+def _shape(element: Element, owner: str) -> Box | Cylinder | Capsule | Sphere | UrdfMesh:
+    """Shape of a geometry element."""
+    match element.tag:
+        case "box":
+            x, y, z = _sizes(element, "size", 3, owner=owner)
+            return Box((x, y, z))
+        case "cylinder":
+            return Cylinder(_size(element, "radius", owner), _size(element, "length", owner))
+        case "capsule":
+            return Capsule(_size(element, "radius", owner), _size(element, "length", owner))
+        case "sphere":
+            return Sphere(_size(element, "radius", owner))
+        case "mesh":
+            return UrdfMesh(uri=element.text("filename", owner), scale=_scale(element, owner))
+        case other:
+            raise element.error(f"{owner}: expected a box, cylinder, capsule, sphere or mesh, got <{other}>")
+
+
+def _sizes(element: Element, name: str, count: int, *, owner: str) -> list[float]:
+    """Positive lengths of a likely size in [m]."""
+    values = element.numbers(name, count, owner=owner)
+    if np.any(values <= 0.0):
+        raise element.error(f"{owner}: expected a positive '{name}', got {shown(element.attributes[name])}")
+    if np.any(values > MAX_SIZE):
+        given = shown(element.attributes[name])
+        raise element.error(f"{owner}: expected a '{name}' of at most {MAX_SIZE:g} m, got {given}: is the unit mm?")
+    return [float(value) for value in values]
+
+
+def _size(element: Element, name: str, owner: str) -> float:
+    """One positive length in [m]."""
+    return _sizes(element, name, 1, owner=owner)[0]
+
+
+def _scale(element: Element, owner: str) -> tuple[float, float, float]:
+    """Metres per unit of a mesh file along its axes; one number stands for all three."""
+    count = 1 if len(element.attributes.get("scale", "1 1 1").split()) == 1 else 3
+    values = np.broadcast_to(element.numbers("scale", count, owner=owner, default=(1.0,) * count), (3,))
+    if np.any(values == 0.0):
+        raise element.error(f"{owner}: expected a 'scale' without zeros, got {shown(element.attributes['scale'])}")
+    return (float(values[0]), float(values[1]), float(values[2]))
+
+
+def _joint(element: Element) -> UrdfJoint:
+    """One joint."""
+    name = _name(element)
+    owner = f"joint '{name}'"
+    _require_known_children(element, JOINT_CHILDREN, owner)
+    _require_known_attributes(element, owner)
+    kind = element.text("type", owner)
+    if kind in REFUSED:
+        raise element.error(f"{owner}: expected one axis at most, got the type '{kind}', which is not supported")
+    if kind not in (*MOVABLE, "fixed"):
+        hint = did_you_mean(kind, (*MOVABLE, "fixed"))
+        raise element.error(
+            f"{owner}: expected the type revolute, continuous, prismatic or fixed, got {shown(kind)}{hint}"
+        )
+    ends = {tag: element.one(tag, owner) for tag in ("parent", "child")}
+    for tag, end in ends.items():
+        if end is None:
+            raise element.error(f"{owner}: expected <{tag} link=…>, got none")
+    parent, child = (end.text("link", owner) for end in ends.values() if end is not None)
+    return UrdfJoint(
+        name=name,
+        kind=kind,
+        element=element,
+        parent=parent,
+        child=child,
+        X_PJ=origin_of(element, owner),
+        axis_J=np.array([1.0, 0.0, 0.0]) if kind == "fixed" else _axis(element, owner),
+        limit=_limit(element, owner, kind=kind),
+        mimic=None if kind == "fixed" else _mimic(element, owner),
+    )
+
+
+def _axis(element: Element, owner: str) -> Array:
+    """Unit axis in the joint frame; x when the file names none."""
+    axis = element.one("axis", owner)
+    if axis is None:
+        return np.array([1.0, 0.0, 0.0])
+    vector = axis.numbers("xyz", 3, owner=owner)
+    length = float(np.linalg.norm(vector))
+    if not 1e-6 < length < 1e6:
+        raise axis.error(f"{owner}: expected an axis that is not zero, got {shown(axis.attributes['xyz'])}")
+    return vector / length
+
+
+def _limit(element: Element, owner: str, *, kind: str) -> UrdfLimit:
+    """Limits; a pair that leaves no room and a speed that is not positive count as not given."""
+    limit = element.one("limit", owner)
+    if limit is None or kind == "fixed":
+        return UrdfLimit()
+    velocity = limit.number("velocity", owner, default=0.0)
+    if kind == "continuous":
+        return UrdfLimit(velocity=velocity if velocity > 0.0 else None)
+    lower, upper = (limit.number(name, owner, default=0.0) for name in ("lower", "upper"))
+    if lower > upper:
+        raise limit.error(f"{owner}: expected 'lower' below 'upper', got {lower:g} and {upper:g}")
+    has_room = lower < upper
+    return UrdfLimit(
+        lower=lower if has_room else None,
+        upper=upper if has_room else None,
+        velocity=velocity if velocity > 0.0 else None,
+    )
+
+
+def _mimic(element: Element, owner: str) -> UrdfMimic | None:
+    """The joint that drives this one through a linkage."""
+    mimic = element.one("mimic", owner)
+    if mimic is None:
+        return None
+    return UrdfMimic(
+        leader=mimic.text("joint", owner),
+        multiplier=mimic.number("multiplier", owner, default=1.0),
+        offset=mimic.number("offset", owner, default=0.0),
+    )

@@ -1,0 +1,177 @@
+"""Robot from a URDF: joint axes and link bodies at the zero posture, with nothing of the file lost."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+from cellplan.errors import CellplanError
+from cellplan.geometry.transforms import Array
+from cellplan.io.input.allowed_folders import AllowedFolders
+from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
+from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_document
+from cellplan.io.robots.urdf.limits import JointLimits, joint_range
+from cellplan.io.robots.urdf.tree import (
+    Roles,
+    ZeroPosture,
+    assign_roles,
+    build_tree,
+    choose_flange,
+    known_joint,
+    links_in_order,
+    zero_posture,
+)
+from cellplan.model.robot import FollowerJoint, Joint, JointKind, Link, RobotModel
+
+__all__ = ["JointLimits", "UrdfOptions", "UrdfRobot", "load_urdf", "read_urdf"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UrdfOptions:
+    """What a cell adds to a URDF.
+
+    Attributes:
+        flange: Link taken as the flange; None for the usual one (``tool0``, ``flange``, the only moving leaf).
+        package_dirs: Folders in which ``package://`` names are looked up.
+        limits: Limits by joint name; they tighten the URDF's or stand in for missing ones.
+        locked: Position in [rad] or [m] of joints that are held still, by name.
+        lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where it was not written.
+        within: Folders that its meshes must lie in; None for all.
+    """
+
+    flange: str | None = None
+    package_dirs: tuple[Path, ...] = ()
+    limits: Mapping[str, JointLimits] = field(default_factory=lambda: MappingProxyType({}))
+    locked: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    lock_units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    within: AllowedFolders | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UrdfRobot:
+    """A robot model and the mesh files it was read from, each once."""
+
+    model: RobotModel
+    mesh_files: tuple[Path, ...]
+
+
+def read_urdf(path: Path, options: UrdfOptions | None = None) -> RobotModel:
+    """Robot model of a URDF; see `load_urdf`."""
+    return load_urdf(path, options).model
+
+
+def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
+    """Read a URDF and its collision meshes.
+
+    The root link is the base frame B. Joints between base and flange are driven; mimic joints follow them; every other
+    movable joint must be locked. A link without collision elements is represented by its visual ones.
+
+    Args:
+        path: The file.
+        options: What the cell adds; None adds nothing.
+
+    Raises:
+        InputError: With file and line, for anything that cannot be taken over faithfully.
+    """
+    options = options or UrdfOptions()
+    document = read_document(path)
+    tree = build_tree(document)
+    _require_lock_units(document, options.lock_units)
+    flange = choose_flange(tree, options.flange)
+    roles = assign_roles(tree, flange, options.locked)
+    _require_known_limits(document, roles, options.limits)
+    posture = zero_posture(tree, roles)
+    shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
+    model = RobotModel(
+        name=document.name,
+        source=path.name,
+        joints=tuple(_driven(joint, roles, posture, limits=options.limits) for joint in roles.driven),
+        followers=tuple(_follower(joint, roles, posture) for joint in roles.followers),
+        flange_link=posture.carrier[flange],
+        X_BF=posture.X_BL[flange],
+        bodies=link_bodies(tree, posture, shelf),
+        links=tuple(
+            Link(name=link.name, index=posture.carrier[link.name], X_BL=posture.X_BL[link.name])
+            for link in links_in_order(tree)
+        ),
+    )
+    _require_complete(document, roles, model)
+    return UrdfRobot(model=model, mesh_files=tuple(shelf.files))
+
+
+def _require_known_limits(document: UrdfDocument, roles: Roles, limits: Mapping[str, JointLimits]) -> None:
+    """Limits make sense only for joints that are driven."""
+    driven = {joint.name for joint in roles.driven}
+    for name in limits:
+        joint = known_joint(document, name, "limits")
+        if name not in driven:
+            reason = "is fixed" if joint.is_fixed else "follows another joint" if joint.mimic else "is locked"
+            raise joint.error(f"has limits in the cell, but it {reason}")
+
+
+def _require_lock_units(document: UrdfDocument, units: Mapping[str, str]) -> None:
+    """A joint that slides is held still in millimetres, one that turns in degrees."""
+    for name, unit in units.items():
+        joint = known_joint(document, name, "locked")
+        required = "mm" if joint.kind == "prismatic" else "deg"
+        if unit != required and not joint.is_fixed:
+            raise joint.error(f"is {joint.kind}: expected to be locked in {required}, got {unit}")
+
+
+def _driven(joint: UrdfJoint, roles: Roles, posture: ZeroPosture, *, limits: Mapping[str, JointLimits]) -> Joint:
+    """A driven joint with its axis in B."""
+    followers = [other for other in roles.followers if other.mimic and other.mimic.leader == joint.name]
+    wanted = limits.get(joint.name, JointLimits())
+    allowed = joint_range(joint, wanted, followers)
+    axis_B, point_B = _axis_in_base(joint, posture)
+    return Joint(
+        name=joint.name,
+        kind=_kind(joint),
+        parent=posture.carrier[joint.parent],
+        axis_B=axis_B,
+        point_B=point_B,
+        lower=allowed.lower,
+        upper=allowed.upper,
+        velocity=allowed.velocity,
+        acceleration=wanted.acceleration,
+        jerk=wanted.jerk,
+        rated_velocity=allowed.rated_velocity,
+    )
+
+
+def _follower(joint: UrdfJoint, roles: Roles, posture: ZeroPosture) -> FollowerJoint:
+    """A joint that a driven one moves, with its axis in B."""
+    axis_B, point_B = _axis_in_base(joint, posture)
+    leader = next(i for i, other in enumerate(roles.driven) if joint.mimic and other.name == joint.mimic.leader)
+    return FollowerJoint(
+        name=joint.name,
+        kind=_kind(joint),
+        parent=posture.carrier[joint.parent],
+        axis_B=axis_B,
+        point_B=point_B,
+        leader=leader,
+        ratio=joint.mimic.multiplier if joint.mimic else 0.0,
+        offset=joint.mimic.offset if joint.mimic else 0.0,
+    )
+
+
+def _axis_in_base(joint: UrdfJoint, posture: ZeroPosture) -> tuple[Array, Array]:
+    """Unit axis and a point on it in B."""
+    X_BJ = posture.X_BJ[joint.name]
+    return X_BJ[:3, :3] @ joint.axis_J, X_BJ[:3, 3]
+
+
+def _kind(joint: UrdfJoint) -> JointKind:
+    """How the joint moves."""
+    return JointKind.PRISMATIC if joint.kind == "prismatic" else JointKind.REVOLUTE
+
+
+def _require_complete(document: UrdfDocument, roles: Roles, model: RobotModel) -> None:
+    """Compare what was read with what came out, once more."""
+    joints = len(model.joints) + len(model.followers) + len(roles.still)
+    solids = sum(len(link.solids) for link in document.links.values())
+    if joints != len(document.joints) or solids != len(model.bodies):
+        raise CellplanError(
+            f"{document.file}: read {len(document.joints)} joints and {solids} bodies, but took over {joints} "
+            f"and {len(model.bodies)}"
+        )

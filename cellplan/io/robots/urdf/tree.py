@@ -1,0 +1,249 @@
+"""How the links of a URDF hang together, and what each joint does: driven, following, held still."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array, pose_from, rotation_about
+from cellplan.io.input.findings import did_you_mean, listed
+from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, UrdfLink
+from cellplan.model.robot import BASE
+
+FLANGE_NAMES: Final = ("tool0", "flange")  # taken as the flange in this order when the user names none
+
+SHOWN_NAMES: Final = 12  # more names than these make a message unreadable
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UrdfTree:
+    """A document whose links form one tree.
+
+    Attributes:
+        document: Links and joints.
+        root: Name of the link that carries all others: the base frame B.
+        joints: Every joint after the one that carries it.
+        above: The joint that carries each link but the root.
+    """
+
+    document: UrdfDocument
+    root: str
+    joints: tuple[UrdfJoint, ...]
+    above: Mapping[str, UrdfJoint]
+
+    def path_to(self, link: str) -> list[UrdfJoint]:
+        """Joints from the root to a link."""
+        path: list[UrdfJoint] = []
+        while link != self.root:
+            path.append(self.above[link])
+            link = path[-1].parent
+        return path[::-1]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Roles:
+    """What each joint does.
+
+    Attributes:
+        driven: The joints between base and flange that the planner moves, from the base on.
+        followers: Joints that a driven one moves through a linkage.
+        still: Position in [rad] or [m] of every other joint, by name; zero for fixed ones.
+    """
+
+    driven: tuple[UrdfJoint, ...]
+    followers: tuple[UrdfJoint, ...]
+    still: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ZeroPosture:
+    """Where everything is when all joints read zero.
+
+    Attributes:
+        X_BL: Pose of each link in the root link's frame, by link name.
+        X_BJ: Pose of each joint frame, by joint name.
+        carrier: Index of the driven or following joint that carries each link, by link name.
+    """
+
+    X_BL: Mapping[str, Array]
+    X_BJ: Mapping[str, Array]
+    carrier: Mapping[str, int]
+
+
+def build_tree(document: UrdfDocument) -> UrdfTree:
+    """Put the joints in order from the one root.
+
+    Raises:
+        InputError: A joint names an unknown link, a link hangs on two joints, there are several roots, or a cycle.
+    """
+    above: dict[str, UrdfJoint] = {}
+    below: dict[str, list[UrdfJoint]] = {name: [] for name in document.links}
+    for joint in document.joints.values():
+        for end, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in document.links:
+                raise joint.error(f"unknown {end} link '{link}'{_known(link, document.links)}")
+        if joint.child in above:
+            first = above[joint.child]
+            raise joint.error(
+                f"link '{joint.child}' already hangs on joint '{first.name}' in line {first.element.line}"
+            )
+        above[joint.child] = joint
+        below[joint.parent].append(joint)
+    roots = [name for name in document.links if name not in above]
+    if len(roots) > 1:
+        raise InputError(f"{document.file}: expected one root link, got {len(roots)}: {listed(roots)}")
+    ordered: list[UrdfJoint] = []
+    waiting = [joint for root in roots for joint in below[root]]
+    while waiting:
+        ordered.append(waiting.pop(0))
+        waiting = below[ordered[-1].child] + waiting
+    lost = [joint for joint in document.joints.values() if joint not in ordered]
+    if lost:
+        raise lost[0].error(f"its links form a cycle: {listed(joint.child for joint in lost)}")
+    return UrdfTree(document=document, root=roots[0], joints=tuple(ordered), above=above)
+
+
+def choose_flange(tree: UrdfTree, wanted: str | None) -> str:
+    """Name of the flange link: the wanted one, else ``tool0``, else ``flange``, else the only moving leaf.
+
+    Raises:
+        InputError: The wanted link does not exist, or there is no obvious one.
+    """
+    links = tree.document.links
+    if wanted is not None:
+        if wanted not in links:
+            raise InputError(f"{tree.document.file}: flange: unknown link '{wanted}'{_known(wanted, links)}")
+        return wanted
+    for name in FLANGE_NAMES:
+        if name in links:
+            return name
+    parents = {joint.parent for joint in tree.joints}
+    leaves = [name for name in links if name not in parents and _moves(tree, name)]
+    if len(leaves) != 1:
+        names = listed(leaves)
+        raise InputError(f"{tree.document.file}: flange: expected the name of a link, as it could be any of: {names}")
+    return leaves[0]
+
+
+def assign_roles(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> Roles:
+    """Say for every joint whether it is driven, follows a driven one or stands still.
+
+    Raises:
+        InputError: A movable joint off the chain is not locked, or a lock or a mimic is unsound.
+    """
+    _require_sound_locks(tree.document, locked)
+    on_chain = {joint.name for joint in tree.path_to(flange)}
+    driven: list[UrdfJoint] = []
+    followers: list[UrdfJoint] = []
+    still: dict[str, float] = {}
+    for joint in tree.joints:
+        if joint.is_fixed:
+            still[joint.name] = 0.0
+        elif joint.mimic:
+            leader = _leader(joint, tree.document)
+            if leader.name in locked:
+                still[joint.name] = joint.mimic.multiplier * locked[leader.name] + joint.mimic.offset
+            elif joint.name in on_chain:
+                raise joint.error(f"follows '{leader.name}' and carries the flange '{flange}', which is not supported")
+            else:
+                followers.append(joint)
+        elif joint.name in locked:
+            still[joint.name] = locked[joint.name]
+        elif joint.name in on_chain:
+            driven.append(joint)
+        else:
+            unit = "mm" if joint.kind == "prismatic" else "deg"
+            cure = f"hold it still with `locked: {{{joint.name}_{unit}: …}}`"
+            raise joint.error(f"moves, but is not between the base and the flange '{flange}': {cure}")
+    if not driven:
+        raise InputError(
+            f"{tree.document.file}: expected a movable joint between '{tree.root}' and '{flange}', got none"
+        )
+    return Roles(driven=tuple(driven), followers=tuple(followers), still=still)
+
+
+def zero_posture(tree: UrdfTree, roles: Roles) -> ZeroPosture:
+    """Poses of all links with every moving joint at zero and every other one where it is held."""
+    moving = [joint.name for joint in (*roles.driven, *roles.followers)]
+    X_BL: dict[str, Array] = {tree.root: np.eye(4)}
+    X_BJ: dict[str, Array] = {}
+    carrier = {tree.root: BASE}
+    for joint in tree.joints:
+        X_BJ[joint.name] = X_BL[joint.parent] @ joint.X_PJ
+        X_BL[joint.child] = X_BJ[joint.name] @ _travel(joint, roles.still.get(joint.name, 0.0))
+        is_moving = joint.name in moving
+        carrier[joint.child] = moving.index(joint.name) if is_moving else carrier[joint.parent]
+    return ZeroPosture(X_BL=X_BL, X_BJ=X_BJ, carrier=carrier)
+
+
+def known_joint(document: UrdfDocument, name: str, key: str) -> UrdfJoint:
+    """The joint that an option names.
+
+    Raises:
+        InputError: There is no such joint.
+    """
+    if name not in document.joints:
+        raise InputError(f"{document.file}: {key}: unknown joint '{name}'{_known(name, document.joints)}")
+    return document.joints[name]
+
+
+def links_in_order(tree: UrdfTree) -> list[UrdfLink]:
+    """All links in the order of the file."""
+    return list(tree.document.links.values())
+
+
+def _known(word: str, names: Collection[str]) -> str:
+    """The nearest name, or all of them when none is near and they are few."""
+    few = f", expected one of: {listed(names)}" if len(names) <= SHOWN_NAMES else ""
+    return did_you_mean(word, names) or few
+
+
+def _moves(tree: UrdfTree, link: str) -> bool:
+    """Whether a joint other than a mimic moves a link."""
+    return any(not joint.is_fixed and joint.mimic is None for joint in tree.path_to(link))
+
+
+def _require_sound_locks(document: UrdfDocument, locked: Mapping[str, float]) -> None:
+    """Only movable joints that lead can be locked, and only where they can go."""
+    for name, position in locked.items():
+        joint = known_joint(document, name, "locked")
+        if joint.is_fixed:
+            raise joint.error("is locked by the cell, but it is fixed anyway")
+        if joint.mimic:
+            raise joint.error(f"is locked by the cell, but it follows '{joint.mimic.leader}': lock that one")
+        lower = -np.inf if joint.limit.lower is None else joint.limit.lower
+        upper = np.inf if joint.limit.upper is None else joint.limit.upper
+        if not (np.isfinite(position) and lower - 1e-9 <= position <= upper + 1e-9):  # rounding of degrees
+            allowed = f"{in_user_unit(joint, lower)} to {in_user_unit(joint, upper)}"
+            raise joint.error(f"expected to be locked within {allowed}, got {in_user_unit(joint, position)}")
+
+
+def in_user_unit(joint: UrdfJoint, value: float, per: str = "") -> str:
+    """A position in [rad] or [m] as a message says it: in degrees or mm."""
+    if joint.kind == "prismatic":
+        return f"{1e3 * value:.6g} mm{per}"
+    return f"{np.degrees(value):.6g} deg{per}"
+
+
+def _leader(joint: UrdfJoint, document: UrdfDocument) -> UrdfJoint:
+    """The joint that drives a mimic joint."""
+    name = joint.mimic.leader if joint.mimic else ""
+    if name not in document.joints:
+        raise joint.error(f"mimics the unknown joint '{name}'{_known(name, document.joints)}")
+    leader = document.joints[name]
+    if leader is joint:
+        raise joint.error("mimics itself")
+    if leader.is_fixed:
+        raise joint.error(f"mimics '{name}', which is fixed")
+    if leader.mimic:
+        raise joint.error(f"mimics '{name}', which mimics '{leader.mimic.leader}': name the leading joint")
+    return leader
+
+
+def _travel(joint: UrdfJoint, position: float) -> Array:
+    """Motion of a joint's child from zero to a position, in the joint frame."""
+    if joint.kind == "prismatic":
+        return pose_from(np.eye(3), position * joint.axis_J)
+    return pose_from(rotation_about(joint.axis_J, position), np.zeros(3))

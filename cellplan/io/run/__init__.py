@@ -1,0 +1,1 @@
+"""Run folders: joint tables, manifest, atomic writing, reading back."""

@@ -1,0 +1,231 @@
+"""A run as it stands on disk: its folder read whole, each file as it was written, before anybody relies on it."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.errors import InputError, InvalidFileError
+from cellplan.io.input.files import digest, read_regular_file
+from cellplan.io.input.findings import shown
+from cellplan.io.input.json_reader import parse_json, required
+from cellplan.io.run.folder import MANIFEST
+from cellplan.io.run.joint_tables import MM_PER_M, parse_header, parse_table, table_body
+from cellplan.io.run.manifest import SIZE_LIMIT, Manifest, file_complaints, parse_manifest
+from cellplan.model.motion import JointTable
+
+REPORT_SCHEMA: Final = "cellplan.report/1"
+OF_EVERY_RUN: Final = ("cell.yaml", "report.html", "report.json")
+CELL: Final = "cell.yaml"
+TABLE_LIMIT: Final = 500_000_000  # [bytes] of a table that is read only to say where it is spoilt
+SERIES_ROOM: Final = 1e-6  # [-] series have seven digits
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StoredRun:
+    """The content of a run folder whose files are all as they were written.
+
+    Attributes:
+        folder: The run folder.
+        digest: SHA-256 of the manifest, which stands for the whole run.
+        manifest: What the run holds and rests on.
+        record: Its ``report.json``.
+        records: The ``report.json`` of each run, by its place in the folder: empty for a single one, else the task.
+        tables: Text of the joint tables by place of the run and by robot.
+    """
+
+    folder: Path
+    digest: str
+    manifest: Manifest
+    record: Record
+    records: Mapping[str, Record]
+    tables: Mapping[str, Mapping[str, str]]
+
+    def file(self, place: str, name: str) -> str:
+        """Path of a file of one run as messages show it."""
+        return str(self.folder / place / name)
+
+    def content(self, place: str, name: str) -> bytes:
+        """Content of a file of one run, which is still as it was written.
+
+        Raises:
+            InputError: It is missing, or was changed meanwhile.
+        """
+        return _content(self.folder, _at(place, name), self.manifest)
+
+    def drawings(self, place: str) -> dict[str, bytes]:
+        """The SVG pictures of one run by file name, in the order of the manifest."""
+        plots = PurePosixPath(_at(place, "plots"))
+        names = [PurePosixPath(name) for name in self.manifest.files]
+        found = [path.name for path in names if path.parent == plots and path.suffix == ".svg"]
+        return {name: self.content(place, f"plots/{name}") for name in found}
+
+
+def read_stored_run(folder: Path) -> StoredRun:
+    """Read a run folder and compare every file with the manifest.
+
+    Raises:
+        InvalidFileError: Everything that is not as it was written, one line for each file.
+        InputError: The folder is not a run, or its manifest cannot be read.
+    """
+    manifest, whole = _manifest(folder)
+    changed = file_complaints(folder, manifest)
+    if changed:
+        raise InvalidFileError([*changed.values(), *_spoilt_tables(folder, changed)])
+    record = _record(folder, "report.json", manifest)
+    records = _records(folder, record, manifest)
+    complaints = list(_incomplete(folder, manifest, [*records]))
+    complaints += _contradictions(folder, manifest, record=record, records=records)
+    if complaints:
+        raise InvalidFileError(complaints)
+    tables = {place: dict(_tables(folder, manifest, place)) for place in records}
+    return StoredRun(folder=folder, digest=whole, manifest=manifest, record=record, records=records, tables=tables)
+
+
+def _manifest(folder: Path) -> tuple[Manifest, str]:
+    """The manifest and its digest."""
+    if not folder.is_dir():
+        what = "a file" if folder.exists() else "nothing"
+        raise InputError(f"{folder}: expected the folder of a run, got {what}")
+    path = folder / MANIFEST
+    if path.is_symlink():
+        raise InputError(f"{path}: expected a file of the run, got a symbolic link")
+    if not path.exists():
+        has_report = (folder / "report.json").is_file()
+        why = "a run without a manifest: solve the cell again" if has_report else "no manifest.json in it"
+        raise InputError(f"{folder}: expected the folder of a run, got {why}")
+    data = read_regular_file(path, file=str(path), limit=SIZE_LIMIT)
+    return parse_manifest(data, str(path)), digest(data)
+
+
+def _content(folder: Path, name: str, manifest: Manifest) -> bytes:
+    """Content of a file that must be the one the manifest speaks of, even if somebody writes meanwhile."""
+    file, stored = str(folder / name), manifest.files.get(name)
+    if stored is None:
+        raise InputError(f"{file}: missing; the run was written without it")
+    data = read_regular_file(folder / name, file=file, limit=stored.size)
+    if digest(data) != stored.digest:
+        raise InputError(f"{file}: changed while it was read")
+    return data
+
+
+def _record(folder: Path, name: str, manifest: Manifest) -> Record:
+    """A report of known form."""
+    file = str(folder / name)
+    record = parse_json(_content(folder, name, manifest), file)
+    if record.get("schema") != REPORT_SCHEMA:
+        raise InputError(f"{file}: schema: expected '{REPORT_SCHEMA}', got {shown(record.get('schema'))}")
+    for key, kind in (("cell", str), ("status", str), ("tasks", dict), ("inputs", dict), ("versions", dict)):
+        required(record, key, kind, file=file)
+    return record
+
+
+def _records(folder: Path, record: Record, manifest: Manifest) -> dict[str, Record]:
+    """The report of each run, by its place."""
+    if "runs" not in record:
+        return {"": record}
+    runs = required(record, "runs", dict, file=str(folder / "report.json"))
+    if not runs:
+        raise InputError(f"{folder / 'report.json'}: runs: expected at least one")
+    return {name: _record(folder, f"{name}/report.json", manifest) for name in runs}
+
+
+def _incomplete(folder: Path, manifest: Manifest, places: list[str]) -> Iterator[InputError]:
+    """What a run must have and this one has not, and tables that do not go with the verdict."""
+    for place in {"", *places}:
+        for name in OF_EVERY_RUN:
+            if _at(place, name) not in manifest.files:
+                yield InputError(f"{folder / place / name}: missing; every run has it")
+    for place in places:
+        if place and manifest.files.get(_at(place, CELL)) != manifest.files.get(CELL):
+            yield InputError(f"{folder / place / CELL}: differs from the cell of the other runs")
+    unfitting = "rejected" if manifest.status == "passed" else "tables"
+    for name in manifest.files:
+        if _is_table(name, places, unfitting):
+            yield InputError(f"{folder / name}: does not go with a run that has {manifest.status}")
+
+
+def _contradictions(
+    folder: Path, manifest: Manifest, *, record: Record, records: Mapping[str, Record]
+) -> Iterator[InputError]:
+    """Reports that say something else than the manifest."""
+    named = {"report.json": record} | {_at(place, "report.json"): found for place, found in records.items()}
+    for name, found in named.items():
+        said = {
+            "cell": (found["cell"], manifest.cell),
+            "inputs": (found["inputs"], dict(manifest.inputs)),
+            "versions": (found["versions"], dict(manifest.versions)),
+        }
+        if name == "report.json":
+            said["status"] = (found["status"], manifest.status)
+        for key, (got, expected) in said.items():
+            if got != expected:
+                yield InputError(f"{folder / name}: {key}: contradicts {MANIFEST}; solve the cell again")
+
+
+def _tables(folder: Path, manifest: Manifest, place: str) -> Iterator[tuple[str, str]]:
+    """Robot name and text of each joint table of one run."""
+    for name in manifest.files:
+        path = PurePosixPath(name)
+        if _is_table(name, [place]):
+            data = _content(folder, name, manifest)
+            try:
+                yield path.stem, data.decode("utf-8")
+            except UnicodeDecodeError as error:
+                line = 1 + data.count(b"\n", 0, error.start)
+                text = f"expected text in UTF-8, got byte 0x{data[error.start]:02x}"
+                raise InputError(f"{folder / name}:{line}: {text}") from None
+
+
+def _is_table(name: str, places: list[str], kind: str = "tables") -> bool:
+    """Whether a file of the manifest is a joint table of one of the runs."""
+    path = PurePosixPath(name)
+    return path.suffix == ".csv" and str(path.parent) in {_at(place, kind) for place in places}
+
+
+def _spoilt_tables(folder: Path, changed: Iterable[str]) -> Iterator[InputError]:
+    """Where exactly a table that was changed can no longer be read."""
+    for name in changed:
+        path = folder / name
+        if path.suffix != ".csv" or path.is_symlink() or not path.is_file():
+            continue
+        try:
+            data = read_regular_file(path, file=str(path), limit=TABLE_LIMIT)
+            text = data.decode("utf-8", "replace")
+            parse_header(text, str(path))
+            yield from _first_other_row(parse_table(text, str(path)), text, path)
+        except InputError as error:
+            yield error
+        except (AttributeError, KeyError, TypeError, ValueError):  # the report is spoilt too: nothing to compare with
+            continue
+
+
+def _first_other_row(table: JointTable, text: str, path: Path) -> Iterator[InputError]:
+    """The first number that is not the one in the series of the report beside the table, as far as that can tell."""
+    report = path.parent.parent / "report.json"
+    curves = parse_json(read_regular_file(report, file=str(report), limit=TABLE_LIMIT), str(report)).get("series", {})
+    own = curves.get("joints", {}).get(table.robot, {})
+    if curves.get("every") != 1 or list(own) != list(table.joints):
+        return
+    found = []
+    for joint, q in zip(table.joints, table.q.T, strict=True):
+        is_turn = "position_deg" in own[joint]
+        said = np.array(own[joint]["position_deg" if is_turn else "position_mm"], dtype=np.float64)
+        written = np.rad2deg(q) if is_turn else MM_PER_M * q
+        if said.shape != written.shape:
+            return
+        other = np.flatnonzero(~np.isclose(written, said, rtol=SERIES_ROOM, atol=SERIES_ROOM))
+        found += [(int(other[0]), joint, float(said[other[0]]), float(written[other[0]]))] if len(other) else []
+    if found:
+        row, joint, said_there, got = min(found)
+        line = text.count("\n", 0, len(text) - len(table_body(text))) + 2 + row
+        yield InputError(f"{path}:{line}: {joint}: expected {said_there:.7g} as in report.json, got {got:.10g}")
+
+
+def _at(place: str, name: str) -> str:
+    """Path of a file in the run folder."""
+    return f"{place}/{name}" if place else name

@@ -1,0 +1,59 @@
+"""Reach of a robot: how far from its first axis it can bring its flange."""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Robot, Tool
+from cellplan.model.robot import RobotModel
+
+STARTS: Final = 4  # postures the search climbs from; the bundled arms need one
+GRID: Final = 25  # positions tried per joint and round
+SWEEPS: Final = 24  # rounds over all joints; the grid shrinks by half in each, down to a rounding error
+ENDLESS: Final = 2.0 * np.pi  # [rad] range of a joint that may turn without end
+
+
+def arm_reach(model: RobotModel) -> float:
+    """Largest distance in [m] of the flange from the first joint's axis, within the joint limits.
+
+    One joint after the other is moved to its best position on a grid that gets finer in each round, from several
+    postures. A first joint that slides has no axis to turn about: then the distance from its point is taken.
+    """
+    placed = Robot(
+        name=model.name,
+        model=model,
+        X_WB=np.eye(4),
+        tool=Tool(X_FT=np.eye(4), bodies=()),
+        start=None,
+        weights=np.ones(len(model.joints)),
+    )
+    chain = ScrewChain(placed)
+    first = model.joints[0]
+
+    def distances(q: Array) -> Array:
+        from_point = chain.flange_poses(q)[:, :3, 3] - first.point_B
+        lever = np.cross(from_point, first.axis_B) if first.is_revolute else from_point
+        lengths: Array = np.sqrt(np.sum(lever**2, axis=1))
+        return lengths
+
+    lower = np.where(np.isfinite(model.lower), model.lower, -0.5 * ENDLESS)
+    upper = np.where(np.isfinite(model.upper), model.upper, 0.5 * ENDLESS)
+    starts = np.random.default_rng(0).uniform(lower, upper, size=(STARTS, len(lower)))
+    return max(_climb(distances, q, lower, upper) for q in starts)
+
+
+def _climb(distances: Callable[[Array], Array], q: Array, lower: Array, upper: Array) -> float:
+    """Distance at the best posture found from ``q``, in [m]."""
+    best = q.copy()
+    width = upper - lower
+    for _ in range(SWEEPS):
+        for joint in range(len(best)):
+            tried = np.repeat(best[None], GRID, axis=0)
+            offsets = np.linspace(-width[joint], width[joint], GRID)
+            tried[:, joint] = np.clip(best[joint] + offsets, lower[joint], upper[joint])
+            best = tried[int(np.argmax(distances(tried)))]
+        width = 0.5 * width
+    return float(distances(best[None])[0])

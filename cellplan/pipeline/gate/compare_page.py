@@ -1,0 +1,121 @@
+"""Whether the page of a run says what was found when its tables were computed again; its pictures are those on disk."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from cellplan.io.input.findings import listed, shown
+from cellplan.io.run.stored import StoredRun
+from cellplan.model.cell import Cell
+from cellplan.model.verified_run import VerifiedMotion
+from cellplan.pipeline.gate.compare_report import KNOWN_TO_THE_PLANNER
+from cellplan.pipeline.gate.equal_text import first_difference
+from cellplan.pipeline.gate.picture_text import foreign_piece
+from cellplan.report.page.render import overview_page, report_page
+from cellplan.report.plots.run import clearance_sheets, motion_sheets
+from cellplan.report.plots.sheet import Sheet, pictures
+from cellplan.report.record.run import Provenance, Record
+from cellplan.report.record.write import run_record, summary_record
+
+Drawings = Mapping[str, Mapping[str, bytes]]
+
+PAGE: Final = "report.html"
+AROUND: Final = 40  # [characters] shown of a page from where it differs
+
+
+def drawn_again(cell: Cell, motions: Sequence[VerifiedMotion]) -> Drawings:
+    """The pictures of what was found, by the place of the run and by file name."""
+    return {motion.name or "": pictures(_sheets(motion, cell)) for motion in motions}
+
+
+def page_complaints(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], drawn: Drawings) -> Iterator[str]:
+    """Every page of a run that is not the one its tables, its report's planner facts and its pictures give.
+
+    Args:
+        stored: The run; its reports are known to say what was found.
+        cell: Its cell.
+        motions: What was found.
+        drawn: The pictures of it.
+    """
+    for motion in motions:
+        place = motion.name or ""
+        yield from _foreign_pieces(stored, place, drawn[place])
+        record = _of_the_run(stored, place, run_record(motion.report, cell=cell, provenance=_provenance(stored, place)))
+        yield from _page_complaint(stored, place, cell=cell, motion=motion, record=record)
+    if "runs" in stored.record:
+        reports = {str(motion.name): motion.report for motion in motions}
+        found = summary_record(reports, cell=cell, provenance=_provenance(stored, ""))
+        yield from _difference(stored, "", overview_page(_of_the_run(stored, "", found), cell=cell))
+
+
+def other_pictures(stored: StoredRun, drawn: Drawings) -> Iterator[str]:
+    """Pictures of a run that are not, to the byte, what is drawn here of what was found.
+
+    That may be rounding: curves that show nothing but the noise of the arithmetic look different on each processor.
+    """
+    for place, own in drawn.items():
+        for name, picture in own.items():
+            if stored.content(place, f"plots/{name}") != picture:
+                yield f"{place}/plots/{name}" if place else f"plots/{name}"
+
+
+def _foreign_pieces(stored: StoredRun, place: str, drawn: Mapping[str, bytes]) -> Iterator[str]:
+    """Pictures of one run that hold something that cellplan does not draw; those missing ones are told elsewhere."""
+    for name, picture in stored.drawings(place).items():
+        if name in drawn:
+            foreign = foreign_piece(picture.decode("utf-8", "replace"), drawn[name].decode())
+            if foreign is not None:
+                file = stored.file(place, f"plots/{name}")
+                yield f"{file}: {foreign} stands there, which cellplan does not draw; solve the cell again"
+
+
+def _sheets(motion: VerifiedMotion, cell: Cell) -> dict[str, Sheet]:
+    """The plots of one run by name, in their order."""
+    return motion_sheets(motion.report, cell=cell) | clearance_sheets(motion.report, cell=cell)
+
+
+def _page_complaint(
+    stored: StoredRun, place: str, *, cell: Cell, motion: VerifiedMotion, record: Record
+) -> Iterator[str]:
+    """What is wrong with the page of one run."""
+    wanted, drawings = [f"{name}.svg" for name in _sheets(motion, cell)], stored.drawings(place)
+    if sorted(drawings) != sorted(wanted):
+        names = f"expected the pictures {listed(wanted)}, got {listed(drawings)}"
+        yield f"{stored.file(place, 'plots')}: {names}; solve the cell again"
+        return
+    in_order = {name: drawings[name] for name in wanted}
+    try:
+        page = report_page(record, motion.report.checks, cell=cell, plots=in_order)
+    except (KeyError, TypeError, ValueError, AttributeError):  # of what only the planner knows, or of a picture
+        yield f"{stored.file(place, 'report.json')}: solver: expected cellplan's own form; solve the cell again"
+        return
+    yield from _difference(stored, place, page)
+
+
+def _difference(stored: StoredRun, place: str, page: str) -> Iterator[str]:
+    """Where a page on disk says something else than the one that was made anew."""
+    text = stored.content(place, PAGE).decode("utf-8", "replace")
+    different = first_difference(text, page)
+    if different is not None:
+        at, said, found = different
+        line = text.count("\n", 0, at) + 1
+        words = f"{_shown(said)} stands there, {_shown(found)} was found"
+        yield f"{stored.file(place, PAGE)}:{line}: {words}; solve the cell again"
+
+
+def _shown(text: str) -> str:
+    """The beginning of a text, on one line."""
+    return shown(" ".join(text[:AROUND].split()) or "nothing")
+
+
+def _provenance(stored: StoredRun, place: str) -> Provenance:
+    """Versions and digests as the run has them, which are compared elsewhere."""
+    record = stored.records.get(place, stored.record)
+    return Provenance(versions=stored.manifest.versions, digests=record.get("digests", {}))
+
+
+def _of_the_run(stored: StoredRun, place: str, found: Record) -> Record:
+    """A record with the inputs of the run, and with what only its planner knew as its report has it."""
+    said: Any = stored.records.get(place, stored.record).get("solver", {})
+    known = [key for section, key in KNOWN_TO_THE_PLANNER if section == "solver"]
+    solver = {key: said.get(key) if key in known else value for key, value in found["solver"].items()}
+    return found | {"inputs": dict(stored.manifest.inputs), "solver": solver}

@@ -1,0 +1,106 @@
+"""Whether a report on disk says what was found when its tables were computed again."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.pipeline.gate.equal_text import NOISE, is_same
+
+Record = Mapping[str, Any]
+
+INSTANT: Final = "at_s"  # ends the names of instants
+WORDS: Final = frozenset({"message", "pair", "axis", "joint", "sliding_joint", "busiest_joint"})
+NOISE_BY_ENDING: Final[Mapping[str, float]] = {  # in printed units: differences over short times enlarge the noise
+    "acceleration": 1e-5,
+    "acceleration_m_s2": 1e-5,
+    "jerk": 1e-2,
+    "jerk_m_s3": 1e-2,
+}
+COMPARED_ELSEWHERE: Final = frozenset({"inputs", "versions", "digests"})
+KNOWN_TO_THE_PLANNER: Final = frozenset(  # what the planner's steps and nodes took cannot be seen in the tables
+    {
+        ("solver", "iterations"),
+        ("solver", "slack"),
+        ("solver", "resolution"),
+        ("series", "iterations"),
+        ("series", "slack"),
+    }
+)
+
+
+def differences(said: Record, found: Record, *, same_program: bool) -> Iterator[tuple[str, Any, Any]]:
+    """Key paths at which a report differs from what was found, with both values.
+
+    Figures are the same when they agree to seven digits, words when they do so with the figures in them.
+
+    Args:
+        said: The report on disk.
+        found: What was computed from the tables.
+        same_program: Whether both were made by the same version of cellplan, so that they must have the same keys and
+            the same words; between versions only the figures of common keys are compared.
+    """
+    yield from _compare(said, found, (), same_program=same_program)
+    if same_program and "series" in found:
+        yield from _misshapen_series(said.get("series"), len(found["series"]["times_s"]) - 1)
+
+
+def _misshapen_series(said: Any, steps: int) -> Iterator[tuple[str, Any, Any]]:
+    """Series that only the planner knows and that are neither null nor one figure for each step."""
+    for section, key in sorted(KNOWN_TO_THE_PLANNER):
+        if section != "series" or not isinstance(said, Mapping) or said.get(key) is None:
+            continue
+        series = said[key]
+        is_whole = isinstance(series, list) and len(series) == steps
+        if not is_whole or any(
+            isinstance(value, bool) or not isinstance(value, int | float | None) for value in series
+        ):
+            yield f"{section}.{key}", series, f"a list of {steps} numbers or null"
+
+
+def _compare(said: Any, found: Any, path: tuple[str, ...], *, same_program: bool) -> Iterator[tuple[str, Any, Any]]:
+    if isinstance(found, Mapping) and isinstance(said, Mapping):
+        keys = dict.fromkeys([*found, *said]) if same_program else [key for key in found if key in said]
+        for key in keys:
+            if _is_left_out(path, key) or (not same_program and _is_of_a_tie(key)):
+                continue
+            if key not in said or key not in found:
+                yield ".".join((*path, key)), said.get(key, "nothing"), found.get(key, "nothing")
+            else:
+                yield from _compare(said[key], found[key], (*path, key), same_program=same_program)
+    elif isinstance(found, np.ndarray):
+        yield from _compare_series(said, found, ".".join(path))
+    elif isinstance(found, list) and isinstance(said, list) and len(found) == len(said):
+        for index, (left, right) in enumerate(zip(said, found, strict=True)):
+            yield from _compare(left, right, (*path[:-1], f"{path[-1]}[{index}]"), same_program=same_program)
+    elif not is_same(said, found, noise=_noise(path)):
+        yield ".".join(path), said, found
+
+
+def _is_left_out(path: tuple[str, ...], key: str) -> bool:
+    """Whether a key is not compared here."""
+    return (not path and key in COMPARED_ELSEWHERE) or (*path, key) in KNOWN_TO_THE_PLANNER
+
+
+def _is_of_a_tie(key: str) -> bool:
+    """Whether a key says when or where an extreme is: another version may choose another one of two that are alike."""
+    return key.endswith(INSTANT) or key in WORDS
+
+
+def _noise(path: tuple[str, ...]) -> float:
+    """Noise of a figure in its printed unit, by the ending of its key."""
+    key = path[-1] if path else ""
+    return max((noise for ending, noise in NOISE_BY_ENDING.items() if key.endswith(ending)), default=NOISE)
+
+
+def _compare_series(said: Any, found: np.ndarray[Any, Any], key: str) -> Iterator[tuple[str, Any, Any]]:
+    """The first value at which a list of numbers is not an array up to its digits; null is what is not finite."""
+    if not isinstance(said, list) or len(said) != len(found):
+        yield key, said, f"a list of {len(found)}"
+        return
+    expected = [value if math.isfinite(value) else None for value in found.tolist()]
+    other = (i for i, pair in enumerate(zip(said, expected, strict=True)) if not is_same(*pair))
+    first = next(other, None)
+    if first is not None:
+        yield f"{key}[{first}]", said[first], expected[first]

@@ -1,0 +1,165 @@
+"""The cell of a stored run: read from its resolved copy, and compared with the files it was once read from."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from cellplan.errors import InputError, InvalidFileError
+from cellplan.io.cell.load import load_cell
+from cellplan.io.cell.write import written_document
+from cellplan.io.input.findings import KeyPath, key_text, listed, shown
+from cellplan.io.robots.bundled import load_bundled_table
+from cellplan.io.run.manifest import BUNDLED
+from cellplan.io.run.stored import CELL, StoredRun
+from cellplan.model.cell import Cell
+
+ANY: Final = "*"
+FOUND: Final = frozenset({"start", "start_deg", "home", "home_deg"})  # written ``auto`` where they were to be found
+METHOD: Final = ("solver", "method")
+INTEGRATOR: Final = ("solver", "integrator")
+ASKED: Final = (  # what the command line may have chosen instead of the cell file
+    ("motion", "mode"),
+    ("motion", "duration_s"),
+    METHOD,
+    INTEGRATOR,
+    ("checks", "clearance_mm"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StoredCell:
+    """The cell of a run and how far its sources were compared.
+
+    Attributes:
+        cell: The cell that was solved, every start posture filled in.
+        compared: Names of the inputs that are as they were.
+        remarks: What was not compared, or chosen on the command line.
+    """
+
+    cell: Cell
+    compared: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+
+def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequence[Path]) -> StoredCell:
+    """Read the cell of a run, and refuse it when something that the run rests on has changed.
+
+    Args:
+        stored: The run.
+        cell: The cell file that was solved; None when it is not at hand, which is enough for cells that name no files
+            of their own.
+        allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+
+    Raises:
+        InputError: An input has changed or cannot be looked for; the resolved copy is not made from the cell file.
+    """
+    if cell is None:
+        return _without_file(stored)
+    original = load_cell(cell, allow_dirs=allow_dirs)
+    now = {stored.manifest.cell_file if name == cell.name else name: sha for name, sha in original.inputs.items()}
+    _refuse_stale(stored, now, where=f"'{cell}'")
+    resolved = _resolved(stored, folder=cell.parent, allow_dirs=allow_dirs)
+    written, copied = written_document(original), written_document(resolved)
+    found = list(_differences(written, copied))
+    chosen = [each for each in found if _may_differ(each[0], each[1])]
+    foreign = [each for each in found if each not in chosen]
+    if foreign:
+        raise InvalidFileError([_foreign(stored, cell, each) for each in foreign])
+    remarks = [
+        f"{key_text(path)}: {shown(new)} was chosen on the command line; the cell file has {shown(old)}"
+        for path, old, new in chosen
+        if path[-1] not in FOUND and not _follows(path, original, chosen)
+    ]
+    return StoredCell(cell=resolved, compared=tuple(now), remarks=tuple(remarks))
+
+
+def _without_file(stored: StoredRun) -> StoredCell:
+    """The cell from its resolved copy alone."""
+    manifest = stored.manifest
+    if manifest.own_inputs:
+        raise InputError(
+            f"{stored.folder}: the run rests on files beside its cell file ({listed(manifest.own_inputs)}): name the "
+            f"cell file '{manifest.cell_file}' with --cell, so that they can be found and compared"
+        )
+    bundled = [name for name in manifest.inputs if name != manifest.cell_file]
+    now = {manifest.cell_file: manifest.inputs[manifest.cell_file]}
+    _refuse_stale(stored, now | {name: _bundled_digest(name) for name in bundled}, where="this version of cellplan")
+    remark = f"the cell file '{manifest.cell_file}' was not compared with the run; name it with --cell"
+    resolved = _resolved(stored, folder=stored.folder, allow_dirs=())
+    return StoredCell(cell=resolved, compared=tuple(bundled), remarks=(remark,))
+
+
+def _bundled_digest(name: str) -> str:
+    """Digest of a robot that comes with the program; empty when it no longer does."""
+    try:
+        return load_bundled_table(name.removeprefix(BUNDLED)).digest
+    except InputError:
+        return ""
+
+
+def _refuse_stale(stored: StoredRun, now: Mapping[str, str], *, where: str) -> None:
+    """Refuse inputs that are not what they were when the run was made."""
+    complaints = []
+    for name, digest in stored.manifest.inputs.items():
+        if not now.get(name):
+            complaints.append(f"the run rests on '{name}', which {where} does not lead to")
+        elif now[name] != digest:
+            complaints.append(f"'{name}' has changed since the run was made; solve the cell again")
+    complaints += [
+        f"{where} needs '{name}', which the run does not rest on" for name in now if name not in stored.manifest.inputs
+    ]
+    if complaints:
+        raise InvalidFileError([InputError(f"{stored.folder}: {complaint}") for complaint in complaints])
+
+
+def _resolved(stored: StoredRun, *, folder: Path, allow_dirs: Sequence[Path]) -> Cell:
+    """The resolved copy, which must be the file the manifest speaks of and lead to the inputs it speaks of."""
+    manifest = stored.manifest
+    cell = load_cell(stored.folder / CELL, allow_dirs=allow_dirs, folder=folder)
+    digests = dict(cell.inputs)
+    if digests.pop(CELL) != manifest.files[CELL].digest:
+        raise InputError(f"{stored.folder / CELL}: changed while it was read")
+    own = {name: digest for name, digest in manifest.inputs.items() if name != manifest.cell_file}
+    if digests != own:
+        raise InputError(f"{stored.folder / CELL}: leads to other files than the cell file did; solve the cell again")
+    if cell.name != manifest.cell:
+        raise InputError(f"{stored.folder / CELL}: name: expected '{manifest.cell}', got '{cell.name}'")
+    if any(robot.start is None for robot in cell.robots):
+        raise InputError(f"{stored.folder / CELL}: robots: expected every start posture written out, got auto")
+    return cell
+
+
+def _differences(old: object, new: object, path: KeyPath = ()) -> Iterator[tuple[KeyPath, object, object]]:
+    """Key paths at which two documents differ, with both values."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        for key in dict.fromkeys([*old, *new]):
+            yield from _differences(old.get(key), new.get(key), (*path, str(key)))
+    elif isinstance(old, list | tuple) and isinstance(new, list | tuple) and len(old) == len(new):
+        for index, (one, other) in enumerate(zip(old, new, strict=True)):
+            yield from _differences(one, other, (*path, index))
+    elif old != new:
+        yield path, old, new
+
+
+def _may_differ(path: KeyPath, old: object) -> bool:
+    """Whether a run may have another value there than its cell file."""
+    if len(path) == 3 and path[0] == "robots" and path[2] in FOUND:
+        return old == "auto" or old is None
+    return any(
+        len(path) == len(asked) and all(word in (ANY, part) for word, part in zip(asked, path, strict=True))
+        for asked in ASKED
+    )
+
+
+def _follows(path: KeyPath, original: Cell, chosen: Sequence[tuple[KeyPath, object, object]]) -> bool:
+    """Whether nobody chose a value: an integrator that the cell file leaves open goes with the method."""
+    is_open = path == INTEGRATOR and key_text(path) not in original.origin.lines
+    return is_open and any(other == METHOD for other, _, _ in chosen)
+
+
+def _foreign(stored: StoredRun, cell: Path, difference: tuple[KeyPath, object, object]) -> InputError:
+    path, old, new = difference
+    return InputError(
+        f"{stored.folder / CELL}: {key_text(path)}: expected {shown(old)} as in '{cell}', got {shown(new)}"
+    )

@@ -1,0 +1,1 @@
+"""One run planned: start, homes of idle robots, motion."""

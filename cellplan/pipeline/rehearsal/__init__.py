@@ -1,0 +1,1 @@
+"""Rehearsal: a program on sampled real cells, corrected pass by pass."""

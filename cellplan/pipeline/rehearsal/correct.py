@@ -1,0 +1,182 @@
+"""Correct a program from pass to pass: execute, measure, replace the references, plan again with the written cell."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.real_cell.execution import Measurement, RealCell, measured_poses
+from cellplan.checks.real_cell.true_errors import largest, worst_share
+from cellplan.checks.tools.tracking import pose_accuracy
+from cellplan.errors import NoSolutionError
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Schedule
+from cellplan.model.rehearsal import Correction, Outcome, Round
+from cellplan.model.report import TaskAccuracy
+from cellplan.planning.collocation.at_samples import brought_onto_tasks
+from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.measured_feedback import (
+    corrected_references,
+    follow_measured,
+    measured_start,
+    settled_start,
+)
+
+FAR_WITHIN: Final = 0.02  # [-] share of the tolerance below which a smaller error is of no use to anybody
+PROGRESS: Final = 0.9  # [-] an error that is not below this share of the last one falls no more
+GROWN: Final = 2.0  # [-] an error above this multiple of the first one diverges
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pass:
+    """What stays the same from pass to pass.
+
+    Attributes:
+        cell: The written cell, with its start postures.
+        schedule: What the tasks want.
+        moving: Names of the robots that may move.
+        judged_from: First sample that is judged, by task.
+        q: Joint positions of the program as it was solved, shape (N, nq).
+    """
+
+    cell: Cell
+    schedule: Schedule
+    moving: tuple[str, ...]
+    judged_from: dict[str, int]
+    q: Array
+
+    @property
+    def operators(self) -> tuple[str, ...]:
+        """Robots whose tools are looked at, one per task."""
+        return tuple(scheduled.task.robot for scheduled in self.schedule.tasks)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Attempt:
+    """One execution: what was told, what the joints did, what was measured, and how large the errors are."""
+
+    references: Schedule
+    q: Array
+    measured: tuple[Array, ...]
+    accuracy: tuple[TaskAccuracy, ...]
+    told: Round
+
+
+def correct_from_pass_to_pass(
+    job: Pass,
+    real: RealCell,
+    system: Measurement,
+    *,
+    rng: np.random.Generator,
+    rounds: int,
+    tell: Callable[[int], None],
+) -> Correction:
+    """Repeat the program on the real cell until its error converges.
+
+    The loop goes by the measured errors, as it would have to beside a real cell; the true ones are reported.
+
+    Args:
+        job: The program as it was solved, and what it is for.
+        real: The real cell.
+        system: The measuring system.
+        rng: Where its noise comes from.
+        rounds: Most corrections that are made.
+        tell: Hears the number of each round that begins.
+    """
+    executions = _Executions(job, real, system, rng)
+    executions.add(job.schedule, job.q)
+    outcome = _outcome(executions.rounds, rounds)
+    while outcome is None:
+        last = executions.all[-1]
+        tell(last.told.number + 1)
+        references = corrected_references(job.schedule, last.references, last.measured)
+        try:
+            start = settled_start(job.cell, references, start=last.q[0], moving=job.moving)
+            q = _planned(job, references, start)
+        except NoSolutionError:
+            outcome = Outcome.DIVERGED
+            break
+        executions.add(references, q)
+        outcome = _outcome(executions.rounds, rounds)
+    best = min(executions.all, key=lambda attempt: attempt.told.measured_share)
+    return Correction(
+        outcome=outcome,
+        rounds=executions.rounds,
+        best=best.told.number,
+        accuracy=best.accuracy,
+        references=best.references,
+        q=best.q,
+    )
+
+
+def correct_within_the_pass(
+    job: Pass, real: RealCell, system: Measurement, *, rng: np.random.Generator
+) -> tuple[TaskAccuracy, ...] | None:
+    """True errors when every instant's measured error is fed back at the next one; None when a tool loses its path.
+
+    Before the pass the tools stand on the first poses of their tasks and are put right there, measurement by
+    measurement: a pass that began with the whole error would begin with a jerk.
+    """
+
+    def measure(q: Array) -> Sequence[Array]:
+        return measured_poses(real.tool_poses(job.operators, q), system, rng)
+
+    try:
+        start = measured_start(job.cell, job.schedule, start=job.q[0], moving=job.moving, measure=measure)
+        motion = follow_measured(job.cell, job.schedule, start=start, moving=job.moving, measure=measure)
+    except NoSolutionError:
+        return None
+    return real.accuracy(job.schedule, motion.q)
+
+
+def _planned(job: Pass, references: Schedule, start: Array) -> Array:
+    """Motion on new references, which are known at the instants of the clock only: by steps, then put right there."""
+    q = follow(job.cell, references, start=start, moving=job.moving).q
+    return brought_onto_tasks(job.cell, references, q, moving=job.moving) if job.cell.solver.is_accurate else q
+
+
+class _Executions:
+    """Executions of one job on one real cell."""
+
+    def __init__(self, job: Pass, real: RealCell, system: Measurement, rng: np.random.Generator) -> None:
+        """Remember what stays the same."""
+        self._job, self._real, self._system, self._rng = job, real, system, rng
+        self.all: list[_Attempt] = []
+
+    @property
+    def rounds(self) -> tuple[Round, ...]:
+        """The errors of every execution."""
+        return tuple(attempt.told for attempt in self.all)
+
+    def add(self, references: Schedule, q: Array) -> None:
+        """Tell the real cell a motion and look at its tools."""
+        job = self._job
+        true = self._real.tool_poses(job.operators, q)
+        measured = measured_poses(true, self._system, self._rng)
+        accuracy, seen = (
+            tuple(pose_accuracy(task, X_PT) for task, X_PT in zip(job.schedule.tasks, poses, strict=True))
+            for poses in (true, measured)
+        )
+        told = Round(
+            number=len(self.all),
+            position={each.task: largest(each.position_error, job.judged_from[each.task]) for each in accuracy},
+            orientation={each.task: largest(each.orientation_error, job.judged_from[each.task]) for each in accuracy},
+            share=worst_share(job.cell, accuracy, job.judged_from),
+            measured_share=worst_share(job.cell, seen, job.judged_from),
+        )
+        self.all.append(_Attempt(references=references, q=q, measured=measured, accuracy=accuracy, told=told))
+
+
+def _outcome(rounds: Sequence[Round], limit: int) -> Outcome | None:
+    """How correcting ended; None while another round is worth its while."""
+    shares = [each.measured_share for each in rounds]
+    last = shares[-1]
+    if last <= FAR_WITHIN:
+        return Outcome.CONVERGED
+    if not last <= GROWN * shares[0]:
+        return Outcome.DIVERGED
+    if len(shares) > 1 and last > PROGRESS * shares[-2]:
+        return Outcome.CONVERGED if min(shares) <= 1.0 else Outcome.STALLED
+    return Outcome.UNFINISHED if len(shares) > limit else None

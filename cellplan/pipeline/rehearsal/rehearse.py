@@ -1,0 +1,225 @@
+"""Rehearse a cell with errors: solve it, execute the program on real cells, and correct it from measurements."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.real_cell.execution import Measurement, RealCell
+from cellplan.checks.real_cell.iso9283 import path_figures, pose_figures
+from cellplan.checks.real_cell.true_errors import check_true_errors
+from cellplan.checks.verify import verify
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
+from cellplan.io.run.joint_tables import parse_table
+from cellplan.kinematics.perturbed_cell import draw_errors, perturbed_cell
+from cellplan.model.cell import Cell
+from cellplan.model.cell_errors import CellErrors
+from cellplan.model.motion import Motion, Schedule
+from cellplan.model.progress import Progress, silent
+from cellplan.model.rehearsal import CorrectedProgram, IsoFigures, Rehearsal, RunRehearsal, Trial
+from cellplan.model.report import Check, Report, TaskAccuracy
+from cellplan.pipeline.rehearsal.correct import Pass, correct_from_pass_to_pass, correct_within_the_pass
+from cellplan.pipeline.solution import Run
+from cellplan.pipeline.solve import render_program, solve, with_verdict
+from cellplan.planning.path.build import build_toolpath
+from cellplan.scene.scene import Scene
+
+MEASUREMENT_STREAM: Final = 1  # stream of random numbers of the measurements of a trial; its cell has stream 0
+IN_PASS_STREAM: Final = 2
+MOST_ERRORS: Final = 4_000_000  # trials times samples times tasks that are kept: 200 MB, twice with feedback
+DEFAULT_ROUNDS: Final = 20
+TOOL_ERRORS: Final = frozenset(
+    {"position_error", "orientation_error", "position_error_between_rows", "orientation_error_between_rows"}
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Wish:
+    """What is to be done on every real cell."""
+
+    feedback: bool
+    in_pass: bool
+    rounds: int
+
+
+def rehearse(
+    cell: Cell,
+    errors: CellErrors,
+    *,
+    feedback: bool = False,
+    in_pass: bool = False,
+    rounds: int = DEFAULT_ROUNDS,
+    progress: Progress = silent,
+) -> Rehearsal:
+    """Solve a cell and execute its program on perturbed cells; say how far the tools really are from their tasks.
+
+    With feedback the program is repeated on each real cell: the tools are measured on the part, the references are
+    corrected, and the written cell is planned again, until the error converges. For a single real cell the corrected
+    program is rendered and verified on the written cell.
+
+    Args:
+        cell: The cell, as ``load_cell`` gives it.
+        errors: How real cells differ from it, as ``load_errors`` gives them.
+        feedback: Correct from pass to pass.
+        in_pass: Also execute with the error measured at each instant fed back at the next.
+        rounds: Most corrections from pass to pass.
+        progress: Who wants to know how far it is.
+
+    Raises:
+        InputError: The cell cannot be worked with, several robots hold the part, or there are more trials than can be
+            kept.
+        NoSolutionError: The cell has no solution.
+    """
+    if rounds < 1:
+        raise InputError(f"--rounds: expected a whole number of at least 1, got {rounds}")
+    if cell.closures:
+        raise InputError(
+            f"{cell.origin.at('part.held_by')}: expected one robot that holds the part, got {len(cell.part.held_by)}: "
+            "where a part settles between holders that pull at it depends on their stiffness, which no cell tells"
+        )
+    solution = solve(cell, progress=progress)
+    trials = errors.trials if errors.is_random else 1
+    _refuse_too_many(solution.runs, trials, errors)
+    wish = _Wish(feedback=feedback, in_pass=in_pass, rounds=rounds)
+    runs = tuple(
+        _rehearse_run(solution.cell, run, errors, trials=trials, wish=wish, progress=progress) for run in solution.runs
+    )
+    return Rehearsal(
+        cell=solution.cell,
+        errors=errors,
+        runs=runs,
+        checks=tuple(
+            check for run, made in zip(solution.runs, runs, strict=True) for check in _checks(solution.cell, run, made)
+        ),
+        has_feedback=feedback,
+        has_in_pass=in_pass,
+    )
+
+
+def _checks(cell: Cell, run: Run, made: RunRehearsal) -> tuple[Check, ...]:
+    """The true errors, and what the program that counts fails of limits and clearance on the written cell."""
+    report = _without_tool_errors(run.report) if made.corrected is None else made.corrected.report
+    return (*check_true_errors(cell, made), *(check for check in report.checks if not check.passed))
+
+
+def _without_tool_errors(report: Report) -> Report:
+    """A report that leaves tool errors to the real cell: on the written one they say nothing of it."""
+    return replace(report, checks=tuple(check for check in report.checks if check.name not in TOOL_ERRORS))
+
+
+def _refuse_too_many(runs: Sequence[Run], trials: int, errors: CellErrors) -> None:
+    """Refuse more trials than fit into memory."""
+    kept = sum(len(run.schedule.times) * len(run.schedule.tasks) for run in runs)
+    most = MOST_ERRORS // kept
+    if trials > max(most, 1):
+        raise InputError(
+            f"{errors.file}: trials: expected at most {max(most, 1)} for this cell ({kept} samples of its tasks), "
+            f"got {trials}; make fewer trials or motion.step_s longer"
+        )
+
+
+def _rehearse_run(
+    cell: Cell, run: Run, errors: CellErrors, *, trials: int, wish: _Wish, progress: Progress
+) -> RunRehearsal:
+    """Execute one run on every real cell."""
+    job = Pass(
+        cell=cell,
+        schedule=run.schedule,
+        moving=run.moving,
+        judged_from=_judged_from(run.schedule),
+        q=_written(cell, run.program.tables),
+    )
+    made = []
+    for number in range(trials):
+        progress("rehearsing", number / trials)
+        made.append(_try(job, errors, number, wish=wish, progress=_within(progress, number, trials)))
+    corrected = _corrected(job, made[0], progress) if trials == 1 and wish.feedback else None
+    return RunRehearsal(
+        name=run.name,
+        times=run.schedule.times,
+        judged_from=job.judged_from,
+        trials=tuple(made),
+        before=_iso_figures(job, [trial.before for trial in made]),
+        after=_iso_figures(job, [trial.final for trial in made]) if wish.feedback else None,
+        corrected=corrected,
+    )
+
+
+def _within(progress: Progress, number: int, trials: int) -> Progress:
+    """Progress of one trial among many."""
+    return lambda stage, share: progress(stage, (number + share) / trials)
+
+
+def _try(job: Pass, errors: CellErrors, number: int, *, wish: _Wish, progress: Progress) -> Trial:
+    """One real cell."""
+    draw = draw_errors(job.cell, errors, number)
+    real = RealCell(perturbed_cell(job.cell, draw))
+    system = Measurement(position_noise=errors.position_noise, orientation_noise=errors.orientation_noise)
+    before = real.accuracy(job.schedule, job.q)
+    correction, in_pass = None, None
+    if wish.feedback:
+        correction = correct_from_pass_to_pass(
+            job,
+            real,
+            system,
+            rng=np.random.default_rng([errors.seed, number, MEASUREMENT_STREAM]),
+            rounds=wish.rounds,
+            tell=lambda made: progress(f"correcting, round {made}", made / (wish.rounds + 1)),
+        )
+    if wish.in_pass:
+        progress("correcting within the pass", 1.0)
+        rng = np.random.default_rng([errors.seed, number, IN_PASS_STREAM])
+        in_pass = correct_within_the_pass(job, real, system, rng=rng)
+    return Trial(draw=draw, before=before, correction=correction, in_pass=in_pass)
+
+
+def _corrected(job: Pass, trial: Trial, progress: Progress) -> CorrectedProgram | None:
+    """The corrected joint tables, verified on the written cell against the corrected references."""
+    if trial.correction is None:
+        return None
+    cell, references = job.cell, trial.correction.references
+    program = render_program(cell, Motion(times=references.times, q=trial.correction.q))
+    tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
+    report = _without_tool_errors(
+        verify(Scene.from_cell(cell), references, tables, moving=job.moving, progress=progress)
+    )
+    kept = trial.correction.best
+    remark = f"corrected for measured errors, round {kept}: right for the measured cell, not for the written one"
+    return CorrectedProgram(program=with_verdict(cell, program, report, remark=remark), report=report)
+
+
+def _written(cell: Cell, tables: Mapping[str, str]) -> Array:
+    """Stacked joint positions as they stand in the tables, shape (N, nq)."""
+    return np.concatenate(
+        [parse_table(tables[robot.name], f"tables/{robot.name}.csv").q for robot in cell.robots], axis=1
+    )
+
+
+def _judged_from(schedule: Schedule) -> dict[str, int]:
+    """First sample of each task that is judged: the first one after it has settled."""
+    first = {}
+    for scheduled in schedule.tasks:
+        task = scheduled.task
+        settled = int(np.searchsorted(schedule.times, task.start + task.settle)) if task.settle > 0.0 else 0
+        first[task.name] = min(settled, len(schedule.times) - 1)
+    return first
+
+
+def _iso_figures(job: Pass, trials: Sequence[tuple[TaskAccuracy, ...]]) -> dict[str, IsoFigures]:
+    """Figures of ISO 9283 of every task over all trials."""
+    figures = {}
+    times = job.schedule.times
+    for place, scheduled in enumerate(job.schedule.tasks):
+        name, first = scheduled.task.name, job.judged_from[scheduled.task.name]
+        errors = np.stack(
+            [np.concatenate([made[place].position_error, made[place].orientation_error], axis=1) for made in trials]
+        )
+        behind = build_toolpath(scheduled.task, job.cell.part, job.cell.origin).behind
+        stops = [max(int(np.argmin(np.abs(scheduled.travelled - length))), first) for length in behind]
+        figures[name] = IsoFigures(
+            poses=tuple(pose_figures(errors[:, k], float(times[k])) for k in dict.fromkeys(stops)),
+            path=path_figures(errors[:, first:], times[first:]),
+        )
+    return figures

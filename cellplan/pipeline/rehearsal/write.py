@@ -1,0 +1,54 @@
+"""Write a rehearsal: record, page, plots, and the corrected joint tables when there are any that may be used."""
+
+from pathlib import Path
+
+from cellplan.io.cell.write import render_cell
+from cellplan.io.run.folder import RunFolder
+from cellplan.io.run.joint_tables import program_digest
+from cellplan.model.progress import Progress, silent
+from cellplan.model.rehearsal import Rehearsal
+from cellplan.pipeline.write_run import versions
+from cellplan.report.page.render import rehearsal_html
+from cellplan.report.plots.rehearsal import draw_rehearsal
+from cellplan.report.record.rehearsal import rehearsal_json
+from cellplan.report.record.run import Provenance
+
+
+def write_rehearsal(rehearsal: Rehearsal, folder: Path, *, progress: Progress = silent) -> None:
+    """Write the folder of a rehearsal; it appears whole or not at all.
+
+    It has ``rehearsal.json``, ``rehearsal.html``, ``plots/`` and ``cell.yaml``. Corrected tables stand under
+    ``tables/``, or ``tables/<task>/`` where there is one run per task; only when everything passed.
+
+    Args:
+        rehearsal: What was rehearsed.
+        folder: The folder; an older rehearsal there is replaced.
+        progress: Who wants to know how far it is.
+
+    Raises:
+        InputError: The folder cannot be written, or holds something that cellplan did not write.
+    """
+    progress("writing the rehearsal", 1.0)
+    provenance = Provenance(versions=versions(), digests=_digests(rehearsal))
+    plots = draw_rehearsal(rehearsal)
+    with RunFolder(folder) as target:
+        for name, picture in plots.items():
+            target.write_bytes(f"plots/{name}", picture)
+        target.write_text("rehearsal.json", rehearsal_json(rehearsal, provenance=provenance))
+        target.write_text("rehearsal.html", rehearsal_html(rehearsal, provenance=provenance, plots=plots))
+        target.write_text("cell.yaml", render_cell(rehearsal.cell))
+        for run in rehearsal.runs if rehearsal.is_released else ():
+            place = "tables" if run.name is None else f"tables/{run.name}"
+            for robot, text in run.corrected.program.tables.items() if run.corrected else ():
+                target.write_text(f"{place}/{robot}.csv", text)
+
+
+def _digests(rehearsal: Rehearsal) -> dict[str, str]:
+    """Digest of the corrected program of each run."""
+    return {
+        "corrected program" if run.name is None else f"corrected program of {run.name}": program_digest(
+            run.corrected.program.tables
+        )
+        for run in rehearsal.runs
+        if run.corrected is not None and rehearsal.is_released
+    }

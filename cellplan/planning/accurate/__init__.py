@@ -1,1 +1,0 @@
-"""The accurate mode: joints as polynomials in time, found at all nodes of a stretch of time at once."""

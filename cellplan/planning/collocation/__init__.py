@@ -1,0 +1,1 @@
+"""Collocation: joint polynomials that hold the tasks between samples too."""

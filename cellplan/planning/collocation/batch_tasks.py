@@ -1,0 +1,287 @@
+"""All tasks of a run at many postures at once: pose errors and the arrow-shaped cooperation Jacobian."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.transforms import SMALL_ANGLE, Array, inverse
+from cellplan.kinematics.batched import LaneChains, LaneState, Placement
+from cellplan.model.cell import Cell, Relation
+from cellplan.model.task import Frame
+from cellplan.planning.collocation.arrow_inverse import ArrowInverse
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wanted:
+    """Where the tools are wanted, one instant per lane, in the frame that each task is relative to.
+
+    Attributes:
+        R: Wanted tool orientations, shape (3, 3, tasks, lanes).
+        p: Wanted tool tips in [m], shape (3, tasks, lanes).
+        twists: Wanted tool twists, linear first, shape (6, tasks, lanes).
+    """
+
+    R: Array
+    p: Array
+    twists: Array
+
+    def between(self, low: int, high: int) -> "Wanted":
+        """The instants from one number up to another."""
+        return Wanted(*(part[..., low:high].copy() for part in (self.R, self.p, self.twists)))
+
+    def repeated(self, count: int) -> "Wanted":
+        """The same instants for so many cells, one cell after the other."""
+        if count == 1:
+            return self
+        return Wanted(*(np.concatenate([part] * count, axis=-1) for part in (self.R, self.p, self.twists)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """The tools as the tasks see them.
+
+    Attributes:
+        R_WR: Frames that the tasks are relative to, in W, shape (3, 3, tasks, lanes).
+        R: Tool orientations in these frames, shape (3, 3, tasks, lanes).
+        p: Tool tips in these frames in [m], shape (3, tasks, lanes).
+        p_WT: Tool tips in W in [m], shape (3, tasks, lanes).
+    """
+
+    R_WR: Array
+    R: Array
+    p: Array
+    p_WT: Array
+
+
+class LaneTasks:
+    """The tasks of one run, and the joints that may move for them.
+
+    Attributes:
+        chains: The chains of all robots.
+        joint_count: Length of the stacked joint vector.
+    """
+
+    def __init__(self, cell: Cell, tasks: Sequence[Relation], moving: Sequence[str]) -> None:
+        """Gather what stays the same from posture to posture."""
+        names, holders = [robot.name for robot in cell.robots], cell.positioners[:1]
+        self.chains, self.joint_count = LaneChains(cell), cell.joint_count
+        self._robots = np.array([names.index(task.robot) for task in tasks], dtype=np.intp)
+        self._holder = names.index(holders[0]) if holders else None
+        self._X_TP = _part_in_carrier(cell)
+        self._is_on_part = np.array([task.relative_to is Frame.PART for task in tasks])
+        self._is_spin_free = np.array([task.is_spin_free for task in tasks])
+        self._kept = np.array([_kept(task) for task in tasks]).T[:, :, None]
+        self._is_whole = bool(np.all(self._kept == 1.0))
+        carries = np.isin([task.robot for task in tasks], holders)
+        self._own = np.where(carries, 0.0, 1.0)[:, None]
+        self._share = np.where(carries, 1.0, -1.0 * self._is_on_part)[:, None]
+        joints = 0 if self._holder is None else len(cell.robots[self._holder].model.joints)
+        self._own_columns = self.chains.columns[:, self._robots]
+        self._shared_columns = self.chains.columns[:joints, self._holder or 0]
+        self._weights = np.concatenate([robot.weights for robot in cell.robots])
+        self._may_move = np.concatenate([np.full(len(r.model.joints), float(r.name in moving)) for r in cell.robots])
+
+    def look(self, q: Array, wanted: Wanted, placement: Placement, *, mobile: Array) -> "Look":
+        """The tasks at stacked joint vectors, shape (nq, lanes), to first order.
+
+        Args:
+            q: The postures.
+            wanted: Where the tools are wanted.
+            placement: Where the robots stand.
+            mobile: 1 for joints that are not locked, shape (nq,).
+        """
+        state = self.chains.state(q, placement)
+        seen = self._seen(state)
+        mobile = mobile * self._may_move
+        columns, count = self._columns(state, seen, wanted), len(self._robots)
+        shared = mobile[self._shared_columns][:, None, None]
+        arrow = ArrowInverse(
+            columns[:, :, :count],
+            columns[:, : len(shared), count:] * (self._share * shared),
+            mobility=np.append(mobile / self._weights, 0.0)[self._own_columns][:, :, None] * self._own,
+            coupling_weights=self._weights[self._shared_columns],
+            idle=1.0 - self._kept,
+        )
+        rows = seen.R_WR if self._is_whole else None
+        errors = self._errors(seen, wanted)
+        return Look(self, arrow, errors=errors, rows=rows, wanted=self._twists(wanted), mobile=mobile)
+
+    def errors(self, q: Array, wanted: Wanted, placement: Placement) -> Array:
+        """Pose errors, wanted minus actual, as `cooperation.pose_errors` has them, shape (6, tasks, lanes).
+
+        Components that a task leaves open are zero. With free spin the rotation is given in the wanted tool frame.
+        """
+        return self._errors(self._seen(self.chains.state(q, placement)), wanted)
+
+    def task_errors(self, q: Array, wanted: Wanted, placement: Placement) -> Array:
+        """Pose errors with all rotations in the frames of the tasks, shape (6, tasks, lanes)."""
+        errors, free = self.errors(q, wanted, placement), self._is_spin_free
+        errors[3:, free] = np.einsum("ijtb,jtb->itb", wanted.R[:, :, free], errors[3:, free])
+        return errors
+
+    def stacked(self, own: Array, shared: Array) -> Array:
+        """What belongs to the joints, sorted into the stacked joint vector, shape (nq, lanes)."""
+        everything = np.zeros((self.joint_count + 1, shared.shape[1]))
+        everything[self._own_columns] = own
+        everything[self._shared_columns] = shared
+        return everything[:-1]
+
+    def unstacked(self, everything: Array) -> tuple[Array, Array]:
+        """The parts of stacked joint vectors, shape (nq, lanes), that belong to each task and to all of them."""
+        padded = np.concatenate([everything, np.zeros((1, everything.shape[1]))])
+        return padded[self._own_columns] * self._own, padded[self._shared_columns]
+
+    def _seen(self, state: LaneState) -> Seen:
+        """The tools as the tasks see them."""
+        p_WT, R_WT = state.p_WT[:, self._robots], state.R_WT[:, :, self._robots]
+        R_TP, p_TP = self._X_TP[:3, :3], self._X_TP[:3, 3]
+        R_WR, p_WR = np.empty_like(R_WT), np.empty_like(p_WT)
+        if self._holder is None:
+            R_WR[:], p_WR[:] = R_TP[..., None, None], p_TP[..., None, None]
+        else:
+            R_WH = state.R_WT[:, :, self._holder]
+            R_WR[:] = np.einsum("ijb,jk->ikb", R_WH, R_TP)[:, :, None]
+            p_WR[:] = (state.p_WT[:, self._holder] + np.einsum("ijb,j->ib", R_WH, p_TP))[:, None]
+        if not self._is_on_part.all():
+            R_WR[:, :, ~self._is_on_part] = np.eye(3)[:, :, None, None]
+            p_WR[:, ~self._is_on_part] = 0.0
+        R = np.einsum("jitb,jktb->iktb", R_WR, R_WT)
+        p = np.einsum("jitb,jtb->itb", R_WR, p_WT - p_WR)
+        return Seen(R_WR, R, p, p_WT)
+
+    def _errors(self, seen: Seen, wanted: Wanted) -> Array:
+        """See `errors`."""
+        errors = np.empty((6, *seen.p.shape[1:]))
+        errors[:3] = wanted.p - seen.p
+        between = np.einsum("ijtb,kjtb->iktb", wanted.R, seen.R)
+        across = between[[2, 0, 1], [1, 2, 0]] - between[[1, 2, 0], [2, 0, 1]]
+        errors[3:] = _rotation(0.5 * across, 0.5 * (np.einsum("iitb->tb", between) - 1.0))
+        if self._is_spin_free.any():
+            free = self._is_spin_free
+            z, goal = seen.R[:, 2, free], wanted.R[:, 2, free]
+            across_tool = np.einsum("jitb,jtb->itb", wanted.R[:, :, free], _cross(z, goal))
+            errors[3:, free] = _rotation(across_tool, np.einsum("itb,itb->tb", z, goal))
+        return errors if self._is_whole else errors * self._kept
+
+    def _twists(self, wanted: Wanted) -> Array:
+        """Wanted twists of the components that the tasks keep, in the frames of `errors`, shape (6, tasks, lanes)."""
+        if self._is_whole:
+            return wanted.twists
+        twists = wanted.twists.copy()
+        free = self._is_spin_free
+        twists[3:, free] = np.einsum("jitb,jtb->itb", wanted.R[:, :, free], twists[3:, free])
+        twists *= self._kept
+        return twists
+
+    def _columns(self, state: LaneState, seen: Seen, wanted: Wanted) -> Array:
+        """Tool twists per unit speed of joints: of each task's own robot, then of the positioner at each tip.
+
+        Shape (6, joints, 2 tasks, lanes), expressed in W, or in the frames of `errors` where a task leaves components
+        open; without a positioner the second half is not used.
+        """
+        chains = self.chains
+        robots = np.concatenate([self._robots, np.full(len(self._robots), self._holder or 0)])
+        axes = state.axes[:, :, robots]
+        tips = np.concatenate([seen.p_WT, seen.p_WT], axis=1)
+        columns = np.empty((6, *axes.shape[1:]))
+        columns[:3] = _cross(axes, tips[:, None] - state.points[:, :, robots])
+        columns[3:] = axes
+        if not chains.is_all_turning:
+            turning = chains.is_turning[:, robots][..., None]
+            columns[:3] = np.where(turning, columns[:3], axes)
+            columns[3:] *= turning
+        if not chains.is_plain:
+            columns = np.einsum("iltb,ljt->ijtb", columns, chains.to_joints[:, :, robots])
+        return columns if self._is_whole else self._in_rows(columns, seen, wanted)
+
+    def _in_rows(self, columns: Array, seen: Seen, wanted: Wanted) -> Array:
+        """Columns in the frames of `errors`, zero in the rows that a task leaves open."""
+        R, turned, free = seen.R_WR, seen.R_WR.copy(), self._is_spin_free
+        turned[:, :, free] = np.einsum("ijtb,jktb->iktb", R[:, :, free], wanted.R[:, :, free])
+        rows = np.empty_like(columns)
+        for half in (slice(None, len(free)), slice(len(free), None)):
+            rows[:3, :, half] = np.einsum("jitb,jltb->iltb", R, columns[:3, :, half])
+            rows[3:, :, half] = np.einsum("jitb,jltb->iltb", turned, columns[3:, :, half])
+            rows[:, :, half] *= self._kept[:, None]
+        return rows
+
+
+class Look:
+    """The tasks at many postures, to first order.
+
+    Attributes:
+        errors: Pose errors, see `LaneTasks.errors`, shape (6, tasks, lanes).
+    """
+
+    def __init__(
+        self, tasks: LaneTasks, arrow: ArrowInverse, *, errors: Array, rows: Array | None, wanted: Array, mobile: Array
+    ) -> None:
+        """Keep what was found; ``rows`` turn errors and twists into the frame of the columns, if it is another."""
+        self._tasks, self._arrow, self._rows, self._wanted, self._mobile = tasks, arrow, rows, wanted, mobile
+        self.errors = errors
+
+    def speeds(self, drift: Array | None = None) -> Array:
+        r"""Joint speeds ``J^# x_dot + (I - J^# J) u`` for the wanted twists and a drift ``u``, shape (nq, lanes).
+
+        The drift has the shape (nq,) or (nq, lanes).
+        """
+        b = self._turned(self._wanted)
+        if drift is None:
+            return self._tasks.stacked(*self._arrow.speeds(b))
+        u = np.broadcast_to((self._mobile * drift.T).T.reshape(len(drift), -1), (len(drift), b.shape[2]))
+        return u + self._tasks.stacked(*self._arrow.speeds(b - self._arrow.twists(*self._tasks.unstacked(u))))
+
+    def correction(self, moved: Array) -> Array:
+        """Newton's correction ``J^# (e - J d)`` of postures that will be moved by ``d``, shape (nq, lanes)."""
+        b = self._turned(self.errors) - self._arrow.twists(*self._tasks.unstacked(moved))
+        return self._tasks.stacked(*self._arrow.speeds(b))
+
+    def _turned(self, b: Array) -> Array:
+        """Errors or twists in the frame of the columns."""
+        if self._rows is None:
+            return b
+        turned = np.empty_like(b)
+        np.einsum("ijtb,jtb->itb", self._rows, b[:3], out=turned[:3])
+        np.einsum("ijtb,jtb->itb", self._rows, b[3:], out=turned[3:])
+        return turned
+
+
+def _part_in_carrier(cell: Cell) -> Array:
+    """The part in the tool frame of the robot that carries the part frame, or in W where nobody holds it."""
+    if cell.part.held_by:
+        return inverse(cell.part.held_by[0].X_PT)
+    if cell.part.X_WP is None:
+        raise ValueError("a part that nobody holds needs a pose in the world")
+    return cell.part.X_WP
+
+
+def _kept(task: Relation) -> Array:
+    """1 for the components that a task keeps; with free spin the two rotations across the tool axis."""
+    kept = np.zeros(6)
+    kept[list(task.axes)] = 1.0
+    if task.is_spin_free:
+        kept[3:] = [1.0, 1.0, 0.0]
+    return kept
+
+
+def _rotation(sine_axis: Array, cosine: Array) -> Array:
+    """Rotation vectors from axis times sine, shape (3, ...), and cosine of the angle, shape (...).
+
+    Of a half turn the axis is not known; it is given as one about x, so that it does not look like none.
+    """
+    sine = np.sqrt(np.einsum("i...,i...->...", sine_axis, sine_axis))
+    is_small = sine <= SMALL_ANGLE
+    scale = np.where(is_small, 1.0, np.arctan2(sine, cosine) / np.where(is_small, 1.0, sine))
+    vector: Array = sine_axis * scale
+    vector[0] += np.pi * (is_small & (cosine < 0.0))
+    return vector
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Cross products along the first axis, shape (3, ...)."""
+    product = np.empty_like(a)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.multiply(a[j], b[k], out=product[i])
+        product[i] -= a[k] * b[j]
+    return product

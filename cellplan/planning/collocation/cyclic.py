@@ -1,0 +1,92 @@
+"""Closed path: an accurate motion that brings every joint back at the end of each cycle."""
+
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.geometry.transforms import Array
+from cellplan.model.motion import Schedule
+from cellplan.model.task import INSTANT_ROOM
+from cellplan.planning.collocation.joint_polynomials import JointPath, joined
+from cellplan.planning.collocation.run import AccurateRun
+from cellplan.planning.euler.cycle_closing import SAME_POSE, closing_drift, not_back
+from cellplan.planning.timing.common_cycles import common_cycles
+from cellplan.planning.tracking.problem import TrackingProblem
+
+PERIODIC: Final = 3e-9  # [rad] or [m] by which joints may be off after a cycle that is repeated: they would jump by it
+
+
+class _LostWayError(NoSolutionError):
+    """The accurate mode finds no way through a cycle."""
+
+
+def closed_path(run: AccurateRun, problem: TrackingProblem, schedule: Schedule, *, start: Array) -> JointPath | None:
+    """A path that closes in every cycle; None where the accurate mode finds no way.
+
+    Each cycle gets a drift of its own, in one direction and at rest at both ends. Where the targets of a cycle are
+    those of the one before, it repeats its motion: a drift alone would let rounding grow from cycle to cycle, as the
+    map of one cycle onto the next need not be a contraction. Before the first cycle and after the last one there is
+    nothing to close, and no drift.
+
+    Args:
+        run: The run.
+        problem: Its tasks.
+        schedule: Their schedule.
+        start: Stacked start posture, shape (nq,).
+
+    Raises:
+        InputError: A path is open.
+        NoSolutionError: A cycle does not close.
+    """
+    bounds = _bounds(run, schedule)
+    for begin, end in pairwise(bounds):
+        _refuse_open(run, problem, begin, end)
+    try:
+        path = _whole(run, start, begin=0.0, end=bounds[0])
+        before: JointPath | None = None
+        for begin, end in pairwise(bounds):
+            again = None if before is None else run.repeated(before, begin=begin)
+            cycle = _closing(run, problem, path.last, begin=begin, end=end) if again is None else again
+            path = joined(path, cycle)
+            before = cycle if np.max(np.abs(cycle.last - cycle.start)) <= PERIODIC else None
+        return joined(path, _whole(run, path.last, begin=bounds[-1], end=run.end))
+    except _LostWayError:
+        return None
+
+
+def _bounds(run: AccurateRun, schedule: Schedule) -> list[float]:
+    """Instants in [s] between which the cycles lie; the whole motion when the tasks keep no common cycles."""
+    ends = common_cycles(schedule)
+    return [0.0, run.end] if ends is None else np.clip(ends, 0.0, run.end).tolist()
+
+
+def _refuse_open(run: AccurateRun, problem: TrackingProblem, begin: float, end: float) -> None:
+    """Stop where a tool is not back at the end of a cycle; the tasks come first among what asks for tools."""
+    gaps = run.gaps(begin, end)
+    for task, gap in zip(problem.tasks, gaps.tolist(), strict=True):
+        if gap > SAME_POSE:
+            raise InputError(not_back(problem.cell, task, end))
+
+
+def _closing(run: AccurateRun, problem: TrackingProblem, q: Array, *, begin: float, end: float) -> JointPath:
+    """Motion of one cycle that brings the joints back."""
+    found: list[JointPath] = []
+
+    def moved(drift: Array) -> Array:
+        found[:] = [_whole(run, q, begin=begin, end=end, drift=drift)]
+        round_trip: Array = found[0].last - q
+        return round_trip
+
+    instant = int(np.argmin(np.abs(problem.times - begin)))
+    closing_drift(problem, q, moved, duration=end - begin, instant=instant)
+    return found[0]
+
+
+def _whole(run: AccurateRun, q: Array, *, begin: float, end: float, drift: Array | None = None) -> JointPath:
+    """Motion up to an instant, not less far."""
+    path = run.path(q, begin=begin, end=end, drift=drift)
+    if path.end < end - INSTANT_ROOM:
+        raise _LostWayError("no way leads through the cycle")
+    return path

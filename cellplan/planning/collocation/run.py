@@ -1,0 +1,154 @@
+"""Accurate run: the joints of one cell as polynomials in time, by collocation."""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.kinematics.batched import IN_CACHE
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Schedule
+from cellplan.model.progress import Progress, silent
+from cellplan.model.task import INSTANT_ROOM
+from cellplan.planning.collocation.batch_targets import LaneTargets
+from cellplan.planning.collocation.batch_tasks import LaneTasks
+from cellplan.planning.collocation.joint_polynomials import JointPath
+from cellplan.planning.collocation.solver import Collocation, Indices, largest
+from cellplan.planning.collocation.start_offset import start_offset
+from cellplan.planning.collocation.windows import Panel, Window, windows_between
+from cellplan.planning.euler.cycle_closing import SAME_POSE, drift_pace
+from cellplan.planning.timing.timed_path import TimedTasks, distinct
+from cellplan.planning.tracking.locked_joints import locked_since
+from cellplan.planning.tracking.targets import closures
+
+SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
+SHORTEST_SHARE: Final = 1.0 / 4096.0  # of the motion: panels may be that short where steps of the clock are longer
+TO_CLOSE: Final = 1e-7  # [m] and [rad]: what no tool is back to brings no joint back
+STEADY: Final = 1e-11  # [rad] and [m]: postures this near to their limit depend smoothly on a drift, as a search asks
+ONLY: Final = np.zeros(1, dtype=np.intp)  # the one cell among all of a collocation
+
+
+class AccurateRun:
+    """One run of one cell.
+
+    Attributes:
+        end: End of the run in [s].
+        collocation: What resolves it, and counts how much that takes.
+    """
+
+    def __init__(
+        self, cell: Cell, timed: TimedTasks, *, start: Array, moving: Sequence[str], progress: Progress = silent
+    ) -> None:
+        """Gather the tasks, and see how far the tools stand beside their paths at the start.
+
+        Args:
+            cell: The cell.
+            timed: The tasks on the common clock.
+            start: Stacked start posture, shape (nq,).
+            moving: Names of the robots that may move.
+            progress: Who wants to know how far it is.
+        """
+        grasps = closures(cell, moving)
+        accuracy = min(cell.solver.accuracy, TO_CLOSE) if cell.motion.cyclic else cell.solver.accuracy
+        tasks = LaneTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
+        targets, placement = LaneTargets(timed, grasps), tasks.chains.placement(cell)
+        breaks, jumps = timed.breaks, timed.jumps
+        until, first = _settled(cell, timed, len(grasps)), breaks[:2]
+        wanted = targets.at(first[:1], first[:1], first[1:])
+        targets.offset = start_offset(tasks, wanted, placement, start=start, until=until, accuracy=accuracy)
+        self.collocation = Collocation(tasks, targets, placement, accuracy=accuracy)
+        self.end = float(timed.times[-1])
+        if cell.motion.cyclic:
+            self.collocation.posture_room = STEADY
+        self.collocation.shortest = min(cell.motion.step, SHORTEST_SHARE * self.end)
+        self._tasks, self._targets, self._placement = tasks, targets, placement
+        self._locked_since, self._progress = locked_since(cell), progress
+        inner = np.concatenate([jumps, self._locked_since, *([] if targets.offset is None else [until])])
+        self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
+        self._knots = breaks
+
+    def path(self, q: Array, *, begin: float, end: float, drift: Array | None = None) -> JointPath:
+        """Motion from a posture at ``begin``, shape (nq,), up to ``end``, or as far as a way leads.
+
+        Args:
+            q: The posture.
+            begin: First instant in [s].
+            end: Last instant in [s].
+            drift: Joint speeds that are asked for in the null space of the tasks, shape (nq,), on average: they begin
+                and end with rest.
+        """
+        panels: list[Panel] = []
+        nodes: list[Array] = []
+        errors = [0.0]
+
+        def record(window: Window, _cells: Indices, q: Array, worst: Array) -> None:
+            panels.extend(window.panels)
+            nodes.extend(q[:, 0, place] for place in window.places)
+            errors.append(float(worst[0]))
+            self._progress("planning", window.panels[-1].end / self.end)
+
+        self.collocation.drift = None if drift is None else _paced(drift, begin, end)
+        at = q[:, None].copy()
+        for breaks in self._stretches(begin, end):
+            self.collocation.mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
+            if not len(
+                self.collocation.carry(windows_between(breaks, whole=self.end, knots=self._knots), at, ONLY, record)
+            ):
+                break
+        return JointPath(q, begin, panels, nodes, max(errors))
+
+    def gaps(self, begin: float, end: float) -> Array:
+        """How far each tool is wanted at one instant from where it is wanted at a later one, in pose entries."""
+        inside = np.array([begin, end - INSTANT_ROOM])
+        wanted = self._targets.on_path(np.array([begin, end]), inside, inside + INSTANT_ROOM)
+        turned = np.abs(np.diff(wanted.R))[..., 0].max(axis=(0, 1))
+        farthest: Array = np.maximum(turned, np.abs(np.diff(wanted.p))[..., 0].max(axis=0))
+        return farthest
+
+    def errors(self, schedule: Schedule, q: Array) -> Array:
+        """Largest tool errors in [m] or [rad] at the first N instants of the clock, at postures, shape (N, nq)."""
+        worst = np.empty(len(q))
+        for first in range(0, len(q), IN_CACHE):
+            some = slice(first, min(first + IN_CACHE, len(q)))
+            wanted = self._targets.sampled(schedule, some)
+            worst[some] = largest(self._tasks.errors(q[some].T, wanted, self._placement))
+        return worst
+
+    def repeated(self, cycle: JointPath, *, begin: float) -> JointPath | None:
+        """The motion of a cycle once more from another instant on; None where its tasks ask for something else."""
+        again = cycle.shifted(begin - cycle.begin)
+        if np.any((self._locked_since > cycle.begin) & (self._locked_since < again.end)):
+            return None
+        here, there = (self._targets.in_windows([Window(tuple(path.panels))])[0] for path in (cycle, again))
+        gap = max(float(np.abs(here.R - there.R).max()), float(np.abs(here.p - there.p).max()))
+        return again if gap <= SAME_POSE else None
+
+    def _stretches(self, begin: float, end: float) -> list[Array]:
+        """Breaks between two instants, cut where a joint fails; none when there is no time between them."""
+        if end - begin <= INSTANT_ROOM:
+            return []
+        inner = self._breaks[(self._breaks > begin + INSTANT_ROOM) & (self._breaks < end - INSTANT_ROOM)]
+        breaks = np.concatenate([[begin], inner, [end]])
+        is_lock = np.min(np.abs(breaks[:, None] - self._locked_since), axis=1) <= INSTANT_ROOM
+        cuts = [0, *(np.flatnonzero(is_lock[1:-1]) + 1).tolist(), len(breaks) - 1]
+        return [breaks[low : high + 1] for low, high in pairwise(cuts)]
+
+
+def _paced(drift: Array, begin: float, end: float) -> Callable[[Array], Array]:
+    """Speeds at instants in [s] that begin and end with rest, for mean ones of shape (nq,)."""
+
+    def speeds(instants: Array) -> Array:
+        at_instants: Array = drift[:, None] * drift_pace((instants - begin) / (end - begin))
+        return at_instants
+
+    return speeds
+
+
+def _settled(cell: Cell, timed: TimedTasks, grasps: int) -> Array:
+    """Instants in [s] until which each tool, and that of each further holder, may be on its way to where it belongs."""
+    given = [path.task.start + path.task.settle if path.task.settle else 0.0 for path in timed.paths]
+    soon = min(SETTLING_STEPS * cell.motion.step, 0.5 * float(timed.times[-1]))
+    until: Array = np.maximum(np.array(given + [0.0] * grasps), soon)
+    return until

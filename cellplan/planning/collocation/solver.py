@@ -1,0 +1,175 @@
+r"""Collocation: joints as polynomials in time that hold the tools on their tasks and resolve the redundancy.
+
+On each panel the joints are polynomials through Chebyshev points, the nodes. At every node the tools are on their
+tasks, and in the null space of the tasks the joints are the integral of the weighted pseudo-inverse
+([Ribeiro2010]_ Eq. D.28):
+
+.. math:: e(t_j, q_j) = 0, \qquad N_j \left( q(t_0) + \int_{t_0}^{t_j} J^\# \dot x_d \, dt - q_j \right) = 0
+
+Picard's iteration finds the integral, Newton's the tasks, both in one pass over all nodes of a window: with
+``d_j`` what Picard would add to ``q_j``, the pass adds ``d_j + J^# (e_j - J d_j)``.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.transforms import Array
+from cellplan.kinematics.batched import Placement
+from cellplan.planning.collocation.batch_targets import LaneTargets
+from cellplan.planning.collocation.batch_tasks import LaneTasks, Wanted
+from cellplan.planning.collocation.windows import Window
+
+Indices = NDArray[np.intp]
+Record = Callable[[Window, Indices, Array, Array], None]  # window, cells, q (nq, cells, nodes), bounds (cells,)
+
+AT_ONCE: Final = 200  # windows whose targets are looked up together: some 20 000 instants
+MOST_PASSES: Final = 20  # over a window; where passes help, about eight do
+SLOW: Final = 0.7  # a pass that leaves more than this share of the change before does not lead to a solution
+FREE_PASSES: Final = 3  # before a pass is judged by that
+LONGEST_MOVE: Final = np.pi  # [rad] or [m]: a pass that moves a joint farther has lost its way
+OVERSHOOT: Final = 2.0  # largest error anywhere, of the largest that is looked at; see `_errors`
+TOOL_SHARE: Final = 0.25  # of the accuracy: tool errors at the nodes that passes may leave
+POSTURE_SHARE: Final = 10.0  # postures may be this many times as far from their limit as tools, in [rad] for [m]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Attempt:
+    """What came of one window.
+
+    Attributes:
+        q: Postures at the nodes, shape (nq, cells, nodes).
+        is_settled: Whether the passes came to an end, shape (cells,).
+        errors: Bound of the tool errors at the nodes and between them, [m] or [rad], by panel, shape (panels, cells).
+    """
+
+    q: Array
+    is_settled: NDArray[np.bool_]
+    errors: Array
+
+
+class Collocation:
+    """Resolves one run of many cells that differ in bases, tools and start postures only.
+
+    Attributes:
+        sweeps: Passes over windows so far.
+        solves: Systems of equations solved so far: nodes of all passes.
+        mobile: 1 for joints that are not locked, shape (nq,).
+        drift: Joint speeds that are asked for in the null space of the tasks at instants in [s], as a function of
+            shape (K,) to (nq, K); None for none.
+        posture_room: How far postures may be from the limit of the passes, in [rad] and [m].
+        shortest: Length in [s] below which no panel is made by halving.
+    """
+
+    def __init__(self, tasks: LaneTasks, targets: LaneTargets, placement: Placement, *, accuracy: float) -> None:
+        """Begin with all joints free.
+
+        Args:
+            tasks: The tasks of the run.
+            targets: Where the tools are wanted.
+            placement: Where the robots of the cells stand; one for all, or one per cell.
+            accuracy: Largest tool error at the nodes and between them, in [m] and [rad].
+        """
+        self._tasks, self._targets, self._placement, self._accuracy = tasks, targets, placement, accuracy
+        self.sweeps = self.solves = 0
+        self.mobile: Array = np.ones(tasks.joint_count)
+        self.drift: Callable[[Array], Array] | None = None
+        self.shortest, self.posture_room = 0.0, POSTURE_SHARE * accuracy
+
+    def carry(self, windows: tuple[Window, ...], q: Array, cells: Indices, record: Record) -> Indices:
+        """Carry cells through windows, refined where that is needed; returns those that came to the end.
+
+        Args:
+            windows: Windows in order.
+            q: Postures of all cells, shape (nq, all cells); those of the cells are carried on in place.
+            cells: Indices of the cells to carry.
+            record: Is told of every window that cells passed, in order for each of them.
+        """
+        for first in range(0, len(windows), AT_ONCE):
+            batch = windows[first : first + AT_ONCE]
+            for window, wanted in zip(batch, self._targets.in_windows(batch), strict=True):
+                if not len(cells):
+                    return cells
+                cells = self._carry_on(window, wanted, q, cells, record=record)
+        return cells
+
+    def _carry_on(self, window: Window, wanted: Wanted, q: Array, cells: Indices, *, record: Record) -> Indices:
+        """Carry cells through one window; those for which it is too coarse go through finer ones."""
+        attempt = self.attempt(window, wanted, q[:, cells], self._placement.of(cells))
+        is_exact = attempt.is_settled & np.all(attempt.errors <= self._accuracy, axis=0)
+        through = cells[is_exact]
+        if len(through):
+            q[:, through] = attempt.q[:, is_exact, -1]
+            record(window, through, attempt.q[:, is_exact], attempt.errors[:, is_exact].max(axis=0))
+        is_rough = attempt.is_settled & ~is_exact
+        finer = [(~attempt.is_settled, window.parts(shortest=self.shortest))]
+        if is_rough.any():
+            places = np.any(attempt.errors[:, is_rough] > self._accuracy, axis=1)
+            finer.append((is_rough, window.refined(places.tolist(), shortest=self.shortest)))
+        arrived = [through]
+        for which, windows in finer:
+            if which.any() and windows:
+                arrived.append(self.carry(windows, q, cells[which], record))
+        return np.sort(np.concatenate(arrived))
+
+    @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # what is not a number does not settle
+    def attempt(self, window: Window, wanted: Wanted, q0: Array, placement: Placement) -> Attempt:
+        """Resolve one window from start postures, shape (nq, cells)."""
+        cells, nodes = q0.shape[1], window.count
+        q = np.repeat(q0[:, :, None], nodes, axis=2)
+        is_settled, before = np.zeros(cells, dtype=bool), np.full(cells, np.inf)
+        going = np.arange(cells)
+        for number in range(MOST_PASSES):
+            at_nodes, spread = wanted.between(0, nodes).repeated(len(going)), placement.of(going).repeated(nodes)
+            moved, errors = self._pass(window, at_nodes, q[:, going], spread, q0=q0[:, going])
+            q[:, going] += moved
+            change = np.abs(moved).max(axis=(0, 2))
+            ratio = change / before[going] if number else np.full(cells, SLOW)
+            left = change * ratio / np.maximum(1.0 - ratio, 1.0 - SLOW)
+            is_near = errors * ratio <= TOOL_SHARE * self._accuracy  # where blocks are nearly singular, Newton is slow
+            is_there = is_near & (left <= self.posture_room)
+            is_lost = ~(change < LONGEST_MOVE) | ((ratio > SLOW) & (number >= FREE_PASSES))
+            is_settled[going[is_there]] = True
+            before[going] = change
+            going = going[~is_there & ~is_lost]
+            if not len(going):
+                break
+        return Attempt(q, is_settled, self._errors(window, wanted.repeated(cells), q, placement))
+
+    def _pass(
+        self, window: Window, wanted: Wanted, q: Array, placement: Placement, *, q0: Array
+    ) -> tuple[Array, Array]:
+        """What one pass adds to the postures at the nodes, (nq, cells, nodes), and tool errors before it, (cells,)."""
+        self.sweeps += 1
+        self.solves += q.shape[1] * q.shape[2]
+        look = self._tasks.look(q.reshape(len(q), -1), wanted, placement, mobile=self.mobile)
+        drift = None if self.drift is None else np.tile(self.drift(window.instants[: window.count]), q.shape[1])
+        speeds = look.speeds(drift).reshape(q.shape)
+        picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
+        moved: Array = (picard + look.correction(picard)).reshape(q.shape)
+        moved[:, :, 0] = 0.0
+        return moved, np.abs(look.errors).max(axis=(0, 1)).reshape(q.shape[1:]).max(axis=1)
+
+    def _errors(self, window: Window, wanted: Wanted, q: Array, placement: Placement) -> Array:
+        r"""Bounds of the tool errors at the nodes and between them, by panel, shape (panels, cells).
+
+        The nodes of a panel and the points between them are ``2 n + 1`` Chebyshev points. A polynomial of degree ``m``
+        is nowhere larger than :math:`1 / \cos(\pi m / 4 n)` times its largest value at them (Ehlich and Zeller 1964):
+        twice, up to degree ``4 n / 3``. The error of interpolation begins with degree ``n + 1`` and falls from there.
+        """
+        everywhere = np.concatenate([q, q @ window.between.T], axis=2)
+        cells, instants = everywhere.shape[1:]
+        errors = self._tasks.errors(everywhere.reshape(len(q), -1), wanted, placement.repeated(instants))
+        by_panel = np.zeros((len(window.panels), cells))
+        np.maximum.at(by_panel, window.panel_of, largest(errors).reshape(cells, instants).T)
+        return OVERSHOOT * by_panel
+
+
+def largest(errors: Array) -> Array:
+    """Largest distance in [m] or angle in [rad] of all tasks, shape (6, tasks, lanes) to (lanes,)."""
+    squares = np.maximum(np.sum(errors[:3] ** 2, axis=0), np.sum(errors[3:] ** 2, axis=0))
+    worst: Array = np.sqrt(squares.max(axis=0))
+    return worst

@@ -1,0 +1,74 @@
+"""Start offset: tools that start beside their paths come to them smoothly, instead of by a jump."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array, rotation_exp
+from cellplan.kinematics.batched import Placement
+from cellplan.planning.collocation.batch_tasks import LaneTasks, Wanted
+from cellplan.planning.timing.approach_retract import REST_TO_REST
+from cellplan.planning.timing.time_law import advance
+
+QUIET: Final = 0.1  # share of the accuracy up to which a start counts as on its path
+ROUNDS: Final = 8  # of looking at the offset through the components that a task keeps; the first is nearly right
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StartOffset:
+    r"""How far the tools stand from where they are wanted at first, and when they have to be there.
+
+    Targets are moved by ``v (1 - \sigma(t / T))`` with the quintic law ``\sigma``: from the tool's own pose to the
+    path, from rest to rest.
+
+    Attributes:
+        linear: Wanted tip minus actual one at the start in the frame of each task, in [m], shape (3, tasks).
+        angular: Rotation vector from the actual to the wanted orientation, in [rad], shape (3, tasks).
+        until: Instants in [s] from which on nothing is left of it, shape (tasks,).
+    """
+
+    linear: Array
+    angular: Array
+    until: Array
+
+    def applied(self, times: Array, R: Array, p: Array, twists: Array) -> tuple[Array, Array, Array]:
+        """Targets moved so that they begin where the tools are.
+
+        Args:
+            times: Instants in [s], shape (N,).
+            R: Wanted orientations, shape (3, 3, tasks, N).
+            p: Wanted tips, shape (3, tasks, N).
+            twists: Wanted twists, shape (6, tasks, N).
+        """
+        law = advance(REST_TO_REST, np.clip(times / self.until[:, None], 0.0, 1.0))
+        left, rate = 1.0 - law.share, law.rate / self.until[:, None]
+        back = np.moveaxis(rotation_exp(-np.moveaxis(self.angular[:, :, None] * left, 0, -1)), (-2, -1), (0, 1))
+        turned = twists.copy()
+        turned[:3] += self.linear[:, :, None] * rate
+        turned[3:] = np.einsum("ijtb,jtb->itb", back, twists[3:]) + self.angular[:, :, None] * rate
+        return np.einsum("ijtb,jktb->iktb", back, R), p - self.linear[:, :, None] * left, turned
+
+
+def start_offset(
+    tasks: LaneTasks, wanted: Wanted, placement: Placement, *, start: Array, until: Array, accuracy: float
+) -> StartOffset | None:
+    """How far the tools stand beside their paths at the start; None when they stand on them.
+
+    Args:
+        tasks: The tasks.
+        wanted: Where the tools are wanted at first, one lane.
+        placement: Where the robots stand.
+        start: Stacked start posture, shape (nq,).
+        until: Instants in [s] from which on they have to be there, shape (tasks,).
+        accuracy: Largest tool error that is let pass, in [m] and [rad].
+    """
+    offset = StartOffset(np.zeros((3, len(until))), np.zeros((3, len(until))), until)
+    at_start = np.zeros(1)
+    for number in range(ROUNDS):
+        moved = Wanted(*offset.applied(at_start, wanted.R, wanted.p, wanted.twists))
+        error = tasks.task_errors(start[:, None], moved, placement)[:, :, 0]
+        if np.max(np.abs(error), initial=0.0) <= QUIET * accuracy:
+            return offset if number else None
+        offset = StartOffset(offset.linear + error[:3], offset.angular + error[3:], until)
+    return offset

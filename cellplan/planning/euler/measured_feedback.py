@@ -1,0 +1,152 @@
+"""Feedback: references corrected so that the tools of a real cell come where they are wanted, not those of the model.
+
+[Nicolato2007]_ section 3.5, Eq. 3.31: ``s_d* = g(r_d - r_n) + s~_n`` replaces the wanted pose by the nominal one plus
+the *measured* error, so that the method cancels what is measured instead of what is modelled.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import NoSolutionError
+from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_exp, rotation_vector
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Motion, Schedule, TaskSchedule
+from cellplan.model.task import Task
+from cellplan.planning.euler.integrate import follow, refuse_leap
+from cellplan.planning.methods import method_named
+from cellplan.planning.tracking.cooperation_jacobian import pose_errors, reference_frames
+from cellplan.planning.tracking.problem import TrackingProblem
+from cellplan.planning.tracking.singularity import singular_words
+
+SETTLING_STEPS: Final = 60  # Newton steps from one start posture to the next; a few are enough away from singularities
+START_MEASUREMENTS: Final = 6  # times that standing tools are measured and put right before a pass begins
+
+Measure = Callable[[Array], Sequence[Array]]  # stacked joints (1, nq) -> X_PT of every task, (1, 4, 4) each
+
+
+def corrected_references(wanted: Schedule, references: Schedule, measured: Sequence[Array]) -> Schedule:
+    r"""References for the next pass from what was measured in the last one.
+
+    .. math:: X_{ref}^{i+1}(k) = \Delta(k) \, X_{ref}^{i}(k), \quad \Delta = X_{PT,d} \, X_{PT,measured}^{-1}
+
+    Where a task leaves components open, ``Delta`` takes the measured pose to the nearest one that the task wants. A
+    real cell whose tool stands at ``X_ref E``, with an ``E`` that does not depend on the reference, is corrected in one
+    pass. In general the error shrinks as long as ``E`` changes less than its argument, which is so for small errors.
+
+    Args:
+        wanted: What the tasks want.
+        references: What the model was told in the last pass.
+        measured: Measured tool poses of that pass, shape (N, 4, 4) for each task.
+    """
+    told = zip(wanted.tasks, references.tasks, measured, strict=True)
+    return Schedule(
+        times=wanted.times,
+        tasks=tuple(
+            _with_poses(reference, displaced(task.task, task.X_PT, seen, nominal=reference.X_PT), wanted.times)
+            for task, reference, seen in told
+        ),
+    )
+
+
+def displaced(task: Task, X_wanted: Array, X_measured: Array, *, nominal: Array) -> Array:
+    """Nominal poses moved by the displacement in P that takes the measured ones to the wanted ones, shape (N, 4, 4)."""
+    error = pose_errors(X_wanted, X_measured, [task.is_spin_free] * len(X_wanted))
+    error[:, [axis for axis in range(6) if axis not in task.axes]] = 0.0
+    turn, tip = rotation_exp(error[:, 3:]), X_measured[:, :3, 3]
+    lever = (turn @ (nominal[:, :3, 3] - tip)[..., None])[..., 0]
+    return pose_from(turn @ nominal[:, :3, :3], tip + error[:, :3] + lever)
+
+
+def settled_start(cell: Cell, references: Schedule, *, start: Array, moving: Sequence[str]) -> Array:
+    """The posture near a start posture from which the model's tools stand on the first references, shape (nq,).
+
+    Raises:
+        NoSolutionError: The tools cannot be brought there.
+    """
+    times: Array = cell.motion.step * np.arange(SETTLING_STEPS + 1, dtype=np.float64)
+    still = Schedule(times=times, tasks=tuple(_standing(task, len(times)) for task in references.tasks))
+    newton = replace(
+        cell,
+        solver=replace(
+            cell.solver, method="weighted_pseudo_inverse", gain=1.0 / cell.motion.step, damping=None, goals=()
+        ),
+        motion=replace(cell.motion, cyclic=False),
+    )
+    settled: Array = follow(newton, still, start=start, moving=moving).q[-1]
+    return settled
+
+
+def measured_start(cell: Cell, wanted: Schedule, *, start: Array, moving: Sequence[str], measure: Measure) -> Array:
+    """Start posture from which the real tools stand on the first poses of their tasks, shape (nq,).
+
+    The standing tools are measured and put right several times: a pass that began with the whole error would begin with
+    a jerk. The arguments are those of `follow_measured`.
+
+    Raises:
+        NoSolutionError: The tools cannot be brought there.
+    """
+    first = Schedule(times=wanted.times[:1], tasks=tuple(_standing(task, 1) for task in wanted.tasks))
+    references, q = first, start
+    for _ in range(START_MEASUREMENTS):
+        references = corrected_references(first, references, measure(q[None]))
+        q = settled_start(cell, references, start=q, moving=moving)
+    return q
+
+
+def follow_measured(cell: Cell, wanted: Schedule, *, start: Array, moving: Sequence[str], measure: Measure) -> Motion:
+    r"""Follow a schedule with the error measured at each instant fed back at once ([Nicolato2007]_ section 3.5).
+
+    At instant k the method is told ``Delta(k) X_nominal(q_k)`` in place of the wanted pose, with ``Delta`` of
+    `corrected_references`, and for the next instant the displacement from what is measured now to what is wanted then.
+
+    Args:
+        cell: The written cell: what the method knows.
+        wanted: What the tasks want.
+        start: Stacked start posture, shape (nq,), in [rad] or [m].
+        moving: Names of the robots that may move.
+        measure: The measuring system.
+
+    Raises:
+        NoSolutionError: A tool lost its path, or the method found no way on.
+    """
+    problem = TrackingProblem(cell, wanted, moving)
+    advance = method_named(cell.solver.method)(problem)
+    targets = problem.wanted.copy()
+    q = np.empty((len(wanted.times), cell.joint_count))
+    q[0] = start
+    for k in range(len(q) - 1):
+        state = problem.state(q[k])
+        nominal = inverse(reference_frames(state, problem.tasks)) @ state.X_WT[problem.operators]
+        for place, (scheduled, X_seen) in enumerate(zip(wanted.tasks, measure(q[k : k + 1]), strict=True)):
+            seen, told = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
+            problem.wanted[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=told)
+        try:
+            step = advance(k, q[k])
+            refuse_leap(cell, q[k], step)
+        except NoSolutionError as error:
+            singular = singular_words(problem, k, q[k])
+            raise type(error)(f"{cell.origin.at('motion')}: at {wanted.times[k]:.3f} s {error}{singular}") from None
+        q[k + 1] = step.q
+    return Motion(times=wanted.times, q=q)
+
+
+def _with_poses(scheduled: TaskSchedule, X_PT: Array, times: Array) -> TaskSchedule:
+    """A schedule of other poses, with the mean twist from each instant to the next; it ends at rest."""
+    step = np.diff(times)[:, None]
+    V_PT_P = np.zeros((len(times), 6))
+    V_PT_P[:-1, :3] = np.diff(X_PT[:, :3, 3], axis=0) / step
+    V_PT_P[:-1, 3:] = rotation_vector(X_PT[1:, :3, :3] @ np.swapaxes(X_PT[:-1, :3, :3], 1, 2)) / step
+    return replace(scheduled, X_PT=X_PT, V_PT_P=V_PT_P)
+
+
+def _standing(scheduled: TaskSchedule, count: int) -> TaskSchedule:
+    """A tool that stands still at its first pose for so many instants."""
+    return replace(
+        scheduled,
+        X_PT=np.repeat(scheduled.X_PT[:1], count, axis=0),
+        V_PT_P=np.zeros((count, 6)),
+        travelled=np.zeros(count),
+    )

@@ -1,0 +1,201 @@
+"""Layouts: the same job in many candidate cells at once, screened for what a layout search asks first."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.transforms import Array
+from cellplan.kinematics.batched import Placement
+from cellplan.model.cell import Cell
+from cellplan.model.task import Frame
+from cellplan.planning.collocation.batch_targets import LaneTargets
+from cellplan.planning.collocation.batch_tasks import LaneTasks
+from cellplan.planning.collocation.solver import Collocation, Indices
+from cellplan.planning.collocation.windows import Window, windows_between
+from cellplan.planning.timing.timed_path import TimedTasks
+from cellplan.planning.tracking.targets import closures
+
+AT_ONCE: Final = 32  # candidates that are resolved together: enough for NumPy, and their arrays stay in the cache
+FIRST_DEGREE: Final = 12  # of the polynomials: enough for most windows at the accuracy of a screening
+NEWTON_STEPS: Final = 20  # to bring the tools to the starts of their paths; about six where they come there
+LARGEST_STEP: Final = 0.5  # [rad] or [m] of one of them
+QUIET: Final = 1e-3  # of the accuracy: a Newton step below this share in [rad] or [m] changes nothing any more
+ALL_WAY: Final = np.inf  # instant at which a candidate is lost that does the whole job
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Candidates:
+    """Cells that differ in base poses, tool tips and start postures only.
+
+    Attributes:
+        X_WB: Bases in the world, shape (K, robots, 4, 4).
+        X_FT: Tool tips in the flange frames, shape (K, robots, 4, 4).
+        start: Start postures in [rad] or [m], shape (K, nq); the tools need only be near the starts of their paths.
+    """
+
+    X_WB: Array
+    X_FT: Array
+    start: Array
+
+    def __post_init__(self) -> None:
+        """Check at the door that all belong together and are finite."""
+        count, robots = self.X_WB.shape[:2]
+        if self.X_FT.shape != (count, robots, 4, 4) or self.X_WB.shape != self.X_FT.shape or len(self.start) != count:
+            raise ValueError(
+                f"candidates: expected X_WB and X_FT of shape (K, robots, 4, 4) and start of shape (K, nq), "
+                f"got {self.X_WB.shape}, {self.X_FT.shape} and {self.start.shape}"
+            )
+        if not all(np.all(np.isfinite(part)) for part in (self.X_WB, self.X_FT, self.start)):
+            raise ValueError("candidates: a pose or a start posture is not finite")
+
+    @classmethod
+    def of(cls, cells: Sequence[Cell], start: Array) -> "Candidates":
+        """Those of given cells with start postures, shape (K, nq)."""
+        return cls(
+            X_WB=np.array([[robot.X_WB for robot in cell.robots] for cell in cells]),
+            X_FT=np.array([[robot.tool.X_FT for robot in cell.robots] for cell in cells]),
+            start=np.asarray(start, dtype=float),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Screening:
+    """What came of each candidate; figures of one that was lost hold up to that instant.
+
+    Attributes:
+        start: Start postures with the tools on their paths, shape (K, nq).
+        lost_at: Instant in [s] at which a tool could not follow; -inf where it did not even come to its start, inf for
+            candidates that did the whole job, shape (K,).
+        error: Bound of the tool error at the nodes and between them, in [m] or [rad], shape (K,).
+        margins: Smallest distance of each joint from its limits in [rad] or [m], negative beyond, shape (K, nq).
+        speed_ratios: Largest speed of each joint as a share of its limit, shape (K, nq).
+    """
+
+    start: Array
+    lost_at: Array
+    error: Array
+    margins: Array
+    speed_ratios: Array
+
+    @classmethod
+    def unknown(cls, start: Array) -> "Screening":
+        """Figures of candidates of which nothing is known but their start postures, shape (K, nq)."""
+        return cls(
+            start=start,
+            lost_at=np.full(len(start), -np.inf),
+            error=np.zeros(len(start)),
+            margins=np.full(start.shape, np.inf),
+            speed_ratios=np.zeros(start.shape),
+        )
+
+    def joined(self, others: Sequence["Screening"]) -> "Screening":
+        """These figures, then those of others."""
+        names = [field.name for field in fields(self)]
+        return Screening(**{name: np.concatenate([getattr(each, name) for each in (self, *others)]) for name in names})
+
+    def worst(self, other: "Screening") -> "Screening":
+        """Of two runs from the same candidates, the worse figures; the start postures of the later one."""
+        return Screening(
+            start=other.start,
+            lost_at=np.minimum(self.lost_at, other.lost_at),
+            error=np.maximum(self.error, other.error),
+            margins=np.minimum(self.margins, other.margins),
+            speed_ratios=np.maximum(self.speed_ratios, other.speed_ratios),
+        )
+
+    @property
+    def is_followed(self) -> NDArray[np.bool_]:
+        """Which candidates did the whole job, shape (K,)."""
+        followed: NDArray[np.bool_] = self.lost_at == ALL_WAY
+        return followed
+
+    @property
+    def is_feasible(self) -> NDArray[np.bool_]:
+        """Which did it within all joint limits and speeds, shape (K,); nothing is known of collisions yet."""
+        within = np.all(self.margins >= 0.0, axis=1) & np.all(self.speed_ratios <= 1.0, axis=1)
+        feasible: NDArray[np.bool_] = self.is_followed & within
+        return feasible
+
+
+def screen_layouts(
+    cell: Cell, timed: TimedTasks, candidates: Candidates, *, moving: Sequence[str], accuracy: float = 1e-5
+) -> Screening:
+    """Resolve the job of a cell in many candidates for it.
+
+    All candidates go through the same windows together; those that need finer ones leave the others for a while. The
+    redundancy is resolved as in `resolve`, by the weighted pseudo-inverse with constant weights; joints that fail and
+    drifts that close a cycle are left out. Start postures are brought to the paths with the part at rest, so that
+    candidates keep what was chosen for the positioner.
+
+    Args:
+        cell: The cell: its robots, part, weights and limits.
+        timed: Its tasks on the common clock.
+        candidates: What differs.
+        moving: Names of the robots that may move.
+        accuracy: Largest tool error that is let pass, in [m] and [rad].
+
+    Raises:
+        ValueError: The candidates are not cells of these robots.
+    """
+    if candidates.X_WB.shape[1] != len(cell.robots) or candidates.start.shape[1] != cell.joint_count:
+        raise ValueError(f"candidates: expected {len(cell.robots)} robots with {cell.joint_count} joints in all")
+    screen = _Screen(cell, timed, moving=moving, accuracy=accuracy)
+    groups = [slice(first, first + AT_ONCE) for first in range(0, len(candidates.start), AT_ONCE)]
+    parts = [screen.of(candidates.X_WB[group], candidates.X_FT[group], candidates.start[group]) for group in groups]
+    return parts[0].joined(parts[1:]) if parts else Screening.unknown(candidates.start)
+
+
+class _Screen:
+    """What all candidates share."""
+
+    def __init__(self, cell: Cell, timed: TimedTasks, *, moving: Sequence[str], accuracy: float) -> None:
+        """Prepare the tasks, the windows that all go through, and the limits."""
+        grasps = closures(cell, moving)
+        self._tasks = LaneTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
+        self._targets, self._accuracy, self._shortest = LaneTargets(timed, grasps), accuracy, cell.motion.step
+        breaks, jumps = timed.breaks, timed.jumps
+        self._at_start = self._targets.at(breaks[:1], breaks[:1], breaks[1:2])
+        self._windows = windows_between(jumps, whole=float(breaks[-1]), knots=breaks, highest=FIRST_DEGREE)
+        at_rest = cell.positioners[:1] if all(path.task.relative_to is Frame.PART for path in timed.paths) else ()
+        self._settling = np.concatenate([np.full(len(r.model.joints), r.name not in at_rest) for r in cell.robots])
+        joints = [joint for robot in cell.robots for joint in robot.model.joints]
+        self._lower = np.array([joint.lower for joint in joints])
+        self._upper = np.array([joint.upper for joint in joints])
+        self._fastest = np.array([joint.velocity for joint in joints])
+
+    def of(self, X_WB: Array, X_FT: Array, start: Array) -> Screening:
+        """Figures of one group of candidates; see `Candidates`."""
+        placement = self._tasks.chains.placements(X_WB, X_FT)
+        q, arrived = self._settled(start.T.copy(), placement)
+        found = Screening.unknown(q.T.copy())
+        found.lost_at[arrived] = 0.0
+        collocation = Collocation(self._tasks, self._targets, placement, accuracy=self._accuracy)
+        collocation.shortest = self._shortest
+
+        def record(window: Window, cells: Indices, nodes: Array, errors: Array) -> None:
+            everywhere = np.concatenate([nodes, nodes @ window.between.T], axis=2)
+            speeds = np.abs(nodes @ window.rates.T).max(axis=2).T
+            room = np.minimum(everywhere.min(axis=2).T - self._lower, self._upper - everywhere.max(axis=2).T)
+            found.margins[cells] = np.minimum(found.margins[cells], room)
+            found.speed_ratios[cells] = np.maximum(found.speed_ratios[cells], speeds / self._fastest)
+            found.error[cells] = np.maximum(found.error[cells], errors)
+            found.lost_at[cells] = window.panels[-1].end
+
+        found.lost_at[collocation.carry(self._windows, q, np.flatnonzero(arrived), record)] = ALL_WAY
+        return found
+
+    def _settled(self, q: Array, placement: Placement) -> tuple[Array, NDArray[np.bool_]]:
+        """Start postures, shape (nq, cells), with the tools brought to their paths, and which of them came there."""
+        cells = q.shape[1]
+        wanted, still = self._at_start.repeated(cells), np.zeros_like(q)
+        for _ in range(NEWTON_STEPS):
+            step = self._tasks.look(q, wanted, placement, mobile=self._settling).correction(still)
+            longest = np.abs(step).max(axis=0)
+            if not np.any(longest > QUIET * self._accuracy):
+                break
+            q = q + step * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, LARGEST_STEP))
+        errors = np.abs(self._tasks.errors(q, wanted, placement)).max(axis=(0, 1))
+        return q, errors <= self._accuracy

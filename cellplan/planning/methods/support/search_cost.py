@@ -1,0 +1,216 @@
+"""Search cost: how far all tools are from where they are to be, and what each joint can do about it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array, rotation_about, skew
+from cellplan.model.cell import Cell, Grasp, Relation, Robot
+from cellplan.model.robot import BASE, FollowerJoint, Joint
+from cellplan.planning.tracking.cooperation_jacobian import reference_frames
+from cellplan.planning.tracking.problem import TrackingProblem
+
+PARALLEL: Final = 1e-9  # sine of the angle below which two axes count as parallel: rounding of axis tables
+NO_EFFECT: Final = 1e-24  # share of the largest k0 below which a joint does not move any tool: rounding, squared
+COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    r"""The cost at one posture, and the circle on which each joint moves the tools seen from the part.
+
+    The cost ``h = e^T e`` is a sum of squared distances: of each tool tip from its wanted place, and of each
+    constrained axis of the tool from its wanted direction, the latter times ``gamma`` ([Nicolato2007]_ Eq. 3.1, as
+    ``tr((R_d - R)^T (R_d - R))`` is the sum over the columns of R). With joint i alone at ``q_i + theta`` it is
+
+    .. math:: h_i = |e - \sin\theta \, a_i - (1 - \cos\theta) \, n_i|^2
+
+    Attributes:
+        q: Stacked joint vector, shape (nq,).
+        e: Wanted minus actual, all entries, shape (m,).
+        a: First derivative of the actual by each joint, shape (m, nq).
+        n: Second derivative of the actual by each joint, shape (m, nq); zero for joints that do not turn on a circle.
+        turns: Whether a joint moves the tools on circles; False also for one that drives others through a linkage,
+            whose way has no simple form, shape (nq,).
+    """
+
+    q: Array
+    e: Array
+    a: Array
+    n: Array
+    turns: NDArray[np.bool_]
+
+    @property
+    def cost(self) -> float:
+        """The cost h in [m^2]."""
+        return float(self.e @ self.e)
+
+
+class SearchCost:
+    r"""The sum over all tasks of the squared errors of tool places and tool directions, seen from the part.
+
+    **One joint.** Seen from the part, a turn of joint i by ``theta`` turns a tool by ``sigma theta`` about the joint's
+    axis ``s`` through ``s0``, both expressed in P: ``sigma`` is +1 where the joint moves the tool, -1 where it moves
+    the part (the tool then turns the other way about the same axis) and 0 elsewhere. By Rodrigues' formula a point x of
+    the tool goes to
+
+    .. math:: x(\theta) = x + \sin\theta \, a + (1 - \cos\theta) \, n, \quad
+              a = \sigma \, s \times (x - s_0), \quad n = \sigma \, s \times a
+
+    and a direction of the tool likewise without ``s0``; a slide by ``theta`` takes a point to ``x + sigma theta s`` and
+    leaves directions alone. The sum of ``|d - x(theta)|^2`` over points and directions is
+    ``k0 + k1 sin(theta) + k2 cos(theta)`` (Eq. 3.13) or a parabola (Eq. 3.21); see `joint_lines`.
+
+    **What counts.** Places: the axes of P that the task constrains. Directions: all three of the tool when all three
+    rotations are constrained; the tool's z axis when its spin is free; none when no rotation is constrained. Of any
+    other set of rotations only a single one is taken, about an axis that all movable joints of the task are parallel
+    to, as in a planar cell: then the joints cannot touch the other two, and what the wanted turn about that axis makes
+    of the present directions is what is aimed at.
+    """
+
+    def __init__(self, problem: TrackingProblem) -> None:
+        """List the points and directions that count; the joints are looked at when the first posture is known."""
+        self._problem = problem
+        self._signs = problem.signs
+        self._turns = turning_joints(problem.cell)
+        self._kinds = [_kind(task) for task in problem.tasks]
+        self._is_examined = False
+        gamma = problem.cell.solver.search.orientation_weight
+        owners: list[int] = []
+        columns: list[int] = []  # column of the tool's pose: 3 is the tip, 0 to 2 its axes
+        weights: list[list[float]] = []
+        for index, (task, kind) in enumerate(zip(problem.tasks, self._kinds, strict=True)):
+            of_kind = {"none": (), "axis": (2,)}.get(kind, (0, 1, 2))
+            owners += [index] * (1 + len(of_kind))
+            columns += [3, *of_kind]
+            weights.append([float(axis in task.axes) for axis in range(3)])
+            weights += [[float(np.sqrt(gamma))] * 3 for _ in of_kind]
+        self._owners, self._columns = np.array(owners), np.array(columns)
+        self._weights = np.array(weights)
+        self._is_tip = (self._columns == 3).astype(float)[:, None, None]
+
+    def aim(self, k: int, q: Array) -> None:
+        """Take the wanted poses at instant k as the goal, and the joints that may move on the way there from q."""
+        problem = self._problem
+        self._signs = problem.signs * problem.mobile(k - 1)
+        wanted = problem.wanted[k]
+        if "turn" in self._kinds:
+            self._require_parallel_axes(q)
+            wanted = self._with_reachable_turns(wanted, q)
+        self._goal = wanted[self._owners, :3, self._columns]
+
+    def look(self, q: Array) -> Look:
+        """The cost at a posture, and what each joint does to it."""
+        state = self._problem.state(q)
+        X_WR = reference_frames(state, self._problem.tasks)
+        R, p = np.swapaxes(X_WR[:, :3, :3], 1, 2), X_WR[:, :3, 3]
+        w = R @ state.screws_W[3:]
+        v = R @ (state.screws_W[:3] - skew(p) @ state.screws_W[3:])  # of the point at the origin of P
+        poses = R @ state.X_WT[self._problem.operators][:, :3, :]
+        poses[:, :, 3] -= (R @ p[:, :, None])[:, :, 0]
+        x = poses[self._owners, :, self._columns]
+        signs = self._signs[self._owners][:, None, :]
+        turns = signs * w[self._owners]
+        a = signs * (self._is_tip * v[self._owners]) - skew(x) @ turns
+        n = _cross(turns, a) * self._turns
+        scale = self._weights[:, :, None]
+        m = x.size
+        return Look(
+            q=q,
+            e=(self._weights * (self._goal - x)).reshape(m),
+            a=(scale * a).reshape(m, -1),
+            n=(scale * n).reshape(m, -1),
+            turns=self._turns,
+        )
+
+    def _require_parallel_axes(self, q: Array) -> None:
+        """Refuse once and for all what a search cannot take apart."""
+        if self._is_examined:
+            return
+        self._is_examined = True
+        state = self._problem.state(q)
+        X_WR = reference_frames(state, self._problem.tasks)
+        for task, kind, signs, frame in zip(self._problem.tasks, self._kinds, self._signs, X_WR, strict=True):
+            if kind == "turn":
+                axes_P = frame[:3, :3].T @ state.screws_W[3:]
+                turning = axes_P[:, (signs != 0.0) & (np.abs(axes_P).max(axis=0) > PARALLEL)]
+                rotations = [axis - 3 for axis in task.axes if axis >= 3]
+                others = np.delete(turning, rotations, axis=0)
+                if turning.size and (len(rotations) != 1 or np.abs(others).max() > PARALLEL):
+                    raise InputError(_refusal(self._problem.cell, task))
+
+    def _with_reachable_turns(self, wanted: Array, q: Array) -> Array:
+        r"""Wanted poses whose tilt is the present one where a task asks for a turn about one axis u only.
+
+        The turn left to do is the twist of ``E = R_d R^T`` about u: ``psi = atan2(u . vee(E), tr E - u^T E u)``.
+        """
+        wanted = wanted.copy()
+        state = self._problem.state(q)
+        X_WR = reference_frames(state, self._problem.tasks)
+        for index, (task, kind) in enumerate(zip(self._problem.tasks, self._kinds, strict=True)):
+            if kind == "turn":
+                rotations = [axis - 3 for axis in task.axes if axis >= 3]
+                R = X_WR[index, :3, :3].T @ state.X_WT[self._problem.operators[index], :3, :3]
+                wanted[index, :3, :3] = _twist(wanted[index, :3, :3] @ R.T, rotations) @ R
+        return wanted
+
+
+def turning_joints(cell: Cell) -> NDArray[np.bool_]:
+    """Whether a joint turns and drives no other joint on the way to its robot's flange, shape (nq,)."""
+    turning = np.array([joint.is_revolute for robot in cell.robots for joint in robot.model.joints], dtype=bool)
+    for robot in cell.robots:
+        turning[cell.columns(robot.name).start + np.array(_leaders(robot), dtype=int)] = False
+    return turning
+
+
+def _leaders(robot: Robot) -> list[int]:
+    """Joints of a robot that drive others between base and flange."""
+    model = robot.model
+    axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
+    leaders, link = [], model.flange_link
+    while link != BASE:
+        if link >= len(model.joints):
+            leaders.append(model.followers[link - len(model.joints)].leader)
+        link = axes[link].parent
+    return leaders
+
+
+def _kind(task: Relation) -> str:
+    """Which directions of the tool count: all, its axis, those about one axis, or none."""
+    if task.is_spin_free:
+        return "axis"
+    rotations = sum(axis >= 3 for axis in task.axes)
+    return {0: "none", 3: "all"}.get(rotations, "turn")
+
+
+def _twist(E: Array, rotations: Sequence[int]) -> Array:
+    """The share of a rotation that turns about one axis of P; none when no single one is asked for."""
+    if len(rotations) != 1:
+        return np.eye(3)
+    u = rotations[0]
+    i, j = (u + 1) % 3, (u + 2) % 3
+    angle = np.arctan2(E[j, i] - E[i, j], E[i, i] + E[j, j])
+    return rotation_about(np.eye(3)[u], angle)
+
+
+def _cross(u: Array, v: Array) -> Array:
+    """Cross products along the second axis, shape (m, 3, n)."""
+    w = np.empty_like(v)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        w[:, i] = u[:, j] * v[:, k] - u[:, k] * v[:, j]
+    return w
+
+
+def _refusal(cell: Cell, task: Relation) -> str:
+    """Why a task's set of rotations cannot be searched for, and what could."""
+    asked = ", ".join(COMPONENTS[axis] for axis in task.axes)
+    key = "part.held_by" if isinstance(task, Grasp) else f"tasks.{task.name}.axes"
+    return (
+        f"{cell.origin.at(key)}: method '{cell.solver.method}' expected all of rx, ry, rz, none "
+        "of them, free: [spin], or the one about which all joints turn (planar cells), "
+        f"got {asked}; another method can take it"
+    )

@@ -1,0 +1,1 @@
+"""Paths: from a task's entries to poses of the tool on the part, before any robot or clock."""

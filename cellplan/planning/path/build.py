@@ -1,0 +1,95 @@
+"""Toolpaths: from the words of a task to tool poses on the part."""
+
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import CellplanError, InputError
+from cellplan.geometry.curves.arc_length import ArcLength, measure
+from cellplan.geometry.curves.curve import Curve
+from cellplan.geometry.curves.orientation import Orientation
+from cellplan.geometry.transforms import Array, is_rigid, pose_from
+from cellplan.model.cell import Origin, Part
+from cellplan.model.task import Task, TimedPath
+from cellplan.model.toolpath import Toolpath, Trajectory
+from cellplan.planning.path.curve import draw_path
+from cellplan.planning.path.formatting import in_mm
+from cellplan.planning.path.plausible_size import refuse_unlikely_path
+from cellplan.planning.path.projection import lay_path
+from cellplan.planning.path.tool_orientation import orient_tool
+
+STANDSTILL: Final = 1e-4  # [-] of the largest speed by the parameter: a curve slower than this has a cusp there
+SAME_POSE: Final = 1e-9  # [m], [-] entries of poses that differ by less are those of one pose
+PROBES: Final = 257  # poses looked at before a toolpath is handed on
+
+
+def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
+    """Draw a task's path, lay it on the part, stand the tool on it and cut it at its stops.
+
+    Args:
+        task: The task.
+        part: The part it works on.
+        origin: Where the words of the task stand, for complaints.
+
+    Raises:
+        InputError: The path cannot be drawn, misses the part, runs over an edge, leaves the tool's turn open, or is to
+            be gone through again and does not come back to its start.
+    """
+    drawing = draw_path(task, origin)
+    laid = lay_path(drawing, task, part, origin)
+    arc = measure(laid.tip)
+    refuse_unlikely_path(laid.tip, arc, task=task, part=part, where=origin.at(f"tasks.{task.name}.path"))
+    orientation = orient_tool(task, drawing, laid, origin)
+    is_timed = isinstance(task.path, TimedPath)
+    if not is_timed:
+        _refuse_standstill(laid.tip, arc, origin.at(f"tasks.{task.name}.path"))
+    is_closed = drawing.is_closed and _comes_back(laid.tip, orientation, drawing.stops)
+    if task.repeat > 1 and not is_closed:
+        raise InputError(
+            f"{origin.at(f'tasks.{task.name}.repeat')}: expected 1 for a path that does not end in the pose of its "
+            f"start, got {task.repeat}; close the path"
+        )
+    toolpath = (Trajectory if is_timed else Toolpath)(
+        name=task.name,
+        tip=laid.tip,
+        orientation=orientation,
+        arc=arc,
+        stops=drawing.stops,
+        turn=task.turn,
+        is_closed=is_closed,
+        runs_on=drawing.runs_on,
+        stand_off=task.approach.distance if task.approach else 0.0,
+    )
+    if not is_rigid(_probe(toolpath)):
+        raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")
+    return toolpath
+
+
+def _comes_back(tip: Curve, orientation: Orientation, stops: Array) -> bool:
+    """Whether the last pose is the first one; a file may come back to a point with another orientation."""
+    poses = []
+    for u, interval in ((stops[:1], (stops[0], stops[1])), (stops[-1:], (stops[-2], stops[-1]))):
+        p, dp = tip.evaluate(u, interval)
+        R, _ = orientation.frames(u, interval, p=p, dp=dp)
+        poses.append(pose_from(R, p)[0])
+    return bool(np.abs(poses[1] - poses[0]).max() <= SAME_POSE)
+
+
+def _probe(toolpath: Toolpath) -> Array:
+    """Poses spread over a toolpath, shape (N, 4, 4)."""
+    if isinstance(toolpath, Trajectory):
+        return toolpath.at(np.linspace(0.0, toolpath.duration, PROBES))[0]
+    return toolpath.poses(np.linspace(0.0, toolpath.length, PROBES))
+
+
+def _refuse_standstill(tip: Curve, arc: ArcLength, where: str) -> None:
+    """Refuse a path that has no direction somewhere: a side along the projection, or a cusp."""
+    u = np.concatenate([arc.edges, 0.5 * (arc.edges[:-1] + arc.edges[1:])])
+    p, dp = tip.evaluate(u, (float(arc.edges[0]), float(arc.edges[-1])))
+    speed = np.linalg.norm(dp, axis=1)
+    k = int(np.argmin(speed))
+    if not speed[k] > STANDSTILL * speed.max():
+        raise InputError(
+            f"{where}: expected a path with a direction everywhere, but it stands still near {in_mm(p[k])}: "
+            "a side runs along the projection, or the curve turns back on itself"
+        )

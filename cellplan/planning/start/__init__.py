@@ -1,0 +1,1 @@
+"""Start: configurations from which all tasks can be carried out."""

@@ -1,0 +1,242 @@
+"""Start branches: the configurations of each robot from which a start of the whole cell can be put together."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Cell, Grasp, Relation, Robot
+from cellplan.model.task import Frame, Task
+from cellplan.model.toolpath import Toolpath
+from cellplan.planning.start.failures import Failures, Goal
+from cellplan.planning.start.given import is_off, part_pose, tool_distance
+from cellplan.planning.start.inverse_kinematics import (
+    finite_limits,
+    joint_margin_shares,
+    random_postures,
+    reaching_postures,
+    smallest_singular_values,
+    within_limits,
+)
+from cellplan.planning.start.near_ties import best_first
+from cellplan.planning.start.trial_motion import StartTrials
+
+SEEDS: Final = 48  # random starts of the inverse kinematics per robot and place; finds all 8 branches of a 6-axis arm
+SEEDS_PER_HOLDER: Final = 16  # the same when many configurations of the positioner are to be tried
+HOLDER_DRAWS: Final = 1500  # configurations of the positioner that are drawn when its start is to be found as well
+HOLDER_POSTURES: Final = 120  # the most promising of these, which are tried
+HOLDER_RANGE: Final = 0.7  # share of each joint range that they are drawn from, so that room is left to move
+TRIED_ALONE: Final = 8  # branches of each operator that are tried out without the other operators
+BRANCHES: Final = 4  # the best of these, which are combined
+ALL_AXES: Final = 6  # [-] components of a grasp that leaves nothing free
+COMFORTABLE: Final = 0.1  # smallest singular value above which more manipulability is worth no more
+
+Branch = tuple[float, Array]  # what a configuration is worth, and the configuration, shape (n,)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StartSearch:
+    """What all parts of the search for a start use.
+
+    Attributes:
+        cell: The cell in the order of names.
+        chains: Kinematic chain of each robot, by name.
+        toolpaths: Toolpath of every task, by task name.
+        trials: The coarse clock on which motions are tried, and the bodies.
+        random: Random numbers of each robot, by name.
+        failures: Why configurations were dropped.
+    """
+
+    cell: Cell
+    chains: Mapping[str, ScrewChain]
+    toolpaths: Mapping[str, Toolpath]
+    trials: StartTrials
+    random: Mapping[str, np.random.Generator]
+    failures: Failures
+
+    @property
+    def is_holder_open(self) -> bool:
+        """Whether the start of the robot that carries the part is to be found as well."""
+        return any(self.cell.robot(name).start is None for name in self.cell.positioners[:1])
+
+    def X_PT_start(self, relation: Relation) -> Array:
+        """Where a tool is to be at the start: on its task, or on its grasp."""
+        return relation.X_PT if isinstance(relation, Grasp) else self.toolpaths[relation.name].X_PT_start
+
+    def random_postures(self, robot: Robot, count: int) -> Array:
+        """Configurations of a robot drawn from its own random numbers, shape (count, n)."""
+        return random_postures(robot.model, count, self.random[robot.name])
+
+
+def holder_postures(search: StartSearch) -> list[Array | None]:
+    """Configurations of the positioner to try: the given one, those that suit a given operator, or drawn ones."""
+    cell = search.cell
+    if not cell.positioners:
+        return [None]
+    holder = cell.robot(cell.positioners[0])
+    if holder.start is not None:
+        return [holder.start]
+    found = _postures_of_holder(search, holder)
+    search.failures.reached(holder.name, found, None)
+    return list(found)
+
+
+def _postures_of_holder(search: StartSearch, holder: Robot) -> Array:
+    """Configurations of a positioner whose start is to be found, best first, shape (K, n)."""
+    cell = search.cell
+    for relation in cell.relations:
+        if relation.robot == holder.name:
+            return _postures_at(search, holder, relation, search.X_PT_start(relation))
+    for relation in cell.relations:
+        operator = cell.robot(relation.robot)
+        if operator.start is not None and relation.relative_to is Frame.PART:
+            return _postures_meeting(search, relation, operator.start)
+    return _promising_postures(search, holder)
+
+
+def branches_of(search: StartSearch, robot: Robot, holder_posture: Array | None) -> list[Branch]:
+    """Configurations of one robot with what they are worth, best first; one entry when there is no choice."""
+    cell = search.cell
+    if holder_posture is not None and robot.name == cell.positioners[0]:
+        return [(np.inf, holder_posture)]
+    relation = next((each for each in cell.relations if each.robot == robot.name), None)
+    if robot.start is not None:
+        is_off = relation is not None and _is_off(search, robot, relation, holder_posture)
+        return [] if is_off else [(np.inf, robot.start)]
+    if relation is None:
+        neutral = np.clip(np.zeros(len(robot.model.joints)), *finite_limits(robot.model))
+        neutral = neutral if robot.home is None else robot.home
+        search.failures.reached(robot.name, neutral[None], holder_posture)
+        return [(np.inf, neutral)]
+    scored = _scored_branches(search, robot, relation, holder_posture)
+    if isinstance(relation, Grasp):
+        return [*_as_stated(search, robot, relation, holder_posture), *scored[:BRANCHES]]
+    if search.is_holder_open:
+        return scored[:BRANCHES]
+    return _tried_alone(search, relation, scored[:TRIED_ALONE], holder_posture)[:BRANCHES]
+
+
+def _is_off(search: StartSearch, robot: Robot, relation: Relation, holder_posture: Array | None) -> bool:
+    """Whether a given start is off its task or grasp while the positioner, which is searched, holds the part so."""
+    if not search.is_holder_open or relation.relative_to is not Frame.PART or robot.start is None:
+        return False
+    if isinstance(relation, Task) and relation.settle > 0.0:
+        return False
+    X_WP = part_pose(search.cell, holder_posture)
+    if X_WP is None:
+        return False
+    distance = tool_distance(search.chains[robot.name], relation, robot.start, search.X_PT_start(relation), X_WR=X_WP)
+    if not is_off(search.cell, relation, distance):
+        return False
+    search.failures.off_path(robot.name, distance)
+    return True
+
+
+def _tried_alone(search: StartSearch, task: Task, branches: list[Branch], holder_posture: Array | None) -> list[Branch]:
+    """Branches of an operator by the shares that the motion from each leaves free, best first."""
+    if not branches:
+        return []
+    shares = np.array([search.trials.judge_alone(task, q, holder_posture) for _, q in branches])
+    order = best_first(np.column_stack([shares, np.array([q for _, q in branches])]))
+    return [(float(shares[index, 0]), branches[index][1]) for index in order]
+
+
+def _as_stated(search: StartSearch, robot: Robot, grasp: Grasp, holder_posture: Array | None) -> list[Branch]:
+    """Configurations that bring a tool to its grasp just as it is stated, where that leaves components free.
+
+    They are worth more than all others: with any other lean a tool may well dig into the part.
+    """
+    X_WP = part_pose(search.cell, holder_posture)
+    if len(grasp.axes) == ALL_AXES or X_WP is None:
+        return []
+    closed = replace(grasp, axes=tuple(range(ALL_AXES)))
+    seeds = search.random_postures(robot, SEEDS_PER_HOLDER if search.is_holder_open else SEEDS)
+    chain = search.chains[robot.name]
+    q = within_limits(robot.model, reaching_postures(chain, closed, grasp.X_PT, X_WP=X_WP, seeds=seeds))
+    margins = np.sort(joint_margin_shares(robot.model, q), axis=1)
+    order = best_first(np.column_stack([margins, q]))
+    return [(1.0 + float(margins[index, 0]), q[index]) for index in order[:BRANCHES]]
+
+
+def _scored_branches(
+    search: StartSearch, robot: Robot, relation: Relation, holder_posture: Array | None
+) -> list[Branch]:
+    """Configurations that bring a tool to the start of its task or to its grasp, by joint margin times manipulability.
+
+    Where two are worth the same, the joints with the next smaller margins decide, and then the configuration itself.
+    """
+    X_WP = part_pose(search.cell, holder_posture) if relation.relative_to is Frame.PART else np.eye(4)
+    if X_WP is None:
+        return []
+    X_PT = search.X_PT_start(relation)
+    chain = search.chains[robot.name]
+    seeds = search.random_postures(robot, SEEDS_PER_HOLDER if search.is_holder_open else SEEDS)
+    found = reaching_postures(chain, relation, X_PT, X_WP=X_WP, seeds=seeds)
+    q = within_limits(robot.model, found)
+    if not len(q):
+        search.failures.unreached(robot.name, Goal(relation=relation, X_PT=X_PT, X_WP=X_WP), beyond=found)
+        return []
+    manipulability = np.minimum(1.0, smallest_singular_values(chain, relation, X_PT, q) / COMFORTABLE)
+    scores = np.sort(joint_margin_shares(robot.model, q), axis=1) * manipulability[:, None]
+    order = best_first(np.column_stack([scores, q]))
+    search.failures.reached(robot.name, q[order], holder_posture)
+    return [(float(scores[index, 0]), q[index]) for index in order]
+
+
+def _promising_postures(search: StartSearch, holder: Robot) -> Array:
+    """Configurations of the positioner that hold the part where the tools of operators like to be, best first."""
+    cell = search.cell
+    lower, upper = finite_limits(holder.model)
+    middle = 0.5 * (lower + upper)
+    q = middle + HOLDER_RANGE * (search.random_postures(holder, HOLDER_DRAWS) - middle)
+    X_WP = search.chains[holder.name].tool_poses(q) @ inverse(cell.part.held_by[0].X_PT)
+    awkwardness = np.zeros(len(q))
+    for relation in cell.relations:
+        operator = cell.robot(relation.robot)
+        usual = search.chains[relation.robot].tool_poses(search.random_postures(operator, HOLDER_DRAWS))
+        goal = (X_WP if relation.relative_to is Frame.PART else np.eye(4)) @ search.X_PT_start(relation)
+        base = operator.X_WB[:3, 3]
+        awkwardness = np.maximum(awkwardness, _awkwardness(goal, usual, base))
+    order = best_first(np.column_stack([-awkwardness, q]))
+    chosen: Array = q[order[:HOLDER_POSTURES]]
+    return chosen
+
+
+def _awkwardness(goal: Array, usual: Array, base: Array) -> Array:
+    """How far tool goals, shape (N, 4, 4), are from where and how a robot's tool usually is, shape (N,).
+
+    The measure is the distance from the base in standard deviations of the usual distance, and the cosine between the
+    tool axis and the direction away from the base.
+    """
+    away, usual_away = goal[:, :3, 3] - base, usual[:, :3, 3] - base
+    distance, usual_distance = np.linalg.norm(away, axis=1), np.linalg.norm(usual_away, axis=1)
+    spread = max(float(usual_distance.std()), 1e-6)  # a robot that cannot move has none
+    outward = np.sum(goal[:, :3, 2] * away, axis=1) / np.maximum(distance, 1e-9)
+    measure: Array = np.abs(distance - np.median(usual_distance)) / spread + (1.0 - outward)
+    return measure
+
+
+def _postures_meeting(search: StartSearch, relation: Relation, operator_start: Array) -> Array:
+    """Configurations of the positioner that bring the start of a task, or a grasp, to a tool that stands."""
+    cell, chains = search.cell, search.chains
+    holder = cell.robot(cell.positioners[0])
+    X_WT = chains[relation.robot].tool_poses(operator_start[None])[0]
+    X_W_holder = X_WT @ inverse(search.X_PT_start(relation)) @ cell.part.held_by[0].X_PT
+    return _postures_at(search, holder, cell.part.held_by[0], X_W_holder)
+
+
+def _postures_at(search: StartSearch, holder: Robot, relation: Relation, X_W_holder: Array) -> Array:
+    """Configurations of the positioner that bring its tool to a place in the world, those with most margin first."""
+    seeds = search.random_postures(holder, SEEDS)
+    found = reaching_postures(search.chains[holder.name], relation, X_W_holder, X_WP=np.eye(4), seeds=seeds)
+    inside = within_limits(holder.model, found)
+    if not len(inside):
+        goal = Goal(relation=relation, X_PT=X_W_holder, X_WP=np.eye(4))
+        search.failures.unreached(holder.name, goal, beyond=found)
+        return inside
+    order = best_first(np.column_stack([np.sort(joint_margin_shares(holder.model, inside), axis=1), inside]))
+    chosen: Array = inside[order]
+    return chosen

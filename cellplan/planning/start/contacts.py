@@ -1,0 +1,120 @@
+"""Start contacts: which pairs of bodies touch in how many of the configurations that were tried."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.seeds import generator
+from cellplan.planning.start.inverse_kinematics import finite_limits, random_postures
+from cellplan.planning.start.trial_motion import StartTrials
+from cellplan.scene.bodies import Kind, SceneBody
+
+ANYWHERE: Final = 12  # configurations drawn from the whole range of a robot's joints
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """Two bodies that touch.
+
+    Attributes:
+        robot: The robot whose configurations were looked at.
+        bodies: The body of that robot first.
+        count: In how many of them they touch.
+        of: How many there were.
+        is_everywhere: Whether they also touch wherever else the robot may be.
+    """
+
+    robot: str
+    bodies: tuple[SceneBody, SceneBody]
+    count: int
+    of: int
+    is_everywhere: bool = False
+
+    @property
+    def is_in_all(self) -> bool:
+        """Whether no configuration that was tried avoids it."""
+        return self.count == self.of
+
+
+def contacts_of(
+    trials: StartTrials, cell: Cell, robot: Robot, tried: Sequence[tuple[Array, Array | None]]
+) -> list[Contact]:
+    """Contacts of one robot with itself and with what does not depend on the other robots' choices, most often first.
+
+    Args:
+        trials: The bodies.
+        cell: The cell in the order of names.
+        robot: The robot.
+        tried: Its configurations, each with that of the positioner.
+    """
+    among = _own_pairs(trials, cell, robot)
+    counts: Counter[tuple[str, str]] = Counter()
+    for q, holder_posture in tried:
+        counts.update(trials.contacts(_placed(cell, robot, q, holder_posture), among=among))
+    bodies = {body.name: body for body in trials.bodies}
+    found = [
+        Contact(robot=robot.name, bodies=_own_first(robot, bodies, pair), count=count, of=len(tried))
+        for pair, count in counts.items()
+    ]
+    return sorted(found, key=lambda each: (-each.count, [body.name for body in each.bodies]))
+
+
+def touches_anywhere(trials: StartTrials, cell: Cell, contact: Contact, holder_posture: Array | None) -> bool:
+    """Whether two bodies touch at configurations from the whole range of their robot's joints as well."""
+    robot = cell.robot(contact.robot)
+    names = {body.name for body in contact.bodies}
+    among = _own_pairs(trials, cell, robot) & np.array([set(pair) == names for pair in trials.pair_names], dtype=bool)
+    drawn = random_postures(robot.model, ANYWHERE, generator(f"{robot.name} anywhere", cell.solver.seed))
+    return all(trials.contacts(_placed(cell, robot, q, holder_posture), among=among) for q in drawn)
+
+
+def contacts_between(trials: StartTrials, tried: Sequence[Array]) -> list[tuple[tuple[str, str], int]]:
+    """Pairs that touch in configurations of the whole cell, shape (nq,) each, with how often, most often first."""
+    counts: Counter[tuple[str, str]] = Counter()
+    for q in tried:
+        counts.update(trials.contacts(q, among=trials.open_pairs))
+    ordered = [((min(pair), max(pair)), count) for pair, count in counts.items()]
+    return sorted(ordered, key=lambda each: (-each[1], each[0]))
+
+
+def _own_pairs(trials: StartTrials, cell: Cell, robot: Robot) -> Flags:
+    """Pairs of a body that the robot moves and one of its own or one that stands where it stands, shape (pairs,)."""
+    given = {each.name for each in cell.robots if each.start is not None} | {robot.name, *cell.positioners[:1]}
+
+    def is_own(body: SceneBody) -> bool:
+        return body.robot == robot.name and not body.is_at_rest
+
+    def is_settled(body: SceneBody) -> bool:
+        return body.is_at_rest or body.robot in given
+
+    pairs = [(trials.bodies[pair.first], trials.bodies[pair.second]) for pair in trials.pairs]
+    own = [(is_own(a) and is_settled(b)) or (is_own(b) and is_settled(a)) for a, b in pairs]
+    among: Flags = np.array(own, dtype=bool) & trials.open_pairs
+    return among
+
+
+def _placed(cell: Cell, robot: Robot, q: Array, holder_posture: Array | None) -> Array:
+    """The whole cell with one robot and the positioner where they are wanted, shape (nq,)."""
+    whole = np.concatenate(
+        [each.start if each.start is not None else np.clip(0.0, *finite_limits(each.model)) for each in cell.robots]
+    )
+    if holder_posture is not None:
+        whole[cell.columns(cell.positioners[0])] = holder_posture
+    whole[cell.columns(robot.name)] = q
+    return whole
+
+
+def _own_first(robot: Robot, bodies: dict[str, SceneBody], pair: tuple[str, str]) -> tuple[SceneBody, SceneBody]:
+    """Two bodies by name, that of the robot first; of two of its own a link after what it carries."""
+    a, b = sorted((bodies[name] for name in pair), key=lambda body: body.name)
+    if a.robot == b.robot:
+        return (b, a) if a.kind is Kind.LINK and b.kind is not Kind.LINK else (a, b)
+    return (a, b) if a.robot == robot.name else (b, a)

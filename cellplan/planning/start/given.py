@@ -1,0 +1,186 @@
+"""Start postures given in the cell are examined before anything is solved: within limits, tool on the task's start."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from cellplan.errors import (
+    HomeOutsideLimitsError,
+    InputError,
+    InvalidFileError,
+    StartOffGraspError,
+    StartOffTaskError,
+    StartOutsideLimitsError,
+)
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Cell, Grasp, Relation, Robot
+from cellplan.model.robot import Joint
+from cellplan.model.task import Frame, Task
+from cellplan.model.toolpath import Toolpath
+from cellplan.planning.tracking.cooperation_jacobian import constraint_rows, pose_errors
+
+
+def start_place(cell: Cell, robot: Robot) -> str:
+    """Where a robot's start posture stands in the cell file, or would stand."""
+    by_joint, as_list = f"robots.{robot.name}.start", f"robots.{robot.name}.start_deg"
+    return cell.origin.at(by_joint if by_joint in cell.origin.lines else as_list)
+
+
+def home_key(robot: Robot) -> str:
+    """Key of a robot's home: a list of angles, or a mapping where a joint slides."""
+    return "home_deg" if all(joint.is_revolute for joint in robot.model.joints) else "home"
+
+
+def home_place(cell: Cell, robot: Robot) -> str:
+    """Where a robot's home stands in the cell file, or would stand."""
+    by_joint = f"robots.{robot.name}.home"
+    return cell.origin.at(by_joint if by_joint in cell.origin.lines else f"robots.{robot.name}.{home_key(robot)}")
+
+
+def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
+    """Refuse start postures and homes that no solve could be right with.
+
+    Args:
+        cell: The cell; starts and homes that are to be found are passed over.
+        toolpaths: Toolpath of every task, by task name.
+
+    Raises:
+        StartOutsideLimitsError: A joint starts outside its limits.
+        HomeOutsideLimitsError: A joint is outside its limits at home.
+        StartOffGraspError: A further holder's tool is not where it holds the part.
+        StartOffTaskError: A tool does not start on its task.
+        InvalidFileError: More than one of these.
+    """
+    complaints: list[InputError] = [complaint for robot in cell.robots for complaint in _outside(cell, robot)]
+    if not complaints:
+        complaints += [complaint for grasp in cell.closures for complaint in _off_grasp(cell, grasp)]
+        complaints += [complaint for task in cell.tasks for complaint in _off_task(cell, task, toolpaths[task.name])]
+    if len(complaints) == 1:
+        raise complaints[0]
+    if complaints:
+        raise InvalidFileError(complaints)
+
+
+def part_pose(cell: Cell, holder_start: Array | None) -> Array | None:
+    """The part at the start; None while its holder's posture is still to be found."""
+    if not cell.part.held_by:
+        return cell.part.X_WP
+    if holder_start is None:
+        return None
+    grasp = cell.part.held_by[0]
+    X_WT = ScrewChain(cell.robot(grasp.robot)).tool_poses(holder_start[None])[0]
+    pose: Array = X_WT @ inverse(grasp.X_PT)
+    return pose
+
+
+def tool_distance(
+    chain: ScrewChain, relation: Relation, q: Array, X_PT_wanted: Array, *, X_WR: Array
+) -> tuple[float, float]:
+    """How far a configuration, shape (n,), puts a tool from where it is wanted, in [m] and [rad].
+
+    Args:
+        chain: The robot.
+        relation: The task or grasp, which says which components of the pose count.
+        q: The configuration.
+        X_PT_wanted: Wanted tool tip, shape (4, 4), in the frame that the relation refers to.
+        X_WR: That frame in the world, shape (4, 4).
+    """
+    X_PT, wanted = inverse(X_WR) @ chain.tool_poses(q[None]), X_PT_wanted[None]
+    rows = constraint_rows(relation, wanted)[0]
+    error = rows.T @ (rows @ pose_errors(wanted, X_PT, [relation.is_spin_free])[0])
+    return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
+
+
+def is_off(cell: Cell, relation: Relation, off: tuple[float, float]) -> bool:
+    """Whether a tool is farther, in [m] or [rad], from where it is wanted at the start than is allowed."""
+    position, orientation = _allowed(cell, relation)
+    return off[0] > position or off[1] > orientation
+
+
+def off_words(cell: Cell, relation: Relation, off: tuple[float, float], *, at_best: str = "") -> str:
+    """One line on a given start that is off its task or its grasp, in [m] and [rad].
+
+    Args:
+        cell: The cell.
+        relation: The task or grasp.
+        off: Distance and angle.
+        at_best: Words before them where they are the smallest of several.
+    """
+    goal = f"the start of task '{relation.name}'"
+    if isinstance(relation, Grasp):
+        goal = f"its grasp on the part that '{cell.positioners[0]}' carries"
+    position, orientation = _allowed(cell, relation)
+    return (
+        f"{start_place(cell, cell.robot(relation.robot))}: the tool of '{relation.robot}' is {at_best}"
+        f"{1e3 * off[0]:.3f} mm and {np.degrees(off[1]):.4f} deg from {goal}, allowed are {1e3 * position:g} mm and "
+        f"{np.degrees(orientation):g} deg; `auto` finds a configuration"
+    )
+
+
+def _allowed(cell: Cell, relation: Relation) -> tuple[float, float]:
+    """Largest distance in [m] and angle in [rad] of a given start from its task or grasp."""
+    if isinstance(relation, Grasp):
+        return cell.checks.closure_position, cell.checks.closure_orientation
+    return relation.tolerance.position, relation.tolerance.orientation
+
+
+def _outside(cell: Cell, robot: Robot) -> list[InputError]:
+    """One complaint for each joint that is outside its limits at the start or at home."""
+    found: list[InputError] = [
+        StartOutsideLimitsError(f"{start_place(cell, robot)}: joint '{joint.name}' starts at {words}")
+        for joint, words in _outside_limits(robot, robot.start)
+    ]
+    if found and robot.home is not None and np.array_equal(robot.home, np.asarray(robot.start)):
+        return found  # a parked robot, whose start is its home
+    return found + [
+        HomeOutsideLimitsError(f"{home_place(cell, robot)}: joint '{joint.name}' stands at {words}")
+        for joint, words in _outside_limits(robot, robot.home)
+    ]
+
+
+def _outside_limits(robot: Robot, q: Array | None) -> Iterator[tuple[Joint, str]]:
+    """Joints that are outside their limits, each with its position and limits in words."""
+    for joint, position in zip(robot.model.joints, () if q is None else q, strict=q is not None):
+        if not joint.lower <= position <= joint.upper:
+            limits = f"{_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}"
+            yield joint, f"{_shown(joint, position)}, outside its limits {limits}"
+
+
+def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
+    """A complaint when a given start does not put the tool on the start of its task, within the task's tolerance.
+
+    A task that gives its tool time to settle may start beside its path.
+    """
+    off = _distance(cell, task, toolpath.X_PT_start)
+    if off is None or task.settle > 0.0 or not is_off(cell, task, off):
+        return []
+    return [StartOffTaskError(off_words(cell, task, off))]
+
+
+def _off_grasp(cell: Cell, grasp: Grasp) -> list[InputError]:
+    """A complaint when a given start does not put a further holder's tool on its grasp, within the allowed closure."""
+    off = _distance(cell, grasp, grasp.X_PT)
+    if off is None or not is_off(cell, grasp, off):
+        return []
+    return [StartOffGraspError(off_words(cell, grasp, off))]
+
+
+def _distance(cell: Cell, task: Relation, X_PT_wanted: Array) -> tuple[float, float] | None:
+    """How far a given start puts a tool from where it is wanted, in [m] and [rad]; None while a start is missing."""
+    robot = cell.robot(task.robot)
+    X_WR = np.eye(4)
+    if task.relative_to is Frame.PART:
+        holder = cell.robot(cell.positioners[0]).start if cell.positioners else None
+        at_start = part_pose(cell, holder)
+        if at_start is None:
+            return None
+        X_WR = at_start
+    if robot.start is None:
+        return None
+    return tool_distance(ScrewChain(robot), task, robot.start, X_PT_wanted, X_WR=X_WR)
+
+
+def _shown(joint: Joint, position: float) -> str:
+    """A joint position with its unit, as people write it."""
+    return f"{np.degrees(position):g} deg" if joint.is_revolute else f"{1e3 * position:g} mm"

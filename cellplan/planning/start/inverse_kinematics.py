@@ -1,0 +1,129 @@
+"""All postures that bring one operator's tool to one place on the part, by multi-start."""
+
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array, inverse, skew
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Relation
+from cellplan.model.robot import RobotModel
+from cellplan.planning.tracking.cooperation_jacobian import constraint_rows, pose_errors
+
+CLOSED: Final = 1e-12  # [m, rad] a posture counts as found when the tool is this near its goal: rounding is 1e-15
+SAME_POSTURE: Final = 1e-3  # [rad, m] solutions nearer to each other are one branch
+LONGEST_MOVE: Final = 0.4  # [rad, m] largest change of a joint in one iteration: farther, the linear model is wrong
+DAMPING: Final = 1e-3  # keeps iterations finite at singular postures; small enough to converge to CLOSED
+ITERATIONS: Final = 50  # most starts that arrive at all do so in 15 to 25
+TRIAL: Final = 25  # iterations after which starts that are still far away are given up
+FAR: Final = 1e-2  # [m, rad] far away: convergence is quadratic well inside this
+
+
+def random_postures(model: RobotModel, count: int, rng: np.random.Generator) -> Array:
+    """Postures drawn evenly within the joint limits (one turn for endless joints), shape (count, n)."""
+    lower, upper = finite_limits(model)
+    return rng.uniform(lower, upper, (count, len(lower)))
+
+
+def finite_limits(model: RobotModel) -> tuple[Array, Array]:
+    """Joint limits with half a turn to either side for joints that may turn without end."""
+    endless = np.isinf(model.lower) | np.isinf(model.upper)
+    return np.where(endless, -np.pi, model.lower), np.where(endless, np.pi, model.upper)
+
+
+def reaching_postures(chain: ScrewChain, task: Relation, X_PT: Array, *, X_WP: Array, seeds: Array) -> Array:
+    """Run damped Newton iterations from all seeds at once and keep what arrives.
+
+    Joint limits are not looked at here: a posture out of limits may have an equal one a turn away.
+
+    Args:
+        chain: The operator.
+        task: The task or grasp, which says which components of the pose count.
+        X_PT: Wanted tool tip in P, shape (4, 4).
+        X_WP: The part, shape (4, 4).
+        seeds: Postures to start from, shape (B, n).
+
+    Returns:
+        Postures with the tool within ``CLOSED`` of the goal, shape (K, n).
+    """
+    rows = constraint_rows(task, X_PT[None])[0]
+    R_PW = X_WP[:3, :3].T
+    q, arrived = seeds, [seeds[:0]]
+    for iteration in range(ITERATIONS):
+        X_WT, screws_W = chain.tool_motion(q)
+        goals = np.broadcast_to(X_PT, (len(q), 4, 4))
+        error = pose_errors(goals, inverse(X_WP) @ X_WT, [task.is_spin_free] * len(q)) @ rows.T
+        largest = np.abs(error).max(axis=1)
+        arrived.append(q[largest < CLOSED])
+        going_on = (largest >= CLOSED) & ((largest < FAR) | (iteration < TRIAL))
+        if not going_on.any():
+            break
+        J = rows @ tip_jacobian(screws_W[going_on], X_WT[going_on, :3, 3], R_PW)
+        q = q[going_on] + _damped_move(J, error[going_on])
+    return np.concatenate(arrived)
+
+
+def _damped_move(J: Array, error: Array) -> Array:
+    """Damped Newton moves, shape (B, n), none of their joints by more than ``LONGEST_MOVE``."""
+    J_T = np.swapaxes(J, 1, 2)
+    normal = J @ J_T + DAMPING**2 * np.eye(J.shape[1])
+    move = (J_T @ np.linalg.solve(normal, error[:, :, None]))[:, :, 0]
+    longest = np.abs(move).max(axis=1, keepdims=True)
+    shortened: Array = move * np.minimum(1.0, LONGEST_MOVE / np.maximum(longest, LONGEST_MOVE))
+    return shortened
+
+
+def within_limits(model: RobotModel, q: Array) -> Array:
+    """Turn joints by whole turns as near to mid-range as they go and drop postures out of limits, shape (K, n)."""
+    lower, upper = finite_limits(model)
+    q = on_nearest_turns(model, q)
+    inside = q[np.all((q >= lower) & (q <= upper), axis=1)]
+    return _distinct(inside)
+
+
+def on_nearest_turns(model: RobotModel, q: Array) -> Array:
+    """Postures with joints turned by whole turns as near to mid-range as they go, shape (B, n)."""
+    lower, upper = finite_limits(model)
+    turning = np.array([joint.is_revolute for joint in model.joints])
+    middle = 0.5 * (lower + upper)
+    turned: Array = q - 2 * np.pi * np.where(turning, np.round((q - middle) / (2 * np.pi)), 0.0)
+    return turned
+
+
+def margin_shares(model: RobotModel, q: Array) -> Array:
+    """Smallest distance to a joint limit as share of half the range, shape (...): 1 in the middle, 0 on a limit."""
+    shares: Array = joint_margin_shares(model, q).min(axis=-1)
+    return shares
+
+
+def joint_margin_shares(model: RobotModel, q: Array) -> Array:
+    """Distance of each joint to its nearer limit as share of half its range, 1 where it has none, shape (..., n)."""
+    bounded = np.isfinite(model.lower) & np.isfinite(model.upper)
+    half = np.where(bounded, 0.5 * (model.upper - model.lower), 1.0)
+    return np.where(bounded, np.minimum(q - model.lower, model.upper - q) / half, 1.0)
+
+
+def smallest_singular_values(chain: ScrewChain, task: Relation, X_PT: Array, q: Array) -> Array:
+    """Smallest singular value of the operator's constrained Jacobian at each posture, shape (K,)."""
+    X_WT = chain.tool_poses(q)
+    R_PW = X_PT[:3, :3] @ np.swapaxes(X_WT[:, :3, :3], 1, 2)
+    rows = constraint_rows(task, X_PT[None])[0]
+    J = rows @ tip_jacobian(chain.flange_screws(q), X_WT[:, :3, 3], R_PW)
+    values: Array = np.linalg.svd(J, compute_uv=False)[:, -1]
+    return values
+
+
+def tip_jacobian(screws_W: Array, p_WT: Array, R_PW: Array) -> Array:
+    """Jacobians of tool tips in axes parallel to P from screws at the world origin, shape (B, 6, n)."""
+    linear = screws_W[:, :3] - skew(p_WT) @ screws_W[:, 3:]
+    jacobians: Array = np.concatenate([R_PW @ linear, R_PW @ screws_W[:, 3:]], axis=1)
+    return jacobians
+
+
+def _distinct(q: Array) -> Array:
+    """One posture of each branch, in the order they were found."""
+    kept: list[Array] = []
+    for posture in q:
+        if all(np.abs(posture - other).max() > SAME_POSTURE for other in kept):
+            kept.append(posture)
+    return np.array(kept).reshape(len(kept), q.shape[1])

@@ -1,0 +1,194 @@
+"""Start reasons: why no start was found, in one line that says what to change: base, tool, obstacle or joint limit."""
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Grasp, Robot
+from cellplan.model.robot import Joint
+from cellplan.model.seeds import generator
+from cellplan.planning.start.branches import SEEDS, SEEDS_PER_HOLDER, StartSearch
+from cellplan.planning.start.contacts import Contact, contacts_between, contacts_of, touches_anywhere
+from cellplan.planning.start.given import off_words, start_place
+from cellplan.planning.start.inverse_kinematics import on_nearest_turns, random_postures
+from cellplan.planning.start.nearest_reach import nearest_reach
+from cellplan.scene.bodies import Kind
+
+ARRIVED: Final = 1e-4  # [m] a tip that comes this near reaches its place
+SHOWN: Final = 3  # contacts that are named at most
+
+
+def why_nothing(search: StartSearch, holder_count: int) -> str:
+    """One line on what stands in the way of a start.
+
+    A contact that no configuration of a robot avoids comes first, then the contact that occurs most often. Where some
+    robot does not come to its task at all, the line says by how much it fails and for which robot.
+
+    Args:
+        search: The search that failed.
+        holder_count: Configurations of the positioner that were tried.
+    """
+    if search.failures.touching:
+        unavoidable = _unavoidable(search)
+        return _unavoidable_words(search, *unavoidable) if unavoidable else _frequent_words(search)
+    return _unreached_words(search, holder_count)
+
+
+def _unavoidable(search: StartSearch) -> list[Contact]:
+    """Contacts in every configuration of some robot, one for each robot.
+
+    Those that are there wherever the robot is come first, and of these what stands in the surroundings.
+    """
+    found: list[Contact] = []
+    for robot in search.cell.robots:
+        tried = search.failures.arrived.get(robot.name, [])
+        if robot.start is not None or not tried:
+            continue
+        in_all = [each for each in contacts_of(search.trials, search.cell, robot, tried) if each.is_in_all]
+        own = sorted((replace(each, is_everywhere=_is_everywhere(search, each)) for each in in_all), key=_urgency)
+        found += own[:1]
+    return sorted(found, key=_urgency)
+
+
+def _urgency(contact: Contact) -> tuple[bool, bool]:
+    """What decides which contact is named first."""
+    return not contact.is_everywhere, contact.bodies[1].robot is not None
+
+
+def _unavoidable_words(search: StartSearch, contact: Contact, *others: Contact) -> str:
+    """What to say of a contact that no configuration of a robot avoids, and of the same of other robots."""
+    cell, (own, other) = search.cell, contact.bodies
+    also = ", and wherever else its joints may be" if contact.is_everywhere else ""
+    which = "the only one" if contact.of == 1 else f"all {contact.of}"
+    besides = [
+        f"'{each.bodies[0].name}' touches '{each.bodies[1].name}' in all {each.of} of its own" for each in others
+    ]
+    more = f"; besides, {', '.join(besides[: SHOWN - 1])}" if besides else ""
+    return (
+        f"{start_place(cell, cell.robot(contact.robot))}: no start configuration of '{contact.robot}' is free of "
+        f"contact: '{own.name}' touches '{other.name}' in {which} that {_arrives(search, contact.robot)}{also}: "
+        f"{_cure(contact)}{more}"
+    )
+
+
+def _is_everywhere(search: StartSearch, contact: Contact) -> bool:
+    """Whether a contact is there wherever its robot is."""
+    holder_posture = search.failures.arrived[contact.robot][0][1]
+    return touches_anywhere(search.trials, search.cell, contact, holder_posture)
+
+
+def _cure(contact: Contact) -> str:
+    """What to change so that two bodies need not touch."""
+    robot, (own, other) = contact.robot, contact.bodies
+    if other.robot == robot:
+        if Kind.PART in {own.kind, other.kind}:
+            return "hold the part otherwise"
+        return "change its tool" if Kind.TOOL in {own.kind, other.kind} else "move its base, so that it need not fold"
+    if other.kind is Kind.PART:
+        tool = f"change the tool of '{robot}' or the direction of its axis"
+        return tool if own.kind is Kind.TOOL else f"lengthen the tool of '{robot}' or turn its axis"
+    if other.robot is not None:
+        return f"move the bases of '{robot}' and '{other.robot}' apart"
+    places = f"move the base of '{robot}' or the obstacle '{other.name}'"
+    return places if own.kind is Kind.LINK or contact.is_everywhere else f"{places}, or change the tool"
+
+
+def _frequent_words(search: StartSearch) -> str:
+    """What to say where every contact can be avoided, but not all of them together."""
+    tried = search.failures.touching
+    counted = contacts_between(search.trials, tried)[:SHOWN]
+    named = ", ".join(f"'{first}' touches '{second}' in {count}" for (first, second), count in counted)
+    return (
+        f"{search.cell.origin.at('robots')}: found no start configurations that reach the tasks without contact: of "
+        f"{len(tried)} combinations looked at, {named}: move the bases apart, or change a tool"
+    )
+
+
+def _arrives(search: StartSearch, name: str) -> str:
+    """What a robot's configurations do, as the end of a sentence."""
+    relation = next((each for each in search.cell.relations if each.robot == name), None)
+    if relation is None:
+        return "were tried"
+    return (
+        "reach its grasp on the part" if isinstance(relation, Grasp) else f"reach the start of task '{relation.name}'"
+    )
+
+
+def _unreached_words(search: StartSearch, holder_count: int) -> str:
+    """What to say of a robot that does not come to where it is wanted."""
+    cell, failures = search.cell, search.failures
+    usual = (*cell.positioners, cell.robots[0].name)[0]
+    name = max(sorted(failures.misses), key=lambda robot: failures.misses[robot], default=usual)
+    robot = cell.robot(name)
+    relation = next((each for each in cell.relations if each.robot == name), None)
+    if name in failures.off and relation is not None:
+        return off_words(cell, relation, failures.off[name], at_best="at best ")
+    tried = f"{SEEDS} attempts of the inverse kinematics"
+    if search.is_holder_open and name not in cell.positioners[:1]:
+        tried = f"{holder_count} configuration(s) of the positioner, {SEEDS_PER_HOLDER} attempts for each"
+    wanted = f"the tool of '{name}' to {_goal_words(search, name)}"
+    return (
+        f"{start_place(cell, robot)}: no configuration within the joint limits brings {wanted} ({tried}): "
+        f"{_shortfall(search, robot)}"
+    )
+
+
+def _goal_words(search: StartSearch, name: str) -> str:
+    """Where a robot's tool is wanted at the start."""
+    relation = next((each for each in search.cell.relations if each.robot == name), None)
+    if relation is None:
+        return "where the part meets the robots that stand"
+    return "its grasp on the part" if isinstance(relation, Grasp) else f"the start of task '{relation.name}'"
+
+
+def _shortfall(search: StartSearch, robot: Robot) -> str:
+    """By how much a robot fails to come where it is wanted, and the cure."""
+    goals = search.failures.missed.get(robot.name, [])
+    if not goals:
+        return "move its base or change its tool"
+    seeds = random_postures(robot.model, SEEDS, generator(f"{robot.name} nearest", search.cell.solver.seed))
+    left = [
+        nearest_reach(robot, goal.relation, goal.X_PT, X_WP=goal.X_WP, seeds=seeds, tip_only=True) for goal in goals
+    ]
+    distance, best = min((each[0], index) for index, each in enumerate(left))
+    outside = search.failures.beyond.get(robot.name, [])
+    if outside:
+        return _beyond_words(robot, np.array(outside), distance)
+    if distance > ARRIVED:
+        return (
+            f"out of reach, the best attempt leaves its tool tip {1e3 * distance:.1f} mm away; move its base or the "
+            "part, or change its tool"
+        )
+    goal = goals[best]
+    tip, angle = nearest_reach(robot, goal.relation, goal.X_PT, X_WP=goal.X_WP, seeds=seeds, tip_only=False)
+    return (
+        f"its tool tip gets there, but not with the desired direction, the best attempt leaves "
+        f"{1e3 * tip:.1f} mm and {np.degrees(angle):.1f} deg; turn the tool or its axis, free an axis, or move its base"
+    )
+
+
+def _beyond_words(robot: Robot, q: Array, distance: float) -> str:
+    """The joint that is in the way of configurations, shape (K, n), which reach the goal outside the limits.
+
+    The distance in [m] is what is left of the way within them.
+    """
+    model = robot.model
+    turned = on_nearest_turns(model, q)
+    beyond = np.maximum(np.maximum(model.lower - turned, turned - model.upper), 0.0)
+    nearest = int(np.argmin(np.round(beyond.max(axis=1), 9)))
+    worst = int(np.argmax(beyond[nearest]))
+    joint = model.joints[worst]
+    within = f", and within the limits its tip stays {1e3 * distance:.1f} mm away" if distance > ARRIVED else ""
+    return (
+        f"it gets there only beyond a limit, at best with joint '{joint.name}' at "
+        f"{_shown(joint, turned[nearest, worst])}, {_shown(joint, beyond[nearest, worst])} outside "
+        f"{_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}{within}; "
+        "move its base, change its tool or free an axis"
+    )
+
+
+def _shown(joint: Joint, position: float) -> str:
+    """A joint position with its unit, with one decimal."""
+    return f"{np.degrees(position):.1f} deg" if joint.is_revolute else f"{1e3 * position:.1f} mm"

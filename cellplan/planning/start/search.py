@@ -1,0 +1,188 @@
+"""Starts that are to be found: several inverse-kinematics branches per robot, tried out, the best one kept."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import StartNotFoundError
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.name_order import NameOrder
+from cellplan.model.progress import Progress, silent
+from cellplan.model.seeds import generator
+from cellplan.model.toolpath import Toolpath
+from cellplan.planning.start.branches import Branch, StartSearch, branches_of, holder_postures
+from cellplan.planning.start.combinations import Picks, best_combinations
+from cellplan.planning.start.failures import Failures
+from cellplan.planning.start.near_ties import best_first, levels
+from cellplan.planning.start.reasons import why_nothing
+from cellplan.planning.start.trial_motion import StartTrials, Trial
+from cellplan.scene.scene import Scene
+
+CANDIDATES: Final = 10  # configurations of the whole cell that are tried out at first
+ROUNDS: Final = 3  # times that as many are tried out while none keeps all limits and touches nothing
+COMBINATIONS_PER_HOLDER: Final = 3  # candidates taken from one configuration of the positioner, to compare several
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StartChoice:
+    """A start of the whole cell, and how it was chosen.
+
+    Attributes:
+        start: Stacked start configuration in the order of the file, shape (nq,).
+        tried: How many were tried out; 0 when all were given.
+        trial: What is known of the motion from it; None when all were given.
+    """
+
+    start: Array
+    tried: int = 0
+    trial: Trial | None = None
+
+    @property
+    def words(self) -> str | None:
+        """How the start was chosen, in one line; None when all were given."""
+        if self.trial is None:
+            return None
+        among = "the only one found" if self.tried == 1 else f"the best of {self.tried} found"
+        if self.trial.is_sound:
+            share = 100.0 * float(self.trial.shares[0])
+            kept = f"its whole motion keeps limits and speeds, {share:.0f} % of the tightest one left free"
+            return f"start chosen: {among}; on trial {kept}"
+        return f"start chosen: {among}, but no trial was without fault: {_fault(self.trial)}; the checks will say where"
+
+    @property
+    def warning(self) -> str | None:
+        """The same words where no trial was without fault; None otherwise."""
+        return None if self.trial is None or self.trial.is_sound else self.words
+
+
+def find_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: Progress = silent) -> Array:
+    """Stacked start configuration of the whole cell: see `choose_start`."""
+    return choose_start(scene, toolpaths, progress=progress).start
+
+
+def choose_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: Progress = silent) -> StartChoice:
+    """Start configuration of the whole cell; given ones are kept, the others chosen.
+
+    Candidates put every tool on the start of its task, within limits and without collision. They are ranked by joint
+    margin and manipulability; the best are tried out on a coarse clock. Those whose whole motion keeps all limits and
+    touches nothing come first, and of these the one that leaves the largest share of its joint ranges and speeds free;
+    of equal ones that whose next joint leaves more free, and so on. While there is none, more are tried out.
+
+    The search works in the order of names, each robot with random numbers of its own, drawn from ``solver.seed`` and
+    its name: the order in which the file lists robots and tasks changes nothing.
+
+    Args:
+        scene: The cell made computable.
+        toolpaths: Toolpath of every task, by task name.
+        progress: Who wants to know how far it is.
+
+    Raises:
+        StartNotFoundError: No configuration reaches all tasks within limits and without collision.
+    """
+    cell = scene.cell
+    if all(robot.start is not None for robot in cell.robots):
+        return StartChoice(start=np.concatenate([robot.start for robot in cell.robots if robot.start is not None]))
+    order = NameOrder.of(cell)
+    search = StartSearch(
+        cell=order.cell,
+        chains=scene.chains,
+        toolpaths=toolpaths,
+        trials=StartTrials(scene, toolpaths),
+        random={robot.name: generator(robot.name, cell.solver.seed) for robot in cell.robots},
+        failures=Failures(),
+    )
+    tried = _tried(search, progress)
+    best = tried[best_first(np.array([trial.figures for trial in tried]))[0]]
+    return StartChoice(start=order.as_listed(best.start), tried=len(tried), trial=best)
+
+
+def _tried(search: StartSearch, progress: Progress) -> list[Trial]:
+    """Trials of the candidates, round by round until one is sound."""
+    candidates = _candidates(search, progress)
+    tried: list[Trial] = []
+    for _ in range(ROUNDS):
+        judged = []
+        for index, candidate in enumerate(islice(candidates, CANDIDATES)):
+            progress("trying start configurations", index / CANDIDATES)
+            judged.append(search.trials.judge(candidate))
+        tried += search.trials.looked_at_closely(judged)
+        if len(judged) < CANDIDATES or any(trial.is_sound for trial in tried):
+            break
+    return tried
+
+
+def _candidates(search: StartSearch, progress: Progress) -> Iterator[Array]:
+    """Configurations of the whole cell that reach every task without touching, best first for each of the positioner.
+
+    Raises:
+        StartNotFoundError: There is none.
+    """
+    postures = holder_postures(search)
+    found = 0
+    for index, posture in enumerate(postures):
+        progress("searching start configurations", index / len(postures))
+        room = CANDIDATES * ROUNDS if len(postures) == 1 else COMBINATIONS_PER_HOLDER
+        for candidate in islice(_combinations(search, posture), room):
+            found += 1
+            yield candidate
+    if not found:
+        raise StartNotFoundError(why_nothing(search, len(postures)))
+
+
+def _combinations(search: StartSearch, holder_posture: Array | None) -> Iterator[Array]:
+    """Configurations of the whole cell for one of the positioner, best first, that touch nothing."""
+    cell = search.cell
+    choices: list[list[Branch]] = []
+    for robot in cell.robots:
+        branches = branches_of(search, robot, holder_posture)
+        if not branches:
+            return
+        choices.append(branches)
+    blocked: set[tuple[tuple[int, int], ...]] = set()
+
+    def collides(picks: Picks) -> bool:
+        return any(all(robot < len(picks) and picks[robot] == pick for robot, pick in known) for known in blocked)
+
+    for picks in best_combinations(_scores(choices), collides):
+        q = np.concatenate([branches[pick][1] for branches, pick in zip(choices, picks, strict=True)])
+        pair = search.trials.touching(q)
+        if pair is None:
+            yield q
+            continue
+        search.failures.touched(q)
+        culprits = _culprits(cell, pair, picks)
+        if not culprits:
+            return
+        blocked.add(culprits)
+
+
+def _scores(choices: list[list[Branch]]) -> list[list[float]]:
+    """What the branches of each robot are worth; what is near-equal, of whichever robots, is equal."""
+    levelled = iter(levels([score for branches in choices for score, _ in branches]))
+    return [list(islice(levelled, len(branches))) for branches in choices]
+
+
+def _culprits(cell: Cell, pair: tuple[str, str], picks: Picks) -> tuple[tuple[int, int], ...]:
+    """Robots of a pair that touches with the branches they are on: no other robot can keep these from touching."""
+    owners = {name.split("/")[0] for name in pair}
+    return tuple(
+        (index, picks[index])
+        for index, robot in enumerate(cell.robots)
+        if robot.name in owners or (robot.name in cell.positioners[:1] and "part" in owners)
+    )
+
+
+def _fault(trial: Trial) -> str:
+    """What is wrong with the motion of a trial."""
+    if not trial.is_followed:
+        return "a tool loses its path"
+    faults = ["something collides on the way"] if trial.touches else []
+    if trial.ranges.min() < 0.0:
+        faults.append(f"a joint goes {-100.0 * trial.ranges.min():.3g} % of half its range beyond its limit")
+    if trial.speeds.min() < 0.0:
+        faults.append(f"a joint is {-100.0 * trial.speeds.min():.3g} % above its top speed")
+    return " and ".join(faults)

@@ -1,0 +1,281 @@
+"""Start trials: what a start posture is worth, seen from the motion that follows from it on a coarse clock."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.certify.depths import mounted_depths
+from cellplan.errors import NoSolutionError
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell, Mode
+from cellplan.model.name_order import NameOrder
+from cellplan.model.task import Task
+from cellplan.model.toolpath import Toolpath
+from cellplan.planning.euler.integrate import follow
+from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
+from cellplan.planning.modes import RunPlan, plan_runs, standing
+from cellplan.planning.start.inverse_kinematics import finite_limits
+from cellplan.planning.start.near_ties import ALIKE
+from cellplan.planning.start.present_pairs import present_pairs
+from cellplan.planning.timing.schedule import schedule_tasks, time_tasks
+from cellplan.scene.mounting import Mount
+from cellplan.scene.scene import Scene
+
+SAMPLES: Final = 160  # instants of the coarse motion that a posture is judged by
+GAIN: Final = 0.5  # feedback gain times step of the coarse motion
+TOUCH_INSTANTS: Final = 12  # instants of the coarse motion that are looked at for collisions
+TRIED_WITH: Final = "weighted_pseudo_inverse"  # fast, and it shows how far a posture would go beyond its limits
+CLOSE_ENOUGH: Final = 1e-4  # [m] and [rad] tool error of the closer look: it is about joints
+MOST_BREAKS: Final = 500  # of the wanted motion up to which a closer look costs some tenths of a second
+LOST: Final = -1e6  # stands for the share that a motion leaves free which loses its path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trial:
+    """What is known of the motion from one start configuration of the whole cell.
+
+    Attributes:
+        start: Stacked start configuration on the turns that leave its joints most room, shape (nq,).
+        ranges: Share of half its range that each joint leaves free at least, shape (nq,); negative beyond a limit.
+        speeds: Share of its speed limit that each joint leaves free at least, shape (nq,); negative above the limit.
+        is_followed: Whether every tool keeps to its path.
+        touches: Whether something collides on the way.
+    """
+
+    start: Array
+    ranges: Array
+    speeds: Array
+    is_followed: bool = True
+    touches: bool = False
+
+    @property
+    def shares(self) -> Array:
+        """All shares, the worst first, shape (2 nq,)."""
+        shares: Array = np.sort(np.concatenate([self.ranges, self.speeds]))
+        return shares
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether the motion keeps its paths, limits and speeds and touches nothing."""
+        return self.is_followed and not self.touches and self.keeps_limits
+
+    @property
+    def keeps_limits(self) -> bool:
+        """Whether all joints stay within their limits of position and speed."""
+        return bool(self.shares[0] >= -ALIKE)
+
+    @property
+    def figures(self) -> Array:
+        """What trials are compared by: sound ones first, then by the worst share, the next one, the configuration."""
+        signs = [float(self.is_sound), float(self.is_followed), float(not self.touches)]
+        return np.concatenate([signs, self.shares, self.start])
+
+
+class StartTrials:
+    """The coarse clock of one cell, on which start postures are tried.
+
+    Attributes:
+        bodies: All solids of the cell.
+        pairs: Pairs of them that must keep apart.
+        pair_names: The names of these pairs.
+        open_pairs: Pairs of bodies that a choice of the search moves and that meet in some run, shape (pairs,); what
+            given configurations make collide is for the report to say.
+    """
+
+    def __init__(self, scene: Scene, toolpaths: Mapping[str, Toolpath]) -> None:
+        """Choose a step that makes few samples of the whole motion, of which every path is gone through once."""
+        self._order = NameOrder.of(scene.cell)
+        once = self._order.cell
+        tasks = tuple(_first_cycle(task, once.motion.duration) for task in once.tasks)
+        self._once = replace(once, tasks=tasks, motion=replace(once.motion, duration=None))
+        self._scene, self._toolpaths = scene, toolpaths
+        schedule = schedule_tasks(self._once, self._paths(self._once))
+        self._step = float(max(once.motion.step, schedule.times[-1] / SAMPLES))
+        # which joint fails is not known beforehand
+        motion = replace(once.motion, step=self._step, locked=(), cyclic=False)
+        solver = replace(once.solver, gain=GAIN / self._step, method=TRIED_WITH)
+        self._cell = replace(self._once, motion=motion, solver=solver)
+        self._alone: dict[str, Cell] = {}
+        self._plans = plan_runs(self._cell)
+        open_grips = tuple(pair for pair in scene.mounted if pair.moves and pair.mount is Mount.GRIP)
+        self._open_grips = replace(scene, mounted=open_grips)
+        self.bodies, self.pairs = scene.bodies, scene.pairs
+        self.pair_names = [scene.names(pair) for pair in scene.pairs]
+        is_present = np.any([present_pairs(scene, plan) for plan in self._plans], axis=0)
+        self.open_pairs = _open_pairs(scene) & is_present
+
+    def touching(self, q: Array) -> tuple[str, str] | None:
+        """Two bodies that a choice of the search moves and that touch, at a configuration in the order of names."""
+        return self._scene.touching(self._order.as_listed(q), among=self.open_pairs)
+
+    def contacts(self, q: Array, *, among: NDArray[np.bool_]) -> list[tuple[str, str]]:
+        """All of some pairs, shape (pairs,), that touch at a configuration in the order of names, shape (nq,)."""
+        listed, left = self._order.as_listed(q), among.copy()
+        found: list[tuple[str, str]] = []
+        while (pair := self._scene.touching(listed, among=left)) is not None:
+            found.append(pair)
+            left[self.pair_names.index(pair)] = False
+        return found
+
+    def judge(self, start: Array) -> Trial:
+        """What follows from a start configuration of the whole cell in the order of names, shape (nq,)."""
+        try:
+            motions = self._motions(self._cell, start, self._plans)
+        except NoSolutionError:
+            lost = np.full(len(start), LOST)
+            return Trial(start=start, ranges=lost, speeds=lost, is_followed=False)
+        turns = _whole_turns(self._cell, np.concatenate(motions))
+        found = [_shares_left_free(self._cell, q + turns, self._step) for q in motions]
+        return Trial(
+            start=start + turns,
+            ranges=np.min([ranges for ranges, _ in found], axis=0),
+            speeds=np.min([speeds for _, speeds in found], axis=0),
+            touches=any(self._touches_on_the_way(plan, q) for plan, q in zip(self._plans, motions, strict=True)),
+        )
+
+    def looked_at_closely(self, trials: Sequence[Trial]) -> list[Trial]:
+        """Trials with the shares of the whole motion on the accurate clock, which sees what lies between samples.
+
+        A trial that the accurate mode cannot follow keeps the shares of the coarse clock, and so do all of them where
+        the cell asks for another mode.
+        """
+        cell = self._once
+        if len(trials) < 2 or not cell.solver.is_accurate:
+            return list(trials)
+        timed = [time_tasks(cell, self._paths(cell, run.tasks)) for run in self._plans]
+        if max(len(each.breaks) for each in timed) > MOST_BREAKS:
+            return list(trials)
+        candidates = Candidates.of([cell] * len(trials), np.array([trial.start for trial in trials]))
+        runs = [
+            screen_layouts(
+                cell,
+                clocked,
+                candidates,
+                moving=run.moving,
+                accuracy=CLOSE_ENOUGH,
+            )
+            for run, clocked in zip(self._plans, timed, strict=True)
+        ]
+        found = reduce(Screening.worst, runs)
+        ranges = _range_shares(cell, found.margins)
+        return [
+            replace(trial, ranges=ranges[k], speeds=1.0 - found.speed_ratios[k]) if found.is_followed[k] else trial
+            for k, trial in enumerate(trials)
+        ]
+
+    def judge_alone(self, task: Task, posture: Array, holder_posture: Array | None) -> Array:
+        """Shares that one operator's configuration leaves free if its task were the only one, the worst first.
+
+        Of the other robots only the first holder moves. Collisions and the other holders are not looked at.
+        """
+        cell = self._cell_alone(task.robot)
+        start = np.concatenate([np.clip(0.0, *finite_limits(robot.model)) for robot in cell.robots])
+        start[cell.columns(task.robot)] = posture
+        for name in cell.positioners[:1]:
+            start[cell.columns(name)] = holder_posture
+        movers = () if cell.motion.mode is Mode.PART_AT_REST else cell.positioners
+        is_together = cell.motion.mode is Mode.SIMULTANEOUS
+        tasks = tuple(
+            each.name for each in cell.tasks if each.name == task.name or (is_together and each.robot in movers)
+        )
+        chosen = np.concatenate(
+            [np.full(len(robot.model.joints), robot.name in {*movers, task.robot}) for robot in cell.robots]
+        )
+        try:
+            motions = self._motions(cell, start, [RunPlan(name=None, tasks=tasks, moving=(*movers, task.robot))])
+        except NoSolutionError:
+            return np.full(2 * int(chosen.sum()), LOST)
+        turns = _whole_turns(cell, motions[0])
+        ranges, speeds = _shares_left_free(cell, motions[0] + turns, self._step)
+        return np.sort(np.concatenate([ranges[chosen], speeds[chosen]]))
+
+    def _touches_on_the_way(self, plan: RunPlan, q: Array) -> bool:
+        """Whether something collides in the motion of a run, shape (N, nq), judged at a few samples.
+
+        A grip that leaves components free and is too deep in the part at the start counts as well.
+        """
+        instants = np.linspace(0, len(q) - 1, TOUCH_INSTANTS).astype(int)
+        placed = self._order.as_listed(standing(self._cell, plan, q[instants]))
+        among = self.open_pairs & present_pairs(self._scene, plan)
+        if any(grip.depth > grip.pair.limit for grip in mounted_depths(self._open_grips, placed[:1])):
+            return True
+        return any(self._scene.touching(each, among=among) is not None for each in placed)
+
+    def _paths(self, cell: Cell, names: Sequence[str] | None = None) -> list[Toolpath]:
+        """Toolpaths of some tasks of a cell, or of all, in its order."""
+        return [self._toolpaths[task.name] for task in cell.tasks if names is None or task.name in names]
+
+    def _cell_alone(self, robot: str) -> Cell:
+        """The cell with the first holder and one operator; all robots stay where goals may look at them."""
+        if robot not in self._alone:
+            whole = self._cell
+            kept = {robot, *whole.positioners[:1]} if not whole.solver.goals else {each.name for each in whole.robots}
+            self._alone[robot] = replace(
+                whole,
+                robots=tuple(each for each in whole.robots if each.name in kept),
+                tasks=tuple(each for each in whole.tasks if each.robot in kept),
+                part=replace(whole.part, held_by=whole.part.held_by[:1]),
+            )
+        return self._alone[robot]
+
+    def _motions(self, cell: Cell, start: Array, plans: Sequence[RunPlan]) -> list[Array]:
+        """Joint positions of each run on the coarse clock, shape (N, nq) each."""
+        motions = []
+        for run in plans:
+            schedule = schedule_tasks(cell, self._paths(cell, run.tasks))
+            motions.append(follow(cell, schedule, start=start, moving=run.moving).q)
+        return motions
+
+
+def _first_cycle(task: Task, clock: float | None) -> Task:
+    """A task that goes through its path once, as fast as it does on the whole."""
+    duration = task.time_for_path(clock)
+    return replace(task, repeat=1, duration=None if duration is None else duration / task.repeat)
+
+
+def _open_pairs(scene: Scene) -> NDArray[np.bool_]:
+    """Pairs of bodies that a choice of the search moves; what given postures make collide is for the report to say."""
+    given = {None, *(robot.name for robot in scene.cell.robots if robot.start is not None)}
+    bodies = scene.bodies
+    is_open = [not {bodies[pair.first].robot, bodies[pair.second].robot} <= given for pair in scene.pairs]
+    return np.array(is_open, dtype=bool)
+
+
+def _whole_turns(cell: Cell, q: Array) -> Array:
+    """Whole turns in [rad] that bring the motion of each joint nearest to mid-range; none where the start is given.
+
+    A posture does not show on which turn its joints are, and a wrist may need a whole turn of room on one side.
+    """
+    turns = np.zeros(q.shape[1])
+    for robot in cell.robots:
+        if robot.start is None:
+            lower, upper = robot.model.lower, robot.model.upper
+            motion = q[:, cell.columns(robot.name)]
+            turning = np.isfinite(upper - lower) & np.array([joint.is_revolute for joint in robot.model.joints])
+            middle = 0.5 * np.where(turning, lower + upper, 0.0)
+            own = -2 * np.pi * np.round((0.5 * (motion.min(axis=0) + motion.max(axis=0)) - middle) / (2 * np.pi))
+            start = motion[0] + own
+            turns[cell.columns(robot.name)] = np.where(turning & (start >= lower) & (start <= upper), own, 0.0)
+    return turns
+
+
+def _shares_left_free(cell: Cell, q: Array, step: float) -> tuple[Array, Array]:
+    """Shares of half its range and of its speed limit that each joint leaves free in a motion, shape (nq,) each."""
+    lower, upper, velocity = (
+        np.concatenate([getattr(robot.model, name) for robot in cell.robots]) for name in ("lower", "upper", "velocity")
+    )
+    ranges = _range_shares(cell, np.minimum(q.min(axis=0) - lower, upper - q.max(axis=0)))
+    speeds: Array = 1.0 - np.abs(np.diff(q, axis=0)).max(axis=0, initial=0.0) / step / velocity
+    return ranges, speeds
+
+
+def _range_shares(cell: Cell, margins: Array) -> Array:
+    """Distances of joints from their limits as shares of half their ranges, 1 without limits, shape (..., nq)."""
+    half = np.concatenate([0.5 * (robot.model.upper - robot.model.lower) for robot in cell.robots])
+    half = np.where(np.isfinite(half), half, np.pi)
+    shares: Array = np.minimum(margins / np.where(half > 0.0, half, 1.0), 1.0)
+    return shares

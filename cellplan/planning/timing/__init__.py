@@ -1,0 +1,1 @@
+"""Timing: toolpaths on the common clock."""

@@ -1,0 +1,1 @@
+"""Tracking: desired poses and twists, cooperation Jacobian, weighted inverse."""

@@ -1,0 +1,244 @@
+"""Tracking problem: what a resolution method is asked at every instant, and what it may ask back."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import DivergedError
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.kinematics.pinocchio_model import CellState, CombinedModel
+from cellplan.model.cell import Cell, Grasp, Relation
+from cellplan.model.motion import Schedule
+from cellplan.model.task import Frame
+from cellplan.planning.timing.common_cycles import common_cycles
+from cellplan.planning.tracking.cooperation_jacobian import (
+    column_signs,
+    constraint_rows,
+    cooperation_jacobian,
+    pose_errors,
+    reference_frames,
+)
+from cellplan.planning.tracking.joint_weights import JointWeights
+from cellplan.planning.tracking.locked_joints import locked_since
+from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, share_within
+from cellplan.planning.tracking.targets import targets
+
+Drift = Callable[[int, Array], Array]
+
+LOST_DISTANCE: Final = 0.5  # [m] a tool this far from its path has left it for good: the posture means nothing any more
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FirstOrder:
+    """All tasks at one instant and posture, to first order; only the components that they constrain.
+
+    Attributes:
+        J: Rows of the cooperation Jacobian, shape (m, nq); zero columns for joints that may not move.
+        twist: Wanted tool twists relative to the part, shape (m,).
+        error: Pose errors, wanted minus actual, shape (m,).
+        weights: Joint weights, the diagonal of W, shape (nq,).
+        secondary: Joint speeds that the secondary goals ask for, shape (nq,); None when there are none.
+        bounds: Lowest and highest joint speeds that goals may lead to, shape (nq,) each; None when there are no goals.
+    """
+
+    J: Array
+    twist: Array
+    error: Array
+    weights: Array
+    secondary: Array | None
+    bounds: tuple[Array, Array] | None = None
+
+    def bounded(self, unnoticed: Array, *, beside: Array) -> Array:
+        """What of joint speeds that no task notices may be added to the speeds that the tasks need, shape (nq,).
+
+        They are scaled together, so they still move no tool.
+
+        Args:
+            unnoticed: What the tasks leave of the secondary goals, shape (nq,).
+            beside: Joint speeds that the tasks need, shape (nq,).
+        """
+        if self.bounds is None:
+            return unnoticed
+        lowest, highest = self.bounds
+        return share_within(beside, unnoticed, lowest=lowest, highest=highest) * unnoticed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Advance:
+    """One step of a resolution method.
+
+    Attributes:
+        q: Stacked joint vector at the next instant, shape (nq,).
+        iterations: How often the method looked at the tasks.
+        slack: Norm of the twist that was given up on purpose, metres and radians per second as they come.
+    """
+
+    q: Array
+    iterations: int = 1
+    slack: float = 0.0
+
+
+class TrackingProblem:
+    """All tasks of one run on the common clock, and the joints that may move for them.
+
+    Attributes:
+        cell: The cell.
+        times: Instants in [s], shape (N,).
+        tasks: The tasks, then the grasps of further holders, one block row each.
+        operators: Index of each one's robot in the cell.
+        wanted: Wanted tool poses X_PT, shape (N, tasks, 4, 4).
+        twists: Wanted tool twists in P, linear first, shape (N, tasks, 6).
+        signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
+        gain: Error feedback gain in [1/s].
+        damping: Largest damping factor; None leaves it to the method.
+        drift: Joint speeds that are asked for at instant k and posture q besides the tasks, shape (nq,): what closes a
+            cycle.
+    """
+
+    def __init__(self, cell: Cell, schedule: Schedule, moving: Sequence[str], *, start: Array | None = None) -> None:
+        """Gather what stays the same from step to step.
+
+        Args:
+            cell: The cell.
+            schedule: Wanted tool poses and twists on the common clock.
+            moving: Names of the robots that may move.
+            start: Stacked start posture, shape (nq,), which goals may lead back to; needed with goals only.
+        """
+        asked = targets(cell, schedule, moving)
+        tasks = tuple(target.relation for target in asked)
+        names = [robot.name for robot in cell.robots]
+        self._model = CombinedModel(cell)
+        self._rows = [constraint_rows(target.relation, target.X_PT) for target in asked]
+        self._is_whole = all(len(task.axes) == 6 and not task.is_spin_free for task in tasks)
+        self._is_spin_free = [task.is_spin_free for task in tasks]
+        self._is_on_part = all(task.relative_to is Frame.PART for task in tasks)
+        self._is_linear = np.array([[float(axis in task.axes) for axis in range(3)] for task in tasks])
+        self._lost = np.array([max(LOST_DISTANCE, 2.0 * target.tolerance) for target in asked])
+        self._settled = np.array([target.settled for target in asked])
+        self._weights = JointWeights(cell, self._model)
+        self.cell, self.times, self.tasks = cell, schedule.times, tasks
+        self.operators = [names.index(task.robot) for task in tasks]
+        self.wanted = np.stack([target.X_PT for target in asked], axis=1)
+        self.twists = np.stack([target.V_PT_P for target in asked], axis=1)
+        self.signs = column_signs(cell, self._model, tasks, moving)
+        self.gain, self.damping = cell.solver.gain, cell.solver.damping
+        self.drift: Drift | None = None
+        self._goals = self._secondary_goals(start, _rests(cell, schedule)) if cell.solver.goals else None
+        self._locked_since = locked_since(cell)
+        self._may_move = np.isin(_owners(cell), moving)
+
+    def step(self, k: int) -> float:
+        """Time from instant k to the next in [s]."""
+        return float(self.times[k + 1] - self.times[k])
+
+    def state(self, q: Array) -> CellState:
+        """Kinematics of the whole cell at a stacked joint vector, shape (nq,)."""
+        return self._model.state(q)
+
+    def mobile(self, k: int) -> Array:
+        """1 for joints that may move at instant k, 0 for those that stand still or are locked, shape (nq,)."""
+        mobile: Array = (self._may_move & (self.times[k] < self._locked_since)).astype(float)
+        return mobile
+
+    def rows(self, k: int, q: Array) -> list[Array]:
+        """Rows of the cooperation Jacobian that each task constrains at instant k and posture q, shape (m, nq) each."""
+        state = self.state(q)
+        X_WT, X_WR = state.X_WT[self.operators], reference_frames(state, self.tasks)
+        J = cooperation_jacobian(state, X_WT[:, :3, 3], self.signs * self.mobile(k), X_WR=X_WR)
+        return [rows[k] @ block for rows, block in zip(self._rows, J, strict=True)]
+
+    def first_order(self, k: int, q: Array) -> FirstOrder:
+        """The tasks at instant k and posture q, to first order.
+
+        Raises:
+            DivergedError: A tool lost its path.
+        """
+        state = self.state(q)
+        signs = self.signs * self.mobile(k)
+        X_WT = state.X_WT[self.operators]
+        X_WR = None if self._is_on_part else reference_frames(state, self.tasks)
+        J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
+        X_RT = inverse(state.X_WP if X_WR is None else X_WR) @ X_WT
+        error = pose_errors(self.wanted[k], X_RT, self._is_spin_free)
+        self._refuse_lost_path(k, error)
+        rows, twist, errors = self._constrained(k, J, error)
+        drift = self._drift(k, q)
+        weights = self._weights.at(state, q, J=rows, xdot=twist + self.gain * errors, secondary=drift)
+        return self._with_goals(k, q, state, FirstOrder(rows, twist, errors, weights, drift), signs=signs)
+
+    def _constrained(self, k: int, J: Array, error: Array) -> tuple[Array, Array, Array]:
+        """Rows, wanted twists and errors of the components that the tasks and grasps constrain."""
+        if self._is_whole:
+            return J.reshape(-1, J.shape[2]), self.twists[k].reshape(-1), error.reshape(-1)
+        picks = [rows[k] for rows in self._rows]
+        return (
+            np.concatenate([pick @ block for pick, block in zip(picks, J, strict=True)]),
+            np.concatenate([pick @ twist for pick, twist in zip(picks, self.twists[k], strict=True)]),
+            np.concatenate([pick @ part for pick, part in zip(picks, error, strict=True)]),
+        )
+
+    def _secondary_goals(self, start: Array | None, rests: Array) -> SecondaryGoals:
+        """The goals of the cell, which may lead back to the start posture."""
+        if start is None:
+            raise ValueError("secondary goals need the start posture of the motion")
+        return SecondaryGoals(self.cell, self._model, tasks=self.tasks, times=self.times, start=start, rests=rests)
+
+    def _drift(self, k: int, q: Array) -> Array | None:
+        """Joint speeds that are asked for to close a cycle, of those joints that may move."""
+        if self.drift is None:
+            return None
+        speeds: Array = self.drift(k, q) * self.mobile(k)
+        return speeds
+
+    def _with_goals(self, k: int, q: Array, state: CellState, first: FirstOrder, *, signs: Array) -> FirstOrder:
+        """The tasks, with what the secondary goals ask for besides."""
+        if self._goals is None:
+            return first
+        stance = Stance(
+            q=q,
+            state=state,
+            J=first.J,
+            picks=[rows[k] for rows in self._rows],
+            signs=signs,
+            mobility=np.any(signs != 0.0, axis=0) / first.weights,
+        )
+        asked = self._goals.speeds(k, stance)
+        if first.secondary is not None:
+            asked = asked + first.secondary
+        return replace(first, secondary=asked, bounds=self._goals.bounds(q))
+
+    def _refuse_lost_path(self, k: int, error: Array) -> None:
+        """Stop where going on would be meaningless; not a number counts as lost.
+
+        A tool that is still on its way to the path is not lost. With a joint that fails the report is to say how far
+        the others get.
+        """
+        distances = np.linalg.norm(error[:, :3] * self._is_linear, axis=1)
+        is_lost = (distances >= self._lost) & (self.times[k] >= self._settled) & (not self.cell.motion.locked)
+        if not is_lost.any() and np.isfinite(error.sum()):
+            return
+        worst = int(np.argmax(distances))
+        task = self.tasks[worst]
+        raise DivergedError(
+            f"the tool of '{task.robot}' is {1e3 * distances[worst]:.0f} mm from {_place(task)}: "
+            "the path cannot be followed from this start posture"
+        )
+
+
+def _place(task: Relation) -> str:
+    """Where a tool should be, in words."""
+    return "its grasp on the part" if isinstance(task, Grasp) else f"task '{task.name}'"
+
+
+def _owners(cell: Cell) -> list[str]:
+    """Name of the robot of each joint."""
+    return [robot.name for robot in cell.robots for _ in robot.model.joints]
+
+
+def _rests(cell: Cell, schedule: Schedule) -> Array:
+    """Instants in [s] at which goals ask for nothing: the ends of the motion, and of each cycle that is to close."""
+    bounds = common_cycles(schedule) if cell.motion.cyclic else None
+    ends = schedule.times[[0, -1]]
+    return ends if bounds is None else np.unique(np.concatenate([ends, bounds]))

@@ -1,0 +1,234 @@
+r"""Secondary goals: the joint speeds that would serve them best, before the tasks are given their due.
+
+A goal is a function ``w(q)`` that is to grow ([Ribeiro2010]_ Eq. D.44). Its pull is ``qdot_0 = k_0 W^{-1} grad w`` with
+the joint weights W, and of it the tasks leave ``(I - J# J) qdot_0`` with ``J# = W^-1 J^T (J W^-1 J^T)^-1`` (Eq. D.43).
+What is left moves no tool, and makes w grow or leaves it as it is: with ``A = J W^-1/2``, ``g = grad w`` and
+``b = W^-1/2 g``
+
+.. math:: g \cdot \dot q = k_0 \, b^T (I - A^T (A A^T)^{-1} A) \, b = k_0 \, |(I - A^+ A) \, b|^2 \ge 0
+
+because ``I - A+ A`` is an orthogonal projection. This holds for ``W^-1 grad w``, not for ``grad w`` itself.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.kinematics.pinocchio_model import CellState, CombinedModel
+from cellplan.model.cell import Cell, Relation
+from cellplan.model.solver import GoalKind, SecondaryGoal
+from cellplan.model.task import Frame
+from cellplan.planning.tracking.manipulability import ManipulabilityGradient
+from cellplan.planning.tracking.obstacle_distances import ClosestPairs
+from cellplan.scene.scene import Scene
+
+SPEED_SHARE: Final = 0.9  # [-] of a joint's speed limit that goals may use up: the rest is room for the feedback
+BRAKING: Final = 0.2  # [s] a goal takes no joint nearer to its position limit than its speed times this
+FADE: Final = 0.2  # [s] in which the goals set in at the start of a motion, and leave off before its end
+FADE_SHARE: Final = 0.25  # [-] of the whole motion that this may take at most
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stance:
+    """The cell at one instant and posture, as goals look at it.
+
+    Attributes:
+        q: Stacked joint vector, shape (nq,), in [rad] or [m].
+        state: Kinematics there.
+        J: Task rows, shape (m, nq).
+        picks: Rows that pick what each task constrains, shape (m_i, 6) each.
+        signs: Sign of each joint in each task, 0 for joints that may not move, shape (tasks, nq).
+        mobility: Diagonal of ``W^-1``, 0 for joints that take no part in any task now, shape (nq,).
+    """
+
+    q: Array
+    state: CellState
+    J: Array
+    picks: Sequence[Array]
+    signs: Array
+    mobility: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slope:
+    """A goal to second order.
+
+    Attributes:
+        gradient: Gradient of w, shape (nq,).
+        curvature: About the largest curvature of ``-w``, in the metric of W.
+    """
+
+    gradient: Array
+    curvature: float
+
+
+Pull = Callable[[Stance], Slope]
+
+
+class SecondaryGoals:
+    """All secondary goals of a cell along one motion."""
+
+    def __init__(
+        self, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], times: Array, start: Array, rests: Array
+    ) -> None:
+        """Make ready what each goal needs.
+
+        Args:
+            cell: The cell.
+            model: The combined model of its robots.
+            tasks: The tasks and closures, one block row each.
+            times: Instants of the motion in [s], shape (N,).
+            start: Stacked posture at the first instant, shape (nq,).
+            rests: Instants in [s] at which the goals ask for nothing: the ends of the motion and of cycles to close.
+        """
+        self._pulls = [(goal.gain, _pull(goal, cell, model, tasks=tasks, start=start)) for goal in cell.solver.goals]
+        self._lower = np.concatenate([robot.model.lower for robot in cell.robots])
+        self._upper = np.concatenate([robot.model.upper for robot in cell.robots])
+        self._limits = SPEED_SHARE * np.concatenate([robot.model.velocity for robot in cell.robots])
+        self._step = float(times[1] - times[0]) if len(times) > 1 else cell.motion.step
+        self._fade = _fade(times, rests)
+
+    def speeds(self, k: int, stance: Stance) -> Array:
+        r"""Joint speeds that the goals ask for at an instant, shape (nq,), in [rad/s] or [m/s].
+
+        The gain of each goal is taken as in an implicit step of length ``h``, with the curvature ``c`` of ``-w``,
+
+        .. math:: \dot q_0 = \frac{k_0}{1 + k_0 h c} W^{-1} \nabla w
+
+        which is ``k_0`` for all gains that make sense, and does not overshoot for those that do not. No goal asks for
+        more than a joint can do: its speeds are scaled together, so their direction stays. The goals set in and leave
+        off smoothly, so that the cell starts and ends at rest.
+        """
+        asked = np.zeros_like(stance.q)
+        for gain, pull in self._pulls:
+            slope = pull(stance)
+            speeds = gain / (1.0 + gain * self._step * slope.curvature) * slope.gradient * stance.mobility
+            asked += speeds / max(1.0, float(np.max(np.abs(speeds) / self._limits, initial=0.0)))
+        wanted: Array = self._fade[k] * asked
+        return wanted
+
+    def bounds(self, q: Array) -> tuple[Array, Array]:
+        """Lowest and highest joint speeds that a goal may lead to at a posture, shape (nq,) each."""
+        return (
+            np.maximum(-self._limits, (self._lower - q) / BRAKING),
+            np.minimum(self._limits, (self._upper - q) / BRAKING),
+        )
+
+
+def share_within(speeds: Array, extra: Array, *, lowest: Array, highest: Array) -> float:
+    """Largest share of extra joint speeds, at most 1, that takes no joint beyond its bounds.
+
+    A joint that is beyond them already, on behalf of the tasks, is not taken farther.
+
+    Args:
+        speeds: Joint speeds that the tasks need, shape (nq,).
+        extra: Joint speeds to add, shape (nq,).
+        lowest: Lowest allowed speeds, shape (nq,).
+        highest: Highest allowed speeds, shape (nq,).
+    """
+    moves = extra != 0.0
+    room = np.where(extra > 0.0, highest - speeds, lowest - speeds)[moves] / extra[moves]
+    return float(np.clip(room.min(initial=1.0), 0.0, 1.0))
+
+
+def _fade(times: Array, rests: Array) -> Array:
+    """Share of the goals at each instant: 0 at every rest, 1 away from them, smooth in between."""
+    length = float(np.diff(rests).max())
+    away = np.min(np.abs(times[:, None] - rests), axis=1)
+    x = np.clip(away / max(min(FADE, FADE_SHARE * length), np.finfo(float).tiny), 0.0, 1.0)
+    share: Array = x * x * (3.0 - 2.0 * x)
+    return share
+
+
+def _pull(goal: SecondaryGoal, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], start: Array) -> Pull:
+    """The function that gives the slope of one goal."""
+    match goal.kind:
+        case GoalKind.MANIPULABILITY:
+            return _manipulability(cell, model, tasks)
+        case GoalKind.JOINT_LIMITS:
+            return _joint_limits(cell)
+        case GoalKind.OBSTACLES:
+            return _obstacles(cell, goal.within)
+        case GoalKind.POSTURE:
+            return _posture(cell, goal.postures, start=start)
+
+
+def _manipulability(cell: Cell, model: CombinedModel, tasks: Sequence[Relation]) -> Pull:
+    """``w = log sqrt(det(J J^T))`` of all task rows together ([Ribeiro2010]_ Eq. D.45).
+
+    The logarithm makes a sum over the robots of the product: the pull on a robot depends neither on how many others
+    there are nor on the units of the rows. Its direction is that of the gradient of D.45. The curvature is that of
+    ``log sin q``, to which the manipulability of an elbow or a wrist is proportional, one for each task.
+    """
+    names = [robot.name for robot in cell.robots]
+    holder = names.index(cell.positioners[0]) if cell.positioners else None
+    operators = [names.index(task.robot) for task in tasks]
+    on_part = np.array([float(task.relative_to is Frame.PART) for task in tasks])
+    gradients = ManipulabilityGradient(model, operators, holder, on_part=on_part)
+
+    def pull(stance: Stance) -> Slope:
+        gradient = gradients.at(stance.q, stance.state, J=stance.J, picks=stance.picks, signs=stance.signs)
+        most = len(stance.signs) * float(np.max(stance.mobility, initial=0.0))
+        return Slope(gradient, float(stance.mobility @ gradient**2) + most)
+
+    return pull
+
+
+def _joint_limits(cell: Cell) -> Pull:
+    """``w = -1/(2n) sum ((q - middle) / range)^2`` over the n joints of a robot that have limits, robots added up.
+
+    [Ribeiro2010]_ Eq. D.46, which is written for one robot. Joints that may turn without end take no part.
+    """
+    stiffness, middles = [], []
+    for robot in cell.robots:
+        lower, upper = robot.model.lower, robot.model.upper
+        is_limited = np.isfinite(lower) & np.isfinite(upper)
+        lower, upper = np.where(is_limited, lower, -np.inf), np.where(is_limited, upper, np.inf)
+        stiffness.append(1.0 / (max(1, int(is_limited.sum())) * (upper - lower) ** 2))
+        middles.append(0.5 * (np.where(is_limited, lower, 0.0) + np.where(is_limited, upper, 0.0)))
+    return _springs(np.concatenate(stiffness), np.concatenate(middles))
+
+
+def _posture(cell: Cell, wanted: Mapping[str, Array], *, start: Array) -> Pull:
+    """``w = -1/2 |q - q_wanted|^2``; robots without a wanted posture are drawn back to where they start."""
+    middle = start.copy()
+    for robot, posture in wanted.items():
+        middle[cell.columns(robot)] = posture
+    return _springs(np.ones(len(middle)), middle)
+
+
+def _springs(stiffness: Array, middle: Array) -> Pull:
+    """``w = -1/2 sum c_i (q_i - m_i)^2``."""
+
+    def pull(stance: Stance) -> Slope:
+        curvature = float(np.max(stiffness * stance.mobility, initial=0.0))
+        return Slope(-stiffness * (stance.q - middle), curvature)
+
+    return pull
+
+
+def _obstacles(cell: Cell, within: float) -> Pull:
+    """``w = -1/2 sum ((within - d) / within)^2`` over all distances d below ``within`` ([Ribeiro2010]_ Eq. D.47).
+
+    The equation takes one distance, the smallest, whose pull jumps when another pair becomes the nearest. Here every
+    pair pulls, from nothing at ``within`` on the stronger the nearer.
+    """
+    closest = _closest_pairs(cell)
+
+    def pull(stance: Stance) -> Slope:
+        pairs = closest.at(stance.q, within=within)
+        shortfall = np.array([within - pair.distance for pair in pairs])
+        gradients = np.array([pair.gradient for pair in pairs]).reshape(-1, len(stance.q))
+        return Slope(shortfall @ gradients / within**2, float(np.sum(gradients**2 @ stance.mobility)) / within**2)
+
+    return pull
+
+
+@lru_cache(maxsize=1)
+def _closest_pairs(cell: Cell) -> ClosestPairs:
+    """Distances within a cell; built once for the many motions of a search."""
+    return ClosestPairs(Scene.from_cell(cell))

@@ -1,0 +1,102 @@
+"""Series: errors, singular values, joint positions and speeds along the motion, for those who recompute a figure."""
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.motion import Motion
+from cellplan.model.report import JointUse, Report
+from cellplan.report.record.run import SIGNIFICANT
+
+MOST_STEPS: Final = 50_000  # a longer motion is thinned: its report would be too large to open
+DIGITS: Final = 7  # [-] significant: 1e-5 deg of a joint, 1e-7 of an error; the joint tables have all digits
+INDENT: Final = "  "
+
+Tree = dict[str, Any]  # texts to trees, arrays of shape (K,), whole numbers, or None
+
+
+def series(report: Report, motion: Motion | None = None) -> Tree:
+    """What the report says in one figure, along the whole motion, in printed units.
+
+    Every n-th instant is kept, and the last one. What belongs to a step, speeds among them, has one value less than
+    there are instants: its k-th value is that of the step of the clock that begins at the k-th kept instant.
+
+    Args:
+        report: The run.
+        motion: The motion as it was planned; it alone knows what its steps took. None when it is not at hand.
+    """
+    last = len(report.times) - 1
+    every = max(1, math.ceil(last / MOST_STEPS))
+    steps = np.arange(0, last, every)
+    instants = np.append(steps, last)
+    conditioning = report.conditioning
+    of_stack = {
+        "smallest_singular_value": conditioning.stack,
+        "condition": conditioning.condition,
+        "squared_condition": conditioning.squared_condition,
+        "manipulability": conditioning.manipulability,
+    }
+    return {
+        "every": every,
+        "times_s": report.times[instants],
+        "tasks": {
+            accuracy.task: {
+                "position_error_mm": 1e3 * np.linalg.norm(accuracy.position_error[instants], axis=1),
+                "orientation_error_deg": np.rad2deg(np.linalg.norm(accuracy.orientation_error[instants], axis=1)),
+            }
+            for accuracy in report.accuracy
+        },
+        "conditioning": {name: values[instants] for name, values in of_stack.items()},
+        "joints": {
+            robot: _joint_series(
+                [use for use in report.joints if use.robot == robot], q=q[instants], qd=report.qd[robot][steps]
+            )
+            for robot, q in report.q.items()
+        },
+        "iterations": None if motion is None or motion.iterations is None else motion.iterations[steps],
+        "slack": None if motion is None or motion.slack is None else motion.slack[steps],
+    }
+
+
+def _joint_series(uses: Iterable[JointUse], *, q: Array, qd: Array) -> Tree:
+    """Position and speed of each joint of one robot, in the order of its columns."""
+    tree: Tree = {}
+    for use, position, speed in zip(uses, q.T, qd.T, strict=True):
+        unit, scale = ("deg", math.degrees(1.0)) if use.is_revolute else ("mm", 1e3)
+        tree[use.joint] = {f"position_{unit}": scale * position, f"speed_{unit}_s": scale * speed}
+    return tree
+
+
+def series_text(tree: Mapping[str, Any], depth: int = 0) -> str:
+    """The series as JSON, one line for each array; values that are not finite are null.
+
+    Args:
+        tree: What ``series`` gives.
+        depth: How many levels the text will be indented by; its first line is not.
+    """
+    inside = INDENT * (depth + 1)
+    lines = [
+        f"{inside}{json.dumps(name, ensure_ascii=False)}: "
+        + (_array_text(value, SIGNIFICANT) if name == "times_s" else _value_text(value, depth + 1))
+        for name, value in tree.items()
+    ]
+    return "{\n" + ",\n".join(lines) + f"\n{INDENT * depth}}}" if lines else "{}"
+
+
+def _value_text(value: Any, depth: int) -> str:
+    """A tree, an array, a whole number or nothing as JSON."""
+    if isinstance(value, Mapping):
+        return series_text(value, depth)
+    return _array_text(value, DIGITS) if isinstance(value, np.ndarray) else json.dumps(value)
+
+
+def _array_text(values: Array, digits: int) -> str:
+    """Numbers in one line, without -0."""
+    tidy = (values + 0.0).tolist()
+    if np.isfinite(values).all():
+        return f"[{','.join([f'%.{digits}g'] * len(tidy)) % tuple(tidy)}]"
+    return f"[{','.join(f'{value:.{digits}g}' if math.isfinite(value) else 'null' for value in tidy)}]"

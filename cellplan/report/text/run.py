@@ -1,0 +1,177 @@
+"""What a run shows on the screen: verdict, cycle time, worst figures, failed checks, and where the report is."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from cellplan.report.record.clock import clock_words
+from cellplan.report.record.left_out import grips_told, told_left_out
+from cellplan.report.record.method import USUAL_METHOD
+from cellplan.report.record.open_surfaces import open_surface_lines
+from cellplan.report.record.rests_on import good_to
+from cellplan.report.text.accelerations import acceleration_lines
+
+Record = dict[str, Any]
+
+
+def read_record(folder: Path) -> Record:
+    """The report of a run as it stands on disk, without its series, which are for files and not for screens."""
+    record: Record = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    return {name: value for name, value in record.items() if name != "series"}
+
+
+def summary_lines(record: Record, folder: Path) -> list[str]:
+    """Lines for people about one run folder."""
+    return [
+        f"{record['cell']}: {record['status']}",
+        *figure_lines(record),
+        *_failure_lines(record["checks"]),
+        *(f"  {line}" for line in record.get("not_in_program", [])),
+        *_place_lines(record, folder),
+    ]
+
+
+def figure_lines(record: Record) -> list[str]:
+    """The worst figures of a run."""
+    return [
+        f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_clock_word(record)}{_method_word(record['solver'])}",
+        *_task_lines(record["tasks"]),
+        *_closure_lines(record.get("closure", {})),
+        *_margin_lines(record["joints"]),
+        *_speed_lines(record["joints"]),
+        *acceleration_lines(record),
+        *_drift_lines(record.get("repeatability", {})),
+        *_clearance_lines(record["clearance"]["whole"]),
+        *_slack_lines(record["solver"]["slack"]),
+        *_fallback_lines(record["solver"]),
+        *(f"  note: {line}" for _, line in open_surface_lines(record.get("open_surfaces", []))),
+        *(f"  grip: {line}" for line in grips_told(record)),
+        *(f"  {line}" for line in record.get("rests_on", {}).get("lines", [])),
+        *left_out_lines(record),
+    ]
+
+
+def left_out_lines(record: Record) -> list[str]:
+    """One line for each kind of pairs that were not judged in full."""
+    return [f"  {line}" for line in told_left_out(record)]
+
+
+def _clock_word(record: Record) -> str:
+    """What decides the length of the clock, unless the cell file states it."""
+    words = clock_words(record.get("clock_from", ""))
+    return f" ({words})" if words else ""
+
+
+def _method_word(solver: Record) -> str:
+    """The method, unless it is the usual one."""
+    return "" if solver["method"] == USUAL_METHOD else f", method {solver['method']}"
+
+
+def _task_lines(tasks: Record) -> Iterator[str]:
+    for name, task in tasks.items():
+        position, orientation = _largest(task, "position_error", "mm"), _largest(task, "orientation_error", "deg")
+        yield f"  task {name} ({task['robot']}): largest error {_short(position)} mm, {_short(orientation)} deg"
+
+
+def _closure_lines(closures: Record) -> Iterator[str]:
+    for robot, closure in closures.items():
+        position, orientation = _largest(closure, "position_error", "mm"), _largest(closure, "orientation_error", "deg")
+        yield f"  grasp of {robot}: largest closure error {_short(position)} mm, {_short(orientation)} deg"
+
+
+def _largest(errors: Record, name: str, unit: str) -> float | None:
+    """The larger one of an error at the rows and between them."""
+    at_rows: float | None = errors[f"max_{name}_{unit}"]
+    between: float | None = errors.get(f"max_{name}_between_rows_{unit}")
+    return at_rows if at_rows is None or between is None else max(at_rows, between)
+
+
+def _margin_lines(joints: Record) -> Iterator[str]:
+    """The tightest joint of each kind: degrees and millimetres do not compare."""
+    for unit in ("deg", "mm"):
+        bounded = [
+            (use["margin"], f"{robot} {joint}", use["margin_at_s"])
+            for robot, uses in joints.items()
+            for joint, use in uses.items()
+            if use["unit"] == unit and use["margin"] is not None
+        ]
+        if bounded:
+            margin, joint, at_s = min(bounded)
+            yield f"  smallest joint margin {margin:.4g} {unit}: {joint}{_instant(at_s)}"
+
+
+def _speed_lines(joints: Record) -> Iterator[str]:
+    driven = [
+        (use["velocity_ratio"], f"{robot} {joint}", use["peak_velocity_at_s"])
+        for robot, uses in joints.items()
+        for joint, use in uses.items()
+        if use["velocity_ratio"] is not None
+    ]
+    if driven:
+        ratio, joint, at_s = max(driven)
+        yield f"  largest joint speed {100.0 * ratio:.4g} % of its limit: {joint}{_instant(at_s)}"
+
+
+def _drift_lines(repeatability: Record) -> Iterator[str]:
+    """The joint that is farthest from where a cycle began; nothing when all come back."""
+    for name, found in repeatability.items():
+        if found["closes"]:
+            continue
+        subject = "all tasks" if name == "all" else f"task {name}"
+        of_cycles = f"cycle {{}} of {found['cycles']}" if found["cycles"] > 1 else "the cycle"
+        for unit, joint, cycle in (("deg", "joint", "at_cycle"), ("mm", "sliding_joint", "sliding_at_cycle")):
+            if f"worst_drift_{unit}" in found:
+                where = of_cycles.format(found[cycle])
+                drift = found[f"worst_drift_{unit}"]
+                yield f"  joint drift {drift:.4g} {unit} in {where} of {subject}: {found[joint]}"
+
+
+def _clearance_lines(whole: Record) -> Iterator[str]:
+    if whole["minimum_mm"] is not None and whole["pair"]:
+        first, second = whole["pair"]
+        proof = "certified" if whole["certified"] else "not certified"
+        least = "" if whole.get("exact", True) else "at least "
+        figure = f"{least}{whole['minimum_mm']:.4g} mm, {proof}"
+        rests_on = good_to(whole["pair"], whole.get("accuracies_mm"))
+        where = f"{first} - {second}{_instant(whole['at_s'])}{f', {rests_on}' if rests_on else ''}"
+        yield f"  smallest clearance {figure}: {where}"
+
+
+def _slack_lines(slack: Record | None) -> Iterator[str]:
+    """By how much a method left the tasks on purpose."""
+    if slack and slack["max"]:
+        yield f"  tasks left on purpose by at most {slack['max']:.2g} ({slack['unit']}){_instant(slack['max_at_s'])}"
+
+
+def _fallback_lines(solver: Record) -> Iterator[str]:
+    """Where the accurate mode found no way on."""
+    resolution = solver.get("resolution")
+    if resolution and solver["integrator"] == "accurate" and resolution["euler_from_s"] is not None:
+        lost = resolution.get("lost")
+        reason = f"; {lost['message']}" if lost else ""
+        yield f"  no accurate way on: Euler steps from {resolution['euler_from_s']:.3f} s{reason}"
+
+
+def _failure_lines(checks: list[Record]) -> Iterator[str]:
+    for check in checks:
+        if not check["passed"]:
+            run = f"{check['run']}: " if check.get("run") else ""
+            yield f"  FAILED {run}{check['message']}"
+
+
+def _place_lines(record: Record, folder: Path) -> Iterator[str]:
+    yield f"report: {folder / 'report.html'}"
+    runs = list(record.get("runs", {}))
+    for place in [folder / run for run in runs] or [folder]:
+        for tables in (place / "tables", place / "rejected"):
+            if tables.is_dir():
+                yield f"tables: {tables}"
+
+
+def _short(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.2g}"
+
+
+def _instant(at_s: float | None) -> str:
+    return "" if at_s is None else f" at {at_s:.3f} s"

@@ -1,0 +1,203 @@
+"""What ``cellplan explain`` shows on the screen: a cell's structure in lines of at most a hundred columns."""
+
+import textwrap
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from cellplan.report.record.joint_limits import limits_text
+
+Record = dict[str, Any]
+WIDTH = 100  # columns of a terminal that most people have
+GAP = 2  # spaces between two columns of a table
+BLOCKS = {-1: "- J", 1: "+ J", 0: "."}
+
+
+def structure_lines(record: Record) -> list[str]:
+    """Lines for people about one cell."""
+    joints = sum(len(robot["joints"]) for robot in record["robots"])
+    counts = [(len(record["robots"]), "robot"), (joints, "joint"), (len(record["tasks"]), "task")]
+    holders = ", ".join(record["part"]["held_by"])
+    return [
+        f"{record['cell']}: {', '.join(_count(*each) for each in counts)}, mode {record['mode']}",
+        f"the part is held by {holders}" if holders else "the part is fixed in the world",
+        *_robot_lines(record["robots"]),
+        *_task_lines(record["tasks"]),
+        *_closure_lines(record["part"]),
+        *_graph_lines(record["graph"], [closure["name"] for closure in record["part"]["closures"]]),
+        *_circuit_lines(record),
+        *(line for matrix in record["matrices"] for line in _matrix_lines(matrix)),
+    ]
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def _robot_lines(robots: list[Record]) -> Iterator[str]:
+    for robot in robots:
+        duties = ["holds the part"] if robot["holds_part"] else []
+        duties += [f"works on {', '.join(robot['works_on'])}"] if robot["works_on"] else []
+        yield ""
+        yield from _wrapped(f"robot {robot['name']}  ({robot['model']}) ", " and ".join(duties) or "stands by")
+        name_width = max((len(axis["name"]) for axis in robot["joints"] + robot["followers"]), default=0)
+        for joint in robot["joints"]:
+            limits, speed = limits_text(joint)
+            yield f"  {joint['name']:<{name_width}}  {joint['type']:<9}  {limits:<24}  {speed}"
+        for axis in robot["followers"]:
+            yield f"  {axis['name']:<{name_width}}  {axis['type']:<9}  {axis['ratio']:g} times {axis['leader']}"
+
+
+def _task_lines(tasks: list[Record]) -> Iterator[str]:
+    yield ""
+    yield "tasks, and what they ask for on the part"
+    task_width, robot_width = _width(task["name"] for task in tasks), _width(task["robot"] for task in tasks)
+    for task in tasks:
+        wanted = [name for name in task["constrained"] if not name.startswith("across")]
+        wanted += ["tool axis (spin is free)"] if len(wanted) < len(task["constrained"]) else []
+        place = "" if task["relative_to"] == "part" else "  in the world"
+        yield f"  {task['name']:<{task_width}}  {task['robot']:<{robot_width}}  {' '.join(wanted)}{place}"
+
+
+def _closure_lines(part: Record) -> Iterator[str]:
+    closures = part["closures"]
+    if closures:
+        width = _width(closure["name"] for closure in closures)
+        yield ""
+        yield f"grasps that close a loop over the part and the world; {part['held_by'][0]} carries the part frame"
+        for closure in closures:
+            yield f"  {closure['name']:<{width}}  keeps {' '.join(closure['kept'])}"
+
+
+def _graph_lines(graph: Record, closures: list[str]) -> Iterator[str]:
+    """Counts, then every chain as the links it joins."""
+    e, v, circuits = graph["edges"], graph["vertices"], graph["independent_circuits"]
+    where = "PPPS, in space" if graph["plane"] is None else f"PPR, in the plane {graph['plane']}"
+    virtual = sum(joint["virtual"] for joint in graph["joints"])
+    yield ""
+    yield f"graph: {v} links (vertices), {e} joints (edges): {e - virtual} real, {virtual} virtual ({where})"
+    yield f"  l = e - v + 1 = {e} - {v} + 1 = {_count(circuits, 'independent circuit')}"
+    chains: dict[str, list[Record]] = {}
+    for joint in graph["joints"]:
+        chains.setdefault(_owner(joint, closures), []).append(joint)
+    width = _width(chains)
+    for owner, joints in chains.items():
+        steps = [f"-{_short(joint)}- {_link(joint['to'])}" for joint in joints]
+        yield from _wrapped(f"  {owner:<{width}}  ", " ".join([joints[0]["from"], *steps]))
+
+
+def _owner(joint: Record, closures: list[str]) -> str:
+    """Whose chain a joint belongs to: a robot's, a task's, or what the grasp of a further holder leaves open."""
+    if not joint["virtual"]:
+        return str(joint["owner"])
+    return f"{'grasp' if joint['owner'] in closures else 'task'} {joint['owner']}"
+
+
+def _circuit_lines(record: Record) -> Iterator[str]:
+    """The joints round each circuit, from the part on, with the sign with which each is passed."""
+    joints = {joint["name"]: joint for joint in record["graph"]["joints"]}
+    width = _width(joint["owner"] for joint in joints.values())
+    yield ""
+    yield "circuits: + where a joint is passed from its base side, - where it is passed against that"
+    for number, circuit in enumerate(record["circuits"], start=1):
+        by_owner: dict[str, list[str]] = {}
+        for step in _from_first_virtual(circuit["passed"], joints):
+            joint, sign = joints[step["joint"]], "+" if step["sign"] > 0 else "-"
+            by_owner.setdefault(joint["owner"], []).append(f"{sign}{_short(joint)}")
+        for place, (name, steps) in enumerate(by_owner.items()):
+            yield from _wrapped(f"  {number if place == 0 else '':<2} {name:<{width}}  ", " ".join(steps))
+
+
+def _from_first_virtual(passed: list[Record], joints: dict[str, Record]) -> list[Record]:
+    """A circuit as told from the first virtual joint on: along the virtual chain, then back over the robots.
+
+    A circuit without a virtual chain is told from the world on, up one robot that holds the part and down another.
+    """
+    virtual = [joints[step["joint"]]["virtual"] for step in passed]
+    upward = [step["sign"] > 0 and joints[step["joint"]]["from"] == "world" for step in passed]
+    marks = virtual if any(virtual) else upward
+    first = next((place for place, is_in in enumerate(marks) if is_in and not marks[place - 1]), 0)
+    return passed[first:] + passed[:first]
+
+
+def _matrix_lines(matrix: Record) -> Iterator[str]:
+    """The blocks as an arrow, then rank and redundancy."""
+    rows, columns = matrix["rows"], matrix["columns"]
+    of = "cooperation Jacobian" + (f" of the run {matrix['run']}" if matrix["run"] else "")
+    yield ""
+    yield f"{of}: {_count(rows, 'row')}, {_count(columns, 'column')}"
+    task_width = _width(matrix["row_blocks"])
+    for robots in _groups(matrix["column_blocks"], left=task_width + 6):
+        widths = [max(len(robot), 5) + GAP for robot in robots]
+        sizes = [str(matrix["column_blocks"][robot] or "still") for robot in robots]
+        yield f"  {'':<{task_width}}    " + "".join(f"{robot:>{w}}" for robot, w in zip(robots, widths, strict=True))
+        yield f"  {'':<{task_width}}    " + "".join(f"{size:>{w}}" for size, w in zip(sizes, widths, strict=True))
+        for task, size in matrix["row_blocks"].items():
+            signs = [BLOCKS[matrix["signs"][task][robot]] for robot in robots]
+            yield f"  {task:<{task_width}} {size:>2} " + "".join(
+                f"{sign:>{w}}" for sign, w in zip(signs, widths, strict=True)
+            )
+    yield from _rank_lines(matrix)
+
+
+def _rank_lines(matrix: Record) -> Iterator[str]:
+    rows, columns, rank = matrix["rows"], matrix["columns"], matrix["rank"]
+    if rank is None:
+        missing = ", ".join(matrix["starts_to_find"])
+        yield from _wrapped("  ", f"rank: not known, the start of {missing} is to be found (`cellplan check` finds it)")
+        if columns >= rows:
+            yield f"  degree of redundancy: {columns} - {rows} = {columns - rows} wherever the rows are independent"
+    else:
+        smallest = matrix["smallest_singular_value"]
+        yield f"  rank at the start: {rank}" + ("" if smallest is None else f", smallest singular value {smallest:.3g}")
+        yield f"  degree of redundancy: {columns} - {rank} = {matrix['redundancy']}"
+        if rank < rows:
+            yield (
+                f"  only {rank} of {rows} rows are independent there: "
+                f"{_count(rows - rank, 'direction')} in which the tools cannot move as asked"
+            )
+    if rank is None and columns < rows:
+        yield f"  more is asked for than the joints can give: {_count(rows, 'row')} for {_count(columns, 'column')}"
+
+
+def _groups(column_blocks: Record, *, left: int) -> Iterator[list[str]]:
+    """Robots in groups whose columns fit beside each other."""
+    group: list[str] = []
+    used = left
+    for robot in column_blocks:
+        need = max(len(robot), 5) + GAP
+        if group and used + need > WIDTH:
+            yield group
+            group, used = [], left
+        group.append(robot)
+        used += need
+    yield group
+
+
+def _wrapped(head: str, text: str) -> list[str]:
+    """A line that goes on below its own text when it is too long; words are never broken."""
+    return textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent=head,
+        subsequent_indent=" " * min(len(head), WIDTH // 2),
+        break_long_words=False,
+        break_on_hyphens=False,
+        drop_whitespace=True,
+    )
+
+
+def _width(names: Iterable[str]) -> int:
+    """Width of a column that takes all names."""
+    return max(map(len, names), default=0)
+
+
+def _short(joint: Record) -> str:
+    """A joint's own name, without that of its robot or task."""
+    name: str = joint["name"]
+    return name[len(joint["owner"]) + 1 :]
+
+
+def _link(link: str) -> str:
+    """A link's own name where it is only a number."""
+    last = link.replace(":", "/").rpartition("/")[2]
+    return last if last.isdigit() else link

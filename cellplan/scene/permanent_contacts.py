@@ -1,0 +1,235 @@
+"""Pairs that touch, or come near, in every configuration: a robot's own design, or a mistake in its mounting."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.collision.bodies import BodyPoses, checked_poses
+from cellplan.collision.distance import measure
+from cellplan.collision.engine import Engine
+from cellplan.collision.overlap.containment import is_inside
+from cellplan.collision.separation import heights
+from cellplan.geometry.transforms import Array
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Cell
+from cellplan.model.left_out import LeftOutKind
+from cellplan.model.robot import RobotModel
+from cellplan.model.seeds import generator
+from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, part_body
+from cellplan.scene.link_tree import LinkTree
+from cellplan.scene.mounting import (
+    MOUNT_DEPTH,
+    Mount,
+    MountedPair,
+    grasp_of,
+    is_of_own_file,
+    refuse_wrong_mounting,
+)
+from cellplan.scene.pairs import Excluded, Rule, ScenePair, near_in_chain, stands_on
+
+POSTURES: Final = 48  # random postures beside the reference; a pair that is free in one of ten escapes 0.6 % of trials
+HARDLY: Final = 1e-3  # [m] a distance that varies by less over all postures is a matter of mounting, not of motion
+ROUNDING: Final = 1e-6  # [m] poses are worked out to less than that: what stands on a floor may seem to float
+ENDLESS: Final = np.pi  # [rad] or [m] range sampled to either side of zero where a joint has no limit
+
+
+@dataclass(slots=True)
+class Design:
+    """What becomes of pairs that are near each other by design or by their mounting.
+
+    Attributes:
+        kept: Pairs that are watched, some of them for contact only.
+        excluded: Pairs that are not.
+        mounted: Those of them of which the depth is judged.
+    """
+
+    kept: list[ScenePair] = field(default_factory=list)
+    excluded: list[Excluded] = field(default_factory=list)
+    mounted: list[MountedPair] = field(default_factory=list)
+
+
+def apply_design(
+    cell: Cell,
+    bodies: Sequence[SceneBody],
+    pairs: Sequence[ScenePair],
+    *,
+    engine: Engine,
+    chains: Mapping[str, ScrewChain],
+) -> Design:
+    """Leave out what always touches by a robot's own design, and ask only for "no contact" where it sets the distance.
+
+    Looked at are pairs of one robot at the reference posture and at random ones within the joint limits:
+
+    - two links of its own file, with at most two joints between them or with a bar of a linkage, that touch in all of
+      them: left out; else checked for contact, not for distance;
+    - a tool or a held part that touches a link in all of them: an error of the cell, see ``refuse_wrong_mounting``;
+    - a tool or a held part against a link, at most two joints away, nearer than the demanded clearance in all of them,
+      or at a distance that hardly changes between them: checked for contact.
+
+    Where a flange has no body, tool and part may touch the link before it; how deep is judged. A robot whose foot has
+    no body may likewise stand with its first link in the surroundings, if it does so in every posture. The links of
+    each robot that holds the part are looked at as if it were the one that carries it.
+    """
+    sampled = _Sampled(cell, bodies, engine, chains)
+    design, faults = Design(), dict[tuple[int, str | None], list[int]]()
+    for pair in pairs:
+        holder = sampled.further_holder(pair)
+        a, b = (sampled.views[holder][index] for index in (pair.first, pair.second))
+        if stands_on(pair, bodies, cell=cell):
+            is_decided = sampled.always_stands(pair) and _stands(design, cell, pair)
+        elif is_of_own_file(a, b):
+            is_decided = near_in_chain(pair, bodies, cell=cell) and _own_links(design, sampled, pair)
+        elif a.robot is None or a.robot != b.robot or grasp_of(a, b, cell):
+            is_decided = False
+        elif _is_behind_flange(a, b, cell):
+            is_decided = True
+            _mount_behind(design, sampled, pair, holder)
+        elif sampled.always_touch(pair, holder):
+            is_decided = True
+            body, link = sorted((pair.first, pair.second), key=lambda index: bodies[index].kind is Kind.LINK)
+            faults.setdefault((body, holder), []).append(link)
+        else:
+            is_decided = near_in_chain(pair, sampled.views[holder], cell=cell)
+            if is_decided:
+                design.kept.append(_relaxed(pair, sampled, holder))
+        if not is_decided:
+            design.kept.append(pair)
+    refuse_wrong_mounting(cell, bodies, [(body, links) for (body, _), links in faults.items()])
+    return design
+
+
+class _Sampled:
+    """The bodies of a cell in some configurations, as they are and with the part on each further holder.
+
+    Attributes:
+        cell: The cell.
+        bodies: All solids.
+        engine: Those of them that are no half-spaces.
+        views: The bodies, by the further holder that carries the part; None for the first one.
+    """
+
+    def __init__(
+        self, cell: Cell, bodies: Sequence[SceneBody], engine: Engine, chains: Mapping[str, ScrewChain]
+    ) -> None:
+        """Draw the configurations; nothing is placed before it is asked for."""
+        self.cell, self.bodies, self.engine = cell, bodies, engine
+        self.views = _views(cell, bodies)
+        self._chains, self._postures = chains, _postures(cell)
+        self._poses: dict[str | None, BodyPoses] = {}
+
+    def further_holder(self, pair: ScenePair) -> str | None:
+        """The further holder that a pair belongs to, when the pair is one of its bodies and the part."""
+        ends = (self.bodies[pair.first], self.bodies[pair.second])
+        owner = next((body.robot for body in ends if body.kind is not Kind.PART), None)
+        return owner if any(body.kind is Kind.PART for body in ends) and owner in self.views else None
+
+    def poses(self, holder: str | None) -> BodyPoses:
+        """Where all bodies are."""
+        if holder not in self._poses:
+            self._poses[holder] = checked_poses(body_poses(self.views[holder], self._chains, self._postures))
+        return self._poses[holder]
+
+    def always_touch(self, pair: ScenePair, holder: str | None) -> bool:
+        """Whether two bodies touch in every configuration."""
+        engine, poses, (first, second) = self.engine, self.poses(holder), (pair.first, pair.second)
+        return all(
+            engine.touch(first, second, poses, sample=k) or is_inside(engine, (first, second), poses, sample=k)
+            for k in range(poses.p.shape[1])
+        )
+
+    def always_stands(self, pair: ScenePair) -> bool:
+        """Whether a link touches a thing in every configuration, rounding aside."""
+        poses, (first, second) = self.poses(None), (pair.first, pair.second)
+        if not is_ground(self.bodies[second]):
+            return self.distances(pair, None)[1] <= ROUNDING
+        height = heights(self.engine.bodies[first].hull, poses.R[first], poses.p[first], X_WS=self.bodies[second].X_BS)
+        return bool(np.all(height <= ROUNDING))
+
+    def distances(self, pair: ScenePair, holder: str | None) -> tuple[float, float]:
+        """Smallest and largest distance of two bodies in [m]."""
+        poses, ends = self.poses(holder), (pair.first, pair.second)
+        found = [measure(self.engine, ends, poses, sample=k).bound for k in range(poses.p.shape[1])]
+        return min(found), max(found)
+
+
+def _views(cell: Cell, bodies: Sequence[SceneBody]) -> dict[str | None, Sequence[SceneBody]]:
+    """The bodies as they are, and with the part on each further holder whose grasp leaves nothing open."""
+    views: dict[str | None, Sequence[SceneBody]] = {None: bodies}
+    for grasp in cell.closures:
+        if len(grasp.axes) == 6:
+            held = part_body(cell, cell.part, grasp)
+            views[grasp.robot] = [held if body.kind is Kind.PART else body for body in bodies]
+    return views
+
+
+def _postures(cell: Cell) -> dict[str, Array]:
+    """Reference posture and random ones within the limits, by robot, shape (POSTURES + 1, n)."""
+    return {robot.name: _random_postures(robot.model, generator(robot.name)) for robot in cell.robots}
+
+
+def _random_postures(model: RobotModel, rng: np.random.Generator) -> Array:
+    """Reference posture first, then random ones."""
+    lower = np.where(np.isfinite(model.lower), model.lower, -ENDLESS)
+    upper = np.where(np.isfinite(model.upper), model.upper, ENDLESS)
+    q = rng.uniform(lower, upper, size=(POSTURES + 1, len(model.joints)))
+    q[0] = 0.0
+    return q
+
+
+def _stands(design: Design, cell: Cell, pair: ScenePair) -> bool:
+    """Let a robot whose foot has no body stand with its first link in the surroundings."""
+    limit = cell.checks.standing_depth
+    reason = f"stands on it, as the foot has no body: may touch, at most {1e3 * limit:g} mm deep"
+    design.excluded.append(Excluded(pair.first, pair.second, reason, LeftOutKind.STANDING))
+    design.mounted.append(
+        MountedPair(first=pair.first, second=pair.second, mount=Mount.STANDING, limit=limit, moves=True)
+    )
+    return True
+
+
+def _own_links(design: Design, sampled: _Sampled, pair: ScenePair) -> bool:
+    """Leave out two near links of one robot's file that always touch; of the others only contact is looked for."""
+    if sampled.always_touch(pair, None):
+        reason = (
+            f"touch at the reference configuration and at {POSTURES} random ones: it is their shape, not the motion"
+        )
+        design.excluded.append(Excluded(pair.first, pair.second, reason))
+    else:
+        reason = "checked for contact only: two joints apart, their distance is set by the robot's design"
+        design.kept.append(replace(pair, rule=Rule.CONTACT, reason=reason))
+    return True
+
+
+def _is_behind_flange(a: SceneBody, b: SceneBody, cell: Cell) -> bool:
+    """Whether a tool, or a part that no tool holds, is on a flange without a body, and the other is the link before."""
+    mounted, link = (b, a) if a.kind is Kind.LINK else (a, b)
+    robot = cell.robot(str(link.robot))
+    if mounted.kind is not Kind.TOOL and (mounted.kind is not Kind.PART or robot.tool.bodies):
+        return False
+    return link.kind is Kind.LINK and LinkTree(robot.model).carrier(robot.model.flange_link) == link.link
+
+
+def _mount_behind(design: Design, sampled: _Sampled, pair: ScenePair, holder: str | None) -> None:
+    """Let a tool or part on a flange without a body touch the link before it; how deep is judged over the motion."""
+    cell, ends = sampled.cell, [sampled.views[holder][index] for index in (pair.first, pair.second)]
+    grasps = [grasp for grasp in cell.part.held_by if grasp.robot == ends[0].robot]
+    is_grip = Kind.PART in (ends[0].kind, ends[1].kind)
+    limit = grasps[0].depth if is_grip else MOUNT_DEPTH
+    kind, mount = (LeftOutKind.GRIP, Mount.GRIP) if is_grip else (LeftOutKind.MOUNTED, Mount.MOUNT)
+    reason = f"mounted on it, as the flange has no body: may touch, at most {1e3 * limit:g} mm deep"
+    design.excluded.append(Excluded(pair.first, pair.second, reason, kind))
+    design.mounted.append(MountedPair(first=pair.first, second=pair.second, mount=mount, limit=limit, moves=True))
+
+
+def _relaxed(pair: ScenePair, sampled: _Sampled, holder: str | None) -> ScenePair:
+    """The pair, checked for contact only where the distance between the two is a matter of their mounting."""
+    nearest, farthest = sampled.distances(pair, holder)
+    if farthest < pair.demand:
+        reason = "checked for contact only: nearer than the demanded clearance in every configuration by its mounting"
+        return replace(pair, rule=Rule.CONTACT, reason=reason)
+    if farthest - nearest <= HARDLY:
+        reason = "checked for contact only: the mounting sets their distance, the same in every configuration"
+        return replace(pair, rule=Rule.CONTACT, reason=reason)
+    return pair

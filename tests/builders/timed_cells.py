@@ -1,0 +1,120 @@
+"""Timed tasks of shipped cells and of random ones, and what is independent of the planner to judge their motion by."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from builders.lane_cells import everyone, relations, seen_poses
+from cellplan.checks.tools.tracking import errors_on_part
+from cellplan.geometry.transforms import Array
+from cellplan.io.cell.load import load_cell
+from cellplan.model.cell import Cell, Grasp
+from cellplan.model.motion import Motion, Schedule
+from cellplan.model.solver import Integrator
+from cellplan.model.task import SpacePolylinePath
+from cellplan.planning.collocation.joint_polynomials import JointPath
+from cellplan.planning.collocation.run import AccurateRun
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.plan_motion import resolve
+from cellplan.planning.timing.schedule import sample, time_tasks
+from cellplan.planning.timing.timed_path import TimedTasks, distinct
+from cellplan.planning.tracking.targets import closures
+
+SHIPPED = Path(__file__).parents[2] / "cells"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A cell, its tasks on the clock, who moves, and where it starts."""
+
+    cell: Cell
+    timed: TimedTasks
+    moving: tuple[str, ...]
+    start: Array
+
+    @property
+    def schedule(self) -> Schedule:
+        return sample(self.timed)
+
+    def resolved(self, **changes: Any) -> Motion:
+        """The motion, with changed solver settings."""
+        cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
+        return resolve(cell, self.timed, self.schedule, start=self.start, moving=self.moving)
+
+    def path(self, **changes: Any) -> JointPath:
+        """The whole motion as polynomials."""
+        cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
+        run = AccurateRun(cell, self.timed, start=self.start, moving=self.moving)
+        return run.path(self.start, begin=0.0, end=run.end)
+
+
+def case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | None = None) -> Case:
+    """All tasks of a cell at once."""
+    cell = replace(cell, solver=replace(cell.solver, integrator=Integrator.ACCURATE))
+    timed = time_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    if start is None:
+        start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
+    return Case(cell, timed, tuple(everyone(cell) if moving is None else moving), start)
+
+
+@cache
+def shipped(name: str) -> Cell:
+    """A cell of the folder ``cells`` that has start postures."""
+    return load_cell(SHIPPED / f"{name}.yaml")
+
+
+def slowly_clocked(cell: Cell, step: float, **changes: Any) -> Cell:
+    """The cell with another step of the clock and a feedback that goes with it."""
+    return replace(
+        cell,
+        motion=replace(cell.motion, step=step, **changes),
+        solver=replace(cell.solver, gain=0.5 / step),
+    )
+
+
+def largest_error(case: Case, path: JointPath, times: Array) -> float:
+    """Largest distance in [m] or angle in [rad] of any tool from where it belongs, by successive screws.
+
+    The times must increase and keep off the breaks, at which a target may have two values.
+    """
+    breaks = case.timed.breaks
+    place = np.clip(np.searchsorted(breaks, times, side="right"), 1, len(breaks) - 1)
+    within = (breaks[place - 1], breaks[place])
+    seen = seen_poses(case.cell, path.at(times))
+    wanted = [each.at(times, within)[0] for each in case.timed.paths]
+    wanted += [np.broadcast_to(grasp.X_PT, (len(times), 4, 4)) for grasp in closures(case.cell, case.moving)]
+    names = [each.task.name for each in case.timed.paths]
+    judged = [task for task in relations(case.cell) if isinstance(task, Grasp) or task.name in names]
+    worst = 0.0
+    for index, (task, poses) in enumerate(zip(judged, wanted, strict=True)):
+        error = errors_on_part(seen[:, index], poses, task)
+        worst = max(worst, *(float(np.linalg.norm(part, axis=1).max()) for part in (error[:, :3], error[:, 3:])))
+    return worst
+
+
+def between_samples(case: Case, path: JointPath, *, count: int = 10) -> Array:
+    """Instants strictly between all samples of the clock and the panels of a path, so many in each gap."""
+    ends = distinct(np.concatenate([case.timed.times, case.timed.breaks, [panel.end for panel in path.panels]]))
+    shares = (np.arange(count) + 0.5) / count
+    return (ends[:-1, None] + np.diff(ends)[:, None] * shares).ravel()
+
+
+def triangles(cell: Cell, *, side: float = 0.06, start: Array | None = None, **words: Any) -> Case:
+    """A random cell whose tools go along triangles in space that begin where they are at a start posture."""
+    q = np.random.default_rng(2).uniform(-1.0, 1.0, cell.joint_count) if start is None else start
+    seen = seen_poses(cell, q[None])[0]
+    tasks = []
+    for task, X in zip(cell.tasks, seen, strict=False):
+        corners = X[:3, 3] + side * np.array([[0.0, 0.0, 0.0], [1.0, 0.3, 0.2], [0.4, 0.9, -0.3]])
+        path = SpacePolylinePath(points=tuple(tuple(corner.tolist()) for corner in corners), is_closed=True)
+        plain = {"path": path, "tool_axis": X[:3, 2], "tool_x": X[:3, 0], "duration": None}
+        tasks.append(replace(task, **(plain | words)))
+    grasps = zip(cell.closures, seen[len(cell.tasks) :], strict=True)
+    held_by = cell.part.held_by[:1] + tuple(replace(grasp, X_PT=X) for grasp, X in grasps)
+    robots = tuple(replace(robot, start=q[cell.columns(robot.name)]) for robot in cell.robots)
+    part = replace(cell.part, held_by=held_by)
+    return case_of(replace(cell, tasks=tuple(tasks), robots=robots, part=part))

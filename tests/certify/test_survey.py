@@ -1,0 +1,68 @@
+"""What a survey ranks, and which bounds it raises: the same as looking at every pair each time."""
+
+import numpy as np
+import pytest
+from builders.moving_cells import cell_with_bodies
+
+from cellplan.certify import search
+from cellplan.certify import survey as ranks
+from cellplan.certify.survey import CLOSEST, SEARCH_ROOM, Survey, lowest_bounds
+from cellplan.collision.distance import SURELY_APART
+from cellplan.geometry.transforms import Array
+from cellplan.model.report import ClearanceClass
+from cellplan.scene.pairs import Rule
+from cellplan.scene.scene import Scene
+
+
+def wandering(scene: Scene, samples: int) -> Array:
+    rng = np.random.default_rng(5)
+    steps = rng.normal(scale=0.01, size=(samples, scene.cell.joint_count))
+    return rng.uniform(-1.0, 1.0, scene.cell.joint_count) + np.cumsum(steps, axis=0)
+
+
+def cutoff_by_definition(known: Array, scene: Scene, row: int) -> float:
+    """The last of the closest of all other pairs, or the nearest of the class, whichever is farther."""
+    kept = np.array([pair.rule is Rule.CLEARANCE for pair in scene.pairs])
+    kinds = np.array([pair.clearance_class for pair in scene.pairs])
+    if not kept[row]:
+        return SURELY_APART
+    others = np.sort(known[kept & (np.arange(len(known)) != row)])
+    last = others[CLOSEST - 1] if len(others) >= CLOSEST else np.inf
+    return max(SURELY_APART, max(known[kinds == kinds[row]].min(), last) - SEARCH_ROOM)
+
+
+def test_cutoffs_are_those_of_the_definition_whatever_is_found() -> None:
+    scene = Scene.from_cell(cell_with_bodies(1))
+    seen = Survey(scene, wandering(scene, 20))
+    known = np.full(len(scene.pairs), np.inf)
+    rng = np.random.default_rng(6)
+
+    for row in rng.integers(len(scene.pairs), size=25).tolist():
+        seen.found[row].distance = float(min(seen.found[row].distance, rng.choice([0.01, 0.02, rng.uniform()])))
+        if rng.uniform() < 0.05:
+            seen.found[row].touches.append(1.0)
+        seen.remember(row)
+        if seen.found[row].touches:
+            known[row] = 0.0
+        elif scene.pairs[row].rule is Rule.CLEARANCE:
+            known[row] = seen.found[row].distance
+        cutoffs = [seen.cutoff(each) for each in range(len(scene.pairs))]
+        assert cutoffs == [cutoff_by_definition(known, scene, each) for each in range(len(scene.pairs))]
+        assert seen.largest_cutoff() >= max(cutoffs)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_pairs_worked_on_few_at_a_time_give_the_same_bounds(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene.from_cell(cell_with_bodies(seed))
+    q = wandering(scene, 400)
+    at_once = search.survey(scene, q)
+
+    for module in (ranks, search):
+        monkeypatch.setattr(module, "ROWS_AT_ONCE", 7)
+    monkeypatch.setattr(search, "PAIR_WORK", 600)
+    in_pieces = search.survey(scene, q)
+
+    assert np.array_equal(in_pieces.low, at_once.low)
+    for kind in ClearanceClass:
+        rows = at_once.rows(kind)
+        assert np.array_equal(lowest_bounds(in_pieces, rows), at_once.low[rows].min(axis=0, initial=np.inf))

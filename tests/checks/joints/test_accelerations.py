@@ -1,0 +1,144 @@
+"""Accelerations and jerk of rows against motions that are known in closed form."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
+from cellplan.geometry.transforms import Array
+
+CYCLE = 0.004  # [s]
+
+
+def clock(step: float, duration: float = 1.0) -> Array:
+    return np.arange(round(duration / step) + 1) * step
+
+
+def quintic(times: Array) -> Array:
+    tau = times / times[-1]
+    return tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
+
+
+def ramp(times: Array) -> Array:
+    """Evenly up to speed during the first half, evenly down during the second: 4 /s2 all along."""
+    tau = times / times[-1]
+    return np.where(tau < 0.5, 2.0 * tau**2, 1.0 - 2.0 * (1.0 - tau) ** 2) * times[-1] ** 2
+
+
+def sizes(times: Array, positions: Array) -> Array:
+    return joint_accelerations(times, positions[:, None], cycle=CYCLE).values[:, 0]
+
+
+@pytest.mark.parametrize("step", [0.001, 0.004, 0.01, 0.02, 0.05])
+def test_a_quintic_from_rest_to_rest_has_its_peak_and_no_jump(step: float) -> None:
+    times = clock(step)
+    found = joint_accelerations(times, quintic(times)[:, None], cycle=CYCLE)
+
+    assert found.values.max() == pytest.approx(10.0 / np.sqrt(3.0), rel=0.03)
+    assert not found.is_jump.any()
+
+
+@pytest.mark.parametrize("step", [0.001, 0.004, 0.01, 0.02, 0.05])
+def test_even_speeding_up_from_rest_is_no_jump(step: float) -> None:
+    times = clock(step)
+    found = joint_accelerations(times, ramp(times)[:, None], cycle=CYCLE)
+
+    assert found.values.max() == pytest.approx(4.0, rel=1e-6)
+    assert not found.is_jump.any()
+
+
+@pytest.mark.parametrize("step", [0.001, 0.01])
+def test_speeds_that_grow_by_the_same_amount_in_every_step_are_no_jump(step: float) -> None:
+    speeds = 3.0 * step * np.concatenate([np.arange(1, 51), np.arange(50, 0, -1)])  # what a bounded solver does
+    positions = np.concatenate([[0.0], np.cumsum(speeds * step)])
+
+    assert sizes(clock(step, 100 * step), positions).max() == pytest.approx(3.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(("step", "over"), [(0.001, 0.001), (0.004, 0.004), (0.02, CYCLE), (0.05, CYCLE)])
+def test_a_motion_that_starts_and_ends_at_speed_jumps_over_the_step_or_the_cycle(step: float, over: float) -> None:
+    times = clock(step)
+    found = joint_accelerations(times, 0.3 * times[:, None], cycle=CYCLE)
+
+    assert found.values[[0, -1], 0] == pytest.approx([0.3 / over, 0.3 / over])
+    assert found.values[1:-1].max() < 1e-6
+    assert found.is_jump[[0, -1], 0].all()
+
+
+@pytest.mark.parametrize("step", [0.001, 0.02])
+def test_a_jump_in_the_middle_of_a_program_is_found(step: float) -> None:
+    times = clock(step)
+    found = joint_accelerations(times, np.maximum(times - 0.5, 0.0)[:, None], cycle=CYCLE)
+
+    k = int(np.searchsorted(times, 0.5 - 1e-9))
+    assert found.values[k, 0] == pytest.approx(1.0 / min(step, CYCLE))
+    assert found.is_jump[k, 0]
+
+
+def test_a_joint_that_stands_still_has_no_acceleration() -> None:
+    times = clock(0.001)
+    assert np.all(sizes(times, np.full(len(times), 1.2345)) == 0.0)
+
+
+def test_accelerations_of_a_point_on_a_circle() -> None:
+    times = clock(0.001)
+    angle = 2.0 * np.pi * quintic(times)
+    points = 0.5 * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+
+    found = np.linalg.norm(point_accelerations(times, points), axis=1)
+
+    middle = len(times) // 2  # fastest there, and not speeding up
+    assert found[middle] == pytest.approx(0.5 * (2.0 * np.pi * 1.875) ** 2, rel=1e-3)
+    assert found[0] == pytest.approx(0.0, abs=0.1)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=40), st.sampled_from([0.001, 0.004, 0.03]))
+def test_accelerations_times_the_step_add_up_to_nothing(speeds: list[float], step: float) -> None:
+    positions = np.concatenate([[0.2], 0.2 + np.cumsum(np.array(speeds) * step)])
+    times = clock(step, step * len(speeds))
+
+    change = point_accelerations(times, positions).sum() * step
+
+    assert change == pytest.approx(0.0, abs=1e-9)  # from rest to rest
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=40), st.sampled_from([0.001, 0.004, 0.03]))
+def test_a_motion_run_backwards_has_the_same_accelerations(speeds: list[float], step: float) -> None:
+    positions = np.concatenate([[0.2], 0.2 + np.cumsum(np.array(speeds) * step)])
+    times = clock(step, step * len(speeds))
+
+    assert sizes(times, positions[::-1])[::-1] == pytest.approx(sizes(times, positions), abs=1e-6)
+
+
+@pytest.mark.parametrize("step", [0.0005, 0.001, 0.003, 0.004, 0.01, 0.02])
+def test_jerk_of_a_quintic_is_right_for_steps_shorter_and_longer_than_the_window(step: float) -> None:
+    times = clock(step, 0.999 if step == 0.003 else 1.0)
+    found = jerks(times, point_accelerations(times, quintic(times))[:, None, None], window=CYCLE)
+
+    exact = 60.0 / times[-1] ** 3
+    assert exact * (1.0 - 10.0 * max(step, CYCLE)) <= found.max() <= exact * (1.0 + 1e-6)
+
+
+def test_a_jump_of_acceleration_counts_over_the_window_and_not_over_the_step() -> None:
+    times = clock(0.001)
+    found = jerks(times, point_accelerations(times, ramp(times))[:, None, None], window=CYCLE)
+
+    assert found.max() == pytest.approx(8.0 / CYCLE, rel=1e-6)  # from +4 to -4
+
+
+@pytest.mark.parametrize("window", [0.001, 0.0025, 0.004, 0.05, 3.0])
+def test_jerk_is_the_largest_change_over_any_window_of_that_length(window: float) -> None:
+    generator = np.random.default_rng(3)
+    times = clock(0.01, 0.4)
+    accelerations = generator.normal(size=len(times))
+    known = np.concatenate([[-0.01], times, [0.41]])
+    values = np.concatenate([[0.0], accelerations, [0.0]])
+    instants = np.concatenate([known, known - window])  # a piecewise linear change is largest at a corner
+    changes = np.interp(instants + window, known, values) - np.interp(instants, known, values)
+
+    found = jerks(times, accelerations[:, None, None], window=window)
+
+    assert found.max() * window == pytest.approx(np.abs(changes).max(), rel=1e-6)

@@ -1,0 +1,120 @@
+"""Work done aside: in a child that is no more than a help, and gone when it is no longer needed."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+from builders import crashing_jobs
+
+from cellplan.guard import Aside
+from cellplan.guard.background import processors
+
+pytestmark = pytest.mark.skipif(processors() < 2, reason="without a second processor nothing is done aside")
+
+
+@pytest.fixture
+def aside() -> Iterator[Aside]:
+    with Aside() as help_:
+        yield help_
+
+
+def lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_work_is_done_by_one_other_process_while_this_one_goes_on(aside: Aside) -> None:
+    first = aside.begin(crashing_jobs.process)
+    second = aside.begin(crashing_jobs.process)
+
+    assert first() == second() != os.getpid()
+
+
+def test_a_result_can_be_asked_for_twice_and_in_any_order(aside: Aside) -> None:
+    results = [aside.begin(crashing_jobs.same, number) for number in range(5)]
+
+    assert [result() for result in reversed(results)] == [4, 3, 2, 1, 0]
+    assert results[0]() == 0
+
+
+def test_large_work_both_ways_does_not_get_stuck(aside: Aside) -> None:
+    load = b"x" * 5_000_000  # many times what a pipe holds
+    results = [aside.begin(crashing_jobs.same, load) for _ in range(4)]
+
+    assert all(result() == load for result in results)
+
+
+def test_what_the_child_cannot_do_is_done_here(aside: Aside) -> None:
+    crashed = aside.begin(crashing_jobs.leave_unless_in, os.getpid())
+    waiting = aside.begin(crashing_jobs.process)
+
+    assert crashed() == "done at home"
+    assert waiting() == os.getpid()
+    assert aside.begin(crashing_jobs.process)() == os.getpid()
+
+
+def test_what_cannot_be_sent_is_done_here(aside: Aside) -> None:
+    lock = threading.Lock()
+
+    assert aside.begin(crashing_jobs.same, lock)() is lock
+
+
+def test_an_exception_is_that_of_the_work_itself(aside: Aside) -> None:
+    result = aside.begin(crashing_jobs.stumble)
+
+    with pytest.raises(KeyError, match="word"):
+        result()
+
+
+def test_without_leave_to_start_a_process_all_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", "/nowhere/python")
+
+    with Aside() as aside:
+        assert aside.begin(crashing_jobs.process)() == os.getpid()
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="only Linux binds a process to one processor")
+def test_without_a_second_processor_all_is_done_here() -> None:
+    code = (
+        "import os; os.sched_setaffinity(0, [min(os.sched_getaffinity(0))]); from cellplan.guard import Aside\n"
+        "with Aside() as aside: print(aside.begin(os.getpid)() == os.getpid())"
+    )
+
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+
+    assert run.stdout == "True\n"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="asks for a process as Linux and macOS do")
+def test_the_child_is_gone_at_the_end_even_in_the_middle_of_its_work() -> None:
+    began = time.monotonic()
+    with Aside() as aside:
+        child = aside.begin(crashing_jobs.process)()
+        aside.begin(crashing_jobs.sleep_long)
+        aside.begin(crashing_jobs.sleep_long)
+
+    assert not lives(child)
+    assert time.monotonic() - began < 30.0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="asks for a process as Linux and macOS do")
+def test_an_exception_of_this_process_ends_the_child_as_well() -> None:
+    children = []
+
+    def interrupted() -> None:
+        with Aside() as aside:
+            children.append(aside.begin(crashing_jobs.process)())
+            aside.begin(crashing_jobs.loop_forever)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+
+    assert not lives(children[0])

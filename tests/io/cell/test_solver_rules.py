@@ -1,0 +1,142 @@
+"""The integrator of a cell: accurate wherever it goes, refused by line where it does not."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cellplan.io.cell.load import load_cell
+from cellplan.io.cell.write import render_cell
+from cellplan.model.cell import Cell
+from cellplan.model.solver import Integrator
+
+Load = Callable[..., Cell]
+Refuse = Callable[..., list[str]]
+OR_EULER = "or choose solver.integrator: euler"
+
+
+def with_solver(settings: str) -> tuple[str, str]:
+    """The change that gives the small cell a solver, in line 22."""
+    return "environment:", f"solver: {{{settings}}}\nenvironment:"
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        "seed: 0",
+        "gain_per_s: 650",
+        "gain_per_s: 10, damping: 0.3",
+        "damping: 0",
+        "secondary: {}",
+        "weighting: {near_limits: 0, load: 0}",
+        "quadratic_program: {ramp_s: 1}",
+    ],
+)
+def test_nothing_said_means_accurate_where_the_rest_allows_it(load: Load, settings: str) -> None:
+    assert load().solver.integrator is Integrator.ACCURATE
+
+    solver = load(with_solver(settings)).solver
+
+    assert (solver.integrator, solver.is_accurate, solver.against_accurate) == (Integrator.ACCURATE, True, ())
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        "method: damped_least_squares",
+        "method: recursive_search",
+        "secondary: {posture: {}}",
+        "weighting: {near_limits: 0.1}",
+        "weighting: {load: 1}",
+    ],
+)
+def test_nothing_said_means_euler_where_the_accurate_mode_does_not_go(load: Load, settings: str) -> None:
+    solver = load(with_solver(settings)).solver
+
+    assert (solver.integrator, solver.is_accurate) == (Integrator.EULER, False)
+
+
+def test_euler_may_be_asked_for_with_everything(load: Load) -> None:
+    assert load(with_solver("integrator: euler")).solver.integrator is Integrator.EULER
+    assert load(with_solver("integrator: euler, method: quadratic_program")).solver.integrator is Integrator.EULER
+
+
+@pytest.mark.parametrize(
+    ("settings", "accuracy"),
+    [("seed: 0", 1e-7), ("accuracy_mm: 1", 1e-3), ("accuracy_mm: 2e-5, integrator: euler", 2e-8)],
+)
+def test_the_accuracy_is_read_in_millimetres(load: Load, settings: str, accuracy: float) -> None:
+    assert load(with_solver(settings)).solver.accuracy == pytest.approx(accuracy, rel=1e-15)  # a unit in the last place
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaints"),
+    [
+        (
+            "method: jacobian_transpose",
+            [
+                "c:22: solver.method: expected weighted_pseudo_inverse in the accurate mode, got 'jacobian_transpose'; "
+                f"choose it, {OR_EULER}"
+            ],
+        ),
+        (
+            "secondary: {manipulability: {}, posture: {}}",
+            [
+                "c:22: solver.secondary: expected no goals besides the tasks in the accurate mode, got manipulability, "
+                f"posture; remove them, {OR_EULER}"
+            ],
+        ),
+        (
+            "method: quadratic_program, weighting: {near_limits: 0.5, load: 1}",
+            [
+                "c:22: solver.method: expected weighted_pseudo_inverse in the accurate mode, got 'quadratic_program'; "
+                f"choose it, {OR_EULER}",
+                f"c:22: solver.weighting.near_limits: expected 0 in the accurate mode, got 0.5; remove it, {OR_EULER}",
+                f"c:22: solver.weighting.load: expected 0 in the accurate mode, got 1; remove it, {OR_EULER}",
+            ],
+        ),
+    ],
+)
+def test_what_is_in_the_way_of_the_accurate_mode_is_told_line_by_line(
+    refuse: Refuse, settings: str, complaints: list[str]
+) -> None:
+    assert refuse(with_solver(f"integrator: accurate, {settings}")) == complaints
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        ("integrator: rk4", "c:22: solver.integrator: expected accurate or euler, got 'rk4'"),
+        ("integrator: eulr", "c:22: solver.integrator: expected accurate or euler, got 'eulr', did you mean 'euler'?"),
+        ("accuracy_mm: 0", "c:22: solver.accuracy_mm: expected a positive number of millimetres, got 0"),
+        (
+            "accuracy_mm: 1e-10",
+            "c:22: solver.accuracy_mm: expected a number of millimetres of at least 1e-09, got 1e-10",
+        ),
+        ("accuracy_mm: 1.5", "c:22: solver.accuracy_mm: expected a number of millimetres of at most 1, got 1.5"),
+    ],
+)
+def test_other_integrators_and_accuracies_are_refused(refuse: Refuse, settings: str, complaint: str) -> None:
+    assert refuse(with_solver(settings)) == [complaint]
+
+
+@pytest.mark.parametrize("settings", ["seed: 0", "method: damped_least_squares", "integrator: euler, accuracy_mm: 0.3"])
+def test_the_integrator_that_was_taken_is_written_out(load: Load, tmp_path: Path, settings: str) -> None:
+    cell = load(with_solver(settings))
+    text = render_cell(cell)
+    (tmp_path / "again.yaml").write_text(text, encoding="utf-8")
+
+    again = load_cell(tmp_path / "again.yaml")
+
+    assert f"integrator: {cell.solver.integrator}" in text
+    assert (again.solver.integrator, again.solver.accuracy) == (cell.solver.integrator, cell.solver.accuracy)
+    assert "solver.integrator" in again.origin.lines
+    assert render_cell(again) == text
+
+
+def test_every_cell_of_the_papers_takes_steps_as_published(cells: Path) -> None:
+    named = {path.stem: load_cell(path) for path in (cells / "papers").glob("*.yaml")}
+
+    silent = [name for name, cell in named.items() if "solver.integrator" not in cell.origin.lines]
+    assert silent == []
+    assert {cell.solver.integrator for cell in named.values()} == {Integrator.EULER}

@@ -1,0 +1,166 @@
+"""The file format: its JSON Schema, and any spoiled cell refused with a line and nothing but our own errors."""
+
+import math
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cellplan.errors import InvalidFileError
+from cellplan.io.cell.load import load_cell
+from cellplan.io.input.findings import key_text
+from cellplan.io.schema import CellDocument, RobotTableDocument, json_schema
+from cellplan.io.yaml.reader import parse_yaml
+from cellplan.io.yaml.writer import yaml_text
+
+ROOT = Path(__file__).resolve().parents[3]
+Place = tuple[str | int, ...]
+
+
+def plain(value: Any) -> Any:
+    """Lists for tuples, so that values can be changed in place."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    return [plain(item) for item in value] if isinstance(value, tuple) else value
+
+
+def four_robots() -> dict[str, Any]:
+    data = (ROOT / "cells" / "four_robots.yaml").read_bytes()
+    return plain(parse_yaml(data, file="cell").root)
+
+
+def places(value: Any, path: Place = ()) -> list[Place]:
+    found = [path] if path else []
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, item in items:
+        found += places(item, (*path, key))
+    return found
+
+
+PLACES = places(four_robots())
+
+
+def owner(document: Any, place: Place) -> Any:
+    for key in place[:-1]:
+        document = document[key]
+    return document
+
+
+def told(text: str) -> list[str]:
+    """Complaints about a cell; none when it is accepted. Anything but our own error fails the test."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "cell.yaml"
+        path.write_text(text, encoding="utf-8")
+        try:
+            load_cell(path)
+        except InvalidFileError as error:
+            return [str(complaint).removeprefix(str(path)) for complaint in error.complaints]
+    return []
+
+
+def lines_of(complaints: list[str]) -> list[int]:
+    return [int(line.split(":")[1]) for line in complaints]
+
+
+@settings(max_examples=40, deadline=None)
+@given(place=st.sampled_from(PLACES))
+def test_a_dropped_key_is_a_default_or_a_located_complaint(place: Place) -> None:
+    document = four_robots()
+    del owner(document, place)[place[-1]]
+
+    text = yaml_text(document)
+
+    assert all(1 <= line <= len(text.splitlines()) for line in lines_of(told(text)))
+
+
+@settings(max_examples=40, deadline=None)
+@given(place=st.sampled_from([place for place in PLACES if isinstance(place[-1], str)]))
+def test_a_renamed_key_is_named_with_its_own_line(place: Place) -> None:
+    document = four_robots()
+    parent = owner(document, place)
+    renamed = {(f"{key}q" if key == place[-1] else key): value for key, value in parent.items()}
+    parent.clear()
+    parent.update(renamed)
+    new_place = (*place[:-1], f"{place[-1]}q")
+
+    text = yaml_text(document)
+    complaints = told(text)
+
+    names = {("robots",), ("tasks",), ("environment",)}
+    if place[:-1] not in names:  # names are free; elsewhere the key is unknown
+        line = parse_yaml(text.encode(), file="cell").keys[new_place].line
+        assert any(found.startswith(f":{line}: {key_text(new_place)}: unknown key") for found in complaints)
+
+
+WRONG = [True, "wrong word", [], {}, [1, 2], {"a": 1}, -1, 1e300, 5e-324, "", -7.5, ["x"], 10**25]
+
+
+@settings(max_examples=100, deadline=None)
+@given(place=st.sampled_from(PLACES), wrong=st.sampled_from(WRONG))
+def test_a_value_of_another_kind_is_fine_or_named_with_its_line(place: Place, wrong: Any) -> None:
+    document = four_robots()
+    owner(document, place)[place[-1]] = wrong
+
+    text = yaml_text(document)
+    complaints = told(text)
+
+    assert all(1 <= line <= len(text.splitlines()) for line in lines_of(complaints))
+    assert all("Input should" not in found and "<" not in found for found in complaints)
+    kind_differs = isinstance(wrong, bool | list | dict) and wrong not in ([], {})
+    if kind_differs and not isinstance(owner(four_robots(), place)[place[-1]], type(wrong)):
+        line = parse_yaml(text.encode(), file="cell").line(place)
+        assert any(found.startswith(f":{line}: {key_text(place)}") for found in complaints)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    place=st.sampled_from(
+        [place for place in PLACES if isinstance(owner(four_robots(), place)[place[-1]], int | float)]
+    ),
+    word=st.sampled_from([".nan", ".inf", "-.inf", "1e400", "010", "1:30", "0x10", "1_0", "no", "2020-01-01", "~"]),
+)
+def test_words_that_are_no_number_are_refused_where_they_stand(place: Place, word: str) -> None:
+    document = four_robots()
+    owner(document, place)[place[-1]] = 987654321
+    text = yaml_text(document)
+    line = parse_yaml(text.encode(), file="cell").line(place)
+
+    complaints = told(text.replace("987654321", word))
+
+    named = [found for found in complaints if f": {key_text(place)}: " in found]
+    assert named
+    assert named[0].startswith(f":{line}: ")
+
+
+def walk(node: Any) -> list[Any]:
+    children = node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()
+    return [node, *(found for child in children for found in walk(child))]
+
+
+def test_the_json_schema_is_closed_and_holds_no_null() -> None:
+    nodes = walk(json_schema())
+
+    objects = [
+        node for node in nodes if isinstance(node, dict) and node.get("type") == "object" and "properties" in node
+    ]
+    assert objects
+    assert all(node["additionalProperties"] is False for node in objects)
+    assert None not in nodes
+    assert {"type": "null"} not in nodes
+    assert all({"description", "$ref"} & set(field) for node in objects for field in node["properties"].values())
+
+
+@pytest.mark.parametrize("model", [CellDocument, RobotTableDocument])
+def test_every_key_with_a_unitless_name_is_not_a_length_or_an_angle(model: Any) -> None:
+    lengths = {"xyz", "rpy", "radius", "length", "size", "duration", "step", "feed", "clearance", "start_deg_s"}
+
+    properties = {name for node in walk(model.model_json_schema()) if isinstance(node, dict) for name in node}
+
+    assert not properties & lengths
+
+
+def test_defaults_of_the_schema_are_finite() -> None:
+    assert all(math.isfinite(node) for node in walk(json_schema()) if isinstance(node, float))

@@ -1,0 +1,134 @@
+"""Many postures at once against two other kinematics: successive screws and the combined model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders.lane_cells import CELLS, mixed_cell, postures
+from builders.random_cells import moved, random_cell, random_pose
+
+from cellplan.geometry.transforms import Array
+from cellplan.kinematics.batched import LaneChains, LaneState, Placement
+from cellplan.kinematics.pinocchio_model import CombinedModel
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Cell
+
+ROUNDING = 1e-13  # [-] products of a dozen matrices of order one, lengths of some metres
+LANES = 5
+
+
+def tools(state: LaneState) -> Array:
+    """Tool poses, shape (robots, lanes, 4, 4)."""
+    X = np.zeros((*state.p_WT.shape[1:], 4, 4))
+    X[..., :3, :3] = np.moveaxis(state.R_WT, (0, 1), (-2, -1))
+    X[..., :3, 3] = np.moveaxis(state.p_WT, 0, -1)
+    X[..., 3, 3] = 1.0
+    return X
+
+
+def screws_of(chains: LaneChains, state: LaneState, cell: Cell) -> Array:
+    """Screws of all joints at the world origin, from axes and points on them, shape (robots, lanes, 6, joints)."""
+    turning, sliding = chains.is_turning[:, :, None], chains.is_sliding[:, :, None]
+    linear = np.cross(state.points, state.axes, axis=0) * turning + state.axes * sliding
+    per_axis = np.concatenate([linear, state.axes * turning])
+    return np.einsum("ilrb,ljr->rbij", per_axis, chains.to_joints)
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_tools_stand_where_successive_screws_put_them(name: str) -> None:
+    cell, chains = CELLS[name], LaneChains(CELLS[name])
+    q = postures(cell, LANES)
+
+    found = tools(chains.state(q, chains.placement(cell)))
+
+    for robot, poses in zip(cell.robots, found, strict=True):
+        expected = ScrewChain(robot).tool_poses(q[cell.columns(robot.name)].T)
+        np.testing.assert_allclose(poses, expected, atol=100 * ROUNDING)
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_axes_are_the_screws_of_the_combined_model(name: str) -> None:
+    cell, chains, model = CELLS[name], LaneChains(CELLS[name]), CombinedModel(CELLS[name])
+    q = postures(cell, LANES)
+
+    found = screws_of(chains, chains.state(q, chains.placement(cell)), cell)
+
+    for lane in range(LANES):
+        state = model.state(q[:, lane])
+        for index, robot in enumerate(cell.robots):
+            columns = cell.columns(robot.name)
+            expected = state.screws_W[:, columns] * model.carries_flange[index, columns]
+            own = found[index, lane, :, : len(robot.model.joints)]
+            np.testing.assert_allclose(own, expected, atol=100 * ROUNDING)
+            assert not found[index, lane, :, len(robot.model.joints) :].any()
+
+
+def test_each_lane_may_have_its_own_bases_and_tools() -> None:
+    rng, template = np.random.default_rng(3), mixed_cell(5)
+    chains, q = LaneChains(template), postures(template, LANES)
+    cells = []
+    for _ in range(LANES):
+        robots = [
+            replace(r, X_WB=random_pose(rng), tool=replace(r.tool, X_FT=random_pose(rng))) for r in template.robots
+        ]
+        cells.append(replace(template, robots=tuple(robots)))
+    each = [chains.placement(cell) for cell in cells]
+    together = Placement(*(np.concatenate([getattr(p, part) for p in each], axis=-1) for part in Placement.__slots__))
+
+    found = tools(chains.state(q, together))
+
+    for lane, cell in enumerate(cells):
+        for index, robot in enumerate(cell.robots):
+            expected = ScrewChain(robot).tool_poses(q[cell.columns(robot.name), lane][None])[0]
+            np.testing.assert_allclose(found[index, lane], expected, atol=100 * ROUNDING)
+    picked = tools(chains.state(q[:, [3, 1]], together.of(np.array([3, 1]))))
+    np.testing.assert_allclose(picked, found[:, [3, 1]], atol=ROUNDING)
+    twice = tools(chains.state(np.repeat(q, 2, axis=1), together.repeated(2)))
+    np.testing.assert_allclose(twice, np.repeat(found, 2, axis=1), atol=ROUNDING)
+
+
+def test_one_placement_stands_for_all_lanes() -> None:
+    cell = random_cell(2, operators=1)
+    placement = LaneChains(cell).placement(cell)
+    assert placement.of(np.array([4, 7])) is placement
+    assert placement.repeated(3) is placement
+
+
+def test_moving_the_world_moves_all_tools_along() -> None:
+    cell, X = mixed_cell(8), random_pose(np.random.default_rng(1))
+    chains, q = LaneChains(cell), postures(cell, LANES)
+
+    here, there = (tools(chains.state(q, chains.placement(each))) for each in (cell, moved(cell, X)))
+
+    np.testing.assert_allclose(there, X @ here, atol=100 * ROUNDING)
+
+
+def test_what_is_plain_and_what_only_turns_is_known() -> None:
+    found = {name: LaneChains(CELLS[name]) for name in ("plain of equal arms", "followers", "mixed", "plain")}
+    assert {name: chains.is_plain for name, chains in found.items()} == {
+        "plain of equal arms": True,
+        "followers": False,
+        "mixed": False,
+        "plain": True,
+    }
+    assert found["plain"].is_all_turning
+    assert not found["followers"].is_all_turning
+
+
+def test_columns_name_the_joints_of_each_robot() -> None:
+    cell = mixed_cell(5)
+    chains = LaneChains(cell)
+    for index, robot in enumerate(cell.robots):
+        own = chains.columns[:, index]
+        columns = cell.columns(robot.name)
+        assert own[own >= 0].tolist() == list(range(columns.start, columns.stop))
+
+
+def test_a_robot_on_its_own_base_has_a_tool_that_rests() -> None:
+    cell = mixed_cell(5)
+    robot = cell.robot("op2")
+    index = [each.name for each in cell.robots].index("op2")
+    chains = LaneChains(cell)
+    found = tools(chains.state(postures(cell, LANES), chains.placement(cell)))[index]
+    expected = robot.X_WB @ robot.model.X_BF @ robot.tool.X_FT
+    np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=10 * ROUNDING)

@@ -1,0 +1,231 @@
+"""The tasks at many postures against the planner's Jacobian, its dense inverse and derivatives."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from builders.lane_cells import CELLS, everyone, postures, random_wanted, relations, seen_poses
+
+from cellplan.geometry.transforms import Array, inverse, rotation_exp, rotation_vector
+from cellplan.kinematics.pinocchio_model import CombinedModel
+from cellplan.model.cell import Cell
+from cellplan.planning.collocation.batch_tasks import LaneTasks, Look, Wanted
+from cellplan.planning.tracking.cooperation_jacobian import (
+    column_signs,
+    constraint_rows,
+    cooperation_jacobian,
+    pose_errors,
+    reference_frames,
+)
+from cellplan.planning.tracking.weighted_inverse import WeightedInverse
+
+LANES = 3
+H = 1e-6  # [-] step of differences
+ONES = {name: np.ones(cell.joint_count) for name, cell in CELLS.items()}
+
+
+class Dense:
+    """The tasks of one cell at one posture by the planner's other way: rows over the stacked joint vector."""
+
+    def __init__(self, cell: Cell, q: Array, X: Array, twists: Array, *, moving: list[str], mobile: Array) -> None:
+        tasks, model = relations(cell), CombinedModel(cell)
+        state = model.state(q)
+        names = everyone(cell)
+        X_WT = state.X_WT[[names.index(task.robot) for task in tasks]]
+        X_WR = reference_frames(state, tasks)
+        signs = column_signs(cell, model, tasks, moving) * mobile
+        J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
+        error = pose_errors(X, inverse(X_WR) @ X_WT, [task.is_spin_free for task in tasks])
+        picks = [constraint_rows(task, X[None, index])[0] for index, task in enumerate(tasks)]
+        self.J = np.concatenate([pick @ block for pick, block in zip(picks, J, strict=True)])
+        self.error = np.concatenate([pick @ part for pick, part in zip(picks, error, strict=True)])
+        self.twist = np.concatenate([pick @ twist for pick, twist in zip(picks, twists.T, strict=True)])
+        self.weights = np.concatenate([robot.weights for robot in cell.robots])
+
+    @property
+    def inverse(self) -> WeightedInverse:
+        return WeightedInverse(self.J, self.weights)
+
+    @property
+    def rank(self) -> int:
+        return int(np.linalg.matrix_rank(self.J))
+
+
+def looked(
+    cell: Cell, q: Array, wanted: Wanted, *, moving: list[str] | None = None, mobile: Array | None = None
+) -> Look:
+    tasks = LaneTasks(cell, relations(cell), moving or everyone(cell))
+    mobile = np.ones(cell.joint_count) if mobile is None else mobile
+    return tasks.look(q, wanted, tasks.chains.placement(cell), mobile=mobile)
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_errors_are_those_of_the_planner_in_the_rows_that_a_task_keeps(name: str) -> None:
+    cell = CELLS[name]
+    q, tasks = postures(cell, LANES), LaneTasks(cell, relations(cell), everyone(cell))
+    wanted, X = random_wanted(len(relations(cell)), LANES)
+
+    found = tasks.task_errors(q, wanted, tasks.chains.placement(cell))
+
+    seen = seen_poses(cell, q.T)
+    for lane in range(LANES):
+        free = [task.is_spin_free for task in relations(cell)]
+        expected = pose_errors(X[lane], seen[lane], free)
+        for index, task in enumerate(relations(cell)):
+            rows = constraint_rows(task, X[lane, None, index])[0]
+            np.testing.assert_allclose(rows @ found[:, index, lane], rows @ expected[index], atol=1e-11)
+            kept = rows.T @ rows  # onto what the rows keep; nothing is left beside them
+            np.testing.assert_allclose(kept @ found[:, index, lane], found[:, index, lane], atol=1e-11)
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_speeds_are_the_smallest_weighted_ones_and_the_drift_that_no_task_notices(name: str) -> None:
+    cell = CELLS[name]
+    q = postures(cell, LANES)
+    wanted, X = random_wanted(len(relations(cell)), LANES)
+    drift = np.random.default_rng(5).normal(size=cell.joint_count)
+    look = looked(cell, q, wanted)
+
+    plain, drifting = look.speeds(), look.speeds(drift)
+
+    for lane in range(LANES):
+        dense = Dense(cell, q[:, lane], X[lane], wanted.twists[..., lane], moving=everyone(cell), mobile=ONES[name])
+        assert dense.rank == len(dense.J), "drawn so that all tasks can be done"
+        expected = dense.inverse.speeds(dense.twist, 0.0)
+        room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2  # damping of 1e-10, some ten rows
+        np.testing.assert_allclose(plain[:, lane], expected, atol=room * np.abs(expected).max())
+        expected += dense.inverse.unnoticed(drift)
+        np.testing.assert_allclose(drifting[:, lane], expected, atol=room * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_corrections_lead_onto_the_tasks_in_quadratic_steps(name: str) -> None:
+    """Newton's method from 1e-2 beside: 1e-4, 1e-8, then rounding, whatever the factor."""
+    cell = CELLS[name]
+    goal = postures(cell, LANES)
+    X = seen_poses(cell, goal.T)
+    wanted = Wanted(
+        np.moveaxis(X[..., :3, :3], (0, 1), (3, 2)),
+        np.moveaxis(X[..., :3, 3], (0, 1), (2, 1)),
+        np.zeros((6, X.shape[1], LANES)),
+    )
+    q = goal + 2e-4 * postures(cell, LANES, seed=9)
+    found = []
+    for _ in range(6):
+        look = looked(cell, q, wanted)
+        found.append(np.abs(look.errors).max())
+        q = q + look.correction(np.zeros_like(q))
+
+    assert found[0] > 1e-5
+    assert found[-1] <= 1e-13 * 50.0  # lengths of some ten metres
+    assert any(after <= 1e4 * before**2 for before, after in pairwise(found) if before > 1e-6)
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_a_correction_allows_for_what_the_posture_moves_anyway(name: str) -> None:
+    """``J (d + J^# (e - J d)) = e`` for any ``d``."""
+    cell = CELLS[name]
+    q, d = postures(cell, LANES), postures(cell, LANES, seed=4)
+    wanted, X = random_wanted(len(relations(cell)), LANES)
+
+    total = d + looked(cell, q, wanted).correction(d)
+
+    for lane in range(LANES):
+        dense = Dense(cell, q[:, lane], X[lane], wanted.twists[..., lane], moving=everyone(cell), mobile=ONES[name])
+        room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2
+        np.testing.assert_allclose(dense.J @ total[:, lane], dense.error, atol=room * 10.0)
+
+
+@pytest.mark.parametrize("name", [name for name in CELLS if name not in ("carried", "world", "mixed")])
+def test_a_part_at_rest_is_left_to_the_operators(name: str) -> None:
+    cell = CELLS[name]
+    operators = [task.robot for task in cell.tasks]
+    at_rest = replace(cell, part=replace(cell.part, held_by=cell.part.held_by[:1]))  # further holders rest as well
+    q = postures(cell, LANES)
+    wanted, X = random_wanted(len(cell.tasks), LANES)
+    look = looked(at_rest, q, wanted, moving=operators)
+
+    speeds = look.speeds()
+
+    for robot in cell.robots:
+        assert robot.name in operators or not speeds[cell.columns(robot.name)].any()
+    for lane in range(LANES):
+        twists = wanted.twists[..., lane]
+        dense = Dense(at_rest, q[:, lane], X[lane], twists, moving=operators, mobile=ONES[name])
+        expected = np.linalg.pinv(dense.J / np.sqrt(dense.weights), rcond=1e-9) @ dense.twist / np.sqrt(dense.weights)
+        if dense.rank == len(dense.J):
+            scale = (dense.inverse.largest / dense.inverse.smallest) ** 2
+            np.testing.assert_allclose(speeds[:, lane], expected, atol=1e-8 * scale * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_locked_joints_get_exactly_nothing_and_the_others_make_up_for_it(name: str) -> None:
+    cell = CELLS[name]
+    q = postures(cell, LANES)
+    mobile = np.ones(cell.joint_count)
+    mobile[[0, cell.columns(cell.tasks[0].robot).start]] = 0.0
+    wanted, X = random_wanted(len(relations(cell)), LANES)
+    look = looked(cell, q, wanted, mobile=mobile)
+    drift = np.ones(cell.joint_count)
+
+    for found in (look.speeds(), look.speeds(drift), look.correction(np.zeros_like(q))):
+        assert not found[mobile == 0.0].any()
+    for lane in range(LANES):
+        dense = Dense(cell, q[:, lane], X[lane], wanted.twists[..., lane], moving=everyone(cell), mobile=mobile)
+        if dense.rank == len(dense.J):
+            room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2
+            expected = dense.inverse.speeds(dense.twist, 0.0)
+            np.testing.assert_allclose(look.speeds()[:, lane], expected, atol=room * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", ["plain", "sliding", "followers", "mixed", "fixture", "closed", "carried"])
+def test_speeds_move_the_tools_as_wanted(name: str) -> None:
+    """By central differences of poses from successive screws: shares no code with the lanes."""
+    cell = CELLS[name]
+    q = postures(cell, LANES)
+    wanted, _ = random_wanted(len(relations(cell)), LANES)
+    speeds = looked(cell, q, wanted).speeds()
+
+    ahead, behind = (seen_poses(cell, (q + h * speeds).T) for h in (H, -H))
+
+    linear = (ahead - behind)[..., :3, 3] / (2.0 * H)
+    angular = rotation_vector(ahead[..., :3, :3] @ np.swapaxes(behind[..., :3, :3], -1, -2)) / (2.0 * H)
+    found = np.moveaxis(np.concatenate([linear, angular], axis=-1), -1, 0)
+    expected = np.swapaxes(wanted.twists, 1, 2)
+    scale = np.abs(speeds).max()
+    np.testing.assert_allclose(found, expected, atol=1e-7 * max(scale, 1.0) ** 2)  # damping, and eps / H of rounding
+
+
+def test_what_belongs_to_the_joints_is_sorted_there_and_back() -> None:
+    for cell in CELLS.values():
+        tasks = LaneTasks(cell, relations(cell), everyone(cell))
+        q = postures(cell, LANES)
+        working = np.zeros(cell.joint_count, dtype=bool)
+        for name in {*cell.positioners[:1], *(task.robot for task in relations(cell))}:
+            working[cell.columns(name)] = True
+        np.testing.assert_array_equal(tasks.stacked(*tasks.unstacked(q)), q * working[:, None])
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-7, 1e-3, 1.0, 3.0, np.pi - 1e-5, np.pi])
+@pytest.mark.parametrize("name", ["plain", "spin"])
+def test_errors_of_any_size_are_seen(name: str, angle: float) -> None:
+    cell = CELLS[name]
+    q, tasks = postures(cell, 1), LaneTasks(cell, relations(cell), everyone(cell))
+    X = seen_poses(cell, q.T)[0]
+    axis = np.array([0.6, -0.8, 0.0])  # across the tool's axis, so that free spin does not hide it
+    R = X[:, :3, :3] @ rotation_exp(angle * axis)
+    wanted = Wanted(np.moveaxis(R, 0, -1)[..., None], X[:, :3, 3].T[..., None], np.zeros((6, len(X), 1)))
+
+    found = tasks.errors(q, wanted, tasks.chains.placement(cell))
+
+    np.testing.assert_allclose(np.linalg.norm(found[3:, :, 0], axis=0), angle, atol=1e-9)
+    np.testing.assert_allclose(found[:3], 0.0, atol=1e-12)
+
+
+def test_wanted_poses_are_cut_and_repeated() -> None:
+    wanted, _ = random_wanted(2, 6)
+    part = wanted.between(2, 5)
+    assert np.array_equal(part.R, wanted.R[..., 2:5])
+    assert wanted.repeated(1) is wanted
+    assert np.array_equal(part.repeated(2).twists, np.concatenate([part.twists, part.twists], axis=-1))

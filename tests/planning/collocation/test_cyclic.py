@@ -1,0 +1,147 @@
+"""Cycles that close, each on its own, and repeat each other where they are alike."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from builders.lane_cells import CELLS
+from builders.planar_arms import planar_cell
+from builders.random_cells import make_task
+from builders.timed_cells import Case, between_samples, case_of, largest_error, shipped, slowly_clocked, triangles
+
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import LockedJoint
+from cellplan.model.solver import SolverSettings
+from cellplan.model.task import CirclePath, PlaneName, StraightMove, TimeLaw, TimeLawKind
+from cellplan.planning.collocation.cyclic import PERIODIC, closed_path
+from cellplan.planning.collocation.joint_polynomials import JointPath
+from cellplan.planning.collocation.run import AccurateRun
+from cellplan.planning.tracking.problem import TrackingProblem
+
+CONSTANT = TimeLaw(kind=TimeLawKind.CONSTANT)
+MOVES = {"approach": StraightMove(distance=0.02, duration=0.5), "retract": StraightMove(distance=0.02, duration=0.5)}
+
+
+def cyclic(case: Case, cycles: int, *, step: float = 0.05, **words: Any) -> Case:
+    """The same paths so many times, 1 s each, on a slow clock."""
+    words = {"repeat": cycles, "duration": float(cycles), "start": 0.0} | words
+    tasks = tuple(replace(task, **words) for task in case.cell.tasks)
+    leaving = 0.5 if words.get("retract") else 0.0
+    motion = {"cyclic": True, "duration": words["start"] + cycles + leaving}
+    return case_of(slowly_clocked(replace(case.cell, tasks=tasks), step, **motion), start=case.start)
+
+
+def circling(**words: Any) -> Case:
+    """A planar arm with two joints to spare whose tip goes round and round without a stop."""
+    start = np.array([0.4, 0.7, -0.5, 0.9])
+    cell = planar_cell([1.0] * 4, SolverSettings(method="weighted_pseudo_inverse", gain=10.0, damping=None, seed=0))
+    tip = ScrewChain(cell.robots[0]).tool_poses(start[None])[0, :3, 3]
+    path = CirclePath(plane=PlaneName.XY, center=(tip[0] - 0.3, tip[1]), radius=0.3)
+    words = {"path": path, "axes": (0, 1), "tool_axis": np.eye(3)[2], "time_law": CONSTANT} | words
+    return Case(replace(cell, tasks=(make_task("arm", **words),)), None, ("arm",), start)  # type: ignore[arg-type]
+
+
+def closed(case: Case) -> JointPath:
+    run = AccurateRun(case.cell, case.timed, start=case.start, moving=case.moving)
+    problem = TrackingProblem(case.cell, case.schedule, case.moving, start=case.start)
+    path = closed_path(run, problem, case.schedule, start=case.start)
+    assert path is not None
+    return path
+
+
+def drift(path: JointPath, ends: list[float]) -> np.ndarray:
+    """Largest difference of any joint between the ends of neighbouring cycles, shape (cycles,)."""
+    moved: np.ndarray = np.abs(np.diff(path.at(np.array(ends)), axis=0)).max(axis=1)
+    return moved
+
+
+@pytest.mark.parametrize("name", ["plain", "sliding", "mixed", "closed", "spin and partial"])
+def test_joints_come_back_in_every_cycle_and_no_task_notices(name: str) -> None:
+    case = cyclic(triangles(CELLS[name]), 3)
+    path = closed(case)
+
+    assert drift(path, [0.0, 1.0, 2.0, 3.0]).max() <= 1e-9
+    open_ended = replace(case, cell=replace(case.cell, motion=replace(case.cell.motion, cyclic=False))).path()
+    assert drift(open_ended, [0.0, 1.0, 2.0, 3.0]).min() > 1e-7
+    assert largest_error(case, path, between_samples(case, path, count=2)) <= 1e-7
+
+
+def test_cycles_that_are_alike_are_the_same_motion_to_the_last_digit() -> None:
+    path = closed(cyclic(circling(), 25))
+    t = np.linspace(0.01, 0.99, 30)
+    first = path.at(t)
+    for cycle in (1, 7, 24):
+        np.testing.assert_allclose(path.at(cycle + t), first, atol=1e-12)  # rounding of the instants
+    assert drift(path, [float(k) for k in range(26)]).max() <= 1e-9
+
+
+@pytest.mark.parametrize("cycles", [2, 3])
+def test_cycles_under_one_law_close_each_on_its_own(cycles: int) -> None:
+    """They take different times, or go the other way through the same speeds: none is the other once more."""
+    case = cyclic(circling(time_law=TimeLaw(kind=TimeLawKind.QUINTIC)), cycles)
+    (task,) = case.schedule.tasks
+    path = closed(case)
+    assert drift(path, [0.0, *task.cycle_ends]).max() <= PERIODIC
+    assert largest_error(case, path, between_samples(case, path, count=2)) <= 1e-7
+
+
+def test_coming_and_leaving_are_no_part_of_the_cycle() -> None:
+    case = cyclic(triangles(CELLS["mixed"]), 3, step=0.01, start=0.5, **MOVES)
+    path = closed(case)
+    assert drift(path, [0.5, 1.5, 2.5, 3.5]).max() <= PERIODIC
+    assert path.end == pytest.approx(4.0)
+    times = between_samples(case, path, count=2)
+    assert largest_error(case, path, times[times > 0.5]) <= 1e-7
+
+
+def test_a_start_beside_the_path_spoils_the_first_cycle_only() -> None:
+    case = cyclic(triangles(CELLS["mixed"]), 4)
+    path = closed(replace(case, start=case.start + 1e-5))
+    found = drift(path, [0.0, 1.0, 2.0, 3.0, 4.0])
+    assert 1e-6 < found[0] < 1e-3
+    assert found[1:].max() <= PERIODIC
+
+
+@pytest.mark.parametrize("since", [0.0, 1.3, 9.0])
+def test_cycles_close_before_and_after_a_joint_fails(since: float) -> None:
+    case = cyclic(triangles(CELLS["mixed"]), 3)
+    lock = LockedJoint(robot="op1", joint="j1", since=since)
+    case = replace(case, cell=replace(case.cell, motion=replace(case.cell.motion, locked=(lock,))))
+    path = closed(case)
+    found = drift(path, [0.0, 1.0, 2.0, 3.0])
+    assert found.max() <= 1e-8
+    assert largest_error(case, path, between_samples(case, path, count=2)) <= 1e-7
+
+
+def test_a_coarse_accuracy_does_not_keep_cycles_from_closing() -> None:
+    case = cyclic(triangles(CELLS["mixed"]), 2)
+    coarse = replace(case.cell, solver=replace(case.cell.solver, accuracy=1e-3))
+    assert drift(closed(replace(case, cell=coarse)), [0.0, 1.0, 2.0]).max() <= 1e-9
+
+
+def test_tasks_without_a_common_cycle_close_over_the_whole_motion() -> None:
+    case = cyclic(triangles(CELLS["mixed"]), 6)
+    counts = zip(case.cell.tasks, (1, 2, 3, 6), strict=True)
+    cell = replace(case.cell, tasks=tuple(replace(task, repeat=count) for task, count in counts))
+    path = closed(case_of(cell, start=case.start))
+    assert drift(path, [0.0, 6.0]).max() <= 1e-9
+
+
+def test_no_way_through_a_cycle_leaves_it_to_the_steps() -> None:
+    case = cyclic(circling(), 2)
+    (task,) = case.cell.tasks
+    far = replace(task.path, radius=4.5, center=(task.path.center[0] - 4.2, task.path.center[1]))
+    case = case_of(replace(case.cell, tasks=(replace(task, path=far),)), start=case.start)
+    run = AccurateRun(case.cell, case.timed, start=case.start, moving=case.moving)
+    problem = TrackingProblem(case.cell, case.schedule, case.moving, start=case.start)
+    assert closed_path(run, problem, case.schedule, start=case.start) is None
+
+
+@pytest.mark.slow
+def test_nicolato_s_ellipse_closes_in_each_of_25_cycles() -> None:
+    cell = shipped("papers/nicolato_ellipse")
+    case = case_of(replace(cell, motion=replace(cell.motion, step=0.0025, cyclic=True)))
+    found = np.abs(np.diff(case.resolved().q[::800], axis=0)).max(axis=1)
+    assert found[0] <= 1e-8  # the start posture is written with nine decimals
+    assert found[1:].max() <= 1e-11

@@ -1,0 +1,185 @@
+"""Resolving a run: the accurate mode against Euler's steps, and what happens where it finds no way on."""
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from builders.lane_cells import CELLS
+from builders.planar_arms import planar_cell
+from builders.random_cells import make_task
+from builders.timed_cells import Case, case_of, shipped, slowly_clocked, triangles
+
+from cellplan.errors import DivergedError, InputError, NoSolutionError
+from cellplan.geometry.transforms import Array
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.solver import Integrator, SolverSettings
+from cellplan.model.task import SpacePolylinePath
+
+EULER = Integrator.EULER
+
+
+def arm(points: list[Any], start: list[float], *, step: float = 1e-3, damping: float | None = None) -> Case:
+    """A planar arm of links of 1 m whose tip goes along straight lines from where it is in 1 s."""
+    solver = SolverSettings(method="weighted_pseudo_inverse", gain=0.5 / step, damping=damping, seed=0)
+    cell = planar_cell([1.0] * len(start), solver)
+    q = np.array(start)
+    tip = ScrewChain(cell.robots[0]).tool_poses(q[None])[0, :3, 3]
+    path = SpacePolylinePath(points=tuple((float(x), float(y), 0.0) for x, y in [tip[:2], *points]), is_closed=False)
+    task = make_task("arm", path=path, axes=(0, 1), tool_axis=np.eye(3)[2], tolerance=cell.tasks[0].tolerance)
+    return case_of(replace(cell, tasks=(task,), motion=replace(cell.motion, step=step)), start=q)
+
+
+def tips(case: Case, q: Array) -> Array:
+    found: Array = ScrewChain(case.cell.robots[0]).tool_poses(q)[:, :2, 3]
+    return found
+
+
+def test_euler_s_steps_lead_to_the_same_posture_the_better_the_shorter_they_are() -> None:
+    """What is left falls with the step; twice the better minus the worse is better than both."""
+    case = case_of(shipped("four_robots"))
+    accurate = case.resolved().q[-1]
+    coarse, fine, finest = (
+        case_of(slowly_clocked(case.cell, step)).resolved(integrator=EULER).q[-1] for step in (0.02, 0.01, 0.005)
+    )
+
+    gaps = [np.abs(q - accurate).max() for q in (coarse, fine, finest)]
+    assert gaps[2] < np.radians(0.05)
+    assert gaps[0] / gaps[1] == pytest.approx(2.0, rel=0.2)  # first order: Euler's drift in the null space
+    assert gaps[1] / gaps[2] == pytest.approx(2.0, rel=0.1)
+    assert np.abs(2.0 * finest - fine - accurate).max() < np.radians(0.01)
+    roughly = case.resolved(accuracy=1e-6).q[-1]
+    assert np.abs(2.0 * finest - fine - roughly).max() < np.radians(0.02)
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_random_cells_agree_with_short_steps(name: str) -> None:
+    case = triangles(slowly_clocked(CELLS[name], 0.005))
+    accurate, stepped = case.resolved().q, case.resolved(integrator=EULER).q
+    assert np.abs(accurate - stepped)[-1].max() < np.radians(0.02)
+
+
+def test_the_same_input_gives_the_same_bytes() -> None:
+    case = triangles(CELLS["mixed"])
+    one, other = case.resolved(), case.resolved()
+    assert one.q.tobytes() == other.q.tobytes()
+    assert one.resolution == other.resolution
+
+
+def test_more_accuracy_takes_more_work_and_gives_less_error() -> None:
+    case = triangles(CELLS["mixed"], side=0.15)
+    exact = case.resolved(accuracy=1e-12).q
+    loose, tight = (case.resolved(accuracy=accuracy) for accuracy in (1e-4, 1e-8))
+
+    assert loose.resolution.solves < tight.resolution.solves
+    assert np.abs(tight.q - exact).max() < 0.05 * np.abs(loose.q - exact).max()
+    assert np.abs(tight.q - exact).max() < 1e-6
+
+
+def test_an_account_is_kept() -> None:
+    motion = triangles(CELLS["mixed"]).resolved()
+    found = motion.resolution
+    assert found.integrator is Integrator.ACCURATE
+    assert found.nodes == 6 * 24 + 1  # three sides in two panels each
+    assert found.panels == 6
+    assert found.sweeps > 0
+    assert found.solves >= found.nodes
+    assert found.euler_from is None
+    stepped = triangles(CELLS["mixed"]).resolved(integrator=EULER).resolution
+    assert (stepped.integrator, stepped.nodes, stepped.solves, stepped.error_between) == (EULER, 1001, 1000, None)
+
+
+def test_near_a_singularity_there_are_more_panels() -> None:
+    far, near = arm([(1.4, 0.0)], [0.5, 0.9]), arm([(1.9999, 0.0)], [0.5, 0.9])
+    easy, hard = far.resolved(), near.resolved()
+    assert easy.resolution.euler_from is None
+    assert hard.resolution.euler_from is None
+    assert hard.resolution.solves > easy.resolution.solves
+    assert tips(near, hard.q)[-1] == pytest.approx([1.9999, 0.0], abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("points", "start"),
+    [
+        ([(6.0, 0.0)], [0.5, 0.9, -0.3, 0.2, 0.1, 0.0]),  # ends stretched out
+        ([(0.0, 2.0), (0.0, 3.0), (0.0, 2.0)], [0.5, 0.9, -0.3]),  # is stretched out on the way
+        ([(-2.0, 1.0)], [0.0, np.pi, 0.0]),  # starts folded
+    ],
+)
+@pytest.mark.parametrize("step", [1e-3, 0.02])
+def test_through_a_singularity_steps_lead_on_to_the_end(points: Any, start: Any, step: float) -> None:
+    case = arm(points, start, step=step)
+    begun = time.perf_counter()
+    motion = case.resolved()
+    taken = time.perf_counter() - begun
+
+    assert motion.resolution.euler_from is None or 0.0 <= motion.resolution.euler_from < 1.0
+    assert len(motion.q) == len(case.timed.times)
+    assert np.all(np.isfinite(motion.q))
+    assert np.linalg.norm(tips(case, motion.q)[-1] - points[-1]) < 0.05
+    assert taken < 10.0  # a second or so: nothing is halved without end
+
+
+def test_an_arm_that_cannot_leave_its_singularity_stays_as_with_steps() -> None:
+    """Stretched out it cannot move towards its base, to first order."""
+    case = arm([(1.5, 0.0)], [0.0, 0.0], step=0.01)
+    motion = case.resolved()
+    assert motion.resolution.euler_from <= 0.05  # as long as the tip is wanted less than the accuracy away
+    np.testing.assert_allclose(tips(case, motion.q)[-1], [2.0, 0.0], atol=1e-6)
+    np.testing.assert_allclose(tips(case, case.resolved(integrator=EULER).q)[-1], [2.0, 0.0], atol=1e-6)
+
+
+SAYS_WHY = (
+    r"motion: at \d\.\d+ s (the tool of 'arm' is .* mm from task 'task_arm'|joint 'j\d' of 'arm' would leap).*"
+    r"nearest to a singular configuration is 'arm' on 'task_arm': smallest singular value \d"
+)
+
+
+@pytest.mark.parametrize("point", [(3.5, 0.5), (9.0, 0.0)])
+def test_what_is_out_of_reach_is_lost_as_with_steps(point: tuple[float, float]) -> None:
+    case = arm([point], [0.5, 0.9, -0.3])
+    for integrator in Integrator:
+        with pytest.raises(DivergedError, match=SAYS_WHY):
+            case.resolved(integrator=integrator)
+
+
+def test_what_is_just_out_of_reach_is_followed_as_far_as_it_goes() -> None:
+    case = arm([(2.1, 0.0)], [0.5, 0.9])
+    motion = case.resolved()
+    assert 0.5 < motion.resolution.euler_from < 1.0
+    before = case.timed.times <= motion.resolution.euler_from
+    assert np.linalg.norm(tips(case, motion.q)[before], axis=1).max() <= 2.0
+    assert 1.9 < np.linalg.norm(tips(case, motion.q)[-1]) <= 2.0  # Euler's steps swing where nothing can be reached
+
+
+def test_without_damping_steps_are_refused_where_they_have_to_take_over() -> None:
+    with pytest.raises(NoSolutionError, match="singular"):
+        arm([(1.5, 0.0)], [0.0, 0.0], damping=0.0).resolved()
+
+
+def test_a_failing_run_takes_little_longer_than_steps_alone() -> None:
+    case = arm([(2.1, 0.0)], [0.5, 0.9])
+    taken = {}
+    for integrator in Integrator:
+        begun = time.perf_counter()
+        case.resolved(integrator=integrator)
+        taken[integrator] = time.perf_counter() - begun
+    assert taken[Integrator.ACCURATE] < 3.0 * taken[EULER] + 0.5
+
+
+def test_settings_that_rule_the_accurate_mode_out_take_steps() -> None:
+    motion = triangles(slowly_clocked(CELLS["single"], 0.02)).resolved(method="damped_least_squares")
+    assert motion.resolution.integrator is EULER
+
+
+def test_an_open_path_does_not_close() -> None:
+    case = arm([(1.5, 0.5)], [0.5, 0.9, -0.3])
+    cell = replace(case.cell, motion=replace(case.cell.motion, cyclic=True))
+    for integrator in Integrator:
+        with pytest.raises(InputError) as caught:
+            replace(case, cell=cell).resolved(integrator=integrator)
+        assert str(caught.value) == (
+            "<cell>: motion.cyclic: expected closed paths whose cycles end on a multiple of motion.step_s, but the "
+            "tool of task 'task_arm' is not back at its start at 1 s"
+        )

@@ -1,0 +1,337 @@
+"""Secondary goals: each improves what it names, and no tool notices."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders.random_cells import random_cell
+
+from cellplan.io.cell.load import load_cell
+from cellplan.kinematics.pinocchio_model import CombinedModel
+from cellplan.model.cell import Cell, LockedJoint
+from cellplan.model.motion import Motion, Schedule, TaskSchedule
+from cellplan.model.solver import GoalKind, SecondaryGoal
+from cellplan.planning.euler.integrate import follow
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.planning.tracking.obstacle_distances import ClosestPairs
+from cellplan.planning.tracking.problem import TrackingProblem
+from cellplan.planning.tracking.secondary_goals import share_within
+from cellplan.planning.tracking.weighted_inverse import WeightedInverse
+from cellplan.scene.scene import Scene
+
+FOLDER = Path(__file__).parents[3] / "cells"
+PLANAR_START = np.radians([50.0, -85.0, 35.0, -26.91606059, 95.64533787, -68.72927727])
+UNNOTICED = 1e-9  # [m/s] or [rad/s]: rounding of the projection, whose terms are of order one
+H = 1e-6  # [rad] or [m]: central differences leave H^2 and eps / H, both below 1e-9
+
+GOALS = {
+    GoalKind.MANIPULABILITY: SecondaryGoal(kind=GoalKind.MANIPULABILITY, gain=0.5),
+    GoalKind.JOINT_LIMITS: SecondaryGoal(kind=GoalKind.JOINT_LIMITS, gain=30.0),
+    GoalKind.OBSTACLES: SecondaryGoal(kind=GoalKind.OBSTACLES, gain=0.1),
+    GoalKind.POSTURE: SecondaryGoal(kind=GoalKind.POSTURE, gain=1.0),
+}
+HUGE = 1e9
+
+
+def with_goals(cell: Cell, *goals: SecondaryGoal) -> Cell:
+    return replace(cell, solver=replace(cell.solver, goals=goals))
+
+
+def names(cell: Cell) -> tuple[str, ...]:
+    return tuple(robot.name for robot in cell.robots)
+
+
+def four_robots() -> tuple[Cell, np.ndarray]:
+    cell = load_cell(FOLDER / "four_robots.yaml")
+    cell = replace(cell, motion=replace(cell.motion, step=0.01), solver=replace(cell.solver, gain=50.0))
+    return cell, np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
+
+
+def planar_pair() -> tuple[Cell, np.ndarray]:
+    cell = load_cell(FOLDER / "planar_pair.yaml")
+    return replace(cell, motion=replace(cell.motion, step=0.02), solver=replace(cell.solver, gain=25.0)), PLANAR_START
+
+
+def planned(cell: Cell, start: np.ndarray) -> tuple[Schedule, Motion]:
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    return schedule, follow(cell, schedule, start=start, moving=names(cell))
+
+
+def at_rest(cell: Cell, q: np.ndarray) -> Schedule:
+    """Tools that are to stay where they are on the part for 2 s."""
+    operators = [names(cell).index(task.robot) for task in cell.tasks]
+    state = CombinedModel(cell).state(q)
+    times = np.linspace(0.0, 2.0, 21)
+    still = tuple(
+        TaskSchedule(
+            task=task,
+            X_PT=np.tile(np.linalg.solve(state.X_WP, state.X_WT[operator]), (len(times), 1, 1)),
+            V_PT_P=np.zeros((len(times), 6)),
+            travelled=times,
+            length=1.0,
+            end=2.0,
+        )
+        for task, operator in zip(cell.tasks, operators, strict=True)
+    )
+    return Schedule(times=times, tasks=still)
+
+
+def problem_at_rest(cell: Cell, q: np.ndarray, *, moving: tuple[str, ...] | None = None) -> TrackingProblem:
+    """Tools that are to stay where they are; instant 10 is the middle of the motion, away from its ends."""
+    return TrackingProblem(cell, at_rest(cell, q), moving or names(cell), start=q)
+
+
+def random_problem(
+    seed: int, *goals: SecondaryGoal, moving: tuple[str, ...] | None = None
+) -> tuple[TrackingProblem, np.ndarray]:
+    cell = with_goals(random_cell(seed, operators=1 + seed % 3, joints=7, with_follower=seed % 2 == 0), *goals)
+    q = np.random.default_rng(seed).uniform(-1.0, 1.0, cell.joint_count)
+    return problem_at_rest(cell, q, moving=moving), q
+
+
+def log_manipulability(problem: TrackingProblem, q: np.ndarray, k: int = 10) -> float:
+    J = problem.first_order(k, q).J
+    return 0.5 * float(np.linalg.slogdet(J @ J.T)[1])
+
+
+def limit_measure(cell: Cell, q: np.ndarray) -> float:
+    """D.46, robot by robot, as printed."""
+    total = 0.0
+    for robot in cell.robots:
+        lower, upper = robot.model.lower, robot.model.upper
+        share = (q[cell.columns(robot.name)] - 0.5 * (lower + upper)) / (upper - lower)
+        total -= float(share @ share) / (2 * len(lower))
+    return total
+
+
+def nearness(pairs: ClosestPairs, q: np.ndarray, within: float) -> float:
+    return -0.5 * sum(((within - pair.distance) / within) ** 2 for pair in pairs.at(q, within=within))
+
+
+def central_differences(measure, q: np.ndarray, step: float = H) -> np.ndarray:
+    return np.array([(measure(q + step * e) - measure(q - step * e)) / (2 * step) for e in np.eye(len(q))])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_manipulability_pulls_along_its_gradient_in_the_metric_of_the_weights(seed: int) -> None:
+    gain = 1e-6  # small: no speed limit is near
+    problem, q = random_problem(seed, replace(GOALS[GoalKind.MANIPULABILITY], gain=gain))
+
+    asked = problem.first_order(10, q).secondary
+
+    expected = central_differences(lambda x: log_manipulability(problem, x), q) / problem.first_order(10, q).weights
+    np.testing.assert_allclose(asked / gain, expected, atol=1e-4 * np.abs(expected).max())  # 1 / (1 + k h c) is left
+
+
+def test_joint_limits_pull_along_the_gradient_of_d46() -> None:
+    gain = 1e-3
+    problem, q = random_problem(3, replace(GOALS[GoalKind.JOINT_LIMITS], gain=gain))
+    expected = central_differences(lambda x: limit_measure(problem.cell, x), q)
+    first = problem.first_order(10, q)
+    np.testing.assert_allclose(first.secondary * first.weights / gain, expected, rtol=1e-5, atol=1e-9)
+
+
+def test_joint_without_limits_has_no_middle() -> None:
+    problem, q = random_problem(1, GOALS[GoalKind.JOINT_LIMITS])
+    robots = list(problem.cell.robots)
+    joints = list(robots[1].model.joints)
+    joints[3] = replace(joints[3], lower=-np.inf, upper=np.inf)
+    robots[1] = replace(robots[1], model=replace(robots[1].model, joints=tuple(joints)))
+    asked = problem_at_rest(replace(problem.cell, robots=tuple(robots)), q).first_order(10, q).secondary
+    column = problem.cell.columns("op0").start + 3
+    assert asked[column] == 0.0
+    assert np.count_nonzero(asked) == len(q) - 1
+
+
+def test_obstacles_pull_along_the_gradient_of_their_distances() -> None:
+    cell, start = planar_pair()
+    gain, within = 1e-6, 0.25
+    pairs = ClosestPairs(Scene.from_cell(cell))
+    cell = with_goals(cell, SecondaryGoal(kind=GoalKind.OBSTACLES, gain=gain, within=within))
+    asked = problem_at_rest(cell, start).first_order(10, start).secondary
+    expected = central_differences(lambda x: nearness(pairs, x, within), start, 1e-4)
+    assert np.abs(expected).max() > 0.1
+    np.testing.assert_allclose(asked / gain, expected, atol=1e-3 * np.abs(expected).max())  # kinks of flat faces
+
+
+def test_posture_pulls_to_the_wanted_posture_and_else_to_the_start() -> None:
+    cell = random_cell(4, operators=2, joints=7)
+    start = np.random.default_rng(4).uniform(-1.0, 1.0, cell.joint_count)
+    gain = 1e-3
+    goal = SecondaryGoal(kind=GoalKind.POSTURE, gain=gain, postures={"op1": np.full(7, 0.25)})
+    problem = problem_at_rest(with_goals(cell, goal), start)
+    q = start + 0.01
+    wanted = start.copy()
+    wanted[cell.columns("op1")] = 0.25
+    first = problem.first_order(10, q)
+    np.testing.assert_allclose(first.secondary * first.weights / gain, wanted - q, rtol=1e-3)  # 1 / (1 + k h c) is left
+
+
+@pytest.mark.parametrize("kind", [kind for kind in GOALS if kind is not GoalKind.OBSTACLES])
+@pytest.mark.parametrize("seed", range(6))
+def test_no_task_notices_and_the_goal_grows(kind: GoalKind, seed: int) -> None:
+    """``grad w . qdot >= 0`` after the projection, in the metric of unequal weights."""
+    problem, start = random_problem(seed, GOALS[kind])
+    q = start + 0.002  # off the start posture, which is the wanted one
+    tasks = problem.first_order(10, q)
+    motion = WeightedInverse(tasks.J, tasks.weights).unnoticed(tasks.secondary)
+    if len(tasks.J) < len(q):
+        assert np.abs(motion).max() > 0.0
+    assert np.abs(tasks.J @ motion).max() <= UNNOTICED
+    assert (tasks.secondary * tasks.weights) @ motion >= -UNNOTICED
+
+
+def test_more_rows_than_joints_have_no_manipulability() -> None:
+    cell = with_goals(random_cell(5, operators=2, joints=3), GOALS[GoalKind.MANIPULABILITY])
+    q = np.random.default_rng(5).uniform(-1.0, 1.0, cell.joint_count)
+    tasks = problem_at_rest(cell, q).first_order(10, q)
+    assert tasks.J.shape == (12, 9)
+    np.testing.assert_array_equal(tasks.secondary, 0.0)
+
+
+def test_gain_means_the_same_for_one_and_for_three_operators() -> None:
+    """Operators round a part at rest do not know of each other."""
+    cell = random_cell(6, operators=3, joints=7, held=False)
+    cell = with_goals(cell, GOALS[GoalKind.MANIPULABILITY])
+    q = np.random.default_rng(6).uniform(-1.0, 1.0, cell.joint_count)
+    gain = SecondaryGoal(kind=GoalKind.MANIPULABILITY, gain=1e-6)
+    together = problem_at_rest(with_goals(cell, gain), q).first_order(10, q).secondary
+    alone = problem_at_rest(with_goals(replace(cell, tasks=cell.tasks[:1]), gain), q, moving=("op0",))
+    columns = cell.columns("op0")
+    np.testing.assert_allclose(together[columns], alone.first_order(10, q).secondary[columns], atol=1e-10)
+
+
+def test_robots_that_stand_and_joints_that_are_locked_are_not_moved() -> None:
+    cell = random_cell(7, operators=2, joints=7)
+    locked = LockedJoint(robot="op0", joint="j4", since=0.0)
+    cell = replace(cell, motion=replace(cell.motion, locked=(locked,)))
+    cell = with_goals(cell, *(goal for kind, goal in GOALS.items() if kind is not GoalKind.OBSTACLES))
+    start = np.random.default_rng(7).uniform(-1.0, 1.0, cell.joint_count)
+    q = start + 0.01
+    tasks = problem_at_rest(cell, start, moving=("op0", "op1")).first_order(10, q)
+    stands = np.zeros(cell.joint_count, dtype=bool)
+    stands[cell.columns("holder")] = True
+    stands[cell.columns("op0").start + 4] = True
+    left = WeightedInverse(tasks.J, tasks.weights).unnoticed(tasks.secondary)
+    np.testing.assert_array_equal(tasks.secondary[stands], 0.0)
+    np.testing.assert_array_equal(left[stands], 0.0)
+    assert np.all(tasks.secondary[~stands] != 0.0)
+
+
+def test_goals_set_in_and_leave_off_at_rest() -> None:
+    problem, q = random_problem(8, GOALS[GoalKind.JOINT_LIMITS])
+    sizes = [float(np.abs(problem.first_order(k, q).secondary).max()) for k in (0, 1, 10, 20)]
+    assert sizes[0] == sizes[3] == 0.0
+    assert 0.0 < sizes[1] < sizes[2]
+
+
+def test_goals_rest_at_both_ends_of_a_motion_that_is_to_close() -> None:
+    """Whoever starts the program starts it from rest."""
+    cell = with_goals(random_cell(8, operators=1, joints=7), GOALS[GoalKind.JOINT_LIMITS])
+    cell = replace(cell, motion=replace(cell.motion, cyclic=True))
+    q = np.random.default_rng(8).uniform(-1.0, 1.0, cell.joint_count)
+    problem = problem_at_rest(cell, q)
+    asked = [problem.first_order(k, q).secondary for k in (0, 10, len(problem.times) - 1)]
+    assert [bool(np.any(speeds)) for speeds in asked if speeds is not None] == [False, True, False]
+
+
+def test_share_takes_no_joint_beyond_its_bounds() -> None:
+    speeds, extra = np.array([0.5, -0.5, 0.0, 0.2]), np.array([1.0, -0.1, 0.0, -4.0])
+    lowest, highest = np.full(4, -1.0), np.array([1.0, 1.0, 0.0, 1.0])
+    assert share_within(speeds, extra, lowest=lowest, highest=highest) == pytest.approx(0.3)  # the last joint's room
+
+
+def test_joint_beyond_its_bounds_is_not_taken_farther_but_may_come_back() -> None:
+    bounds = {"lowest": np.array([-1.0]), "highest": np.array([1.0])}
+    assert share_within(np.array([1.5]), np.array([0.1]), **bounds) == 0.0
+    assert share_within(np.array([1.5]), np.array([-0.1]), **bounds) == 1.0
+
+
+@pytest.mark.parametrize("kind", [kind for kind in GOALS if kind is not GoalKind.OBSTACLES])
+def test_huge_gain_breaks_no_speed_limit_and_takes_no_joint_to_its_end(kind: GoalKind) -> None:
+    cell, start = planar_pair()
+    goal = replace(GOALS[kind], gain=HUGE)
+    if kind is GoalKind.POSTURE:  # far outside of what the arms can do
+        goal = replace(goal, postures={"left": np.radians([500.0, 500.0, 500.0])})
+    _, motion = planned(with_goals(cell, goal), start)
+    for robot in cell.robots:
+        q = motion.q[:, cell.columns(robot.name)]
+        assert np.all(np.abs(np.diff(q, axis=0)) / 0.02 <= robot.model.velocity)
+        assert np.all((q > robot.model.lower) & (q < robot.model.upper))
+
+
+def test_without_goals_nothing_is_asked_for() -> None:
+    problem, q = random_problem(9)
+    tasks = problem.first_order(10, q)
+    assert tasks.secondary is None
+    assert tasks.bounds is None
+
+
+def test_goals_without_a_start_posture_are_refused() -> None:
+    problem, q = random_problem(9)
+    cell = with_goals(problem.cell, GOALS[GoalKind.POSTURE])
+    with pytest.raises(ValueError, match="start posture"):
+        TrackingProblem(cell, at_rest(cell, q), names(cell))
+
+
+def tracking_errors(cell: Cell, schedule: Schedule, motion: Motion) -> np.ndarray:
+    """Position errors of all tools in [m], shape (N, tasks)."""
+    problem = TrackingProblem(with_goals(cell), schedule, names(cell))
+    axes = [3 if 2 in task.axes else 2 for task in problem.tasks]
+    errors = [problem.first_order(k, q).error for k, q in enumerate(motion.q)]
+    parts = np.cumsum([len(task.axes) for task in problem.tasks])[:-1]
+    return np.array(
+        [[np.linalg.norm(e[:n]) for e, n in zip(np.split(row, parts), axes, strict=True)] for row in errors]
+    )
+
+
+@pytest.mark.parametrize("kind", list(GOALS))
+def test_each_goal_improves_along_a_whole_motion_of_four_robots(kind: GoalKind) -> None:
+    cell, start = four_robots()
+    schedule, plain = planned(cell, start)
+    goal = GOALS[kind]
+    _, helped = planned(with_goals(cell, goal), start)
+    samples = range(0, len(plain.q), 20)
+
+    if kind is GoalKind.MANIPULABILITY:
+        problem = TrackingProblem(cell, schedule, names(cell))
+        before, after = ([log_manipulability(problem, m.q[k], k) for k in samples] for m in (plain, helped))
+    elif kind is GoalKind.JOINT_LIMITS:
+        before, after = ([limit_measure(cell, m.q[k]) for k in samples] for m in (plain, helped))
+    elif kind is GoalKind.OBSTACLES:
+        pairs = ClosestPairs(Scene.from_cell(cell))
+        before, after = (
+            [min(pair.distance for pair in pairs.at(m.q[k], within=0.2)) for k in samples] for m in (plain, helped)
+        )
+        assert min(after) > min(before) + 0.01  # 10 mm more clearance
+    else:
+        before, after = ([-float(np.linalg.norm(m.q[k] - start)) for k in samples] for m in (plain, helped))
+
+    assert np.mean(after) > np.mean(before)
+    worst, worst_plain = (tracking_errors(cell, schedule, m).max() for m in (helped, plain))
+    assert worst < 1.5 * worst_plain  # Euler's error is of second order in all speeds, the goal's among them
+
+
+@pytest.mark.parametrize("kind", list(GOALS))
+def test_no_step_of_a_whole_motion_is_noticed_by_a_task(kind: GoalKind) -> None:
+    cell, start = planar_pair()
+    cell = with_goals(cell, GOALS[kind])
+    schedule, motion = planned(cell, start)
+    problem = TrackingProblem(cell, schedule, names(cell), start=start)
+    largest = 0.0
+    for k in range(0, len(motion.q), 5):
+        tasks = problem.first_order(k, motion.q[k])
+        left = WeightedInverse(tasks.J, tasks.weights).unnoticed(tasks.secondary)
+        largest = max(largest, float(np.abs(tasks.J @ tasks.bounded(left, beside=np.zeros(6))).max()))
+    assert largest <= UNNOTICED
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", list(GOALS))
+def test_four_robots_keep_their_accuracy_with_every_goal(kind: GoalKind) -> None:
+    cell = load_cell(FOLDER / "four_robots.yaml")
+    start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
+    schedule, motion = planned(with_goals(cell, GOALS[kind]), start)
+    assert tracking_errors(cell, schedule, motion).max() <= 3e-6  # [m] what the cell is to keep

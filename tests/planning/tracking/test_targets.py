@@ -1,0 +1,121 @@
+"""Closures against the derivative of an independent kinematics, and what they ask for in each mode."""
+
+import numpy as np
+import pytest
+from builders.jacobian_cells import planners_jacobian
+from builders.random_cells import carried, moved, random_cell, random_pose, sharing
+
+from cellplan.errors import DivergedError, InputError
+from cellplan.geometry.transforms import inverse, rotation_vector
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Grasp, Mode
+from cellplan.model.motion import Schedule
+from cellplan.model.task import Frame
+from cellplan.pipeline.overrides import with_overrides
+from cellplan.planning.modes import plan_runs
+from cellplan.planning.tracking.problem import TrackingProblem
+from cellplan.planning.tracking.targets import targets
+
+DERIVATIVE_TOL = 1e-6  # relative; central differences with h = 1e-5 leave h^2 and eps / h, both near 1e-10
+H = 1e-5
+STILL = Schedule(times=np.arange(4) * 1e-3, tasks=())
+
+
+def relative_poses(cell, q):
+    """Tools on the part, or in the world, by screw displacements: shares no code with the planner's kinematics."""
+    poses = {r.name: ScrewChain(r).tool_poses(q[None, cell.columns(r.name)])[0] for r in cell.robots}
+    X_PW = cell.part.held_by[0].X_PT @ inverse(poses["holder"])
+    in_world = [relation.relative_to is Frame.WORLD for relation in cell.relations]
+    return np.stack(
+        [poses[r.robot] if world else X_PW @ poses[r.robot] for r, world in zip(cell.relations, in_world, strict=True)]
+    )
+
+
+def central_differences(cell, q):
+    columns = []
+    R_T = np.swapaxes(relative_poses(cell, q)[:, :3, :3], 1, 2)
+    for j in range(cell.joint_count):
+        step = H * np.eye(cell.joint_count)[j]
+        ahead, behind = relative_poses(cell, q + step), relative_poses(cell, q - step)
+        linear = (ahead - behind)[:, :3, 3] / (2 * H)
+        angular = rotation_vector(ahead[:, :3, :3] @ R_T) - rotation_vector(behind[:, :3, :3] @ R_T)
+        columns.append(np.concatenate([linear, angular / (2 * H)], axis=1))
+    return np.stack(columns, axis=2)
+
+
+@pytest.mark.parametrize("holders", [1, 2, 3])
+@pytest.mark.parametrize("with_follower", [False, True], ids=["plain", "follower"])
+def test_rows_of_closures_and_of_carrying_are_the_derivative_of_the_poses(holders, with_follower):
+    cell = carried(sharing(random_cell(holders, operators=holders + 1, with_follower=with_follower), holders))
+    q = np.random.default_rng(holders).uniform(-1.5, 1.5, cell.joint_count)
+
+    J = planners_jacobian(cell, q)
+
+    expected = central_differences(cell, q)
+    assert [relation.name for relation in cell.relations[-holders:]] == [f"op{i}@part" for i in range(1, holders + 1)]
+    assert np.abs(J - expected).max() <= DERIVATIVE_TOL * np.abs(expected).max()
+
+
+def test_moving_the_whole_cell_changes_no_row_of_a_closure():
+    cell = sharing(random_cell(41, operators=3), 2)
+    q = np.random.default_rng(2).uniform(-1.5, 1.5, cell.joint_count)
+
+    elsewhere = moved(cell, random_pose(np.random.default_rng(3)))
+
+    np.testing.assert_allclose(planners_jacobian(elsewhere, q), planners_jacobian(cell, q), atol=1e-12)
+
+
+def test_a_closure_wants_the_grasp_at_all_times_and_no_twist():
+    cell = sharing(random_cell(42, operators=2), 1, axes=(0, 1, 5))
+
+    (target,) = targets(cell, STILL, ("holder", "op1"))
+
+    assert isinstance(target.relation, Grasp)
+    assert target.relation.axes == (0, 1, 5)
+    assert not target.V_PT_P.any()
+    np.testing.assert_array_equal(target.X_PT, np.broadcast_to(cell.part.held_by[1].X_PT, (4, 4, 4)))
+
+
+def test_only_the_kept_components_of_a_closure_become_rows():
+    cell = sharing(random_cell(43, operators=2), 2, axes=(0, 1, 5))
+    q = np.random.default_rng(4).uniform(-1.5, 1.5, cell.joint_count)
+    problem = TrackingProblem(cell, STILL, tuple(robot.name for robot in cell.robots))
+
+    with pytest.raises(DivergedError, match="from its grasp on the part"):
+        problem.first_order(0, q)
+    problem.wanted[:] = relative_poses(cell, q)
+    tasks = problem.first_order(0, q)
+
+    np.testing.assert_allclose(tasks.J, planners_jacobian(cell, q)[:, [0, 1, 5]].reshape(6, -1), atol=1e-12)
+    assert np.abs(tasks.error).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("mode", "moving"),
+    [
+        (Mode.SIMULTANEOUS, [("holder", "op1", "op2", "op0")]),
+        (Mode.PAIRWISE, [("holder", "op1", "op2", "op0"), ("holder", "op1", "op2")]),
+    ],
+)
+def test_all_holders_move_in_every_run(mode, moving):
+    cell = with_overrides(carried(sharing(random_cell(44, operators=3), 2)), mode=str(mode))
+    assert [run.moving for run in plan_runs(cell)] == moving
+    assert all(len(targets(cell, STILL, run.moving)) == 2 for run in plan_runs(cell))
+
+
+def test_no_holder_moves_with_the_part_at_rest():
+    cell = with_overrides(sharing(random_cell(45, operators=3), 2), mode="part_at_rest")
+    (run,) = plan_runs(cell)
+    assert run.moving == ("op0",)
+    assert targets(cell, STILL, run.moving) == ()
+
+
+def test_the_part_cannot_be_carried_while_it_is_to_rest():
+    cell = with_overrides(carried(random_cell(46, operators=1)), mode="part_at_rest")
+    with pytest.raises(InputError) as caught:
+        plan_runs(cell)
+    assert str(caught.value) == (
+        "<cell>: tasks.task_holder.robot: expected a robot that does not hold the part in the mode part_at_rest, got "
+        "the positioner 'holder'; choose another mode or leave the task out"
+    )
+    assert plan_runs(cell, only="task_op0")[0].moving == ("op0",)

@@ -1,0 +1,280 @@
+"""``report.html``: verdict first, nothing from outside, and no name that can break out of its place."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cellplan.model.cell import LockedJoint
+from cellplan.model.report import Check, JointDrift, Repeatability
+from cellplan.report.page import render
+from cellplan.report.page.render import overview_html, report_html
+from cellplan.report.plots.run import draw_plots
+
+HOSTILE = "\"><img src=x onerror='alert(1)'><script>alert(2)</script>{{ 7*7 }}&amp;"
+VOID = {"meta", "br", "img", "link", "hr", "input"}
+
+
+class Page(HTMLParser):
+    """Collects tags, ids and visible text; notes tags that do not match."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.words: list[str] = []
+        self.wrong: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(value or "")
+            if name in {"href", "src", "xlink:href"}:
+                self.links.append(value or "")
+            if name.startswith("on"):
+                self.wrong.append(f"{tag} {name}")
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.wrong.append(f"</{tag}>")
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] != "style":
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+
+def page_of(run: Any, plots: dict[str, bytes] | None = None) -> str:
+    drawn = draw_plots(run.report, cell=run.cell) if plots is None else plots
+    return report_html(run.report, cell=run.cell, provenance=run.provenance, plots=drawn)
+
+
+def overview_of(runs: Any) -> str:
+    first = runs["circle"]
+    return overview_html({name: run.report for name, run in runs.items()}, cell=first.cell, provenance=first.provenance)
+
+
+@pytest.fixture(scope="module")
+def failed_page(failed_run: Any) -> str:
+    return page_of(failed_run)
+
+
+def test_page_is_whole_and_stands_alone(failed_page: str) -> None:
+    page = Page(failed_page)
+    assert page.wrong == []
+    assert page.open == []
+    assert not {"script", "link", "img", "iframe", "object"} & set(page.tags)
+    assert [link for link in page.links if not link.startswith("#")] == []
+    addresses = set(re.findall(r"https?://[^\"' ]+", failed_page))
+    assert addresses <= {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}, "only names of XML languages"
+    assert "@import" not in failed_page
+    assert "@font-face" not in failed_page
+
+
+def test_names_of_drawn_parts_do_not_clash(failed_page: str) -> None:
+    page = Page(failed_page)
+    assert len(page.ids) == len(set(page.ids))
+    assert {link[1:] for link in page.links} <= set(page.ids)
+    assert set(re.findall(r"url\(#([^)]+)\)", failed_page)) <= set(page.ids)
+
+
+def test_verdict_comes_first_in_plain_words(failed_run: Any, failed_page: str) -> None:
+    text = Page(failed_page).text
+    verdict = text.index("✗ FAILED 3 of 28 checks do not hold")
+    assert verdict < text.index("Cycle time") < text.index("What was checked")
+    for check in failed_run.report.checks:
+        if not check.passed:
+            assert check.message in text
+
+
+def test_passed_run_says_so(passed_run: Any) -> None:
+    text = Page(page_of(passed_run, plots={})).text
+    assert "✓ PASSED All 27 checks hold." in text
+    assert "FAILED" not in text
+
+
+def test_key_figures_name_the_worst_and_its_instant(passed_run: Any) -> None:
+    text = Page(page_of(passed_run, plots={})).text
+    assert "Cycle time 4.00 s 4001 samples, 1 ms apart" in text
+    assert "Smallest clearance 41.0 mm staubli/C3 and staubli/C6 at 3.060 s; required 5 mm" in text
+    worst = min(passed_run.report.joints, key=lambda use: use.margin)
+    assert re.search(
+        rf"Smallest joint margin [\d.]+ deg {worst.robot} {worst.joint} at {worst.margin_at_s:.3f} s", text
+    )
+
+
+def test_caution_and_assumptions_are_printed(failed_page: str) -> None:
+    text = Page(failed_page).text
+    assert (
+        "Offline result: run first at reduced speed; not a safety function; "
+        "the risk assessment stays with the integrator." in text
+    )
+    assert "Joints move linearly between samples; the samples are 1 ms apart." in text
+    assert "certified at every instant, between the samples too, as long as every joint moves evenly" in text
+    assert "asked the collision engine for 349 distances and 348 contacts" in text
+    assert "belong in the required clearance of 5 mm" in text
+    assert "@media print" in failed_page
+
+
+def test_drawings_have_a_text_for_those_who_cannot_see_them(failed_page: str) -> None:
+    figures = re.findall(r"<figure[^>]*>", failed_page)
+    assert len(figures) == 3 + 4 + 4 + 2  # tasks, positions, velocities, clearance and singularity
+    assert all('role="img"' in figure and 'aria-label="' in figure for figure in figures)
+
+
+def test_missing_values_are_dashes(rail_run: Any) -> None:
+    text = Page(page_of(rail_run)).text
+    assert "no such pair" in text
+    assert "without end" in text
+    assert not re.search(r"\b(None|nan|inf)\b", text)
+    assert not re.search(r"\d[eE][-+]\d", text)
+
+
+def test_figures_are_never_rounded_to_the_better_side(passed_run: Any) -> None:
+    clearance = passed_run.report.clearance
+    minima = {kind: replace(minimum, minimum=0.00499) for kind, minimum in clearance.minima.items()}
+    joints = (replace(passed_run.report.joints[0], margin=-1e-5), *passed_run.report.joints[1:])
+    report = replace(passed_run.report, clearance=replace(clearance, minima=minima), joints=joints)
+    text = Page(page_of(replace(passed_run, report=report), plots={})).text
+    assert "Smallest clearance 4.9 mm" in text
+    assert "outside by 0.000573" in text  # 1e-5 rad in degrees
+
+
+def test_a_broken_sliding_joint_is_the_smallest_margin_while_turning_joints_hold(rail_run: Any) -> None:
+    joints = (replace(rail_run.report.joints[0], margin=-0.04626), *rail_run.report.joints[1:])
+    broken = replace(rail_run, report=replace(rail_run.report, joints=joints))
+
+    text = Page(page_of(broken, plots={})).text
+
+    assert f"Smallest joint margin −46.3 mm {joints[0].robot} {joints[0].joint} at" in text
+
+
+def hostile(run: Any) -> Any:
+    """The same run with names that try to become markup."""
+    robots = (replace(run.cell.robots[0], name=HOSTILE), *run.cell.robots[1:])
+    renamed = {"reis": HOSTILE}
+    report = run.report
+    check = Check(
+        name=HOSTILE, subject=HOSTILE, passed=False, value=1.0, limit=0.0, unit="mm", at_s=None, message=HOSTILE
+    )
+    report = replace(
+        report,
+        cell=HOSTILE,
+        mode=HOSTILE,
+        checks=(check,),
+        joints=tuple(
+            replace(u, robot=HOSTILE, joint=f"{u.joint}$x_{{$<&") if u.robot == "reis" else u for u in report.joints
+        ),
+        q={renamed.get(name, name): values for name, values in report.q.items()},
+        qd={renamed.get(name, name): values for name, values in report.qd.items()},
+        motion_share={renamed.get(name, name): share for name, share in report.motion_share.items()},
+        speeds={renamed.get(name, name): replace(speed, axis=HOSTILE) for name, speed in report.speeds.items()},
+        clearance=replace(report.clearance, exclusions=((HOSTILE, HOSTILE, HOSTILE),)),
+    )
+    cell = replace(run.cell, robots=robots, inputs={HOSTILE: HOSTILE})
+    return replace(run, report=report, cell=cell)
+
+
+def test_hostile_names_stay_text(passed_run: Any) -> None:
+    text = page_of(hostile(passed_run))
+    page = Page(text)
+    assert page.wrong == []
+    assert page.open == []
+    assert not {"script", "img"} & set(page.tags)
+    assert HOSTILE in "".join(page.words)
+    assert "49" not in page.text.partition("checks")[0]
+
+
+def test_overview_leads_to_the_report_of_every_run(pairwise_runs: Any) -> None:
+    page = Page(overview_of(pairwise_runs))
+    assert page.wrong == []
+    assert [link for link in page.links if not link.startswith("#")] == [
+        "circle/report.html",
+        "rhombus/report.html",
+        "rectangle/report.html",
+    ]
+    assert "3 of 82 checks do not hold" in page.text
+    assert "rhombus : kuka/B5 and abb/A5 collide" in page.text
+    assert "Cycle time 12.00 s 3 runs, one after another" in page.text
+
+
+def test_same_run_gives_the_same_page(failed_run: Any, failed_page: str, pairwise_runs: Any) -> None:
+    assert page_of(failed_run) == failed_page
+    assert overview_of(pairwise_runs) == overview_of(pairwise_runs)
+
+
+def test_joints_that_do_not_come_back_have_a_table(passed_run: Any) -> None:
+    drift = JointDrift(
+        robot="kuka", joint="B2", is_revolute=True, drift=np.array([0.01, -0.02]), worst=0.02, at_cycle=2
+    )
+    found = Repeatability(instants=np.array([0.0, 1.0, 2.0]), drifts=(drift,), closes=False)
+    run = replace(passed_run, report=replace(passed_run.report, repeatability=found))
+
+    text = page_of(run)
+
+    assert "The joints do not come back" in text
+    assert "after each of the 2 cycles of 1 s" in text
+    assert "1.15 deg" in text
+    assert "Repeatability" not in page_of(passed_run)
+
+
+def test_a_failed_joint_is_told_in_plain_words(passed_run: Any) -> None:
+    locked = (LockedJoint(robot="kuka", joint="B2", since=2.0),)
+    cell = replace(passed_run.cell, motion=replace(passed_run.cell.motion, locked=locked))
+
+    page = report_html(passed_run.report, cell=cell, provenance=passed_run.provenance, plots={})
+
+    assert "Joint kuka/B2 fails at 2.000 s and stays at " in page
+    assert "the other joints take over, and every task is kept." in page
+
+
+def test_with_many_robots_pictures_are_folded_and_each_robot_has_a_line(
+    passed_run: Any, failed_run: Any, rail_run: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(render, "MANY", 3)
+    for run in (passed_run, failed_run, rail_run):
+        page = Page(page_of(run))
+        assert page.wrong == []
+        assert page.open == []
+        assert len(page.ids) == len(set(page.ids))
+        assert {link[1:] for link in page.links} <= set(page.ids)
+        assert page.tags.count("details") == page.tags.count("summary")
+        assert page.tags.count("figure") - page.tags.count("details") <= 1  # of clearance
+        assert "The joint of each robot with the least room and the fastest one" in page.text
+        assert {f"joints-{robot}" for robot in run.report.q} <= set(page.ids)
+
+
+def test_with_few_robots_nothing_is_folded(passed_run: Any) -> None:
+    assert "details" not in Page(page_of(passed_run)).tags
+
+
+def test_the_line_of_a_robot_names_its_worst_joints(failed_run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(render, "MANY", 3)
+    text = Page(page_of(failed_run, plots={})).text
+    overview = text[text.index("The joint of each robot") :]
+
+    for robot in failed_run.report.q:
+        uses = [use for use in failed_run.report.joints if use.robot == robot]
+        near = min(uses, key=lambda use: use.margin / (use.upper - use.lower))
+        fast = max(uses, key=lambda use: use.peak_velocity / use.velocity_limit)
+        line = overview[overview.index(f" {robot} ") :].split(" % ", 1)[0]
+        assert line.split()[:2] == [robot, near.joint]
+        assert fast.joint in line
+        assert ("outside by" in line) == (near.margin < 0.0)

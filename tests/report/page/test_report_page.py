@@ -1,0 +1,48 @@
+"""The reference page of ``report.json`` names every key that a report has."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cellplan.model.motion import Motion, Resolution
+from cellplan.model.solver import Integrator
+from cellplan.report.record.write import report_json, summary_json
+
+OWN_NAMES = {"inputs", "digests", "versions"}  # the keys below these are names of files and packages
+
+
+def keys(tree: Any, names: set[str]) -> set[str]:
+    """All keys of a record but the names that a user gave."""
+    if isinstance(tree, list):
+        return {key for entry in tree for key in keys(entry, names)}
+    if not isinstance(tree, dict):
+        return set()
+    found = set(tree) - names
+    return found | {key for name, entry in tree.items() if name not in OWN_NAMES for key in keys(entry, names)}
+
+
+@pytest.fixture
+def reports(rail_run: Any, pairwise_runs: Any) -> list[Any]:
+    steps = len(rail_run.report.times) - 1
+    q = np.zeros((steps + 1, 1))
+    made = Resolution(integrator=Integrator.ACCURATE, panels=2, nodes=18, sweeps=4, solves=72, error_between=1e-9)
+    motion = Motion(times=rail_run.report.times, q=q, iterations=np.ones(steps), slack=np.zeros(steps), resolution=made)
+    one = report_json(rail_run.report, cell=rail_run.cell, provenance=rail_run.provenance, motion=motion)
+    runs = {name: run.report for name, run in pairwise_runs.items()}
+    several = summary_json(runs, cell=rail_run.cell, provenance=rail_run.provenance)
+    return [json.loads(one), json.loads(several)]
+
+
+def test_every_key_stands_on_the_page(repository: Path, reports: list[Any]) -> None:
+    page = (repository / "docs" / "reference" / "report-json.md").read_text(encoding="utf-8")
+    named = {word for code in re.findall(r"`([^`\n]+)`", page) for word in re.split(r"[.\s]+", code)}
+    cell_names = {name for robot, uses in reports[0]["joints"].items() for name in (robot, *uses)}
+    cell_names |= set(reports[0]["tasks"])
+
+    unnamed = {key for report in reports for key in keys(report, cell_names)} - named
+
+    assert sorted(unnamed) == []

@@ -1,0 +1,31 @@
+"""Plots are painted whatever display the environment names."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import os, sys
+before = os.environ.get("MPLBACKEND")
+from cellplan.report.plots.sheet import get_ready
+get_ready()
+import matplotlib
+assert os.environ.get("MPLBACKEND") == before
+print(matplotlib.rcParams._get("backend"))
+"""
+
+
+@pytest.mark.parametrize(
+    ("wanted", "left"),
+    [("module://matplotlib_inline.backend_inline", None), ("nonsense", None), ("", None), ("svg", "svg")],
+)
+def test_plots_are_painted_whatever_display_is_wanted(wanted: str, left: str | None) -> None:
+    environment = {**os.environ, "MPLBACKEND": wanted}
+
+    run = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=False)
+
+    assert run.returncode == 0, run.stderr
+    if left is not None:
+        assert run.stdout.strip() == left

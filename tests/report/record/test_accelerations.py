@@ -1,0 +1,96 @@
+"""Accelerations in the record and in the header of a table: units, the worst of several runs."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from cellplan.model.acceleration import (
+    JointAcceleration,
+    LimitSource,
+    MotionAccelerations,
+    PartAcceleration,
+    PointAcceleration,
+    ProcessSpeed,
+)
+from cellplan.report.record.accelerations import acceleration_parts, merge_accelerations, table_line
+
+TURNING = JointAcceleration(
+    robot="kuka",
+    joint="A1",
+    is_revolute=True,
+    peak=math.radians(300.0),
+    peak_at_s=1.5,
+    limit=math.radians(600.0),
+    source=LimitSource.ASSUMED,
+    peak_jerk=math.radians(4000.0),
+    peak_jerk_at_s=0.25,
+    jerk_limit=None,
+    window=0.004,
+)
+SLIDING = replace(
+    TURNING, joint="rail", is_revolute=False, peak=0.6, limit=1.0, source=LimitSource.STATED, peak_jerk=2.0
+)
+POINT = PointAcceleration(peak=3.5, peak_at_s=0.1, peak_jerk=80.0, peak_jerk_at_s=0.2, window=0.004)
+SPEED = ProcessSpeed(mean=0.05, peak=0.1, peak_at_s=0.5, steady_share=0.2, slower=((0.0, 0.4), (0.6, 1.0)))
+FOUND = MotionAccelerations(
+    joints=(TURNING, SLIDING),
+    tools={"kuka": POINT},
+    part=PartAcceleration(centre=POINT, corner=replace(POINT, peak=5.0)),
+    process={"ring": SPEED},
+)
+
+
+def test_joints_speak_degrees_and_millimetres_and_tasks_tell_their_speed() -> None:
+    record = {"tasks": {"ring": {"robot": "kuka"}, "hold": {}}, "joints": {"kuka": {"A1": {"min": 0.0}, "rail": {}}}}
+
+    parts = acceleration_parts(record, FOUND)
+
+    turning, sliding = parts["joints"]["kuka"]["A1"], parts["joints"]["kuka"]["rail"]
+    assert turning["min"] == 0.0
+    assert (turning["peak_acceleration"], turning["acceleration_limit"]) == (300.0, 600.0)
+    assert (turning["acceleration_limit_source"], turning["peak_jerk"], turning["jerk_window_ms"]) == (
+        "assumed",
+        4000.0,
+        4.0,
+    )
+    assert (sliding["peak_acceleration"], sliding["acceleration_limit_source"]) == (600.0, "stated")
+    assert parts["tasks"]["hold"]["process_speed"] is None
+    assert parts["tasks"]["ring"]["process_speed"] == {
+        "mean_mm_s": 50.0,
+        "peak_mm_s": 100.0,
+        "peak_at_s": 0.5,
+        "steady_share": 0.2,
+        "slower_count": 2,
+        "slower_at_s": [[0.0, 0.4], [0.6, 1.0]],
+    }
+    assert parts["accelerations"]["part"]["corner"]["peak_acceleration_m_s2"] == 5.0
+
+
+def test_the_worst_of_several_runs_counts() -> None:
+    gentle = replace(FOUND, joints=(replace(TURNING, peak=0.1, peak_jerk=99.0), SLIDING), part=None)
+
+    merged = merge_accelerations([FOUND, gentle])
+
+    assert merged.joints[0].peak == TURNING.peak
+    assert merged.joints[0].peak_jerk == 99.0
+    assert merged.part == FOUND.part
+
+
+@pytest.mark.parametrize(
+    ("joints", "line"),
+    [
+        (
+            (TURNING, SLIDING),
+            "at most 600 mm/s2 at 1.500 s (rail, 60 % of its stated limit), jerk 4000 deg/s3 over 4 ms at 0.250 s (A1)",
+        ),
+        (
+            (replace(TURNING, limit=None, source=LimitSource.UNLIMITED),),
+            "at most 300 deg/s2 at 1.500 s (A1, not judged), jerk 4000 deg/s3 over 4 ms at 0.250 s (A1)",
+        ),
+    ],
+)
+def test_the_header_of_a_table_tells_the_largest_acceleration_and_jerk(
+    joints: tuple[JointAcceleration, ...], line: str
+) -> None:
+    assert table_line(replace(FOUND, joints=joints), "kuka") == line
