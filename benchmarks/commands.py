@@ -176,12 +176,12 @@ def section(rounds: int) -> Section:
 
 def goals(command: Command, cost: Cost) -> list[Goal]:
     """The goals of a command and whether they are met."""
-    wanted = [("s", cost.wall_s, command.goal_s), ("MB", cost.peak_mb, command.goal_mb)]
+    desired = [("s", cost.wall_s, command.goal_s), ("MB", cost.peak_mb, command.goal_mb)]
     return [
         Goal(
             text=f"`{command.name}`: at most {goal:g} {unit}", measured=f"{digits(value, 3)} {unit}", met=value <= goal
         )
-        for unit, value, goal in wanted
+        for unit, value, goal in desired
         if goal is not None
     ]
 

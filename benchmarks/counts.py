@@ -16,7 +16,9 @@ from cellplan import load_cell, solve
 
 CELLS: Final = Path(__file__).resolve().parent.parent / "cells"
 KEPT: Final = Path(__file__).with_name("counts.json")
-ROOM: Final = 0.1  # [-] share by which a count may grow unnoticed: rounding differs a little between machines
+ROOM: Final = (
+    0.1  # [-] share by which a count may grow null_space_projection: rounding differs a little between machines
+)
 SPARE: Final = 5  # [-] and this much besides, for counts near zero
 
 

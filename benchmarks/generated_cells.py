@@ -20,7 +20,7 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.task import Task
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import part_pose
-from cellplan.planning.start.inverse_kinematics import reaching_postures, within_limits
+from cellplan.planning.start.inverse_kinematics import reaching_configurations, within_limits
 
 FEWEST, MOST = 2, 60  # [-] robots, the positioner among them; the plate of more would be larger than a part may be
 PITCH: Final = 1.1  # [m] between neighbouring bases along the ring
@@ -41,7 +41,7 @@ class Arm:
     Attributes:
         model: Its name.
         below: How far its base stands below the upper face of the plate in [m].
-        ready: A posture in [deg] near to working downwards with the elbow up.
+        ready: A configuration in [deg] near to working downwards with the elbow up.
     """
 
     model: str
@@ -171,9 +171,11 @@ def _starts(cell: Cell) -> dict[str, str]:
 
 
 def _start(cell: Cell, robot: Robot, task: Task, *, X_WP: np.ndarray, ready: np.ndarray) -> np.ndarray:
-    """The posture on the start of a task that is found from a posture ready for work."""
+    """The configuration on the start of a task that is found from a configuration ready for work."""
     X_PT = build_toolpath(task, cell.part, cell.origin).X_PT_start
-    found = within_limits(robot.model, reaching_postures(ScrewChain(robot), task, X_PT, X_WP=X_WP, seeds=ready[None]))
+    found = within_limits(
+        robot.model, reaching_configurations(ScrewChain(robot), task, X_PT, X_WP=X_WP, seeds=ready[None])
+    )
     if not len(found):
         raise ValueError(f"{robot.name}: the start of its task was not reached")
     return found[0]

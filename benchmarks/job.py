@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Arm:
-    """One robot: a chain of revolute joints, written down at its reference posture (all joints at zero).
+    """One robot: a chain of revolute joints, written down at its reference configuration (all joints at zero).
 
     Attributes:
         X_WB: Base in the world, shape (4, 4).
@@ -42,7 +42,7 @@ class Job:
         X_HP: The part in the tool frame of its holder, shape (4, 4).
         operators: Index of the robot of each task, shape (tasks,).
         times: Instants in [s], evenly spaced, shape (N,).
-        X_PT: Wanted tool tips on the part, shape (N, tasks, 4, 4).
+        X_PT: Reference tool tips on the part, shape (N, tasks, 4, 4).
         start: Stacked start posture in [rad], shape (nq,).
     """
 

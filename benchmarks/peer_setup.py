@@ -41,8 +41,8 @@ def install(group: str) -> str:
     """Make the environment of a group unless it is there; what went wrong, or nothing."""
     folder, needed = HOME / group, requirements(group)
     stamp = folder / STAMP
-    wanted = "\n".join([str(folder), sys.version, *needed])  # a checkout that was moved is installed again
-    if stamp.is_file() and stamp.read_text(encoding="utf-8") == wanted:
+    desired = "\n".join([str(folder), sys.version, *needed])  # a checkout that was moved is installed again
+    if stamp.is_file() and stamp.read_text(encoding="utf-8") == desired:
         return ""
     print(f"installing {', '.join(needed)} into {folder.relative_to(ROOT)}", file=sys.stderr)
     venv.create(folder, with_pip=True, clear=True, symlinks=os.name == "posix")
@@ -50,7 +50,7 @@ def install(group: str) -> str:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         return (done.stderr.strip().splitlines() or ["pip failed"])[-1]
-    stamp.write_text(wanted, encoding="utf-8")
+    stamp.write_text(desired, encoding="utf-8")
     return ""
 
 

@@ -95,7 +95,7 @@ def section(rounds: int) -> Section:
             "The robots, the part and the tasks of Ribeiro's thesis (2010), tables 4–7: 24 joints, three tools that "
             f"keep their whole pose on the moving part, 4 s at 1 ms, {len(job.times) - 1} steps "
             "(`cells/four_robots.yaml`). "
-            "Every engine is given the start posture, the wanted pose of each tool on the part at each sample, as its "
+            "Every engine is given the start posture, the desired pose of each tool on the part at each sample, as its "
             "own types, and one model of all robots, all built beforehand; it gives back the joints at each sample. "
             "Nobody looks at limits or collisions.",
             "",

@@ -110,14 +110,14 @@ class Timing:
     def __init__(self, clock: Clock) -> None:
         """Turn the table of stages round."""
         self._clock = clock
-        self._wanted: dict[str, list[tuple[str, str]]] = {}
+        self._desired: dict[str, list[tuple[str, str]]] = {}
         for stage, modules in STAGES.items():
             for module, names in modules.items():
-                self._wanted.setdefault(module, []).extend((name, stage) for name in names)
+                self._desired.setdefault(module, []).extend((name, stage) for name in names)
 
     def find_spec(self, name: str, path: Any, target: Any = None) -> Any:
         """The module as it would be found, with a loader that puts the timed functions in."""
-        if name not in self._wanted:
+        if name not in self._desired:
             return None
         spec = importlib.machinery.PathFinder.find_spec(name, path, target)
         if spec is None or spec.loader is None:
@@ -126,7 +126,7 @@ class Timing:
 
         def load_and_time(module: Any) -> None:
             load(module)
-            for way, stage in self._wanted[name]:
+            for way, stage in self._desired[name]:
                 *owners, last = way.split(".")
                 owner = functools.reduce(getattr, owners, module)
                 own = vars(owner)[last]

@@ -27,20 +27,20 @@ class InputError(CellplanError):
 
 
 class InvalidFileError(InputError):
-    """All complaints about one file at once, one line each.
+    """All findings about one file at once, one line each.
 
     Attributes:
-        complaints: The single errors, in the order of the file.
+        findings: The single errors, in the order of the file.
     """
 
-    def __init__(self, complaints: list[InputError]) -> None:
-        """Join the complaints, one per line."""
-        super().__init__("\n".join(str(complaint) for complaint in complaints))
-        self.complaints = complaints
+    def __init__(self, findings: list[InputError]) -> None:
+        """Join the findings, one per line."""
+        super().__init__("\n".join(str(finding) for finding in findings))
+        self.findings = findings
 
     def __reduce__(self) -> tuple[type["InvalidFileError"], tuple[list[InputError]]]:
-        """Cross to another process with every complaint."""
-        return InvalidFileError, (self.complaints,)
+        """Cross to another process with every finding."""
+        return InvalidFileError, (self.findings,)
 
 
 class OverrunError(InputError):
@@ -51,15 +51,15 @@ class NotVerifiedError(CellplanError):
     """A run on disk is whole, but a check fails on what it holds.
 
     Attributes:
-        complaints: What fails, one line each.
+        findings: What fails, one line each.
     """
 
     status = ExitStatus.CHECK_FAILED
 
-    def __init__(self, complaints: list[str]) -> None:
-        """Join the complaints, one per line."""
-        super().__init__("\n".join(complaints))
-        self.complaints = complaints
+    def __init__(self, findings: list[str]) -> None:
+        """Join the findings, one per line."""
+        super().__init__("\n".join(findings))
+        self.findings = findings
 
 
 class StartOutsideLimitsError(InputError):

@@ -161,7 +161,7 @@ def draw_loop() -> None:
     axes.text(6.73, y + 0.14, r"$\dot q$", ha="center")
     axes.plot([1.0, 1.0, 4.95], [y + 0.3, 2.65, 2.65], color=INK, linewidth=1.6)
     arrow(axes, (4.95, 2.65), (4.95, y + 0.16))
-    axes.text(3.0, 2.73, r"wanted relative twist  $_P V_{PT}$", ha="center", fontsize=10)
+    axes.text(3.0, 2.73, r"desired relative twist  $_P V_{PT}$", ha="center", fontsize=10)
     axes.plot([7.55, 7.55], [y - 0.3, below], color=INK, linewidth=1.6)
     arrow(axes, (7.55, below), (6.1, below))
     axes.text(7.75, 1.0, r"$q$", ha="left")

@@ -31,7 +31,7 @@ the same as a JSON Schema for editors.
 - **Bodies** are called `ROBOT/LINK`, `ROBOT/tool`, `ROBOT/tool_2`, …, `ROBOT/pedestal`, `ROBOT/NAME` for
   attachments, `part`, and by their names in the environment.
 
-All complaints about a file come at once, in the order of the file, as `FILE:LINE: key.path: what, got, allowed`.
+All findings about a file come at once, in the order of the file, as `FILE:LINE: key.path: what, got, allowed`.
 
 The copy of a cell in its run folder has every default and the start postures written out. It names files as the
 original does, so it loads only where these names lead to them. Its numbers read back to the values that were solved.
@@ -39,9 +39,9 @@ Tasks that the command line left out are left out.
 """
 CELL_TITLE, TABLE_TITLE = "Cell", "Robot table"
 TABLE_INTRODUCTION = """\
-A robot may be given by the axes of its joints at the reference posture, where all joints read zero. The joints form
-one chain in the order of the file. Everything is given in the base frame at that posture, the solids of the links as
-well.
+A robot may be given by the axes of its joints at the reference configuration, where all joints read zero. The
+joints form one chain in the order of the file. Everything is given in the base frame at that configuration, the solids
+of the links as well.
 """
 ERRORS_INTRODUCTION = """\
 # The errors file
@@ -55,11 +55,12 @@ robots and joints must be those of the cell.
 - **A number is fixed**: the same in every trial. `{normal: S}` is drawn for every trial from a normal distribution with
   mean zero and standard deviation S, `{uniform: H}` evenly between -H and H.
 - **Poses** are those of the real frame seen from the written one: the real base in the place of the written base, the
-  real tool tip in the place of the written tip, the real part in the place where the written part sits.
+  real tool tip in the place of the written tip, the real part in the place where the written part
+  sits.
 - **A longer link**: the vector from the axis point of the joint before to that of the named joint, at the reference
-  posture, is lengthened; the named joint and all that it carries move along. Where the two points are one, there is no
-  direction, and the entry is refused. Before the first joint stands the origin of the base frame. What lies behind the
-  last joint is an error of the tool.
+  configuration, is lengthened; the named joint and all that it carries move along. Where the two points are one, there
+  is no direction, and the entry is refused. Before the first joint stands the origin of the base frame. What lies
+  behind the last joint is an error of the tool.
 """
 
 

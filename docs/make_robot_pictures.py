@@ -25,7 +25,7 @@ AMBIENT = 0.45
 MARGIN = 60.0  # [mm] white round the robot
 HEIGHT = 4.2  # [inch] of one view
 
-# Working posture of each robot in [deg], the arm bent as it stands in a cell.
+# Working configuration of each robot in [deg], the arm bent as it stands in a cell.
 WORKING_POSTURES = {
     "reis_rv20_16": (0, -93, 108, 0, -15, 0),
     "kuka_kr6": (20, -12, 17, 30, 85, 0),
@@ -45,12 +45,12 @@ mpl.use("agg")
 mpl.rcParams.update({"font.family": "DejaVu Sans", "font.size": 9})
 
 
-def triangles_of(model: RobotModel, posture_deg: tuple[float, ...]) -> tuple[Array, list[int]]:
+def triangles_of(model: RobotModel, configuration_deg: tuple[float, ...]) -> tuple[Array, list[int]]:
     """Triangles of all bodies in B, shape (M, 3, 3) in [mm], and the link of each; the base is 0."""
     n = len(model.joints)
     tool = Tool(X_FT=np.eye(4), bodies=())
     placed = Robot(name=model.name, model=model, X_WB=np.eye(4), tool=tool, start=None, weights=np.ones(n))
-    D = ScrewChain(placed).link_displacements(np.radians([posture_deg]))[0]
+    D = ScrewChain(placed).link_displacements(np.radians([configuration_deg]))[0]
     triangles, links = [], []
     for body in model.bodies:
         mesh = tessellate(body.shape, SEGMENTS)
@@ -87,27 +87,27 @@ def draw(axes: Axes, triangles: Array, *, links: list[int], view: Array) -> None
 
 
 def limits_of(triangles: list[Array], view: Array) -> Array:
-    """Smallest and largest co-ordinates in a view over several postures, shape (2, 2), in [mm]."""
+    """Smallest and largest co-ordinates in a view over several configurations, shape (2, 2), in [mm]."""
     points = np.concatenate(triangles).reshape(-1, 3) @ view[:2].T
     return np.array([points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN])
 
 
 def draw_robot(model: RobotModel) -> None:
-    """One picture: side, front and top view, at the reference posture above and a working posture below."""
+    """One picture: side, front and top view, at the reference configuration above and a working configuration below."""
     zero = (0.0,) * len(model.joints)
-    postures = {"reference posture": zero, "working posture": WORKING_POSTURES[model.name]}
-    bodies = {name: triangles_of(model, posture) for name, posture in postures.items()}
+    configurations = {"reference posture": zero, "working posture": WORKING_POSTURES[model.name]}
+    bodies = {name: triangles_of(model, configuration) for name, configuration in configurations.items()}
     boxes = [limits_of([triangles for triangles, _ in bodies.values()], view) for view in VIEWS.values()]
     widths = [float(box[1, 0] - box[0, 0]) for box in boxes]
     height = max(float(box[1, 1] - box[0, 1]) for box in boxes)  # one for all: every view has the same scale
     size = (HEIGHT * sum(widths) / height + 2.0, 2.0 * HEIGHT)
     figure, sheet = plt.subplots(2, 3, figsize=size, width_ratios=widths, layout="constrained", dpi=RESOLUTION)
-    for row, (posture, (triangles, links)) in zip(sheet, bodies.items(), strict=True):
+    for row, (configuration, (triangles, links)) in zip(sheet, bodies.items(), strict=True):
         for axes, (name, view), box in zip(row, VIEWS.items(), boxes, strict=True):
             draw(axes, triangles, links=links, view=view)
             middle = float(box[:, 1].mean())
             axes.set(xlim=box[:, 0], ylim=(middle - 0.5 * height, middle + 0.5 * height), aspect="equal")
-            axes.set_title(f"{name},\n{posture}")
+            axes.set_title(f"{name},\n{configuration}")
             right, up = ("xyz"[int(np.argmax(np.abs(view[i])))] for i in (0, 1))
             axes.set(xlabel=f"{right} [mm]", ylabel=f"{up} [mm]")
             axes.grid(visible=True, color="#dddddd", linewidth=0.5)

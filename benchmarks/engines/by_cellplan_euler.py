@@ -1,4 +1,4 @@
-"""cellplan with Euler's steps, as the papers have it; start posture and wanted poses given."""
+"""cellplan with Euler's steps, as the papers have it; start posture and desired poses given."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -18,7 +18,7 @@ def prepare(job: Job) -> Callable[[], Array]:
     columns = np.array([robot.get_joint_config_index(name) for name in joint_names(job)])
     start = np.empty(len(columns))
     start[columns] = job.start
-    wanted = [[(X[:3, 3].copy(), np.asfortranarray(X[:3, :3])) for X in at_instant] for at_instant in job.X_PT]
+    desired = [[(X[:3, 3].copy(), np.asfortranarray(X[:3, :3])) for X in at_instant] for at_instant in job.X_PT]
 
     def run() -> Array:
         solver = embodik.KinematicsSolver(robot)
@@ -28,7 +28,7 @@ def prepare(job: Job) -> Callable[[], Array]:
         q = np.empty((len(job.times), len(columns)))
         q[0] = start
         for k in range(1, len(q)):
-            for task, (place, R) in zip(tasks, wanted[k], strict=True):
+            for task, (place, R) in zip(tasks, desired[k], strict=True):
                 task.set_target_pose(place, R)
             q[k] = q[k - 1] + solver.solve_velocity_dq(q[k - 1], False)  # a task weight of 1 takes the whole step
         return q[:, columns]

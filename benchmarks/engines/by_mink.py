@@ -22,7 +22,7 @@ def prepare(job: Job) -> Callable[[], Array]:
     columns = np.array([model.joint(name).qposadr[0] for name in joint_names(job)])
     start = np.empty(model.nq)
     start[columns] = job.start
-    wanted = [[mink.SE3.from_matrix(X_PT) for X_PT in at_instant] for at_instant in job.X_PT]
+    desired = [[mink.SE3.from_matrix(X_PT) for X_PT in at_instant] for at_instant in job.X_PT]
 
     def run() -> Array:
         configuration = mink.Configuration(model, start)
@@ -30,7 +30,7 @@ def prepare(job: Job) -> Callable[[], Array]:
         q = np.empty((len(job.times), model.nq))
         q[0] = start
         for k in range(1, len(q)):
-            for task, X_PT in zip(tasks, wanted[k], strict=True):
+            for task, X_PT in zip(tasks, desired[k], strict=True):
                 task.set_target(X_PT)
             step = mink.solve_ik(configuration, (), 1.0, "daqp", damping=1.0, limits=(), constraints=tasks)
             configuration.integrate_inplace(step, 1.0)
@@ -41,7 +41,7 @@ def prepare(job: Job) -> Callable[[], Array]:
 
 
 def mjcf(job: Job) -> str:
-    """The job as a MuJoCo model; every body frame is parallel to its arm's base at the reference posture."""
+    """The job as a MuJoCo model; every body frame is parallel to its arm's base at the reference configuration."""
     arms = (line for index in range(len(job.arms)) for line in _arm(job, index))
     return "\n".join(['<mujoco><compiler angle="radian"/><worldbody>', *arms, "</worldbody></mujoco>"])
 

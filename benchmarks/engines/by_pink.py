@@ -14,14 +14,15 @@ def prepare(job: Job) -> Callable[[], Array]:
     """Build the model and the targets; a run takes one step of the solver per instant.
 
     Tasks as constraints beside an objective of unit damping ask for the shortest step that does them: faster here than
-    tasks in the objective, and without their trace of damping. The wanted step is taken whole, so the time is left out.
+    tasks in the objective, and without their trace of damping. The desired step is taken whole, so the time is left
+    out.
     """
     model = pin.buildModelFromXML(urdf(job))
     data = model.createData()
     columns = np.array([model.joints[model.getJointId(name)].idx_q for name in joint_names(job)])
     start = np.empty(model.nq)
     start[columns] = job.start
-    wanted = [[pin.SE3(X_PT) for X_PT in at_instant] for at_instant in job.X_PT]
+    desired = [[pin.SE3(X_PT) for X_PT in at_instant] for at_instant in job.X_PT]
 
     def run() -> Array:
         configuration = pink.Configuration(model, data, start)
@@ -29,7 +30,7 @@ def prepare(job: Job) -> Callable[[], Array]:
         q = np.empty((len(job.times), model.nq))
         q[0] = start
         for k in range(1, len(q)):
-            for task, X_PT in zip(tasks, wanted[k], strict=True):
+            for task, X_PT in zip(tasks, desired[k], strict=True):
                 task.set_target(X_PT)
             step = pink.solve_ik(
                 configuration, (), 1.0, "daqp", damping=1.0, limits=(), constraints=tasks, safety_break=False

@@ -17,7 +17,7 @@ def prepare(job: Job) -> Callable[[], Array]:
     columns = np.array([robot.get_joint_offset(name) for name in joint_names(job)])
     start = robot.state.q.copy()  # begins with the pose of a free base, which stays where it is
     start[columns] = job.start
-    wanted = [[np.asfortranarray(X_PT) for X_PT in at_instant] for at_instant in job.X_PT]
+    desired = [[np.asfortranarray(X_PT) for X_PT in at_instant] for at_instant in job.X_PT]
 
     def run() -> Array:
         robot.state.q = start
@@ -33,7 +33,7 @@ def prepare(job: Job) -> Callable[[], Array]:
         q = np.empty((len(job.times), len(columns)))
         q[0] = job.start
         for k in range(1, len(q)):
-            for task, X_PT in zip(tasks, wanted[k], strict=True):
+            for task, X_PT in zip(tasks, desired[k], strict=True):
                 task.T_a_b = X_PT
             solver.solve(True)
             robot.update_kinematics()

@@ -30,10 +30,10 @@ def prepare(job: Job) -> Callable[[], Array]:
             for task, arm in enumerate(job.operators):
                 rows = slice(6 * task, 6 * task + 6)
                 X_WT, J_T = _state(chains[arm], here[columns[arm]])
-                X_wanted = X_WP @ job.X_PT[k, task]
+                X_desired = X_WP @ job.X_PT[k, task]
                 J[rows, columns[arm]] = J_T
                 J[rows, columns[job.holder]] = -_moved(J_P, X_WT[:3, 3] - X_WP[:3, 3])
-                error[rows] = _error(X_wanted, X_WT)
+                error[rows] = _error(X_desired, X_WT)
             q[k] = here + J.T @ np.linalg.solve(J @ J.T, error)
         return q
 
@@ -75,10 +75,10 @@ def _moved(J: Array, lever: Array) -> Array:
     return moved
 
 
-def _error(X_wanted: Array, X: Array) -> Array:
-    """Place and small rotation from a pose to the wanted one, in the world, shape (6,)."""
+def _error(X_desired: Array, X: Array) -> Array:
+    """Place and small rotation from a pose to the desired one, in the world, shape (6,)."""
     error = np.empty(6)
-    error[:3] = X_wanted[:3, 3] - X[:3, 3]
-    R = X_wanted[:3, :3] @ X[:3, :3].T
+    error[:3] = X_desired[:3, 3] - X[:3, 3]
+    R = X_desired[:3, :3] @ X[:3, :3].T
     error[3:] = 0.5 * (R[2, 1] - R[1, 2]), 0.5 * (R[0, 2] - R[2, 0]), 0.5 * (R[1, 0] - R[0, 1])
     return error

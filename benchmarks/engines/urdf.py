@@ -30,7 +30,7 @@ def tool_name(arm: int) -> str:
 
 
 def urdf(job: Job) -> str:
-    """The description; every joint frame is parallel to its arm's base at the reference posture."""
+    """The description; every joint frame is parallel to its arm's base at the reference configuration."""
     lines = ['<robot name="cell">', '<link name="base_link"/>']
     for index, arm in enumerate(job.arms):
         lines += _arm(index, arm)

@@ -15,7 +15,7 @@ OTHERS_MAY_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
 def cache_folder() -> Path | None:
     """The folder, made if need be; None when there is to be none, or none that can be trusted."""
     try:
-        folder = _wanted()
+        folder = _desired()
         if folder is None:
             return None
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -24,7 +24,7 @@ def cache_folder() -> Path | None:
         return None
 
 
-def _wanted() -> Path | None:
+def _desired() -> Path | None:
     """The folder that the user wants, or the usual one of the system."""
     named = os.environ.get(VARIABLE, "")
     if named.strip().lower() in OFF:

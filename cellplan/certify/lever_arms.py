@@ -1,4 +1,4 @@
-r"""How far the points of a body can be from the joint axes that move it, whatever the posture.
+r"""How far the points of a body can be from the joint axes that move it, whatever the configuration.
 
 Seen from one body, another is moved by the joints on the way between the two links: down from the one to the link they
 share, or to the ground, and up to the other. Take a point :math:`P_j` on each of these axes. Two axes that follow each
@@ -69,7 +69,7 @@ class Chain:
 
 
 class LeverArms:
-    """All axes of a cell at their reference posture, and how far each slides in a program."""
+    """All axes of a cell at their reference configuration, and how far each slides in a program."""
 
     def __init__(self, scene: Scene, q: Array) -> None:
         """Place the axes in the world.
@@ -159,7 +159,7 @@ class _Held:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _PlacedAxis:
-    """One axis at the reference posture in the world, and the stacked joint that moves it.
+    """One axis at the reference configuration in the world, and the stacked joint that moves it.
 
     Attributes:
         column: The stacked joint.

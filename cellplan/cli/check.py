@@ -24,7 +24,7 @@ def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_d
 
     Exit status: 0 sound, 1 a collision at the start, 2 bad input, 3 no start posture found, 4 internal error.
     """
-    with json_failure(SCHEMA, wanted=as_json):
+    with json_failure(SCHEMA, desired=as_json):
         from cellplan.io.cell.load import load_cell
         from cellplan.pipeline.check import check as check_cell
 
@@ -83,8 +83,8 @@ def _lines(record: dict[str, Any]) -> list[str]:
 
     lines = [f"{record['cell']}: {'sound' if record['status'] == 'passed' else 'not sound'}"]
     for robot, start in record["start"].items():
-        posture = ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
-        lines.append(f"  start of {robot} ({'found' if robot in record['start_found'] else 'given'}): {posture}")
+        configuration = ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
+        lines.append(f"  start of {robot} ({'found' if robot in record['start_found'] else 'given'}): {configuration}")
     lines += [f"  {record['start_choice']}"] if record["start_choice"] else []
     for name, length in record["path_length_mm"].items():
         lines.append(f"  task {name}: path of {length:.4g} mm, {direction_words(record['direction'][name])}")

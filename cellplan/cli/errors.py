@@ -24,11 +24,11 @@ def exit_status(error: BaseException) -> ExitStatus:
 
 
 def error_lines(error: BaseException) -> list[str]:
-    """What went wrong, one complaint per line; a complaint about a line of a file begins with ``FILE:LINE:``."""
+    """What went wrong, one finding per line; a finding about a line of a file begins with ``FILE:LINE:``."""
     if isinstance(error, KeyboardInterrupt):
         return ["interrupted: no half-written run is left behind"]
     if isinstance(error, InvalidFileError | NotVerifiedError):
-        return [_one_line(str(complaint)) for complaint in error.complaints]
+        return [_one_line(str(finding)) for finding in error.findings]
     if isinstance(error, CellplanError):
         line = _one_line(str(error))
         return [line if LOCATED.match(line) else f"error: {line}"]

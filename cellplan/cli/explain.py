@@ -14,7 +14,7 @@ def explain(cell: CellFile, as_json: AsJson = False, allow_dir: AllowDirs = None
 
     Exit status: 0 shown, 2 bad input, 4 internal error.
     """
-    with json_failure(SCHEMA, wanted=as_json):
+    with json_failure(SCHEMA, desired=as_json):
         from cellplan.io.cell.load import load_cell
         from cellplan.pipeline.explain import explain as explain_cell
 

@@ -37,7 +37,7 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
     The run is verified first, and the rounded numbers of the programs after that. Exit status: 0 written, 1 a check
     fails, 2 bad input, or a run that is changed or stale, 4 internal error. Nothing is written unless it is 0.
     """
-    with json_failure(SCHEMA, wanted=as_json):
+    with json_failure(SCHEMA, desired=as_json):
         from cellplan.pipeline.export import default_folder, export_program, refuse_unless_exportable, require_format
         from cellplan.pipeline.gate.open_gate import open_gate
 

@@ -35,8 +35,8 @@ app = typer.Typer(
 )
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(desired: bool) -> None:
+    if desired:
         say(f"cellplan {cellplan.__version__}")
         raise typer.Exit
 

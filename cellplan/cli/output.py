@@ -34,14 +34,14 @@ def say_json(value: Mapping[str, object]) -> None:
 
 
 @contextlib.contextmanager
-def json_failure(schema: str, *, wanted: bool) -> Iterator[None]:
+def json_failure(schema: str, *, desired: bool) -> Iterator[None]:
     """Give a machine one JSON object also when the command cannot do its work; the error goes on upwards."""
     try:
         yield
     except OutputError:
         raise
     except (Exception, KeyboardInterrupt) as error:
-        if wanted and not hasattr(error, "exit_code"):  # typer ends commands by exceptions with an exit code
+        if desired and not hasattr(error, "exit_code"):  # typer ends commands by exceptions with an exit code
             lines = error_lines(error)
             say_json({"schema": schema, "status": "error", "exit": int(exit_status(error)), "errors": lines})
         raise

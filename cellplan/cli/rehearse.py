@@ -49,7 +49,7 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
     Exit status: 0 the true errors are within tolerance (after feedback when asked), 1 they are not, 2 bad input,
     3 no solution, 4 internal error.
     """
-    with json_failure(SCHEMA, wanted=as_json):
+    with json_failure(SCHEMA, desired=as_json):
         from cellplan.io.cell.load import load_cell
         from cellplan.io.cell_errors import load_errors
         from cellplan.io.run.folder import REHEARSAL, refuse_unless_replaceable

@@ -16,7 +16,7 @@ SCHEMA = "cellplan.robots/1"
 
 def robots(as_json: AsJson = False) -> None:
     """List the bundled robots with reach, limits and source."""
-    with json_failure(SCHEMA, wanted=as_json):
+    with json_failure(SCHEMA, desired=as_json):
         from cellplan.io.robots.bundled import bundled_names, load_bundled
 
         records = [_record(name, load_bundled(name)) for name in bundled_names()]

@@ -55,12 +55,12 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     The tables are written only when every check passes. Exit status: 0 passed, 1 a check failed, 2 bad input,
     3 no solution, 4 internal error.
     """
-    from cellplan.guard import Aside
+    from cellplan.guard import BackgroundProcess
 
-    with json_failure(SCHEMA, wanted=as_json), Aside() as aside:
-        from cellplan.pipeline.background_plots import Drawing
+    with json_failure(SCHEMA, desired=as_json), BackgroundProcess() as aside:
+        from cellplan.pipeline.background_plots import BackgroundPlots
 
-        drawing = Drawing(aside)  # the child imports what it paints with while this process imports the rest
+        drawing = BackgroundPlots(aside)  # the child imports what it paints with while this process imports the rest
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides

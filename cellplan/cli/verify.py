@@ -21,7 +21,7 @@ def verify(
 
     Exit status: 0 verified, 1 a check fails, 2 not a run, changed or stale, 4 internal error.
     """
-    with json_failure(SCHEMA, wanted=as_json):
+    with json_failure(SCHEMA, desired=as_json):
         from cellplan.pipeline.gate.open_gate import open_gate
         from cellplan.report.text.run import figure_lines, read_record
 
@@ -32,7 +32,7 @@ def verify(
             if not as_json:
                 raise
             told = {"schema": SCHEMA, "status": "failed", "exit": int(error.status), "folder": str(run)}
-            say_json({**told, "errors": error.complaints})
+            say_json({**told, "errors": error.findings})
             raise typer.Exit(error.status) from None
         record = read_record(run)
     if as_json:

@@ -1,4 +1,4 @@
-"""Which of many pairs of bodies touches first in a single posture."""
+"""Which of many pairs of bodies touches first in a single configuration."""
 
 import numpy as np
 from numpy.typing import NDArray

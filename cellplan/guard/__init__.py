@@ -3,8 +3,8 @@
 The same way of working is open to work of our own that can be done aside.
 """
 
-from cellplan.guard.background import Aside
+from cellplan.guard.background import BackgroundProcess
 from cellplan.guard.isolated_call import in_child
 from cellplan.guard.worker_process import Guard
 
-__all__ = ["Aside", "Guard", "in_child"]
+__all__ = ["BackgroundProcess", "Guard", "in_child"]

@@ -1,4 +1,4 @@
-"""Aside: work of our own that a child process does while this one goes on; what cannot be done there is done here."""
+"""Run functions in a background process; what cannot be done there is done in this one."""
 
 import os
 from collections.abc import Callable
@@ -15,7 +15,7 @@ PATIENT: Final = Guard(file="cellplan", worker="the child process", seconds=600.
 Value = TypeVar("Value")
 
 
-class Aside:
+class BackgroundProcess:
     """Does jobs in a child process, one after the other, until the ``with`` statement ends.
 
     The child is no more than a help: without a second processor there is none, and whatever it cannot do, for want of
@@ -25,7 +25,7 @@ class Aside:
     def __init__(self) -> None:
         """Prepare; the process is started with the first job."""
         self._child: ChildProcess | None = None
-        self._is_wanted = processors() > 1
+        self._is_desired = processors() > 1
         self._waiting = ThreadPoolExecutor(max_workers=1, thread_name_prefix="cellplan-aside")
 
     def __enter__(self) -> Self:
@@ -36,7 +36,7 @@ class Aside:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         """End the child, in the middle of a job if need be."""
-        self._is_wanted = False
+        self._is_desired = False
         if self._child is not None:
             self._child.kill()
         self._waiting.shutdown(wait=True, cancel_futures=True)
@@ -66,11 +66,11 @@ class Aside:
 
     def _begun(self, job: Job) -> Future[Answer | None] | None:
         """The answer to come; None when there is no child to ask."""
-        if self._is_wanted and self._child is None:
+        if self._is_desired and self._child is None:
             with suppress(OSError, TypeError):  # no leave, no memory, no interpreter
                 self._child = ChildProcess()
-        if not self._is_wanted or self._child is None:
-            self._is_wanted = False
+        if not self._is_desired or self._child is None:
+            self._is_desired = False
             return None
         return self._waiting.submit(self._asked, self._child, job)
 
@@ -79,7 +79,7 @@ class Aside:
         try:
             return child.ask(job, PATIENT)
         except Exception:  # noqa: BLE001 - the child is gone, or the job cannot be sent: it is done here
-            self._is_wanted = False
+            self._is_desired = False
             return None
 
 

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.io.input.findings import Complaint, KeyPath, did_you_mean, listed, raise_complaints, shown
+from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, raise_findings, shown
 from cellplan.io.schema.cell_errors import (
     ErrorsDocument,
     PoseErrorEntry,
@@ -40,10 +40,10 @@ def load_errors(path: Path | str, cell: Cell) -> CellErrors:
     """
     file = str(path)
     document = read_yaml(Path(path), file=file)
-    whole, complaints = validate(ErrorsDocument, document)
-    complaints += document.complaints
-    complaints += _unknown_names(document, cell)
-    raise_complaints(file, complaints)
+    whole, findings = validate(ErrorsDocument, document)
+    findings += document.findings
+    findings += _unknown_names(document, cell)
+    raise_findings(file, findings)
     if whole is None:
         raise InputError(f"{file}: the errors cannot be understood")
     noise = whole.measurement
@@ -59,25 +59,25 @@ def load_errors(path: Path | str, cell: Cell) -> CellErrors:
     )
 
 
-def _unknown_names(document: YamlDocument, cell: Cell) -> Iterator[Complaint]:
+def _unknown_names(document: YamlDocument, cell: Cell) -> Iterator[Finding]:
     """Robots and joints that the cell does not have, and links that cannot grow."""
     models = {robot.name: robot.model for robot in cell.robots}
     for name, written in _mapping(document.root, "robots").items():
         place: KeyPath = ("robots", name)
         if name not in models:
-            yield document.key_complaint(place, _unknown("a robot of this cell", name, list(models)))
+            yield document.key_finding(place, _unknown("a robot of this cell", name, list(models)))
         elif isinstance(written, dict):
             yield from _wrong_joints(document, place, written, models[name])
     for name in _mapping(document.root, "grasp"):
         if name not in cell.positioners:
             holders = list(cell.positioners)
             text = _unknown("a robot that holds the part", name, holders)
-            yield document.key_complaint(("grasp", name), text)
+            yield document.key_finding(("grasp", name), text)
 
 
 def _wrong_joints(
     document: YamlDocument, place: KeyPath, written: Mapping[str, object], model: RobotModel
-) -> Iterator[Complaint]:
+) -> Iterator[Finding]:
     """Joints that a robot does not have, that move in another unit, or before which there is no link to lengthen."""
     kinds = {"joint_offsets_deg": True, "joint_offsets_mm": False}
     for key in (*kinds, "link_lengths_mm"):
@@ -85,18 +85,18 @@ def _wrong_joints(
             path = (*place, key, name)
             if name not in model.joint_names:
                 text = _unknown(f"a joint of '{place[-1]}'", name, list(model.joint_names))
-                yield document.key_complaint(path, text)
+                yield document.key_finding(path, text)
                 continue
             joint = model.joint_names.index(name)
             if key in kinds and model.joints[joint].is_revolute != kinds[key]:
                 kind, cure = ("prismatic", "joint_offsets_mm") if kinds[key] else ("revolute", "joint_offsets_deg")
-                yield document.key_complaint(path, f"joint '{name}' is {kind}: state its offset under {cure}")
+                yield document.key_finding(path, f"joint '{name}' is {kind}: state its offset under {cure}")
             if key == "link_lengths_mm" and np.linalg.norm(link_vector(model, joint)) < SHORTEST_LINK:
                 text = (
                     f"the axis points of '{name}' and of the joint before it are one point, so the link has no "
                     "direction to be lengthened in: state the error under base or tool, or move a point along its axis"
                 )
-                yield document.key_complaint(path, text)
+                yield document.key_finding(path, text)
 
 
 def _unknown(what: str, name: str, known: list[str]) -> str:

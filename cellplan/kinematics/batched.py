@@ -1,7 +1,7 @@
-"""Kinematics of all robots at many postures at once, postures last: each lane of an array is one posture of one cell.
+"""Batched kinematics of all robots; the last axis of every array is the batch.
 
-The arrays are laid out so that NumPy works through thousands of postures in one call; robots lie side by side and are
-filled up to the longest chain with axes that do nothing. Lanes may differ in base poses and tools.
+The arrays are laid out so that NumPy works through thousands of configurations in one call; robots lie side by side
+and are filled up to the longest chain with axes that do nothing. Lanes may differ in base poses and tools.
 """
 
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ class Placement:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LaneState:
+class BatchState:
     """All robots at all lanes.
 
     Attributes:
@@ -66,7 +66,7 @@ class LaneState:
     p_WT: Array
 
 
-class LaneChains:
+class BatchChains:
     """The chains from base to flange of all robots of a cell, level by level.
 
     Attributes:
@@ -81,7 +81,7 @@ class LaneChains:
     """
 
     def __init__(self, cell: Cell) -> None:
-        """Take the axes at the reference posture; all link frames are parallel to the base there."""
+        """Take the axes at the reference configuration; all link frames are parallel to the base there."""
         chains = [_chain(robot) for robot in cell.robots]
         robots = len(chains)
         self.levels = max(1, *(len(chain) for chain in chains))
@@ -127,7 +127,7 @@ class LaneChains:
         p_WB, p_LT = np.moveaxis(bases[:, :3, 3], 0, 1), np.moveaxis(tools[:, :3, 3], 0, 1)
         return Placement(R_WB, p_WB, R_LT, p_LT - self._last_point.T[..., None])
 
-    def state(self, q: Array, placement: Placement) -> LaneState:
+    def state(self, q: Array, placement: Placement) -> BatchState:
         """Kinematics at stacked joint vectors, shape (nq, lanes)."""
         frames = self._steps(q)
         R: Array = np.broadcast_to(placement.R_WB, (3, 3, *frames.shape[3:]))
@@ -138,7 +138,7 @@ class LaneChains:
             R, p = frames[level, :, :3], frames[level, :, 3]
         R_WT = np.einsum("ijrb,jkrb->ikrb", R, np.broadcast_to(placement.R_LT, R.shape))
         p_WT = p + np.einsum("ijrb,jrb->irb", R, np.broadcast_to(placement.p_LT, R.shape[1:]))
-        return LaneState(np.swapaxes(frames[:, :, 4], 0, 1), np.swapaxes(frames[:, :, 3], 0, 1), R_WT, p_WT)
+        return BatchState(np.swapaxes(frames[:, :, 4], 0, 1), np.swapaxes(frames[:, :, 3], 0, 1), R_WT, p_WT)
 
     def _steps(self, q: Array) -> Array:
         """How each axis turns what follows (three columns), where it is and where it points to.
@@ -190,7 +190,7 @@ def _chain(robot: Robot) -> list[int]:
 
 
 def _last_point(robot: Robot) -> Array:
-    """The point of the axis that carries the flange, at the reference posture in B; the base origin without one."""
+    """The point of the axis that carries the flange, at zero joints, in B; the base origin without one."""
     if robot.model.flange_link == BASE:
         return np.zeros(3)
     every: tuple[Joint | FollowerJoint, ...] = (*robot.model.joints, *robot.model.followers)

@@ -89,7 +89,7 @@ def _perturbed_robot(robot: Robot, draw: RobotDraw) -> Robot:
 
 
 def _with_link_lengths(model: RobotModel, lengths: Array) -> RobotModel:
-    """Each joint, with all that it carries, moved along the link before it at the reference posture."""
+    """Each joint, with all that it carries, moved along the link before it at the reference configuration."""
     axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
     shifts = np.zeros((len(axes) + 1, 3))  # of each link; the base comes first
     for index, axis in enumerate(axes):
@@ -104,7 +104,7 @@ def _with_link_lengths(model: RobotModel, lengths: Array) -> RobotModel:
 
 
 def _with_offsets(model: RobotModel, offsets: Array) -> RobotModel:
-    r"""A model whose reference posture is the one that the offsets lead to.
+    r"""A model whose reference configuration is the one that the offsets lead to.
 
     ``A_i(q_i + d_i) = A_i(q_i) A_i(d_i)``, so the chain of ([Ribeiro2010]_ Eq. B.73) with offsets is the chain of axes
     displaced by the offsets of the joints before them, ending in a flange displaced by all. A follower turns by its
@@ -124,7 +124,7 @@ def _displaced(model: RobotModel, D: Array, *, by_own: bool) -> RobotModel:
 
     Args:
         model: The model.
-        D: Displacements at the reference posture, expressed in B.
+        D: Displacements at the reference configuration, expressed in B.
         by_own: Whether a joint's axis goes with the link that it moves, rather than with the one that carries it.
     """
     n = len(model.joints)

@@ -37,7 +37,7 @@ class LinkState:
     Attributes:
         screws_W: Twist that unit speed of each axis, driven or follower, gives what it carries, taken at the world
             origin, linear part first, shape (6, links), expressed in W.
-        D: Displacement of each link from its place in B at the reference posture to its place in the world, shape
+        D: Displacement of each link from its place in B at the reference configuration to its place in the world, shape
             (links, 4, 4): anything fixed to it is at ``D @ X_BS``.
     """
 
@@ -152,7 +152,7 @@ class CombinedModel:
         return self._groups[-1]
 
     def _add_robot(self, robot: Robot, columns: slice, carries: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> None:
-        """Add one robot's joints; every joint frame is parallel to B at the reference posture."""
+        """Add one robot's joints; every joint frame is parallel to B at the reference configuration."""
         model = robot.model
         axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
         ids: list[int] = []

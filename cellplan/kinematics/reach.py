@@ -10,7 +10,7 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Robot, Tool
 from cellplan.model.robot import RobotModel
 
-STARTS: Final = 4  # postures the search climbs from; the bundled arms need one
+STARTS: Final = 4  # configurations the search climbs from; the bundled arms need one
 GRID: Final = 25  # positions tried per joint and round
 SWEEPS: Final = 24  # rounds over all joints; the grid shrinks by half in each, down to a rounding error
 ENDLESS: Final = 2.0 * np.pi  # [rad] range of a joint that may turn without end
@@ -20,7 +20,7 @@ def arm_reach(model: RobotModel) -> float:
     """Largest distance in [m] of the flange from the first joint's axis, within the joint limits.
 
     One joint after the other is moved to its best position on a grid that gets finer in each round, from several
-    postures. A first joint that slides has no axis to turn about: then the distance from its point is taken.
+    configurations. A first joint that slides has no axis to turn about: then the distance from its point is taken.
     """
     placed = Robot(
         name=model.name,
@@ -46,7 +46,7 @@ def arm_reach(model: RobotModel) -> float:
 
 
 def _climb(distances: Callable[[Array], Array], q: Array, lower: Array, upper: Array) -> float:
-    """Distance at the best posture found from ``q``, in [m]."""
+    """Distance at the best configuration found from ``q``, in [m]."""
     best = q.copy()
     width = upper - lower
     for _ in range(SWEEPS):

@@ -15,7 +15,7 @@ class ScrewChain:
     """The links of one placed robot."""
 
     def __init__(self, robot: Robot) -> None:
-        """Take the joint axes at the reference posture, followers after driven joints."""
+        """Take the joint axes at the reference configuration, followers after driven joints."""
         model = robot.model
         self._axes: tuple[Joint | FollowerJoint, ...] = (*model.joints, *model.followers)
         self._flange_link = model.flange_link
@@ -26,7 +26,7 @@ class ScrewChain:
         self._n = len(model.joints)
 
     def link_displacements(self, q: Array) -> Array:
-        """Displacement of every link from its place in B at the reference posture to its place in the world.
+        """Displacement of every link from its place in B at the reference configuration to its place in the world.
 
         The displaced pose of anything fixed to link i is ``X_WS = D[:, i + 1] @ X_BS`` (the base is i = -1):
         ``D_i = D_parent A_i(q_i)`` with the screw displacement ``A_i`` ([Ribeiro2010]_ Eq. B.73).

@@ -26,7 +26,7 @@ class Mode(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where the words of a cell stand, so that a later complaint can still name the line.
+    """Where the words of a cell stand, so that a later finding can still name the line.
 
     Attributes:
         file: File name as the user gave it.

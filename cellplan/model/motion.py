@@ -17,8 +17,8 @@ class TaskSchedule:
 
     Attributes:
         task: The task.
-        X_PT: Wanted tool tip in P at each instant, shape (N, 4, 4); held still before the start and after the end.
-        V_PT_P: Wanted twist of the tool relative to the part in P, linear first, shape (N, 6).
+        X_PT: Reference tool tip in P at each instant, shape (N, 4, 4); held still before the start and after the end.
+        V_PT_P: Reference twist of the tool relative to the part in P, linear first, shape (N, 6).
         travelled: Length of path behind the tool in [m], shape (N,); it grows from cycle to cycle.
         length: Length of the path on the surface in [m], of one cycle.
         end: Instant in [s] at which the path is done.
@@ -47,7 +47,7 @@ class DesiredMotion(Protocol):
         """Instants in [s], increasing, at which the speed of a tool may jump, or its rate."""
 
     def poses(self, times: Array) -> tuple[Array, ...]:
-        """Wanted tool tips in P of all tasks at instants in [s], shape (M,), shape (M, 4, 4) each."""
+        """Reference tool tips in P of all tasks at instants in [s], shape (M,), shape (M, 4, 4) each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -69,7 +69,7 @@ class TaskAccuracy:
         task: Name of the task.
         robot: Name of the operator.
         position_error: Position error in P in [m], shape (N, 3); unconstrained components are zero.
-        orientation_error: Rotation vector of ``R_PT,wanted R_PT^T`` in P in [rad], shape (N, 3); likewise.
+        orientation_error: Rotation vector of ``R_PT,desired R_PT^T`` in P in [rad], shape (N, 3); likewise.
         path_length: Length of the path on the surface in [m].
         end_s: Instant at which the path is done.
         between: Errors between the rows; None where they were not evaluated.
@@ -92,7 +92,7 @@ class ClosureAccuracy:
         robot: Name of the holder.
         axes: Components that the grasp keeps, in the order x, y, z, rx, ry, rz.
         position_error: Position error in P in [m], shape (N, 3); components that the grasp leaves open are zero.
-        orientation_error: Rotation vector of ``R_PT,wanted R_PT^T`` in P in [rad], shape (N, 3); likewise.
+        orientation_error: Rotation vector of ``R_PT,desired R_PT^T`` in P in [rad], shape (N, 3); likewise.
         between: Errors between the rows; None where they were not evaluated.
     """
 

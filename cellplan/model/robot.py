@@ -1,4 +1,4 @@
-"""Robot: joint axes and link bodies at the reference posture, where every joint reads zero."""
+"""Robot: joint axes and link bodies at the reference configuration, where every joint reads zero."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -21,7 +21,7 @@ class JointKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Joint:
-    """One driven axis, given at the reference posture in the robot's base frame B.
+    """One driven axis, given at the reference configuration in the robot's base frame B.
 
     Attributes:
         name: Name in tables and reports.
@@ -68,7 +68,7 @@ class FollowerJoint:
         name: Name in messages.
         kind: Revolute or prismatic.
         parent: Index of the link that carries it, counted over joints first and followers after them.
-        axis_B: Unit direction at the reference posture, shape (3,).
+        axis_B: Unit direction at the reference configuration, shape (3,).
         point_B: A point on the axis in [m], shape (3,).
         leader: Index of the driving joint in ``RobotModel.joints``.
         ratio: Follower's motion per leader's motion.
@@ -98,7 +98,7 @@ class Body:
         name: Name in reports, unique within its robot.
         link: Index of the joint that carries it, followers counted after joints; ``BASE`` for the foot of the robot.
         shape: The solid, in its own frame.
-        X_BS: Pose of the shape's frame in B at the reference posture (for tools: in F; for parts: in P).
+        X_BS: Pose of the shape's frame in B at the reference configuration (for tools: in F; for parts: in P).
         accuracy: How far the real link may stick out of it in [m]; None for what the robot states for all its bodies.
     """
 
@@ -150,7 +150,7 @@ class RobotModel:
         body_accuracy: How good the link bodies are that do not say it themselves; None when it is not stated.
         payload: What it may carry; None when it is not stated.
         flange_link: Index of the joint that carries the flange.
-        X_BF: Flange (mechanical interface) in B at the reference posture, z out of the flange.
+        X_BF: Flange (mechanical interface) in B at the reference configuration, z out of the flange.
         bodies: Link bodies.
     """
 

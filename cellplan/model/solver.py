@@ -98,7 +98,7 @@ class FilteredInverseSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchSettings:
-    """How the heuristic and the recursive search look for the next posture ([Nicolato2007]_ ch. 3).
+    """How the heuristic and the recursive search look for the next configuration ([Nicolato2007]_ ch. 3).
 
     Attributes:
         tolerance: Largest root of the cost at which an instant counts as reached, in [m].
@@ -146,13 +146,14 @@ class SecondaryGoal:
         kind: What is improved.
         gain: How strongly: ``k0`` of Eq. D.44.
         within: Distance in [m] below which bodies push each other away (obstacles only).
-        postures: Wanted posture by robot, shape (n,) each (posture only); robots left out: their start posture.
+        postures: Reference configuration by robot, shape (n,) each (configuration only); robots left out: their start
+            posture.
     """
 
     kind: GoalKind
     gain: float
     within: float = 0.2
-    postures: Mapping[str, Array] = field(default_factory=dict)
+    configurations: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

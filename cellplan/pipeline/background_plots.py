@@ -1,9 +1,9 @@
-"""Drawing: the plots of a run, painted aside as soon as their curves are known, or when they are asked for."""
+"""BackgroundPlots: the plots of a run, painted aside as soon as their curves are known, or when they are asked for."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from cellplan.guard import Aside
+from cellplan.guard import BackgroundProcess
 from cellplan.report.plots.sheet import Sheet, get_ready, pictures
 
 if TYPE_CHECKING:  # the child is to begin before these are imported
@@ -13,10 +13,10 @@ if TYPE_CHECKING:  # the child is to begin before these are imported
 Pictures = dict[str, bytes]
 
 
-class Drawing:
+class BackgroundPlots:
     """Paints the plots of one run after the other; the files are the same with and without a child process."""
 
-    def __init__(self, aside: Aside | None = None) -> None:
+    def __init__(self, aside: BackgroundProcess | None = None) -> None:
         """Let the child import what it paints with; without one everything is painted when it is asked for."""
         self._aside = aside
         self._begun: list[tuple[Report, Callable[[], Pictures]]] = []

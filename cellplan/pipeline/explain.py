@@ -106,7 +106,7 @@ def _plane(cell: Cell) -> PlaneName | None:
 
 
 def _matrix(cell: Cell, model: CombinedModel, plan: RunPlan) -> MatrixShape:
-    """Blocks of one run, and its singular values where all postures that matter are known."""
+    """Blocks of one run, and its singular values where all configurations that matter are known."""
     tasks: list[Relation] = [*(cell.task(name) for name in plan.tasks), *closures(cell, plan.moving)]
     signs = column_signs(cell, model, tasks, plan.moving)
     moves = np.any(signs != 0.0, axis=0)

@@ -115,17 +115,15 @@ def _verify_rounded(
 ) -> None:
     """Make every check again on what the files hold, on the clock that they hold."""
     scene = Scene.from_cell(run.cell)
-    complaints = []
+    findings = []
     for motion, tables in zip(run.motions, read, strict=True):
         _refuse_other_clock(motion, tables, room=0.5 * 10.0**-decimals)
         clock = next(iter(tables.values())).times
         schedule = replace(motion.schedule, times=clock)
         report = verify(scene, schedule, list(tables.values()), moving=motion.moving, progress=progress)
-        complaints += [
-            f"rounded to {decimals} decimals: {check.message}" for check in report.checks if not check.passed
-        ]
-    if complaints:
-        raise NotVerifiedError(complaints)
+        findings += [f"rounded to {decimals} decimals: {check.message}" for check in report.checks if not check.passed]
+    if findings:
+        raise NotVerifiedError(findings)
 
 
 def _refuse_other_clock(motion: VerifiedMotion, tables: Mapping[str, JointTable], *, room: float) -> None:

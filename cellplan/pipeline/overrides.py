@@ -96,9 +96,9 @@ def _with_integrator(cell: Cell, name: str, *, is_new_method: bool) -> Cell:
     """The cell with another integrator, which must go with all that is asked of the solver."""
     integrator = Integrator(_known("--integrator", name, [str(each) for each in Integrator]))
     if integrator is Integrator.ACCURATE:
-        complaints = [InputError(_why_not(cell, key, is_new_method)) for key in cell.solver.against_accurate]
-        if complaints:
-            raise complaints[0] if len(complaints) == 1 else InvalidFileError(complaints)
+        findings = [InputError(_why_not(cell, key, is_new_method)) for key in cell.solver.against_accurate]
+        if findings:
+            raise findings[0] if len(findings) == 1 else InvalidFileError(findings)
     return replace(cell, solver=replace(cell.solver, integrator=integrator))
 
 

@@ -12,7 +12,7 @@ from cellplan.model.idle import not_in_program
 from cellplan.model.motion import Motion, Program
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
-from cellplan.pipeline.background_plots import Drawing
+from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_homes
 from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.run import PlannedRun, plan_run
@@ -27,7 +27,7 @@ from cellplan.scene.scene import Scene
 
 
 def solve(
-    cell: Cell, *, task: str | None = None, progress: Progress = silent, drawing: Drawing | None = None
+    cell: Cell, *, task: str | None = None, progress: Progress = silent, drawing: BackgroundPlots | None = None
 ) -> Solution:
     """Plan the motion of all robots, render their joint tables, read these back and verify them.
 
@@ -59,7 +59,7 @@ def solve(
     return Solution(cell=solved, runs=runs, remark=choice.warning)
 
 
-def _run(scene: Scene, planned: PlannedRun, *, progress: Progress, drawing: Drawing | None) -> Run:
+def _run(scene: Scene, planned: PlannedRun, *, progress: Progress, drawing: BackgroundPlots | None) -> Run:
     """Verify what would be written of one run."""
     cell, plan = scene.cell, planned.plan
     motion = replace(planned.motion, q=standing(cell, plan, planned.motion.q))

@@ -12,7 +12,7 @@ from cellplan.io.run.joint_tables import parse_header, program_digest, replace_h
 from cellplan.io.run.manifest import render_manifest
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
-from cellplan.pipeline.background_plots import Drawing
+from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.report.page.render import overview_html, report_html
 from cellplan.report.record.run import Provenance
@@ -34,7 +34,7 @@ def write_run(
     *,
     keep_rejected: bool = False,
     progress: Progress = silent,
-    drawing: Drawing | None = None,
+    drawing: BackgroundPlots | None = None,
 ) -> None:
     """Write a run folder; it appears whole or not at all.
 
@@ -52,7 +52,7 @@ def write_run(
     Raises:
         InputError: The folder cannot be written, or holds something else than a run.
     """
-    painter = drawing or Drawing()
+    painter = drawing or BackgroundPlots()
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
@@ -82,7 +82,7 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _write_one(target: RunFolder, cell: Cell, run: Run, drawing: Drawing) -> None:
+def _write_one(target: RunFolder, cell: Cell, run: Run, drawing: BackgroundPlots) -> None:
     """Report, plots and resolved cell of one run."""
     place = _place(run)
     provenance = Provenance(versions=versions(), digests={"program": program_digest(run.program.tables)})

@@ -11,8 +11,8 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.batched import Placement
 from cellplan.model.cell import Cell
 from cellplan.model.task import Frame
-from cellplan.planning.collocation.batch_targets import LaneTargets
-from cellplan.planning.collocation.batch_tasks import LaneTasks
+from cellplan.planning.collocation.batch_targets import BatchTargets
+from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.solver import Collocation, Indices
 from cellplan.planning.collocation.windows import Window, windows_between
 from cellplan.planning.timing.timed_path import TimedTasks
@@ -154,8 +154,8 @@ class _Screen:
     def __init__(self, cell: Cell, timed: TimedTasks, *, moving: Sequence[str], accuracy: float) -> None:
         """Prepare the tasks, the windows that all go through, and the limits."""
         grasps = closures(cell, moving)
-        self._tasks = LaneTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
-        self._targets, self._accuracy, self._shortest = LaneTargets(timed, grasps), accuracy, cell.motion.step
+        self._tasks = BatchTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
+        self._targets, self._accuracy, self._shortest = BatchTargets(timed, grasps), accuracy, cell.motion.step
         breaks, jumps = timed.breaks, timed.jumps
         self._at_start = self._targets.at(breaks[:1], breaks[:1], breaks[1:2])
         self._windows = windows_between(jumps, whole=float(breaks[-1]), knots=breaks, highest=FIRST_DEGREE)
@@ -190,12 +190,12 @@ class _Screen:
     def _settled(self, q: Array, placement: Placement) -> tuple[Array, NDArray[np.bool_]]:
         """Start postures, shape (nq, cells), with the tools brought to their paths, and which of them came there."""
         cells = q.shape[1]
-        wanted, still = self._at_start.repeated(cells), np.zeros_like(q)
+        desired, still = self._at_start.repeated(cells), np.zeros_like(q)
         for _ in range(NEWTON_STEPS):
-            step = self._tasks.look(q, wanted, placement, mobile=self._settling).correction(still)
+            step = self._tasks.look(q, desired, placement, mobile=self._settling).correction(still)
             longest = np.abs(step).max(axis=0)
             if not np.any(longest > QUIET * self._accuracy):
                 break
             q = q + step * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, LARGEST_STEP))
-        errors = np.abs(self._tasks.errors(q, wanted, placement)).max(axis=(0, 1))
+        errors = np.abs(self._tasks.errors(q, desired, placement)).max(axis=(0, 1))
         return q, errors <= self._accuracy

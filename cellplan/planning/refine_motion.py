@@ -19,7 +19,7 @@ from cellplan.planning.timing.timed_path import TimedTasks, distinct
 LOOKS: Final = 4  # at most, each at a motion with more nodes than the one before
 
 
-def resolve_closely(
+def plan_within_accuracy(
     cell: Cell,
     timed: TimedTasks,
     schedule: Schedule,

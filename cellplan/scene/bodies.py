@@ -37,7 +37,7 @@ class SceneBody:
         shape: The solid, in its own frame S.
         robot: The robot that moves it; None when it is fixed in the world.
         link: The link of that robot it is fixed to.
-        X_BS: Its pose at the reference posture in the robot's base frame; in the world when no robot moves it.
+        X_BS: Its pose at the reference configuration in the robot's base frame; in the world when no robot moves it.
         accuracy: How far the real thing may stick out of it in [m]; None when it is not stated. What the user draws
             (tools, part, attachments, pedestals, surroundings) is taken as exact.
     """

@@ -29,8 +29,12 @@ from cellplan.scene.mounting import (
 )
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, near_in_chain, stands_on
 
-POSTURES: Final = 48  # random postures beside the reference; a pair that is free in one of ten escapes 0.6 % of trials
-HARDLY: Final = 1e-3  # [m] a distance that varies by less over all postures is a matter of mounting, not of motion
+POSTURES: Final = (
+    48  # random configurations beside the reference; a pair that is free in one of ten escapes 0.6 % of trials
+)
+CONSTANT_DISTANCE_TOL: Final = (
+    1e-3  # [m] a distance that varies by less over all configurations is a matter of mounting, not of motion
+)
 ROUNDING: Final = 1e-6  # [m] poses are worked out to less than that: what stands on a floor may seem to float
 ENDLESS: Final = np.pi  # [rad] or [m] range sampled to either side of zero where a joint has no limit
 
@@ -60,7 +64,7 @@ def apply_design(
 ) -> Design:
     """Leave out what always touches by a robot's own design, and ask only for "no contact" where it sets the distance.
 
-    Looked at are pairs of one robot at the reference posture and at random ones within the joint limits:
+    Looked at are pairs of one robot at the reference configuration and at random ones within the joint limits:
 
     - two links of its own file, with at most two joints between them or with a bar of a linkage, that touch in all of
       them: left out; else checked for contact, not for distance;
@@ -69,8 +73,8 @@ def apply_design(
       or at a distance that hardly changes between them: checked for contact.
 
     Where a flange has no body, tool and part may touch the link before it; how deep is judged. A robot whose foot has
-    no body may likewise stand with its first link in the surroundings, if it does so in every posture. The links of
-    each robot that holds the part are looked at as if it were the one that carries it.
+    no body may likewise stand with its first link in the surroundings, if it does so in every configuration. The
+    links of each robot that holds the part are looked at as if it were the one that carries it.
     """
     sampled = _Sampled(cell, bodies, engine, chains)
     design, faults = Design(), dict[tuple[int, str | None], list[int]]()
@@ -116,7 +120,7 @@ class _Sampled:
         """Draw the configurations; nothing is placed before it is asked for."""
         self.cell, self.bodies, self.engine = cell, bodies, engine
         self.views = _views(cell, bodies)
-        self._chains, self._postures = chains, _postures(cell)
+        self._chains, self._configurations = chains, _configurations(cell)
         self._poses: dict[str | None, BodyPoses] = {}
 
     def further_holder(self, pair: ScenePair) -> str | None:
@@ -128,7 +132,7 @@ class _Sampled:
     def poses(self, holder: str | None) -> BodyPoses:
         """Where all bodies are."""
         if holder not in self._poses:
-            self._poses[holder] = checked_poses(body_poses(self.views[holder], self._chains, self._postures))
+            self._poses[holder] = checked_poses(body_poses(self.views[holder], self._chains, self._configurations))
         return self._poses[holder]
 
     def always_touch(self, pair: ScenePair, holder: str | None) -> bool:
@@ -164,13 +168,13 @@ def _views(cell: Cell, bodies: Sequence[SceneBody]) -> dict[str | None, Sequence
     return views
 
 
-def _postures(cell: Cell) -> dict[str, Array]:
-    """Reference posture and random ones within the limits, by robot, shape (POSTURES + 1, n)."""
-    return {robot.name: _random_postures(robot.model, generator(robot.name)) for robot in cell.robots}
+def _configurations(cell: Cell) -> dict[str, Array]:
+    """Reference configuration and random ones within the limits, by robot, shape (POSTURES + 1, n)."""
+    return {robot.name: _random_configurations(robot.model, generator(robot.name)) for robot in cell.robots}
 
 
-def _random_postures(model: RobotModel, rng: np.random.Generator) -> Array:
-    """Reference posture first, then random ones."""
+def _random_configurations(model: RobotModel, rng: np.random.Generator) -> Array:
+    """Reference configuration first, then random ones."""
     lower = np.where(np.isfinite(model.lower), model.lower, -ENDLESS)
     upper = np.where(np.isfinite(model.upper), model.upper, ENDLESS)
     q = rng.uniform(lower, upper, size=(POSTURES + 1, len(model.joints)))
@@ -229,7 +233,7 @@ def _relaxed(pair: ScenePair, sampled: _Sampled, holder: str | None) -> ScenePai
     if farthest < pair.demand:
         reason = "checked for contact only: nearer than the demanded clearance in every configuration by its mounting"
         return replace(pair, rule=Rule.CONTACT, reason=reason)
-    if farthest - nearest <= HARDLY:
+    if farthest - nearest <= CONSTANT_DISTANCE_TOL:
         reason = "checked for contact only: the mounting sets their distance, the same in every configuration"
         return replace(pair, rule=Rule.CONTACT, reason=reason)
     return pair

@@ -123,7 +123,7 @@ class Scene:
         return above - body.looseness
 
     def touching(self, q: Array, *, among: Flags | None = None) -> tuple[str, str] | None:
-        """Names of the first two bodies that must not touch but do, at one stacked posture of shape (nq,).
+        """Names of the first two bodies that must not touch but do, at one stacked configuration of shape (nq,).
 
         Args:
             q: Stacked joint positions in [rad] or [m], shape (nq,).

@@ -90,7 +90,7 @@ def measure_ellipse() -> Numbers:
 
 
 def wide_stage() -> tuple[Curves, Array]:
-    """The first 6 s within wide limits, and the posture in [deg] in which they begin."""
+    """The first 6 s within wide limits, and the configuration in [deg] in which they begin."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "papers"
         shutil.copytree(PAPERS, folder)

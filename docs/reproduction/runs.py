@@ -23,23 +23,23 @@ class Curves:
     Attributes:
         t: Instants, shape (N,).
         q: Joint positions, shape (N, n).
-        wanted: Wanted place of the tool, shape (N, 3).
+        desired: Reference place of the tool, shape (N, 3).
         actual: Actual place of the tool, shape (N, 3).
-        turn: Angle from the wanted orientation, shape (N,).
+        turn: Angle from the desired orientation, shape (N,).
         report: The whole report.
     """
 
     t: Array
     q: Array
-    wanted: Array
+    desired: Array
     actual: Array
     turn: Array
     report: Report
 
     @property
     def error(self) -> Array:
-        """Distance from the wanted place, shape (N,)."""
-        return np.asarray(np.linalg.norm(self.wanted - self.actual, axis=1))
+        """Distance from the desired place, shape (N,)."""
+        return np.asarray(np.linalg.norm(self.desired - self.actual, axis=1))
 
     @property
     def between(self) -> Array:
@@ -71,12 +71,12 @@ def curves(cell: Cell) -> Curves:
     """Solve a cell with one arm and one task."""
     (run,) = solve(cell).runs
     (accuracy,) = run.report.accuracy
-    wanted = run.schedule.tasks[0].X_PT[:, :3, 3]
+    desired = run.schedule.tasks[0].X_PT[:, :3, 3]
     return Curves(
         t=run.report.times,
         q=run.report.q[cell.robots[0].name],
-        wanted=wanted,
-        actual=wanted - accuracy.position_error,
+        desired=desired,
+        actual=desired - accuracy.position_error,
         turn=np.asarray(np.linalg.norm(accuracy.orientation_error, axis=1)),
         report=run.report,
     )

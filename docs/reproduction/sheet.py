@@ -84,10 +84,10 @@ def draw_joints(axes: Axes, x: Array, values: Array, names: Sequence[str]) -> No
     axes.legend(loc="upper center", ncols=len(names), columnspacing=1.2, handlelength=1.6)
 
 
-def draw_path(axes: Axes, wanted: Array, actual: Mapping[str, Array]) -> None:
-    """Paths in a plane, the wanted one in grey below them, to one scale."""
-    every = max(1, len(wanted) // MOST_POINTS)
-    axes.plot(*wanted[::every].T, color=GREY, linewidth=2.6, label="reference")
+def path_curve(axes: Axes, desired: Array, actual: Mapping[str, Array]) -> None:
+    """Paths in a plane, the desired one in grey below them, to one scale."""
+    every = max(1, len(desired) // MOST_POINTS)
+    axes.plot(*desired[::every].T, color=GREY, linewidth=2.6, label="reference")
     for (name, path), colour, style in zip(actual.items(), COLOURS, STYLES, strict=False):
         axes.plot(*path[::every].T, style, color=colour, label=name)
     axes.set_aspect("equal", adjustable="datalim")

@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan import Cell
 from reproduction.runs import Array, Curves, Numbers, curves, paper_cell
-from reproduction.sheet import Sheet, draw, draw_joints, draw_path
+from reproduction.sheet import Sheet, draw, draw_joints, path_curve
 
 METHODS = {
     "filtered_inverse": "filtered inverse I",
@@ -53,7 +53,7 @@ def _of_one(run: Curves) -> Numbers:
         "error_at_s": run.t[settled][np.argmax(run.error[settled])],
         "late_error_mm": 1e3 * run.error[run.after(PASSED_BY)].max(),
         "nearest_mm": 1e3 * nearest(run.actual[settled]),
-        "kept_away_mm": 1e3 * (nearest(run.actual[settled]) - nearest(run.wanted[settled])),
+        "kept_away_mm": 1e3 * (nearest(run.actual[settled]) - nearest(run.desired[settled])),
         "condition_min": condition.min(),
         "condition_max": condition.max(),
         "manipulability_min": run.report.conditioning.manipulability.min(),
@@ -74,14 +74,14 @@ def _draw(case: int, found: dict[str, Curves]) -> None:
     first = found["damped_least_squares"]
     named: dict[str, Curves] = {METHODS[method]: run for method, run in found.items()}
     numeral = "I" * case
-    draw_path(
+    path_curve(
         sheet.panel(f"case {numeral}: paths", "x [m]", "y [m]"),
-        first.wanted[:, :2],
+        first.desired[:, :2],
         {name: run.actual[:, :2] for name, run in named.items()},
     )
     if case in ZOOMS:
         axes = sheet.panel(f"case {numeral}: paths near the singular point", "x [m]", "y [m]")
-        draw_path(axes, first.wanted[:, :2], {name: run.actual[:, :2] for name, run in named.items()})
+        path_curve(axes, first.desired[:, :2], {name: run.actual[:, :2] for name, run in named.items()})
         axes.plot(0.0, 0.0, "k+", markersize=9)
         axes.set_aspect("auto")
         axes.set(xlim=ZOOMS[case][0], ylim=ZOOMS[case][1])

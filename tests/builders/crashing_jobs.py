@@ -59,7 +59,7 @@ def folder() -> str:
 
 
 def complain() -> None:
-    """Refuse a file with two complaints."""
+    """Refuse a file with two findings."""
     raise InvalidFileError([InputError("f:1: one"), InputError("f:2: two")])
 
 

@@ -36,7 +36,7 @@ def planar_cell(lengths: Sequence[float], solver: SolverSettings, *, settle: flo
 def tip_schedule(
     cell: Cell, point: Callable[[Array], Array], *, velocity: Callable[[Array], Array], duration: float, step: float
 ) -> Schedule:
-    """The tip's wanted positions and velocities, given as functions of the instants with values of shape (N, 2)."""
+    """The tip's desired positions and velocities, given as functions of the instants with values of shape (N, 2)."""
     times = np.arange(round(duration / step) + 1) * step
     X = np.tile(np.eye(4), (len(times), 1, 1))
     X[:, :2, 3] = point(times)

@@ -49,7 +49,7 @@ def body(name: str, link: int, *, shape: Solid, at=(0.0, 0.0, 0.0), rpy=(0.0, 0.
 
 
 def arm_model() -> RobotModel:
-    """An elbow arm with six joints and slender links: 1.4 m reach, hand along x at the reference posture."""
+    """An elbow arm with six joints and slender links: 1.4 m reach, hand along x at the reference configuration."""
     z, y, x = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
     joints = (
         joint("a1", -1, axis=z),

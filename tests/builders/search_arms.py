@@ -93,7 +93,7 @@ def with_velocity(model: RobotModel, index: int, velocity: float) -> RobotModel:
 
 
 def schedule_of(cell: Cell, times: Array, X_PT: Array) -> Schedule:
-    """Wanted poses on a clock; the searches need no twists."""
+    """Reference poses on a clock; the searches need no twists."""
     task = TaskSchedule(
         task=cell.tasks[0],
         X_PT=X_PT,
@@ -124,7 +124,7 @@ def tool_poses(cell: Cell, q: Array) -> Array:
 
 
 def position_errors(cell: Cell, schedule: Schedule, motion: Motion) -> Array:
-    """Distances of the tool from its wanted place on the axes that count, without the start."""
+    """Distances of the tool from its desired place on the axes that count, without the start."""
     axes = [axis for axis in cell.tasks[0].axes if axis < 3]
     actual = tool_poses(cell, motion.q)[:, :3, 3]
     return np.linalg.norm((schedule.tasks[0].X_PT[:, :3, 3] - actual)[1:, axes], axis=1)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from builders.lane_cells import everyone, relations, seen_poses
+from builders.batch_cells import everyone, relations, seen_poses
 from cellplan.checks.tools.tracking import errors_on_part
 from cellplan.geometry.transforms import Array
 from cellplan.io.cell.load import load_cell
@@ -85,12 +85,12 @@ def largest_error(case: Case, path: JointPath, times: Array) -> float:
     place = np.clip(np.searchsorted(breaks, times, side="right"), 1, len(breaks) - 1)
     within = (breaks[place - 1], breaks[place])
     seen = seen_poses(case.cell, path.at(times))
-    wanted = [each.at(times, within)[0] for each in case.timed.paths]
-    wanted += [np.broadcast_to(grasp.X_PT, (len(times), 4, 4)) for grasp in closures(case.cell, case.moving)]
+    desired = [each.at(times, within)[0] for each in case.timed.paths]
+    desired += [np.broadcast_to(grasp.X_PT, (len(times), 4, 4)) for grasp in closures(case.cell, case.moving)]
     names = [each.task.name for each in case.timed.paths]
     judged = [task for task in relations(case.cell) if isinstance(task, Grasp) or task.name in names]
     worst = 0.0
-    for index, (task, poses) in enumerate(zip(judged, wanted, strict=True)):
+    for index, (task, poses) in enumerate(zip(judged, desired, strict=True)):
         error = errors_on_part(seen[:, index], poses, task)
         worst = max(worst, *(float(np.linalg.norm(part, axis=1).max()) for part in (error[:, :3], error[:, 3:])))
     return worst

@@ -30,10 +30,10 @@ def test_a_single_error_is_one_line() -> None:
     ]
 
 
-def test_complaints_about_a_file_begin_with_file_and_line() -> None:
-    complaints = [InputError("cell.yaml:3: name: missing"), InputError("cell.yaml:7: robots.a.model: unknown")]
+def test_findings_about_a_file_begin_with_file_and_line() -> None:
+    findings = [InputError("cell.yaml:3: name: missing"), InputError("cell.yaml:7: robots.a.model: unknown")]
 
-    assert error_lines(InvalidFileError(complaints)) == [
+    assert error_lines(InvalidFileError(findings)) == [
         "cell.yaml:3: name: missing",
         "cell.yaml:7: robots.a.model: unknown",
     ]

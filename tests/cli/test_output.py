@@ -23,7 +23,7 @@ def test_figures_that_are_not_finite_are_no_json() -> None:
 
 
 def test_a_machine_gets_an_object_also_when_nothing_could_be_done(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(NoSolutionError), json_failure("cellplan.solve/1", wanted=True):
+    with pytest.raises(NoSolutionError), json_failure("cellplan.solve/1", desired=True):
         raise NoSolutionError("no posture")
 
     assert json.loads(capsys.readouterr().out) == {
@@ -35,7 +35,7 @@ def test_a_machine_gets_an_object_also_when_nothing_could_be_done(capsys: pytest
 
 
 def test_people_get_no_json(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(InputError), json_failure("cellplan.solve/1", wanted=False):
+    with pytest.raises(InputError), json_failure("cellplan.solve/1", desired=False):
         raise InputError("x")
 
     assert capsys.readouterr().out == ""

@@ -93,7 +93,7 @@ def test_the_same_seed_gives_the_same_bytes(pair: str) -> None:
     assert "rehearsal.json" in one
 
 
-def test_complaints_about_the_errors_come_all_at_once(pair: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_findings_about_the_errors_come_all_at_once(pair: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("errors.yaml").write_text(FIXED.replace("left", "lefft").replace("xyz_mm", "xzy_mm"), encoding="utf-8")
 
     status = run(["rehearse", pair, "--errors", "errors.yaml"])
@@ -108,17 +108,17 @@ def test_complaints_about_the_errors_come_all_at_once(pair: str, capsys: pytest.
 
 
 @pytest.mark.parametrize(
-    ("option", "complaint"),
+    ("option", "finding"),
     [
         ("--trials=0", "error: --trials: expected a whole number of at least 1, got 0\n"),
         ("--seed=-1", "error: --seed: expected a whole number of at least 0, got -1\n"),
         ("--rounds=0", "error: --rounds: expected a whole number of at least 1, got 0\n"),
     ],
 )
-def test_a_wrong_number_is_refused(pair: str, capsys: pytest.CaptureFixture[str], option: str, complaint: str) -> None:
+def test_a_wrong_number_is_refused(pair: str, capsys: pytest.CaptureFixture[str], option: str, finding: str) -> None:
     status = run(["rehearse", pair, "--errors", "errors.yaml", option])
 
-    assert (status, capsys.readouterr().err) == (2, complaint)
+    assert (status, capsys.readouterr().err) == (2, finding)
 
 
 def test_errors_must_be_stated(pair: str, capsys: pytest.CaptureFixture[str]) -> None:

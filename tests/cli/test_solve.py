@@ -86,7 +86,7 @@ def test_rejected_tables_are_kept_on_request(
 
 
 @pytest.mark.parametrize(
-    ("option", "value", "complaint"),
+    ("option", "value", "finding"),
     [
         ("--mode", "pair", "error: --mode: expected one of simultaneous, pairwise, part_at_rest, got 'pair'"),
         ("--task", "circel", "error: --task: expected one of circle, rhombus, rectangle, got 'circel'"),
@@ -105,7 +105,7 @@ def test_rejected_tables_are_kept_on_request(
     ],
 )
 def test_a_wrong_choice_is_refused_before_anything_is_done(
-    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str, value: str, complaint: str
+    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str, value: str, finding: str
 ) -> None:
     folder = tmp_path / "out"
 
@@ -113,7 +113,7 @@ def test_a_wrong_choice_is_refused_before_anything_is_done(
 
     out, err = capsys.readouterr()
     assert (status, out) == (2, "")
-    assert err.startswith(complaint)
+    assert err.startswith(finding)
     assert err.count("\n") == 1
     assert not folder.exists()
 
@@ -162,7 +162,7 @@ def test_a_folder_with_other_things_in_it_is_never_replaced(
     assert (folder / "thesis.tex").read_text(encoding="utf-8") == "years of work"
 
 
-def test_complaints_about_a_cell_come_all_at_once_each_with_its_line(
+def test_findings_about_a_cell_come_all_at_once_each_with_its_line(
     coarse_cell: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = coarse_cell.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The first of many pairs that touches in a single posture."""
+"""The first of many pairs that touches in a single configuration."""
 
 import numpy as np
 from builders.moving_cells import cell_with_bodies, program

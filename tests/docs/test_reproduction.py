@@ -104,7 +104,7 @@ def test_limits_of_the_fourth_joint_are_held(script: ModuleType, unwritten: Path
     assert max(found["position"]["error_m"], found["speed"]["error_m"]) < 1e-5
 
 
-def test_a_pose_is_followed_and_ends_at_the_published_posture(script: ModuleType, unwritten: Path) -> None:
+def test_a_pose_is_followed_and_ends_at_the_published_configuration(script: ModuleType, unwritten: Path) -> None:
     found = script.CASES["nicolato_pose"]()
 
     assert found["cost"] < 1e-8

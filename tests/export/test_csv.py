@@ -36,7 +36,7 @@ def test_what_is_read_back_is_what_was_verified_but_for_half_a_unit_of_the_last_
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "complaint"),
+    ("old", "new", "finding"),
     [
         ("time_s", "t", "left.csv:1: expected the names 'time_s,A_deg,B_deg,C_deg', got 't,A_deg,B_deg,C_deg'"),
         ("A_deg,B_deg", "B_deg,A_deg", "left.csv:1: expected the names "),
@@ -46,14 +46,14 @@ def test_what_is_read_back_is_what_was_verified_but_for_half_a_unit_of_the_last_
         ("\n", "\r\n", "left.csv:1: expected the names "),
     ],
 )
-def test_anything_else_is_refused(run: VerifiedRun, old: str, new: str, complaint: str) -> None:
+def test_anything_else_is_refused(run: VerifiedRun, old: str, new: str, finding: str) -> None:
     files = render_csv(run)
     files["left.csv"] = files["left.csv"].replace(old, new)
 
     with pytest.raises(InputError) as refusal:
         read_csv(run, files)
 
-    assert str(refusal.value).startswith(complaint)
+    assert str(refusal.value).startswith(finding)
 
 
 def test_a_file_that_was_cut_off_is_refused(run: VerifiedRun) -> None:

@@ -59,11 +59,11 @@ def test_one_process_does_all_jobs_until_one_of_them_crashes() -> None:
     assert after not in {first, os.getpid()}
 
 
-def test_complaints_cross_whole() -> None:
+def test_findings_cross_whole() -> None:
     with pytest.raises(InvalidFileError) as caught:
         in_child(crashing_jobs.complain, guard=READER)
 
-    assert [str(each) for each in caught.value.complaints] == ["f:1: one", "f:2: two"]
+    assert [str(each) for each in caught.value.findings] == ["f:1: one", "f:2: two"]
 
 
 def test_other_exceptions_are_internal_errors_that_name_the_file() -> None:

@@ -60,11 +60,11 @@ def load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Cell]
 
 @pytest.fixture
 def refuse(load: Callable[..., Cell]) -> Callable[..., list[str]]:
-    """Complaints about the small cell after replacing pieces of its text, one line each."""
+    """Findings about the small cell after replacing pieces of its text, one line each."""
 
-    def complaints(*changes: tuple[str, str]) -> list[str]:
+    def findings(*changes: tuple[str, str]) -> list[str]:
         with pytest.raises(InvalidFileError) as caught:
             load(*changes)
         return str(caught.value).splitlines()
 
-    return complaints
+    return findings

@@ -42,12 +42,12 @@ def load(cell, tmp_path, monkeypatch):
 
 @pytest.fixture
 def refuse(load, cell):
-    def complaints(text, of=cell):
+    def findings(text, of=cell):
         with pytest.raises(InvalidFileError) as caught:
             load(f"cellplan_errors: 1\n{text}\n", of)
         return str(caught.value).splitlines()
 
-    return complaints
+    return findings
 
 
 def test_every_amount_comes_in_metres_and_radians(load):
@@ -73,7 +73,7 @@ def test_a_file_of_nothing_but_its_version_states_an_exact_cell(load):
 
 
 @pytest.mark.parametrize(
-    ("text", "complaint"),
+    ("text", "finding"),
     [
         ("robots: {lefft: {}}", "e:2: robots.lefft: expected a robot of this cell (left, right), got 'lefft', did you "
          "mean 'left'?"),
@@ -106,11 +106,11 @@ def test_a_file_of_nothing_but_its_version_states_an_exact_cell(load):
          "e:2: measurement.position_noise_mm: expected a finite number, got .nan"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_told_with_its_place(refuse, text, complaint):
-    assert refuse(text) == [complaint]
+def test_what_is_wrong_is_told_with_its_place(refuse, text, finding):
+    assert refuse(text) == [finding]
 
 
-def test_all_complaints_come_at_once_in_the_order_of_the_file(refuse):
+def test_all_findings_come_at_once_in_the_order_of_the_file(refuse):
     lines = refuse("sed: 3\nrobots:\n  lefft: {}\n  left: {joint_offsets_deg: {A: {}, Z: 1}}")
 
     assert [line.split(": ")[0] for line in lines] == ["e:2", "e:4", "e:5", "e:5"]

@@ -1,14 +1,14 @@
-"""Many postures at once against two other kinematics: successive screws and the combined model."""
+"""Many configurations at once against two other kinematics: successive screws and the combined model."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders.lane_cells import CELLS, mixed_cell, postures
+from builders.batch_cells import CELLS, configurations, mixed_cell
 from builders.random_cells import moved, random_cell, random_pose
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.batched import LaneChains, LaneState, Placement
+from cellplan.kinematics.batched import BatchChains, BatchState, Placement
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
@@ -17,7 +17,7 @@ ROUNDING = 1e-13  # [-] products of a dozen matrices of order one, lengths of so
 LANES = 5
 
 
-def tools(state: LaneState) -> Array:
+def tools(state: BatchState) -> Array:
     """Tool poses, shape (robots, lanes, 4, 4)."""
     X = np.zeros((*state.p_WT.shape[1:], 4, 4))
     X[..., :3, :3] = np.moveaxis(state.R_WT, (0, 1), (-2, -1))
@@ -26,7 +26,7 @@ def tools(state: LaneState) -> Array:
     return X
 
 
-def screws_of(chains: LaneChains, state: LaneState, cell: Cell) -> Array:
+def screws_of(chains: BatchChains, state: BatchState, cell: Cell) -> Array:
     """Screws of all joints at the world origin, from axes and points on them, shape (robots, lanes, 6, joints)."""
     turning, sliding = chains.is_turning[:, :, None], chains.is_sliding[:, :, None]
     linear = np.cross(state.points, state.axes, axis=0) * turning + state.axes * sliding
@@ -36,8 +36,8 @@ def screws_of(chains: LaneChains, state: LaneState, cell: Cell) -> Array:
 
 @pytest.mark.parametrize("name", CELLS)
 def test_tools_stand_where_successive_screws_put_them(name: str) -> None:
-    cell, chains = CELLS[name], LaneChains(CELLS[name])
-    q = postures(cell, LANES)
+    cell, chains = CELLS[name], BatchChains(CELLS[name])
+    q = configurations(cell, LANES)
 
     found = tools(chains.state(q, chains.placement(cell)))
 
@@ -48,8 +48,8 @@ def test_tools_stand_where_successive_screws_put_them(name: str) -> None:
 
 @pytest.mark.parametrize("name", CELLS)
 def test_axes_are_the_screws_of_the_combined_model(name: str) -> None:
-    cell, chains, model = CELLS[name], LaneChains(CELLS[name]), CombinedModel(CELLS[name])
-    q = postures(cell, LANES)
+    cell, chains, model = CELLS[name], BatchChains(CELLS[name]), CombinedModel(CELLS[name])
+    q = configurations(cell, LANES)
 
     found = screws_of(chains, chains.state(q, chains.placement(cell)), cell)
 
@@ -65,7 +65,7 @@ def test_axes_are_the_screws_of_the_combined_model(name: str) -> None:
 
 def test_each_lane_may_have_its_own_bases_and_tools() -> None:
     rng, template = np.random.default_rng(3), mixed_cell(5)
-    chains, q = LaneChains(template), postures(template, LANES)
+    chains, q = BatchChains(template), configurations(template, LANES)
     cells = []
     for _ in range(LANES):
         robots = [
@@ -89,14 +89,14 @@ def test_each_lane_may_have_its_own_bases_and_tools() -> None:
 
 def test_one_placement_stands_for_all_lanes() -> None:
     cell = random_cell(2, operators=1)
-    placement = LaneChains(cell).placement(cell)
+    placement = BatchChains(cell).placement(cell)
     assert placement.of(np.array([4, 7])) is placement
     assert placement.repeated(3) is placement
 
 
 def test_moving_the_world_moves_all_tools_along() -> None:
     cell, X = mixed_cell(8), random_pose(np.random.default_rng(1))
-    chains, q = LaneChains(cell), postures(cell, LANES)
+    chains, q = BatchChains(cell), configurations(cell, LANES)
 
     here, there = (tools(chains.state(q, chains.placement(each))) for each in (cell, moved(cell, X)))
 
@@ -104,7 +104,7 @@ def test_moving_the_world_moves_all_tools_along() -> None:
 
 
 def test_what_is_plain_and_what_only_turns_is_known() -> None:
-    found = {name: LaneChains(CELLS[name]) for name in ("plain of equal arms", "followers", "mixed", "plain")}
+    found = {name: BatchChains(CELLS[name]) for name in ("plain of equal arms", "followers", "mixed", "plain")}
     assert {name: chains.is_plain for name, chains in found.items()} == {
         "plain of equal arms": True,
         "followers": False,
@@ -117,7 +117,7 @@ def test_what_is_plain_and_what_only_turns_is_known() -> None:
 
 def test_columns_name_the_joints_of_each_robot() -> None:
     cell = mixed_cell(5)
-    chains = LaneChains(cell)
+    chains = BatchChains(cell)
     for index, robot in enumerate(cell.robots):
         own = chains.columns[:, index]
         columns = cell.columns(robot.name)
@@ -128,7 +128,7 @@ def test_a_robot_on_its_own_base_has_a_tool_that_rests() -> None:
     cell = mixed_cell(5)
     robot = cell.robot("op2")
     index = [each.name for each in cell.robots].index("op2")
-    chains = LaneChains(cell)
-    found = tools(chains.state(postures(cell, LANES), chains.placement(cell)))[index]
+    chains = BatchChains(cell)
+    found = tools(chains.state(configurations(cell, LANES), chains.placement(cell)))[index]
     expected = robot.X_WB @ robot.model.X_BF @ robot.tool.X_FT
     np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=10 * ROUNDING)

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from builders import crashing_jobs
 
-from cellplan.guard import Aside
+from cellplan.guard import BackgroundProcess
 from cellplan.io.cell.load import load_cell
-from cellplan.pipeline.background_plots import Drawing
+from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.solve import solve
@@ -35,8 +35,8 @@ def solution(cell_file: Path) -> Solution:
 def test_a_run_folder_is_the_same_with_and_without_a_child(cell_file: Path, tmp_path: Path, mode: str) -> None:
     cell = with_overrides(load_cell(cell_file), mode=mode)
     write_run(solve(cell), tmp_path / "alone")
-    with Aside() as aside:
-        drawing = Drawing(aside)
+    with BackgroundProcess() as aside:
+        drawing = BackgroundPlots(aside)
         write_run(solve(cell, drawing=drawing), tmp_path / "aside", drawing=drawing)
 
     assert files(tmp_path / "aside") == files(tmp_path / "alone")
@@ -45,8 +45,8 @@ def test_a_run_folder_is_the_same_with_and_without_a_child(cell_file: Path, tmp_
 
 def test_plots_are_painted_here_when_the_child_has_crashed(solution: Solution) -> None:
     report, cell = solution.runs[0].report, solution.cell
-    with Aside() as aside:
-        drawing = Drawing(aside)
+    with BackgroundProcess() as aside:
+        drawing = BackgroundPlots(aside)
         aside.begin(crashing_jobs.leave)
         drawing.begin(report, cell=cell)
         painted = drawing.pictures(report, cell=cell)()
@@ -57,8 +57,8 @@ def test_plots_are_painted_here_when_the_child_has_crashed(solution: Solution) -
 def test_plots_begun_with_other_figures_are_not_taken_for_these(solution: Solution) -> None:
     report, cell = solution.runs[0].report, solution.cell
     other = replace(report, q={robot: 0.5 * values for robot, values in report.q.items()})
-    with Aside() as aside:
-        drawing = Drawing(aside)
+    with BackgroundProcess() as aside:
+        drawing = BackgroundPlots(aside)
         drawing.begin(other, cell=cell)
         drawing.begin(report, cell=cell)
         painted = drawing.pictures(report, cell=cell)
@@ -69,7 +69,7 @@ def test_plots_begun_with_other_figures_are_not_taken_for_these(solution: Soluti
 
 def test_drawing_without_a_child_starts_nothing(solution: Solution) -> None:
     before = threading.active_count()
-    drawing = Drawing()
+    drawing = BackgroundPlots()
     drawing.begin(solution.runs[0].report, cell=solution.cell)
 
     assert threading.active_count() == before

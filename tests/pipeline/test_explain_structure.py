@@ -1,4 +1,4 @@
-"""The structure of cells that no file can describe: followers, robots beside the work, postures of any kind."""
+"""The structure of cells that no file can describe: followers, robots beside the work, configurations of any kind."""
 
 from dataclasses import replace
 

@@ -102,7 +102,7 @@ def test_a_method_against_the_integrator_of_the_cell_file_is_refused_with_its_li
 
 
 @pytest.mark.parametrize(
-    ("solver", "choices", "complaints"),
+    ("solver", "choices", "findings"),
     [
         (
             "solver: {method: quadratic_program}",
@@ -130,11 +130,11 @@ def test_a_method_against_the_integrator_of_the_cell_file_is_refused_with_its_li
     ],
 )
 def test_the_accurate_mode_is_refused_where_it_does_not_go(
-    cell_with: Write, solver: str, choices: dict[str, str], complaints: list[str]
+    cell_with: Write, solver: str, choices: dict[str, str], findings: list[str]
 ) -> None:
     cell = cell_with(solver)
 
-    assert refusal(cell, integrator="accurate", **choices) == complaints
+    assert refusal(cell, integrator="accurate", **choices) == findings
 
 
 def test_an_unknown_integrator_is_refused_with_the_nearest_word(cell_with: Write) -> None:

@@ -106,7 +106,7 @@ def test_planar_pair_of_appendix_e(cells):
 
 
 def test_euler_reference_agrees_with_a_finer_one(cells):
-    """The redundancy is resolved too: the final posture at half the step is the same to first order."""
+    """The redundancy is resolved too: the final configuration at half the step is the same to first order."""
     cell = with_overrides(load_cell(cells / "four_robots.yaml"), integrator="euler", duration=4.0)
     finer = replace(
         cell, motion=replace(cell.motion, step=5e-4), solver=replace(cell.solver, gain=2 * cell.solver.gain)

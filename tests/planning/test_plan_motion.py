@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders.lane_cells import CELLS
+from builders.batch_cells import CELLS
 from builders.planar_arms import planar_cell
 from builders.random_cells import make_task
 from builders.timed_cells import Case, case_of, shipped, slowly_clocked, triangles
@@ -125,7 +125,7 @@ def test_an_arm_that_cannot_leave_its_singularity_stays_as_with_steps() -> None:
     """Stretched out it cannot move towards its base, to first order."""
     case = arm([(1.5, 0.0)], [0.0, 0.0], step=0.01)
     motion = case.resolved()
-    assert motion.resolution.euler_from <= 0.05  # as long as the tip is wanted less than the accuracy away
+    assert motion.resolution.euler_from <= 0.05  # as long as the tip is desired less than the accuracy away
     np.testing.assert_allclose(tips(case, motion.q)[-1], [2.0, 0.0], atol=1e-6)
     np.testing.assert_allclose(tips(case, case.resolved(integrator=EULER).q)[-1], [2.0, 0.0], atol=1e-6)
 

@@ -12,7 +12,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.motion import Motion
 from cellplan.planning.collocation.run import AccurateRun
-from cellplan.planning.refine_motion import resolve_closely
+from cellplan.planning.refine_motion import plan_within_accuracy
 from cellplan.planning.timing.schedule import sample
 
 DENT = 2e-5  # [m] depth
@@ -38,7 +38,7 @@ class Dented:
 
 
 def closely(case: Case) -> Motion:
-    return resolve_closely(case.cell, case.timed, sample(case.timed), start=case.start, moving=case.moving)
+    return plan_within_accuracy(case.cell, case.timed, sample(case.timed), start=case.start, moving=case.moving)
 
 
 def seen_by_the_checks(case: Case, q: Array) -> Array:

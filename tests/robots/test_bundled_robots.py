@@ -72,8 +72,8 @@ def placed(model: RobotModel) -> Robot:
     return Robot(name=model.name, model=model, X_WB=np.eye(4), tool=tool, start=None, weights=weights)
 
 
-def flange_at(model: RobotModel, *posture_deg: float) -> Array:
-    flange: Array = ScrewChain(placed(model)).flange_poses(np.radians([posture_deg]))[0]
+def flange_at(model: RobotModel, *configuration_deg: float) -> Array:
+    flange: Array = ScrewChain(placed(model)).flange_poses(np.radians([configuration_deg]))[0]
     return flange
 
 
@@ -98,7 +98,7 @@ def distance_to(shape: Solid, points: Array) -> Array:
 
 
 def distance_to_link(model: RobotModel, link: int, points_B: Array) -> Array:
-    """Signed distance of points in B to the union of a link's bodies at the reference posture."""
+    """Signed distance of points in B to the union of a link's bodies at the reference configuration."""
     distances = [
         distance_to(body.shape, transform_points(inverse(body.X_BS), points_B))
         for body in model.bodies
@@ -109,7 +109,7 @@ def distance_to_link(model: RobotModel, link: int, points_B: Array) -> Array:
 
 
 def surface_of_link(model: RobotModel, link: int) -> Array:
-    """Points in B spread over the outer surface of a link's bodies at the reference posture."""
+    """Points in B spread over the outer surface of a link's bodies at the reference configuration."""
     rng = np.random.default_rng(7)
     found = []
     for body in model.bodies:
@@ -179,7 +179,7 @@ def test_printed_staubli_differs_from_the_corrected_one_in_two_axes_only() -> No
 
 
 @pytest.mark.parametrize(
-    ("name", "posture_deg", "expected_mm"),
+    ("name", "configuration_deg", "expected_mm"),
     [
         ("reis_rv20_16", (0, 0, 0, 0, 0, 0), (1600, 0, 400)),
         # upper arm upright, forearm level again: 280 + 680 forward, 640 up
@@ -200,9 +200,9 @@ def test_printed_staubli_differs_from_the_corrected_one_in_two_axes_only() -> No
     ],
 )
 def test_flange_position_in_closed_form(
-    name: str, posture_deg: tuple[float, ...], expected_mm: tuple[float, ...]
+    name: str, configuration_deg: tuple[float, ...], expected_mm: tuple[float, ...]
 ) -> None:
-    flange = flange_at(load_bundled(name), *posture_deg)
+    flange = flange_at(load_bundled(name), *configuration_deg)
     np.testing.assert_allclose(1000.0 * flange[:3, 3], expected_mm, atol=1e-9)  # rounding of metres
 
 
@@ -248,7 +248,7 @@ def test_no_body_but_the_last_comes_near_a_tool_at_any_wrist_angle(name: str) ->
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_links_but_neighbours_touch_at_the_reference_posture(name: str) -> None:
+def test_no_links_but_neighbours_touch_at_the_reference_configuration(name: str) -> None:
     model = load_bundled(name)
     links = range(BASE, len(model.joints))
     for link in links:
@@ -258,7 +258,7 @@ def test_no_links_but_neighbours_touch_at_the_reference_posture(name: str) -> No
                 assert distance_to_link(model, other, surface).min() > 0.005  # [m] default clearance
 
 
-# The real meshes, moved to the reference posture of the tables. Lengths in [mm] until they are compared.
+# The real meshes, moved to the reference configuration of the tables. Lengths in [mm] until they are compared.
 
 
 def vertices_of(
@@ -271,7 +271,7 @@ def vertices_of(
 
 
 def kuka_vertices(shared_robots: Path) -> dict[str, Array]:
-    """KR 16-2 up to the elbow, turned to the upright posture, and the wrist of the KR 5 arc in its place."""
+    """KR 16-2 up to the elbow, turned to the upright configuration, and the wrist of the KR 5 arc in its place."""
     arm, wrist = shared_robots / "kuka_kr16_2", shared_robots / "kuka_kr5_arc"
     upright = rotation_from_rpy([0.0, -0.5 * np.pi, 0.0])  # the description's zero has the upper arm level
     lying = np.array([[0, 0, -1], [1, 0, 0], [0, -1, 0]])

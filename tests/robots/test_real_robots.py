@@ -46,7 +46,7 @@ def pose_of(link: int, X_B: Array, motions: list[Array]) -> Array:
     return X_B if link == BASE else motions[link] @ X_B
 
 
-def pinocchio_posture(model: pin.Model, ours: RobotModel, q: Array) -> Array:
+def pinocchio_configuration(model: pin.Model, ours: RobotModel, q: Array) -> Array:
     """Configuration vector by joint name; pinocchio gives a continuous joint its cosine and sine."""
     values = dict(zip(ours.joint_names, q, strict=True))
     values |= {f.name: f.ratio * q[f.leader] + f.offset for f in ours.followers}
@@ -59,7 +59,7 @@ def pinocchio_posture(model: pin.Model, ours: RobotModel, q: Array) -> Array:
     return configuration
 
 
-def postures(model: RobotModel, count: int = 20) -> Iterator[Array]:
+def configurations(model: RobotModel, count: int = 20) -> Iterator[Array]:
     rng = np.random.default_rng(7)
     for _ in range(count):
         yield rng.uniform(model.lower, model.upper)
@@ -71,8 +71,8 @@ def test_the_flange_and_every_body_move_as_pinocchio_says(urdf: Path) -> None:
     shapes = pin.buildGeomFromUrdf(theirs, str(urdf), pin.GeometryType.COLLISION, package_dirs=[str(urdf.parent)])
     data, shape_data = theirs.createData(), shapes.createData()
     assert shapes.ngeoms == len(ours.bodies)
-    for q in postures(ours):
-        configuration = pinocchio_posture(theirs, ours, q)
+    for q in configurations(ours):
+        configuration = pinocchio_configuration(theirs, ours, q)
         pin.framesForwardKinematics(theirs, data, configuration)
         pin.updateGeometryPlacements(theirs, data, shapes, shape_data)
         motions = link_motions(ours, q)
@@ -133,7 +133,7 @@ def test_the_levers_of_the_irb_2400_keep_its_parallelogram(shared_robots: Path) 
         ("joint_lever_b", 2, -1.0, 0.0),
     }
     lever = {body.name: body for body in model.bodies}
-    for q in postures(model):
+    for q in configurations(model):
         motions = link_motions(model, q)
         upper_arm, lever_b = motions[1], motions[lever["link_lever_b"].link]
         # lever b hangs on the forearm and turns back against it: it stays parallel to the upper arm

@@ -249,7 +249,7 @@ def test_a_tool_always_near_the_link_behind_it_is_checked_for_contact_only() -> 
 
 
 def test_a_tool_at_a_distance_that_no_joint_changes_is_checked_for_contact_only() -> None:
-    """The round tool turns about the axis of the round wrist: their distance is the same at every posture."""
+    """The round tool turns about the axis of the round wrist: their distance is the same at every configuration."""
     pair = watched(Scene.from_cell(make_cell(placed("a", arm_model(), tool=stick()))))[frozenset(("a/wrist", "a/tool"))]
 
     assert pair.rule is Rule.CONTACT

@@ -1,4 +1,4 @@
-"""The scene: where bodies are, and whether a single posture touches."""
+"""The scene: where bodies are, and whether a single configuration touches."""
 
 import pickle
 
@@ -35,13 +35,13 @@ def cell() -> Cell:
     return make_cell(*arms, part=part, things=(floor(),), tasks=(work("a"),))
 
 
-def postures(cell: Cell, count: int) -> np.ndarray:
+def configurations(cell: Cell, count: int) -> np.ndarray:
     rng = np.random.default_rng(4)
     return rng.uniform(-1.5, 1.5, (count, cell.joint_count))
 
 
 def test_a_held_part_moves_with_the_tool_tip_of_its_holder(cell: Cell) -> None:
-    scene, q = Scene.from_cell(cell), postures(cell, 5)
+    scene, q = Scene.from_cell(cell), configurations(cell, 5)
     place = [body.name for body in scene.bodies].index("part")
 
     poses = scene.body_poses(q)
@@ -52,7 +52,7 @@ def test_a_held_part_moves_with_the_tool_tip_of_its_holder(cell: Cell) -> None:
 
 
 def test_a_tool_ends_at_the_tool_tip(cell: Cell) -> None:
-    scene, q = Scene.from_cell(cell), postures(cell, 5)
+    scene, q = Scene.from_cell(cell), configurations(cell, 5)
     place = [body.name for body in scene.bodies].index("a/tool")
 
     poses = scene.body_poses(q)
@@ -62,11 +62,11 @@ def test_a_tool_ends_at_the_tool_tip(cell: Cell) -> None:
 
 
 def test_single_postures_and_whole_motions_get_the_same_answer(cell: Cell) -> None:
-    scene, q = Scene.from_cell(cell), postures(cell, 60)
-    touching = [scene.touching(posture) for posture in q]
+    scene, q = Scene.from_cell(cell), configurations(cell, 60)
+    touching = [scene.touching(configuration) for configuration in q]
 
-    for posture, pair in zip(q, touching, strict=True):
-        report, _ = check_clearance(scene, schedule(2, *cell.tasks), np.stack([posture, posture]))
+    for configuration, pair in zip(q, touching, strict=True):
+        report, _ = check_clearance(scene, schedule(2, *cell.tasks), np.stack([configuration, configuration]))
         forbidden = {contact.pair for contact in report.contacts if not contact.is_allowed}
         assert (pair in forbidden) if pair else not forbidden
     assert any(touching)
@@ -76,21 +76,25 @@ def test_single_postures_and_whole_motions_get_the_same_answer(cell: Cell) -> No
 def test_moving_the_whole_cell_changes_no_answer(cell: Cell) -> None:
     rng = np.random.default_rng(8)
     moved = displaced(cell, random_pose(rng, reach=5.0))
-    q = postures(cell, 40)
+    q = configurations(cell, 40)
 
     here, there = Scene.from_cell(cell), Scene.from_cell(moved)
 
     assert here.exclusions == there.exclusions
     assert here.pairs == there.pairs
-    assert [here.touching(posture) for posture in q] == [there.touching(posture) for posture in q]
+    assert [here.touching(configuration) for configuration in q] == [
+        there.touching(configuration) for configuration in q
+    ]
 
 
 def test_a_scene_survives_the_way_to_another_process(cell: Cell) -> None:
-    scene, q = Scene.from_cell(cell), postures(cell, 10)
+    scene, q = Scene.from_cell(cell), configurations(cell, 10)
 
     copy = pickle.loads(pickle.dumps(scene))  # noqa: S301
 
-    assert [copy.touching(posture) for posture in q] == [scene.touching(posture) for posture in q]
+    assert [copy.touching(configuration) for configuration in q] == [
+        scene.touching(configuration) for configuration in q
+    ]
 
 
 def test_a_cell_with_nothing_solid_but_the_part_never_touches() -> None:

@@ -71,7 +71,7 @@ def check_payload(uses: tuple[LoadUse, ...]) -> list[Check]:
 
 
 def check_payload_at_rest(cell: Cell, chains: Mapping[str, ScrewChain], start: Array) -> list[Check]:
-    """What the robots carry while they stand at one stacked posture of shape (nq,) in [rad] or [m]."""
+    """What the robots carry while they stand at one stacked configuration of shape (nq,) in [rad] or [m]."""
     still = {robot.name: np.tile(start[cell.columns(robot.name)], (2, 1)) for robot in cell.robots}
     return check_payload(load_uses(cell, chains, np.array([0.0, 1.0]), still))
 

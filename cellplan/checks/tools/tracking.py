@@ -28,7 +28,7 @@ def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP:
     """Errors of one task in P, or in W for a task in the world; components that the task leaves open are zero.
 
     Args:
-        scheduled: Wanted tool poses.
+        scheduled: Reference tool poses.
         chain: The operator.
         q: The operator's positions, shape (N, n).
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
@@ -56,19 +56,19 @@ def pose_accuracy(scheduled: TaskSchedule, X_PT: Array) -> TaskAccuracy:
     )
 
 
-def errors_on_part(X_PT: Array, wanted: Array, relation: Relation) -> Array:
-    """Position errors in [m], then rotation vectors in [rad], wanted against actual, in P, shape (N, 6).
+def errors_on_part(X_PT: Array, desired: Array, relation: Relation) -> Array:
+    """Position errors in [m], then rotation vectors in [rad], desired against actual, in P, shape (N, 6).
 
     Args:
         X_PT: Tool poses, shape (N, 4, 4).
-        wanted: Wanted ones, shape (N, 4, 4).
+        desired: Reference ones, shape (N, 4, 4).
         relation: The task or grasp; components that it leaves open are zero.
     """
-    position = wanted[:, :3, 3] - X_PT[:, :3, 3]
+    position = desired[:, :3, 3] - X_PT[:, :3, 3]
     if relation.is_spin_free:
-        orientation = _turn_between(X_PT[:, None, :3, 2], wanted[:, None, :3, 2])
+        orientation = _turn_between(X_PT[:, None, :3, 2], desired[:, None, :3, 2])
     else:
-        orientation = _turn_between(np.swapaxes(X_PT[:, :3, :3], 1, 2), np.swapaxes(wanted[:, :3, :3], 1, 2))
+        orientation = _turn_between(np.swapaxes(X_PT[:, :3, :3], 1, 2), np.swapaxes(desired[:, :3, :3], 1, 2))
     error = np.concatenate([position, orientation], axis=1)
     error[:, [axis for axis in range(6) if axis not in relation.axes]] = 0.0
     return error
@@ -128,15 +128,15 @@ def worst_error(name: str, times: Array, error: Array, *, subject: str, limit: f
     )
 
 
-def _turn_between(axes: Array, wanted: Array) -> Array:
-    """Rotation vectors in P that lay unit axes on the wanted ones, shape (N, k, 3) each to (N, 3).
+def _turn_between(axes: Array, desired: Array) -> Array:
+    """Rotation vectors in P that lay unit axes on the desired ones, shape (N, k, 3) each to (N, 3).
 
     The direction is that of ``sum a_i x d_i``; the angle follows from the chord ``sum |d_i - a_i|^2``, which loses no
     digits at the small angles that matter: three axes turn by ``4 (1 - cos) = 8 sin^2(angle / 2)``, a single one by
     ``2 (1 - cos)``.
     """
-    across = np.cross(axes, wanted).sum(axis=1)
-    chord = ((wanted - axes) ** 2).sum(axis=(1, 2))
+    across = np.cross(axes, desired).sum(axis=1)
+    chord = ((desired - axes) ** 2).sum(axis=(1, 2))
     per_half_sine = 8.0 if axes.shape[1] == 3 else 4.0
     angle = 2.0 * np.arcsin(np.minimum(1.0, np.sqrt(chord / per_half_sine)))
     length = np.linalg.norm(across, axis=1)

@@ -59,8 +59,8 @@ class ArcLength:
         first = np.searchsorted(self.edges, interval[0], side="left")
         last = np.searchsorted(self.edges, interval[1], side="left") - 1
         panel = np.clip(np.searchsorted(self.behind, length, side="right") - 1, first, last)
-        wanted = np.clip(length - self.behind[panel], 0.0, self.behind[panel + 1] - self.behind[panel])
-        x = _invert(self.series[panel], wanted)
+        desired = np.clip(length - self.behind[panel], 0.0, self.behind[panel + 1] - self.behind[panel])
+        x = _invert(self.series[panel], desired)
         low, high = self.edges[panel], self.edges[panel + 1]
         return np.clip(low + 0.5 * (x + 1.0) * (high - low), interval[0], interval[1])
 
@@ -87,12 +87,12 @@ class QuickParameters:
         last = np.searchsorted(arc.edges, interval[1], side="left") - 1
         panel = np.clip(np.searchsorted(arc.behind, length, side="right") - 1, first, last)
         start, whole = arc.behind[panel], arc.behind[panel + 1] - arc.behind[panel]
-        wanted, series = np.clip(length - start, 0.0, whole), self.series[panel]
-        x = np.clip(2.0 * wanted / np.where(whole > 0.0, whole, 1.0) - 1.0, -1.0, 1.0)
+        desired, series = np.clip(length - start, 0.0, whole), self.series[panel]
+        x = np.clip(2.0 * desired / np.where(whole > 0.0, whole, 1.0) - 1.0, -1.0, 1.0)
         for _ in range(QUICK_STEPS):
             reached = (np.cos(np.arccos(x)[:, None] * degrees)[:, None, :] @ series)[:, 0]
             rate = reached[:, 1]
-            step = (wanted - reached[:, 0]) / np.where(rate > 0.0, rate, np.inf)
+            step = (desired - reached[:, 0]) / np.where(rate > 0.0, rate, np.inf)
             following = np.clip(x + step, -1.0, 1.0)
             if np.all((np.abs(following - x) <= PARAMETER_TOL) & (rate > 0.0)):
                 low, high = arc.edges[panel], arc.edges[panel + 1]
@@ -151,15 +151,15 @@ def _speed_series(curve: Curve, low: Array, high: Array) -> Array:
     return coefficients
 
 
-def _invert(series: Array, wanted: Array) -> Array:
-    """Root x in -1..1 of each Legendre series, shape (N, d), minus its wanted value."""
+def _invert(series: Array, desired: Array) -> Array:
+    """Root x in -1..1 of each Legendre series, shape (N, d), minus its desired value."""
     coefficients = np.ascontiguousarray(series.T)
     slope = legendre.legder(coefficients)
-    low, high = -np.ones_like(wanted), np.ones_like(wanted)
+    low, high = -np.ones_like(desired), np.ones_like(desired)
     whole = np.sum(coefficients, axis=0)
-    x = np.clip(2.0 * wanted / np.where(whole > 0.0, whole, 1.0) - 1.0, -1.0, 1.0)
+    x = np.clip(2.0 * desired / np.where(whole > 0.0, whole, 1.0) - 1.0, -1.0, 1.0)
     for _ in range(NEWTON_STEPS):
-        excess = legendre.legval(x, coefficients, tensor=False) - wanted
+        excess = legendre.legval(x, coefficients, tensor=False) - desired
         low, high = np.where(excess <= 0.0, x, low), np.where(excess >= 0.0, x, high)
         rate = legendre.legval(x, slope, tensor=False)
         step = x - excess / np.where(rate > 0.0, rate, 1.0)

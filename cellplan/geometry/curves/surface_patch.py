@@ -143,7 +143,7 @@ class Ball:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LaidCurve:
+class ProjectedCurve:
     """A curve laid on a patch along a direction.
 
     With the height h along the direction d, ``p = c + h d`` stays on the patch when ``n . (dc + dh d) = 0``.

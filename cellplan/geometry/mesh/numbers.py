@@ -1,4 +1,4 @@
-"""Words of foreign text files that are to become numbers."""
+"""Label of foreign text files that are to become numbers."""
 
 
 def plain_word(word: str) -> str:

@@ -174,7 +174,7 @@ def _parse_obj(data: bytes, name: str) -> Triangles:
 
 
 def _obj_lines(data: bytes, name: str) -> Iterable[tuple[int, list[str]]]:
-    """Words of each line that is not empty, comments cut off and continued lines joined."""
+    """Label of each line that is not empty, comments cut off and continued lines joined."""
     waiting: list[str] = []
     for line, content in enumerate(BytesIO(data), start=1):
         require_no_more(len(content), MAX_LINE, "characters in a line", place=f"{name}:{line}")

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from cellplan.io.input.findings import Complaint, KeyPath, key_text, listed
+from cellplan.io.input.findings import Finding, KeyPath, key_text, listed
 from cellplan.io.schema.acceleration import AccelerationChoice, AccelerationRuleEntry
 from cellplan.io.schema.cell import CellDocument
 from cellplan.io.schema.partial import Pieces
@@ -49,9 +49,9 @@ def written_rule(robot: Robot) -> Any:
     return {"full_speed_in_s": list(rule.full_speed_in)} if rule.full_speed_in else "stated"
 
 
-def acceleration_complaints(
+def acceleration_findings(
     pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument
-) -> Iterator[Complaint]:
+) -> Iterator[Finding]:
     """Rules that do not fit a robot: stated limits that are missing or would not count, more times than joints."""
     for name, model in models.items():
         entry = pieces.robots[name]
@@ -65,7 +65,7 @@ def acceleration_complaints(
                 f"{listed(joint.name for joint in missing)}; give robots.{name}.limits: "
                 f"{{{missing[0].name}: {{{key}: …}}}}, or acceleration: {{full_speed_in_s: …}}"
             )
-            yield document.complaint(path, text)
+            yield document.finding(path, text)
         if _chosen(choice).is_unlimited:
             yield from _limits_beside_unlimited(name, entry, document, where=key_text(path))
         if entry.acceleration is not None:
@@ -77,9 +77,7 @@ def acceleration_complaints(
         yield from _too_many_times(pieces.acceleration, max(following), document, path=("acceleration",), words=words)
 
 
-def _limits_beside_unlimited(
-    robot: str, entry: RobotEntry, document: YamlDocument, *, where: str
-) -> Iterator[Complaint]:
+def _limits_beside_unlimited(robot: str, entry: RobotEntry, document: YamlDocument, *, where: str) -> Iterator[Finding]:
     """Limits of accelerations and jerk in the cell itself, which `unlimited` would leave unjudged."""
     for joint, limits in entry.limits.items():
         for key, value in limits.model_dump(exclude_none=True).items():
@@ -88,14 +86,14 @@ def _limits_beside_unlimited(
                     f"expected no limit, as {where} is unlimited and nothing is judged against it, got {value:g}; "
                     f"remove it, or give robots.{robot}.acceleration: {{full_speed_in_s: …}}"
                 )
-                yield document.complaint(("robots", robot, "limits", joint, key), text)
+                yield document.finding(("robots", robot, "limits", joint, key), text)
 
 
 def _too_many_times(
     choice: AccelerationChoice | None, joints: int, document: YamlDocument, *, path: KeyPath, words: str
-) -> Iterator[Complaint]:
+) -> Iterator[Finding]:
     """A list of times that is longer than the arm has joints."""
     times = choice.full_speed_in_s if isinstance(choice, AccelerationRuleEntry) else None
     if isinstance(times, tuple) and len(times) > joints:
         text = f"expected at most {joints} times, one per {words}, got {len(times)}"
-        yield document.complaint((*path, "full_speed_in_s"), text)
+        yield document.finding((*path, "full_speed_in_s"), text)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
-from cellplan.io.input.findings import Complaint, did_you_mean, listed, shown
+from cellplan.io.input.findings import Finding, did_you_mean, listed, shown
 from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
 from cellplan.io.schema.partial import Pieces
 from cellplan.io.schema.robot import RobotEntry
@@ -73,20 +73,18 @@ def mounted_names(entry: RobotEntry) -> tuple[str, ...]:
     return (*attachment_names(entry.attachments), *([PEDESTAL] if entry.pedestal is not None else []))
 
 
-def mounting_complaints(name: str, model: RobotModel, pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+def mounting_findings(name: str, model: RobotModel, pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
     """What a cell mounts on a robot or puts below it must fit its links, its base and the floor."""
     entry = pieces.robots[name]
-    yield from _attachment_complaints(name, entry, model, document)
+    yield from _attachment_findings(name, entry, model, document)
     if entry.pedestal is not None:
-        yield from _pedestal_complaints(name, entry, entry.pedestal, pieces=pieces, document=document)
+        yield from _pedestal_findings(name, entry, entry.pedestal, pieces=pieces, document=document)
         if any(body.name == PEDESTAL for body in model.bodies):
             text = "unexpected key, a body of the model is called 'pedestal' already"
-            yield document.key_complaint(("robots", name, "pedestal"), text)
+            yield document.key_finding(("robots", name, "pedestal"), text)
 
 
-def _attachment_complaints(
-    name: str, entry: RobotEntry, model: RobotModel, document: YamlDocument
-) -> Iterator[Complaint]:
+def _attachment_findings(name: str, entry: RobotEntry, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:
     """Links that exist, and names of their own."""
     links = [link.name for link in model.links]
     taken = {body.name for body in model.bodies} | {PEDESTAL}
@@ -96,42 +94,40 @@ def _attachment_complaints(
         if attachment.link not in links:
             hint = did_you_mean(attachment.link, links)
             text = f"expected a link of the robot ({listed(links)}), got {shown(attachment.link)}{hint}"
-            yield document.complaint((*path, "link"), text)
+            yield document.finding((*path, "link"), text)
         own = attachment.name
         if own is None:
             continue
         if own in taken or own == "tool" or own.startswith("tool_"):
             text = f"expected another name, '{own}' means another body of the robot"
-            yield document.complaint((*path, "name"), text)
+            yield document.finding((*path, "name"), text)
         if own in seen:
-            yield document.complaint((*path, "name"), f"expected a name of its own, got '{own}' twice")
+            yield document.finding((*path, "name"), f"expected a name of its own, got '{own}' twice")
         seen.add(own)
 
 
-def _pedestal_complaints(
+def _pedestal_findings(
     name: str, entry: RobotEntry, pedestal: PedestalEntry, *, pieces: Pieces, document: YamlDocument
-) -> Iterator[Complaint]:
+) -> Iterator[Finding]:
     """A pedestal stands on a floor, below an upright base."""
     path, height = ("robots", name, "pedestal"), entry.base.xyz_mm[2]
     floor = floor_height_mm(entry, pieces.environment)
     if floor is None:
         text = "missing, expected the height of the floor: no plane of the environment lies below the base"
-        yield document.complaint((*path, "floor_z_mm"), text)
+        yield document.finding((*path, "floor_z_mm"), text)
     elif height - floor < ROOM_MM:
         text = f"expected a base above the floor at {floor:g} mm, got one at {height:g} mm: leave the pedestal out"
-        yield document.complaint(path if pedestal.floor_z_mm is None else (*path, "floor_z_mm"), text)
+        yield document.finding(path if pedestal.floor_z_mm is None else (*path, "floor_z_mm"), text)
     lean = math.degrees(math.acos(min(1.0, max(-1.0, float(pose_from_entry(entry.base)[2, 2])))))
     if lean > MOST_LEAN_DEG:
         text = (
             f"expected a base that stands upright, got one that leans by {lean:.4g} deg: "
             "draw what it hangs on or stands on in the environment"
         )
-        yield document.complaint(path, text)
+        yield document.finding(path, text)
 
 
-def accuracy_complaints(
-    pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument
-) -> Iterator[Complaint]:
+def accuracy_findings(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
     """An accuracy can be added to the clearance only where it is stated."""
     if pieces.checks is None or pieces.checks.body_accuracy != "add":
         return
@@ -139,4 +135,4 @@ def accuracy_complaints(
     if unknown:
         cure = f"state robots.{unknown[0]}.bodies: {{accuracy_mm: …, source: …}}"
         text = f"expected stated accuracies of all link bodies to add, got none for {listed(unknown)}: {cure}"
-        yield document.complaint(("checks", "body_accuracy"), text)
+        yield document.finding(("checks", "body_accuracy"), text)

@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.io.cell.solver_rules import keys_against_accurate
 from cellplan.io.robots.rules import start_keys
-from cellplan.io.schema.solver import PostureGoalEntry, SecondaryEntry, SolverEntry
+from cellplan.io.schema.solver import ConfigurationGoalEntry, SecondaryEntry, SolverEntry
 from cellplan.io.shapes import MM
 from cellplan.model.robot import RobotModel
 from cellplan.model.solver import (
@@ -77,15 +77,15 @@ def _goals(entry: SecondaryEntry, models: Mapping[str, RobotModel]) -> tuple[Sec
         within = entry.obstacles.within_mm / MM
         goals.append(SecondaryGoal(kind=GoalKind.OBSTACLES, gain=entry.obstacles.gain, within=within))
     if entry.posture is not None:
-        goals.append(_posture_goal(entry.posture, models))
+        goals.append(_configuration_goal(entry.posture, models))
     return tuple(goals)
 
 
-def _posture_goal(entry: PostureGoalEntry, models: Mapping[str, RobotModel]) -> SecondaryGoal:
-    """A wanted posture in [rad] and [m]."""
-    postures = {}
+def _configuration_goal(entry: ConfigurationGoalEntry, models: Mapping[str, RobotModel]) -> SecondaryGoal:
+    """A desired configuration in [rad] and [m]."""
+    configurations = {}
     for robot, given in entry.at.items():
         values = [given[key] for key in start_keys(models[robot])]
         turns = [joint.is_revolute for joint in models[robot].joints]
-        postures[robot] = np.where(turns, np.deg2rad(values), np.divide(values, MM))
-    return SecondaryGoal(kind=GoalKind.POSTURE, gain=entry.gain, postures=postures)
+        configurations[robot] = np.where(turns, np.deg2rad(values), np.divide(values, MM))
+    return SecondaryGoal(kind=GoalKind.POSTURE, gain=entry.gain, configurations=configurations)

@@ -1,4 +1,4 @@
-"""Cell file: read, understood, checked against itself and against the files it names; all complaints at once."""
+"""Cell file: read, understood, checked against itself and against the files it names; all findings at once."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -16,17 +16,17 @@ from cellplan.io.cell.build import (
     build_task,
     resolved_document,
 )
-from cellplan.io.cell.build_accelerations import acceleration_complaints
-from cellplan.io.cell.build_mounting import accuracy_complaints, mounted_names, mounting_complaints
+from cellplan.io.cell.build_accelerations import acceleration_findings
+from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings
 from cellplan.io.cell.build_solver import build_solver
 from cellplan.io.cell.referenced_files import Sources
-from cellplan.io.cell.rules import rule_complaints
-from cellplan.io.cell.solver_rules import solver_complaints
-from cellplan.io.cell.trajectory_rules import Targets, target_complaints
+from cellplan.io.cell.rules import rule_findings
+from cellplan.io.cell.solver_rules import solver_findings
+from cellplan.io.cell.trajectory_rules import Targets, target_findings
 from cellplan.io.cell.user_folders import user_folders
 from cellplan.io.input.allowed_folders import AllowedFolders
-from cellplan.io.input.findings import Complaint, KeyPath, did_you_mean, raise_complaints, shown
-from cellplan.io.robots.rules import robot_complaints, with_statements
+from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, raise_findings, shown
+from cellplan.io.robots.rules import robot_findings, with_statements
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.mounting import AttachmentEntry
 from cellplan.io.schema.partial import Pieces, read_pieces
@@ -55,28 +55,28 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
     path = Path(path)
     file = str(path)
     document = read_yaml(path, file=file)
-    pieces, complaints = read_pieces(document)
-    complaints += document.complaints
+    pieces, findings = read_pieces(document)
+    findings += document.findings
     if pieces.is_too_large:
-        raise_complaints(file, complaints)
-    complaints += rule_complaints(pieces, document)
+        raise_findings(file, findings)
+    findings += rule_findings(pieces, document)
     start = folder or path.parent
     allowed = (*(Path(each) for each in allow_dirs), *user_folders(start))
     sources = Sources(document, AllowedFolders(folder=start, allowed=allowed))
     sources.inputs[path.name] = document.digest
     models = _models(pieces, document, sources)
     for name, model in models.items():
-        complaints += robot_complaints(name, pieces.robots[name], model, document)
-        complaints += mounting_complaints(name, model, pieces, document)
-    complaints += acceleration_complaints(pieces, models, document)
-    complaints += _unknown_bodies(pieces, models, document)
-    complaints += accuracy_complaints(pieces, models, document)
-    complaints += solver_complaints(pieces, models, document)
-    complaints += _part_extent(pieces, document)
+        findings += robot_findings(name, pieces.robots[name], model, document)
+        findings += mounting_findings(name, model, pieces, document)
+    findings += acceleration_findings(pieces, models, document)
+    findings += _unknown_bodies(pieces, models, document)
+    findings += accuracy_findings(pieces, models, document)
+    findings += solver_findings(pieces, models, document)
+    findings += _part_extent(pieces, document)
     _read_meshes(pieces, sources)
     targets = _targets(pieces, sources)
-    complaints += target_complaints(pieces, targets, document)
-    raise_complaints(file, [*complaints, *sources.complaints], sources.errors)
+    findings += target_findings(pieces, targets, document)
+    raise_findings(file, [*findings, *sources.findings], sources.errors)
     if pieces.whole is None:
         raise InputError(f"{file}: the cell cannot be understood")
     return _cell(pieces.whole, models, targets, document=document, sources=sources)
@@ -102,7 +102,7 @@ def _targets(pieces: Pieces, sources: Sources) -> Targets:
     return {name: sampled for name, sampled in found.items() if sampled is not None}
 
 
-def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Complaint]:
+def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
     """Exclusions name bodies that exist; told only when all robots are known."""
     if pieces.checks is None or set(models) != set(pieces.names["robots"]):
         return
@@ -117,10 +117,10 @@ def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: 
         for side, body in enumerate(pair.bodies):
             if body not in known:
                 text = f"expected a body of this cell, got {shown(body)}{did_you_mean(body, sorted(known))}"
-                yield document.complaint(("checks", "exclude", index, "bodies", side), text)
+                yield document.finding(("checks", "exclude", index, "bodies", side), text)
 
 
-def _part_extent(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+def _part_extent(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
     """A part of a likely size; meshes are looked at by their reader."""
     shape = pieces.part.geometry if pieces.part else None
     if shape is None or shape.mesh is not None:
@@ -135,14 +135,14 @@ def _part_extent(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
     low, high = PART_EXTENT_MM
     if not low <= extent <= high:
         text = f"expected a part of {low:g} to {high:g} mm, got {extent:g} mm; is the unit right?"
-        yield document.complaint(("part", "geometry"), text)
+        yield document.finding(("part", "geometry"), text)
 
 
 Meshed = ToolShapeEntry | ToolBodyEntry | ObstacleEntry | AttachmentEntry
 
 
 def _read_meshes(pieces: Pieces, sources: Sources) -> None:
-    """Read every mesh once, so that all complaints come together."""
+    """Read every mesh once, so that all findings come together."""
     shapes: list[tuple[KeyPath, Meshed]] = [(("environment", name), it) for name, it in pieces.environment.items()]
     for name, robot in pieces.robots.items():
         place: KeyPath = ("robots", name, "tool")

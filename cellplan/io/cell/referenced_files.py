@@ -16,7 +16,7 @@ from cellplan.guard import Guard, in_child
 from cellplan.io.cell.toolpath_csv import read_toolpath_csv
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.files import digest_of_file
-from cellplan.io.input.findings import Complaint, KeyPath, shown
+from cellplan.io.input.findings import Finding, KeyPath, shown
 from cellplan.io.robots.bundled import load_bundled_table
 from cellplan.io.robots.joint_table import MESH_UNITS, RobotTable, load_robot_table
 from cellplan.io.robots.rules import limits_in_si, tightened
@@ -36,7 +36,7 @@ class Sources:
 
     Attributes:
         inputs: SHA-256 of every file that was read, by the path as written.
-        complaints: About the names in the cell file.
+        findings: About the names in the cell file.
         errors: About the files themselves.
     """
 
@@ -47,13 +47,13 @@ class Sources:
         self._meshes: dict[tuple[str, str], Mesh | None] = {}
         self._urdfs: dict[Hashable, UrdfRobot] = {}
         self.inputs: dict[str, str] = {}
-        self.complaints: list[Complaint] = []
+        self.findings: list[Finding] = []
         self.errors: list[InputError] = []
 
     def mesh(
         self, written: str, unit: str, path: KeyPath, *, demand: Callable[[Mesh], None] | None = None
     ) -> Mesh | None:
-        """Mesh in [m] that is as a demand wants it, which raises an input error otherwise; None after a complaint."""
+        """Mesh in [m] that is as a demand wants it, which raises an input error otherwise; None after a finding."""
         if (written, unit) not in self._meshes:
             self._meshes[written, unit] = self._read_mesh(written, unit, path)
         mesh = self._meshes[written, unit]
@@ -61,12 +61,12 @@ class Sources:
             if mesh is not None and demand is not None:
                 demand(mesh)
         except InputError as error:
-            self.complaints.append(self._document.complaint(path, str(error)))
+            self.findings.append(self._document.finding(path, str(error)))
             return None
         return mesh
 
     def targets(self, entry: str | CsvEntry, path: KeyPath) -> SampledPath | TimedPath | None:
-        """Tool targets of a task; None after a complaint."""
+        """Tool targets of a task; None after a finding."""
         settings = CsvEntry(file=entry) if isinstance(entry, str) else entry
         place = self._file(settings.file, path if isinstance(entry, str) else (*path, "file"))
         if place is None:
@@ -82,17 +82,17 @@ class Sources:
         return sampled
 
     def robot(self, name: str, entry: RobotEntry) -> RobotModel | None:
-        """Model of a robot within the limits of the cell; None after a complaint."""
+        """Model of a robot within the limits of the cell; None after a finding."""
         suffix = PurePosixPath(entry.model).suffix.lower()
         if suffix in URDF_SUFFIXES:
             return self._urdf(name, entry)
-        self.complaints += self._only_for_urdf(name, entry)
+        self.findings += self._only_for_urdf(name, entry)
         model = self._table(name, entry, is_file=suffix in TABLE_SUFFIXES)
         if model is None:
             return None
-        model, complaints = tightened(("robots", name), entry, model, self._document)
-        self.complaints += complaints
-        return None if complaints else model
+        model, findings = tightened(("robots", name), entry, model, self._document)
+        self.findings += findings
+        return None if findings else model
 
     def look_for_model(self, name: str, written: str) -> None:
         """Complain about a model that does not exist, for a robot that is not understood for other reasons."""
@@ -103,10 +103,10 @@ class Sources:
         try:
             load_bundled_table(written)
         except InputError as error:
-            self.complaints.append(self._document.complaint(path, str(error)))
+            self.findings.append(self._document.finding(path, str(error)))
 
     def _read_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
-        """Mesh in [m]; None after a complaint."""
+        """Mesh in [m]; None after a finding."""
         place = self._file(written, path)
         if place is None:
             return None
@@ -115,23 +115,23 @@ class Sources:
             mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), place, guard=guard)
             self.inputs[written] = digest_of_file(place, file=written)
         except InputError as error:
-            self.complaints.append(self._document.complaint(path, str(error)))
+            self.findings.append(self._document.finding(path, str(error)))
             return None
         return mesh
 
     def _file(self, written: str, path: KeyPath) -> Path | None:
-        """Path of a named file; None after a complaint."""
+        """Path of a named file; None after a finding."""
         try:
             return self._folders.file(written)
         except InputError as error:
-            self.complaints.append(self._document.complaint(path, str(error)))
+            self.findings.append(self._document.finding(path, str(error)))
             return None
 
-    def _only_for_urdf(self, name: str, entry: RobotEntry) -> Iterator[Complaint]:
+    def _only_for_urdf(self, name: str, entry: RobotEntry) -> Iterator[Finding]:
         """Keys that say something about a URDF."""
         for key in ("package_dirs", "flange", "locked"):
             if getattr(entry, key):
-                yield self._document.key_complaint(("robots", name, key), "unexpected key, it goes with a URDF only")
+                yield self._document.key_finding(("robots", name, key), "unexpected key, it goes with a URDF only")
 
     def _table(self, name: str, entry: RobotEntry, *, is_file: bool) -> RobotModel | None:
         """Model from a joint-axis table, bundled or in a file."""
@@ -141,7 +141,7 @@ class Sources:
             try:
                 table = load_bundled_table(entry.model)
             except InputError as error:
-                self.complaints.append(self._document.complaint(path, str(error)))
+                self.findings.append(self._document.finding(path, str(error)))
                 return None
             self.inputs[f"bundled:{entry.model}"] = table.digest
             return table.model
@@ -180,7 +180,7 @@ class Sources:
             for mesh in robot.mesh_files:
                 if not self._folders.holds(mesh):
                     text = f"expected meshes below the folder of the cell file, got {shown(mesh.name)} from elsewhere"
-                    self.complaints.append(self._document.complaint(path, f"{text}; allow it with --allow-dir"))
+                    self.findings.append(self._document.finding(path, f"{text}; allow it with --allow-dir"))
                     return None
                 way = os.path.relpath(mesh.resolve(), place.parent.resolve()).replace(os.sep, "/")
                 key = posixpath.normpath(posixpath.join(posixpath.dirname(entry.model), way))
@@ -191,14 +191,14 @@ class Sources:
         return robot.model
 
     def _package_dirs(self, name: str, entry: RobotEntry) -> tuple[Path, ...] | None:
-        """Folders for ``package://``; None after a complaint."""
+        """Folders for ``package://``; None after a finding."""
         found: list[Path] = []
         for index, written in enumerate(entry.package_dirs):
             try:
                 found.append(self._folders.directory(written))
             except InputError as error:
                 path = ("robots", name, "package_dirs", index)
-                self.complaints.append(self._document.complaint(path, str(error)))
+                self.findings.append(self._document.finding(path, str(error)))
         return tuple(found) if len(found) == len(entry.package_dirs) else None
 
 

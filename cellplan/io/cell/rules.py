@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from cellplan.io.cell.solver_rules import accurate_complaints, feedback_complaints
-from cellplan.io.input.findings import Complaint, KeyPath, did_you_mean, listed, shown
+from cellplan.io.cell.solver_rules import accurate_findings, feedback_findings
+from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown
 from cellplan.io.schema.partial import Pieces
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
@@ -15,7 +15,7 @@ MEANS_ELSE: Final = {"part": "the workpiece", "world": "the frame that everythin
 ANGLE_RANGES: Final = ("base", "start_deg", "start")
 
 
-def rule_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+def rule_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
     """Everything in a cell file that contradicts something else in it."""
     yield from _clashing_names(pieces, document)
     yield from _holders(pieces, document)
@@ -23,12 +23,12 @@ def rule_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Complain
     for name, task in pieces.tasks.items():
         yield from _times(pieces, document, name)
         yield from _tool_axis(task, document, name)
-    yield from feedback_complaints(pieces, document)
-    yield from accurate_complaints(pieces, document)
+    yield from feedback_findings(pieces, document)
+    yield from accurate_findings(pieces, document)
     yield from _layout(pieces, document)
 
 
-def _clashing_names(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+def _clashing_names(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
     """Names of files and folders that some systems cannot tell apart, and names that mean two bodies."""
     for section in ("robots", "tasks"):
         seen: dict[str, str] = {}
@@ -36,26 +36,26 @@ def _clashing_names(pieces: Pieces, document: YamlDocument) -> Iterator[Complain
             other = seen.setdefault(name.lower(), name)
             if other != name:
                 text = f"expected a name that differs from '{other}' by more than upper and lower case"
-                yield document.key_complaint((section, name), text)
+                yield document.key_finding((section, name), text)
     for name in pieces.names["robots"]:
         if name.lower() in MEANS_ELSE:
             text = f"expected another name, '{name.lower()}' means {MEANS_ELSE[name.lower()]}"
-            yield document.key_complaint(("robots", name), text)
+            yield document.key_finding(("robots", name), text)
     if "part" in pieces.names["environment"]:
-        yield document.key_complaint(("environment", "part"), "expected another name, 'part' means the workpiece")
+        yield document.key_finding(("environment", "part"), "expected another name, 'part' means the workpiece")
 
 
-def _holders(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+def _holders(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
     """The part is held by robots of the cell, each once."""
     seen: set[str] = set()
     for path, robot in _holders_as_written(document):
         yield from _known_robot(robot, pieces, document, path)
         if robot in seen:
-            yield document.complaint(path, f"expected a robot that does not hold the part already, got '{robot}' twice")
+            yield document.finding(path, f"expected a robot that does not hold the part already, got '{robot}' twice")
         seen.add(robot)
 
 
-def _operators(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+def _operators(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
     """Each task has a robot of its own: one that does not hold the part, or the one that carries it."""
     holders = [robot for _, robot in _holders_as_written(document)]
     busy: dict[str, str] = {}
@@ -65,11 +65,11 @@ def _operators(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
             is_in_world = document.root["tasks"][name].get("relative_to") == "world"
             text = _wrong_holder(robot, holders, pieces, is_in_world=is_in_world)
             if text:
-                yield document.complaint(path, text)
+                yield document.finding(path, text)
         other = busy.setdefault(robot, name)
         if other != name:
             text = f"expected a robot without another task, got '{robot}', which does '{other}'"
-            yield document.complaint(path, text)
+            yield document.finding(path, text)
 
 
 def _wrong_holder(robot: str, holders: Sequence[str], pieces: Pieces, *, is_in_world: bool) -> str | None:
@@ -102,15 +102,15 @@ def _operators_as_written(document: YamlDocument) -> Iterator[tuple[str, KeyPath
             yield name, ("tasks", name, "robot"), robot
 
 
-def _known_robot(robot: str, pieces: Pieces, document: YamlDocument, path: KeyPath) -> Iterator[Complaint]:
+def _known_robot(robot: str, pieces: Pieces, document: YamlDocument, path: KeyPath) -> Iterator[Finding]:
     """A robot that the cell has."""
     known = pieces.names["robots"]
     if robot not in known:
         hint = did_you_mean(robot, known)
-        yield document.complaint(path, f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{hint}")
+        yield document.finding(path, f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{hint}")
 
 
-def _times(pieces: Pieces, document: YamlDocument, name: str) -> Iterator[Complaint]:
+def _times(pieces: Pieces, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A task starts and ends within the common clock."""
     if pieces.motion is None:
         return
@@ -121,14 +121,14 @@ def _times(pieces: Pieces, document: YamlDocument, name: str) -> Iterator[Compla
     if start + leaving >= clock:
         also = f" and retract_s = {leaving:g}" if leaving else ""
         text = f"expected a start before the end of the clock (motion.duration_s = {clock:g}){also}, got {start:g}"
-        yield document.complaint(("tasks", name, "start_s"), text)
+        yield document.finding(("tasks", name, "start_s"), text)
     elif task.duration_s is not None and start + task.duration_s + leaving > clock * (1.0 + TIME_ROOM):
         words = "start_s + duration_s + retract_s" if leaving else "start_s + duration_s"
         text = (
             f"expected an end within the clock (motion.duration_s = {clock:g}), "
             f"got {words} = {start + task.duration_s + leaving:g}"
         )
-        yield document.complaint(("tasks", name, "duration_s"), text)
+        yield document.finding(("tasks", name, "duration_s"), text)
 
 
 def needs_surface(task: TaskEntry) -> bool:
@@ -137,7 +137,7 @@ def needs_surface(task: TaskEntry) -> bool:
     return task.tool_axis == "normal" or (task.tool_axis is None and bool(turns))
 
 
-def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Complaint]:
+def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A normal needs a surface; of a file it is known only later whether it brings orientations."""
     if needs_surface(task) and task.path.project is None and task.path.csv is None:
         cure = "give tool_axis a direction"
@@ -145,22 +145,22 @@ def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[C
             cure = f"add project: +z (or another side), or {cure}"
         text = f"tool_axis: normal needs a path that is laid on the part: {cure}"
         key = "path" if task.tool_axis is None else "tool_axis"
-        yield document.complaint(("tasks", name, key), text)
+        yield document.finding(("tasks", name, key), text)
 
 
-def _layout(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+def _layout(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
     """What a layout search may change exists."""
     for key, value in (pieces.layout.vary if pieces.layout else {}).items():
         path = ("layout", "vary", key)
         robot, _, what = key.rpartition(".")
         if what not in ANGLE_RANGES or not robot:
             text = f"expected ROBOT.base, ROBOT.start_deg or ROBOT.start{did_you_mean(what, ANGLE_RANGES)}"
-            yield document.key_complaint(path, text)
+            yield document.key_finding(path, text)
         elif robot not in pieces.names["robots"]:
             known = pieces.names["robots"]
             hint = did_you_mean(robot, known)
-            yield document.key_complaint(
+            yield document.key_finding(
                 path, f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{hint}"
             )
         elif (what == "base") == (value is True):
-            yield document.complaint(path, "expected ranges for a base and true for a start posture")
+            yield document.finding(path, "expected ranges for a base and true for a start posture")

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from cellplan.io.input.findings import Complaint, KeyPath, did_you_mean, listed, shown
+from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown
 from cellplan.io.robots.rules import start_keys
 from cellplan.io.schema.partial import Pieces
 from cellplan.io.schema.solver import SolverEntry
@@ -15,7 +15,7 @@ FEEDBACK_LIMIT: Final = 2.0  # gain_per_s * step_s at which Euler's steps begin 
 OR_EULER: Final = "or choose solver.integrator: euler"
 
 
-def feedback_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+def feedback_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
     """The error feedback dies away with Euler's steps."""
     if pieces.motion is None or pieces.solver is None or pieces.solver.gain_per_s is None:
         return
@@ -25,7 +25,7 @@ def feedback_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Comp
             f"expected a gain below {FEEDBACK_LIMIT / step:g} (2 / step_s), got {gain:g}; "
             "the error feedback would swing ever wider"
         )
-        yield document.complaint(("solver", "gain_per_s"), text)
+        yield document.finding(("solver", "gain_per_s"), text)
 
 
 def keys_against_accurate(solver: SolverEntry) -> tuple[str, ...]:
@@ -38,7 +38,7 @@ def keys_against_accurate(solver: SolverEntry) -> tuple[str, ...]:
     )
 
 
-def accurate_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+def accurate_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
     """The accurate mode, when asked for by name, goes with everything else that is asked of the solver."""
     solver = pieces.solver
     if solver is None or solver.integrator != "accurate":
@@ -53,7 +53,7 @@ def accurate_complaints(pieces: Pieces, document: YamlDocument) -> Iterator[Comp
         "weighting.load": f"expected 0 in the accurate mode, got {shown(solver.weighting.load)}; remove it, {OR_EULER}",
     }
     for key in keys_against_accurate(solver):
-        yield document.complaint(("solver", *key.split(".")), texts[key])
+        yield document.finding(("solver", *key.split(".")), texts[key])
 
 
 def _goals(solver: SolverEntry) -> list[str]:
@@ -61,7 +61,7 @@ def _goals(solver: SolverEntry) -> list[str]:
     return [name for name, goal in dict(solver.secondary).items() if goal is not None]
 
 
-def solver_complaints(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Complaint]:
+def solver_findings(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
     """Joints that the solver and the motion name exist; the method leaves room for what is asked besides the tasks.
 
     Args:
@@ -75,57 +75,57 @@ def solver_complaints(pieces: Pieces, models: Mapping[str, RobotModel], document
         yield from _joint(path, lock.robot, lock.joint, pieces=pieces, models=models, document=document)
         earlier = [(other.robot, other.joint) for other in (motion.locked_joints if motion else ())[:index]]
         if (lock.robot, lock.joint) in earlier:
-            yield document.complaint(path, f"expected every joint once, got '{lock.robot}/{lock.joint}' again")
+            yield document.finding(path, f"expected every joint once, got '{lock.robot}/{lock.joint}' again")
         clock = None if motion is None else motion.duration_s
         if clock is not None and lock.from_s >= clock:
             text = f"expected an instant before the end at {clock:g} s, got {lock.from_s:g}"
-            yield document.complaint((*path, "from_s"), text)
+            yield document.finding((*path, "from_s"), text)
     if solver is None:
         return
     for index, step in enumerate(solver.search.sequence or ()):
         path = ("solver", "search", "sequence", index)
         yield from _joint(path, step.robot, step.joint, pieces=pieces, models=models, document=document)
         if step in (solver.search.sequence or ())[:index]:
-            yield document.complaint(path, f"expected every joint once, got '{step.robot}/{step.joint}' again")
-    yield from _postures(solver, pieces, models, document=document)
+            yield document.finding(path, f"expected every joint once, got '{step.robot}/{step.joint}' again")
+    yield from _configurations(solver, pieces, models, document=document)
     if solver.method not in NULL_SPACE_METHODS:
         yield from _without_null_space(solver, pieces, document)
 
 
-def _without_null_space(solver: SolverEntry, pieces: Pieces, document: YamlDocument) -> Iterator[Complaint]:
+def _without_null_space(solver: SolverEntry, pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
     """What a method that leaves no room besides the tasks cannot do."""
     text = f"expected a method that leaves room besides the tasks ({listed(sorted(NULL_SPACE_METHODS))})"
     if _goals(solver):
-        yield document.complaint(("solver", "secondary"), f"{text}, got '{solver.method}'")
+        yield document.finding(("solver", "secondary"), f"{text}, got '{solver.method}'")
     if pieces.motion is not None and pieces.motion.cyclic:
-        yield document.complaint(("motion", "cyclic"), f"{text}, got '{solver.method}'")
+        yield document.finding(("motion", "cyclic"), f"{text}, got '{solver.method}'")
 
 
 def _joint(
     path: KeyPath, robot: str, joint: str, *, pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument
-) -> Iterator[Complaint]:
+) -> Iterator[Finding]:
     """A named joint is one of the cell."""
     known = pieces.names["robots"]
     if robot not in known:
         text = f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{did_you_mean(robot, known)}"
-        yield document.complaint((*path, "robot"), text)
+        yield document.finding((*path, "robot"), text)
     elif robot in models and joint not in models[robot].joint_names:
         names = models[robot].joint_names
         text = f"expected a joint of '{robot}' ({listed(names)}), got {shown(joint)}{did_you_mean(joint, names)}"
-        yield document.complaint((*path, "joint"), text)
+        yield document.finding((*path, "joint"), text)
 
 
-def _postures(
+def _configurations(
     solver: SolverEntry, pieces: Pieces, models: Mapping[str, RobotModel], *, document: YamlDocument
-) -> Iterator[Complaint]:
-    """A wanted posture has one value for each joint of a robot of the cell."""
+) -> Iterator[Finding]:
+    """A desired configuration has one value for each joint of a robot of the cell."""
     goal = solver.secondary.posture
     for robot, given in goal.at.items() if goal else ():
         path = ("solver", "secondary", "posture", "at", robot)
         known = pieces.names["robots"]
         if robot not in known:
             text = f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{did_you_mean(robot, known)}"
-            yield document.key_complaint(path, text)
+            yield document.key_finding(path, text)
             continue
         if robot not in models:
             continue
@@ -133,7 +133,7 @@ def _postures(
         for key in given:
             if key not in keys:
                 text = f"unknown key{did_you_mean(key, keys)}; allowed: {listed(keys)}"
-                yield document.key_complaint((*path, key), text)
+                yield document.key_finding((*path, key), text)
         missing = [key for key in keys if key not in given]
         if missing:
-            yield document.complaint(path, f"missing, expected one value per joint: add {listed(missing)}")
+            yield document.finding(path, f"missing, expected one value per joint: add {listed(missing)}")

@@ -11,7 +11,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, quaternion_to_rotation
-from cellplan.io.input.findings import Complaint, did_you_mean, listed, raise_complaints, shown
+from cellplan.io.input.findings import Finding, did_you_mean, listed, raise_findings, shown
 from cellplan.model.task import SampledPath, TimedPath
 
 TIME: Final = "t_s"
@@ -22,7 +22,7 @@ COLUMNS: Final = (TIME, *POSITION, *AXIS, *QUATERNION)
 
 MOST_BYTES: Final = 50_000_000
 MOST_POINTS: Final = 200_000
-MOST_COMPLAINTS: Final = 20  # lines with complaints after which nobody reads on
+MOST_COMPLAINTS: Final = 20  # lines with findings after which nobody reads on
 UNIT_ROOM: Final = 1e-3  # [-] room for axes and quaternions written with four digits
 FARTHEST: Final = 100_000.0  # [mm] no part is that large: a slip of the unit
 SHORTEST_S: Final = 1e-6  # [s] between two instants, halved for rounding; no controller tells nearer ones apart
@@ -39,14 +39,14 @@ _LENGTH_UNITS: Final = ("", "_m", "_cm", "_in", "_inch", "_um", "[mm]", " mm", "
 
 
 @dataclass(slots=True)
-class _Complaints:
-    """Complaints gathered while reading; more than anybody reads are only counted."""
+class _Findings:
+    """Findings gathered while reading; more than anybody reads are only counted."""
 
-    found: list[Complaint] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
 
     def add(self, line: int, text: str, *, column: str = "") -> None:
-        """Note a complaint about a line, or about one value of it."""
-        self.found.append(Complaint(line=line, key=f"column '{column}'" if column else "", text=text))
+        """Note a finding about a line, or about one value of it."""
+        self.found.append(Finding(line=line, key=f"column '{column}'" if column else "", text=text))
 
     @property
     def is_enough(self) -> bool:
@@ -74,24 +74,24 @@ def read_toolpath_csv(
     """
     name = source or path.name
     text = _read_text(path, name)
-    complaints = _Complaints()
+    findings = _Findings()
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n").rstrip("\n \t").split("\n")
-    columns = _read_header(lines[0], complaints)
-    raise_complaints(name, complaints.found)
+    columns = _read_header(lines[0], findings)
+    raise_findings(name, findings.found)
     if len(lines) - 1 > MOST_POINTS:
         raise InputError(f"{name}: expected at most {MOST_POINTS} points, got {len(lines) - 1}")
-    values = _read_rows(lines, columns, complaints)
-    raise_complaints(name, complaints.found)
+    values = _read_rows(lines, columns, findings)
+    raise_findings(name, findings.found)
     if len(values) < 2:
         raise InputError(f"{name}: expected at least 2 points below the header, got {len(values)}")
-    axes = _units(values, columns, complaints, wanted=AXIS, what="tool axis")
-    quaternions = _units(values, columns, complaints, wanted=QUATERNION, what="quaternion")
+    axes = _units(values, columns, findings, desired=AXIS, what="tool axis")
+    quaternions = _units(values, columns, findings, desired=QUATERNION, what="quaternion")
     times = values[:, columns.index(TIME)] if TIME in columns else None
     if times is not None:
-        _examine_times(times, complaints)
+        _examine_times(times, findings)
         if is_closed:
-            _close(values, columns, (axes, quaternions), complaints)
-    raise_complaints(name, complaints.found)
+            _close(values, columns, (axes, quaternions), findings)
+    raise_findings(name, findings.found)
     points = values[:, [columns.index(column) for column in POSITION]] * MM
     rotations = None if quaternions is None else quaternion_to_rotation(quaternions)
     if times is None:
@@ -125,26 +125,26 @@ def _read_text(path: Path, name: str) -> str:
     return text
 
 
-def _read_header(line: str, complaints: _Complaints) -> list[str]:
+def _read_header(line: str, findings: _Findings) -> list[str]:
     """Column names of the first line, complete and each known once."""
     if ";" in line or "\t" in line:
         sign = "';'" if ";" in line else "tabs"
-        complaints.add(1, f"expected columns separated by ',', got {sign}; export with ',' and a decimal point")
+        findings.add(1, f"expected columns separated by ',', got {sign}; export with ',' and a decimal point")
         return []
     columns = [_unquoted(cell) for cell in line.split(",")]
     for column in columns:
         if column not in COLUMNS:
-            complaints.add(1, _unknown(column))
+            findings.add(1, _unknown(column))
     for column in dict.fromkeys(column for column in columns if column in COLUMNS and columns.count(column) > 1):
-        complaints.add(1, f"expected column '{column}' once, got it {columns.count(column)} times")
-    if complaints.found:
+        findings.add(1, f"expected column '{column}' once, got it {columns.count(column)} times")
+    if findings.found:
         return columns
     for group, is_needed in ((POSITION, True), (AXIS, False), (QUATERNION, False)):
         missing = [column for column in group if column not in columns]
         if missing and (is_needed or len(missing) < len(group)):
-            complaints.add(1, f"expected columns {listed(group)}, but {listed(missing)} is missing")
+            findings.add(1, f"expected columns {listed(group)}, but {listed(missing)} is missing")
     if set(AXIS) & set(columns) and set(QUATERNION) & set(columns):
-        complaints.add(1, f"expected axes ({listed(AXIS)}) or quaternions ({listed(QUATERNION)}), got both")
+        findings.add(1, f"expected axes ({listed(AXIS)}) or quaternions ({listed(QUATERNION)}), got both")
     return columns
 
 
@@ -167,46 +167,46 @@ def _unquoted(cell: str) -> str:
     return cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell
 
 
-def _read_rows(lines: list[str], columns: list[str], complaints: _Complaints) -> Array:
-    """Numbers below the header, shape (N, columns); rows with complaints are left out."""
+def _read_rows(lines: list[str], columns: list[str], findings: _Findings) -> Array:
+    """Numbers below the header, shape (N, columns); rows with findings are left out."""
     rows: list[list[float]] = []
     for line, text in enumerate(lines[1:], start=2):
-        if complaints.is_enough:
-            complaints.add(line, f"and so on: stopped reading after {MOST_COMPLAINTS} complaints")
+        if findings.is_enough:
+            findings.add(line, f"and so on: stopped reading after {MOST_COMPLAINTS} findings")
             break
-        row = list(_read_row(line, text, columns, complaints))
+        row = list(_read_row(line, text, columns, findings))
         if len(row) == len(columns):
             rows.append(row)
     return np.array(rows, dtype=float).reshape(-1, len(columns))
 
 
-def _read_row(line: int, text: str, columns: list[str], complaints: _Complaints) -> Iterator[float]:
+def _read_row(line: int, text: str, columns: list[str], findings: _Findings) -> Iterator[float]:
     """Numbers of one row; a value that is none is complained about and left out."""
     if not text.strip():
-        complaints.add(line, "expected a row of numbers, got a blank line; leave it out")
+        findings.add(line, "expected a row of numbers, got a blank line; leave it out")
         return
     cells = text.split(",")
     if text.count('"') % 2:
-        complaints.add(line, "expected closed quotes, got an odd number of '\"'")
+        findings.add(line, "expected closed quotes, got an odd number of '\"'")
         return
     if len(cells) != len(columns):
         hint = "; separate values with ',' and write decimals with '.'" if len(cells) > len(columns) else ""
-        complaints.add(line, f"expected {len(columns)} values, got {len(cells)}{hint}")
+        findings.add(line, f"expected {len(columns)} values, got {len(cells)}{hint}")
         return
     for cell, column in zip(cells, columns, strict=True):
         word = _unquoted(cell)
         if not _NUMBER.fullmatch(word):
-            complaints.add(line, f"expected {_wanted(word)}, got {shown(word)}", column=column)
+            findings.add(line, f"expected {_desired(word)}, got {shown(word)}", column=column)
             continue
         value = float(word)
         limit, unit = _LIMITS.get(column, (1.0 + UNIT_ROOM, ""))
         if abs(value) > limit:
-            complaints.add(line, f"expected at most {limit:.10g}{unit} either way, got {word}", column=column)
+            findings.add(line, f"expected at most {limit:.10g}{unit} either way, got {word}", column=column)
             continue
         yield value
 
 
-def _wanted(word: str) -> str:
+def _desired(word: str) -> str:
     """What a word that is not a number should have been."""
     if re.fullmatch(r"[+-]?(nan|inf|infinity)", word, re.IGNORECASE):
         return "a finite number"
@@ -214,47 +214,47 @@ def _wanted(word: str) -> str:
 
 
 def _units(
-    values: Array, columns: list[str], complaints: _Complaints, *, wanted: tuple[str, ...], what: str
+    values: Array, columns: list[str], findings: _Findings, *, desired: tuple[str, ...], what: str
 ) -> Array | None:
     """Columns that hold vectors of length one, brought to it; None when the file has none."""
-    if wanted[0] not in columns:
+    if desired[0] not in columns:
         return None
-    vectors = values[:, [columns.index(column) for column in wanted]]
+    vectors = values[:, [columns.index(column) for column in desired]]
     norms = np.linalg.norm(vectors, axis=1)
     for row in np.flatnonzero(~(np.abs(norms - 1.0) <= UNIT_ROOM))[:MOST_COMPLAINTS]:
-        text = f"expected a {what} ({listed(wanted)}) of length 1, got {norms[row]:.6g}"
-        complaints.add(int(row) + 2, text)
+        text = f"expected a {what} ({listed(desired)}) of length 1, got {norms[row]:.6g}"
+        findings.add(int(row) + 2, text)
     unit: Array = vectors / np.where(norms > 0.0, norms, 1.0)[:, None]
     return unit
 
 
-def _examine_times(times: Array, complaints: _Complaints) -> None:
+def _examine_times(times: Array, findings: _Findings) -> None:
     """Complain about instants that do not start at zero and grow from row to row."""
     if times[0] != 0.0:
         text = f"expected 0 in the first row, got {times[0]:.9g}; a task is shifted by its start_s"
-        complaints.add(2, text, column=TIME)
+        findings.add(2, text, column=TIME)
     for row in np.flatnonzero(~(np.diff(times) > 0.5 * SHORTEST_S))[:MOST_COMPLAINTS]:
         text = f"expected an instant after {times[row]:.9g} of the row before, got {times[row + 1]:.9g}"
-        complaints.add(int(row) + 3, text, column=TIME)
+        findings.add(int(row) + 3, text, column=TIME)
 
 
 def _close(
-    values: Array, columns: list[str], directions: tuple[Array | None, Array | None], complaints: _Complaints
+    values: Array, columns: list[str], directions: tuple[Array | None, Array | None], findings: _Findings
 ) -> None:
     """Make the last row of a closed trajectory repeat the first to the last digit, or complain that it does not."""
     last = len(values) + 1
     if len(values) < FEWEST_CLOSED:
-        complaints.add(last, f"expected at least {FEWEST_CLOSED} rows for a closed trajectory, got {len(values)}")
+        findings.add(last, f"expected at least {FEWEST_CLOSED} rows for a closed trajectory, got {len(values)}")
         return
     place = [columns.index(column) for column in POSITION]
     gap = np.abs(values[-1, place] - values[0, place]).max()
     if gap > CLOSING_ROOM:
         text = f"expected a closed trajectory to end at the point of its first row, but it ends {gap:.6g} mm from it"
-        complaints.add(last, f"{text}; repeat the first row at the end of the cycle")
+        findings.add(last, f"{text}; repeat the first row at the end of the cycle")
     values[-1, place] = values[0, place]
     for vectors in directions:
         if vectors is not None:
             sign = -1.0 if vectors.shape[1] == len(QUATERNION) and vectors[-1] @ vectors[0] < 0.0 else 1.0
             if np.linalg.norm(sign * vectors[-1] - vectors[0]) > UNIT_ROOM:
-                complaints.add(last, "expected a closed trajectory to end with the orientation of its first row")
+                findings.add(last, "expected a closed trajectory to end with the orientation of its first row")
             vectors[-1] = vectors[0]

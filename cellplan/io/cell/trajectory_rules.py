@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from cellplan.io.cell.rules import TIME_ROOM, needs_surface
-from cellplan.io.input.findings import Complaint, KeyPath
+from cellplan.io.input.findings import Finding, KeyPath
 from cellplan.io.schema.partial import Pieces
 from cellplan.io.schema.task import CsvEntry, TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
@@ -15,7 +15,7 @@ Targets = Mapping[str, SampledPath | TimedPath]  # what was read of the files of
 OWN_CLOCK: Final = ("duration_s", "feed_mm_s", "time_law", "corners")  # what a trajectory decides by itself
 
 
-def target_complaints(pieces: Pieces, targets: Targets, document: YamlDocument) -> Iterator[Complaint]:
+def target_findings(pieces: Pieces, targets: Targets, document: YamlDocument) -> Iterator[Finding]:
     """Everything in the tasks that contradicts the files of their paths."""
     for name, path in targets.items():
         task = pieces.tasks[name]
@@ -25,7 +25,7 @@ def target_complaints(pieces: Pieces, targets: Targets, document: YamlDocument) 
             yield from _end(task, path, pieces, document=document, name=name)
 
 
-def _axes(task: TaskEntry, path: SampledPath | TimedPath, document: YamlDocument, name: str) -> Iterator[Complaint]:
+def _axes(task: TaskEntry, path: SampledPath | TimedPath, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A file without orientations, not laid on the part, has no normals."""
     has_axes = path.axes is not None or path.rotations is not None
     if needs_surface(task) and task.path.project is None and not has_axes:
@@ -34,28 +34,28 @@ def _axes(task: TaskEntry, path: SampledPath | TimedPath, document: YamlDocument
             "tool_axis: normal needs axes or quaternions in the file, or a path that is laid on the part: "
             f"add columns i,j,k, {project}or give tool_axis a direction"
         )
-        yield document.complaint(("tasks", name, "tool_axis" if task.tool_axis else "path"), text)
+        yield document.finding(("tasks", name, "tool_axis" if task.tool_axis else "path"), text)
 
 
-def _clock(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Complaint]:
+def _clock(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A trajectory has its own times, its own smoothness and its own place."""
     for key in OWN_CLOCK:
         if getattr(task, key) is not None:
-            yield document.key_complaint(
+            yield document.key_finding(
                 ("tasks", name, key), "unexpected key, the column t_s of the path's file decides"
             )
     if task.tool_turn_deg != 0.0:
         text = "expected no turn on a path with a column t_s; give the turn as qw,qx,qy,qz in the file"
-        yield document.complaint(("tasks", name, "tool_turn_deg"), text)
+        yield document.finding(("tasks", name, "tool_turn_deg"), text)
     if task.path.project is not None:
         text = "unexpected key, a path with a column t_s is used as it stands in the file"
-        yield document.key_complaint(("tasks", name, "path", "project"), text)
+        yield document.key_finding(("tasks", name, "path", "project"), text)
     if isinstance(task.path.csv, CsvEntry) and not task.path.csv.smooth:
         text = "expected true for a file with a column t_s: straight sides would jump in speed, got false"
-        yield document.complaint(("tasks", name, "path", "csv", "smooth"), text)
+        yield document.finding(("tasks", name, "path", "csv", "smooth"), text)
 
 
-def _end(task: TaskEntry, path: TimedPath, pieces: Pieces, *, document: YamlDocument, name: str) -> Iterator[Complaint]:
+def _end(task: TaskEntry, path: TimedPath, pieces: Pieces, *, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A trajectory ends within the common clock."""
     if pieces.motion is None or pieces.motion.duration_s is None:
         return
@@ -67,4 +67,4 @@ def _end(task: TaskEntry, path: TimedPath, pieces: Pieces, *, document: YamlDocu
             f"expected an end within the clock (motion.duration_s = {clock:g}), got start_s + {cycles}"
             f"{path.duration:g} s of {path.source} = {end:g}"
         )
-        yield document.complaint(place, text)
+        yield document.finding(place, text)

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from cellplan.io.input.findings import raise_complaints, shown
+from cellplan.io.input.findings import raise_findings, shown
 from cellplan.io.yaml.reader import parse_yaml
 
 VARIABLE: Final = "CELLPLAN_ALLOW_DIRS"  # folders, parted as the system parts those of PATH
@@ -54,19 +54,17 @@ def _configured(cell_folder: Path) -> tuple[Path, ...]:
     if data is None:
         return ()
     document = parse_yaml(data, file=str(path))
-    complaints = list(document.complaints)
-    complaints += [
-        document.key_complaint((key,), f"unknown key; allowed: {KEY}") for key in document.root if key != KEY
-    ]
+    findings = list(document.findings)
+    findings += [document.key_finding((key,), f"unknown key; allowed: {KEY}") for key in document.root if key != KEY]
     given = document.root.get(KEY, ())
     if not isinstance(given, tuple):
-        complaints.append(document.complaint((KEY,), f"expected a list of folders, got {shown(given)}"))
+        findings.append(document.finding((KEY,), f"expected a list of folders, got {shown(given)}"))
         given = ()
     for index, written in enumerate(given):
         if not isinstance(written, str) or not Path(written).expanduser().is_absolute():
             text = f"expected an absolute path of a folder, got {shown(written)}"
-            complaints.append(document.complaint((KEY, index), text))
-    raise_complaints(str(path), complaints)
+            findings.append(document.finding((KEY, index), text))
+    raise_findings(str(path), findings)
     return tuple(Path(written).expanduser() for written in given)
 
 

@@ -54,19 +54,19 @@ def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> d
 
 
 def as_written(model: RobotModel, q: Array) -> Array:
-    """The posture that is read back after ``q`` was written; at most a unit in the last place away from it.
+    """The configuration that is read back after ``q`` was written; at most a unit in the last place away from it.
 
-    Not every number of radians is the image of a number of degrees. A solver that starts from this posture can be
+    Not every number of radians is the image of a number of degrees. A solver that starts from this configuration can be
     repeated from the written cell to the last bit.
 
     Args:
         model: The robot.
-        q: Posture in [rad] or [m], shape (n,).
+        q: Configuration in [rad] or [m], shape (n,).
     """
     written = _in_file_units(model, q)
     turns = [joint.is_revolute for joint in model.joints]
-    posture: Array = np.where(turns, np.deg2rad(written), np.divide(written, MM))
-    return posture
+    configuration: Array = np.where(turns, np.deg2rad(written), np.divide(written, MM))
+    return configuration
 
 
 def _robot(entry: Mapping[str, Any], robot: Robot, found: Array | None) -> dict[str, Any]:
@@ -149,7 +149,7 @@ def _pose(entry: Mapping[str, Any], X: Array) -> dict[str, Any]:
 
 
 def _in_file_units(model: RobotModel, q: Array) -> list[float]:
-    """A posture in degrees and millimetres."""
+    """A configuration in degrees and millimetres."""
     return [
         _file_number(float(value), is_revolute=joint.is_revolute) for joint, value in zip(model.joints, q, strict=True)
     ]

@@ -8,7 +8,7 @@ from typing import Final
 
 from cellplan.errors import InputError
 
-CHUNK: Final = 1 << 20  # [bytes] read at a time when only the digest is wanted
+CHUNK: Final = 1 << 20  # [bytes] read at a time when only the digest is desired
 
 
 def read_regular_file(path: Path, *, file: str, limit: int) -> bytes:

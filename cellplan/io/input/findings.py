@@ -1,4 +1,4 @@
-"""Complaints about a file: where, what, got, allowed, in the order of the file."""
+"""Findings about a file: where, what, got, allowed, in the order of the file."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ KeyPath = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Complaint:
+class Finding:
     """One thing that is wrong in a file.
 
     Attributes:
-        line: Line from 1; 0 when the complaint is about the whole file.
+        line: Line from 1; 0 when the finding is about the whole file.
         key: Key path as the user would write it; empty for the whole file.
         text: What is wrong, what was found and what is allowed.
     """
@@ -30,23 +30,23 @@ class Complaint:
     text: str
 
     def to_error(self, file: str) -> InputError:
-        """The complaint as one line: ``file:line: key: text``."""
+        """The finding as one line: ``file:line: key: text``."""
         where = f"{file}:{self.line}" if self.line else file
         return InputError(": ".join(part for part in (where, self.key, self.text) if part))
 
 
-def raise_complaints(file: str, complaints: Iterable[Complaint], others: Sequence[InputError] = ()) -> None:
-    """Raise all complaints about a file at once, sorted by line, then those about the files it names.
+def raise_findings(file: str, findings: Iterable[Finding], others: Sequence[InputError] = ()) -> None:
+    """Raise all findings about a file at once, sorted by line, then those about the files it names.
 
     Raises:
-        InvalidFileError: When there is at least one complaint.
+        InvalidFileError: When there is at least one finding.
     """
-    ordered = sorted(dict.fromkeys(complaints), key=lambda complaint: complaint.line)
-    errors = [complaint.to_error(file) for complaint in ordered[:COMPLAINT_LIMIT]]
+    ordered = sorted(dict.fromkeys(findings), key=lambda finding: finding.line)
+    errors = [finding.to_error(file) for finding in ordered[:COMPLAINT_LIMIT]]
     if len(ordered) > COMPLAINT_LIMIT:
-        errors.append(InputError(f"{file}: and more than {len(ordered) - COMPLAINT_LIMIT - 1} other complaints"))
+        errors.append(InputError(f"{file}: and more than {len(ordered) - COMPLAINT_LIMIT - 1} other findings"))
     for other in others:
-        errors.extend(other.complaints if isinstance(other, InvalidFileError) else [other])
+        errors.extend(other.findings if isinstance(other, InvalidFileError) else [other])
     if errors:
         raise InvalidFileError(errors)
 
@@ -71,7 +71,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def listed(words: Iterable[str]) -> str:
-    """Words joined by commas, or ``none``; of very many only the first."""
+    """Label joined by commas, or ``none``; of very many only the first."""
     words = list(words)
     more = ", …" if len(words) > LISTED_LIMIT else ""
     return ", ".join(words[:LISTED_LIMIT]) + more or "none"

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from cellplan.io.input.findings import Complaint, KeyPath, did_you_mean, listed, shown
+from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown
 from cellplan.io.schema.robot import PayloadEntry
 from cellplan.io.shapes import MM
 from cellplan.io.yaml.reader import YamlDocument
@@ -25,9 +25,9 @@ def build_payload(entry: PayloadEntry | None) -> Payload | None:
     )
 
 
-def payload_complaints(
+def payload_findings(
     path: KeyPath, entry: PayloadEntry | None, turning: tuple[str, ...], document: YamlDocument
-) -> Iterator[Complaint]:
+) -> Iterator[Finding]:
     """Limits of axes belong to the last turning joints before the flange.
 
     Args:
@@ -40,4 +40,4 @@ def payload_complaints(
     for joint in entry.axes if entry is not None else ():
         if joint not in last:
             text = f"expected one of the last turning joints ({listed(last)}), got {shown(joint)}"
-            yield document.key_complaint((*path, "axes", joint), f"{text}{did_you_mean(joint, last)}")
+            yield document.key_finding((*path, "axes", joint), f"{text}{did_you_mean(joint, last)}")

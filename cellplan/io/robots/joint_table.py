@@ -1,4 +1,4 @@
-"""Robot from a joint-axis table: axes, limits, flange and link bodies at the reference posture."""
+"""Robot from a joint-axis table: axes, limits, flange and link bodies at the reference configuration."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -15,8 +15,8 @@ from cellplan.geometry.mesh.load import read_mesh
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.input.allowed_folders import AllowedFolders
-from cellplan.io.input.findings import Complaint, KeyPath, did_you_mean, listed, raise_complaints, shown
-from cellplan.io.robots.build_payload import build_payload, payload_complaints
+from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, raise_findings, shown
+from cellplan.io.robots.build_payload import build_payload, payload_findings
 from cellplan.io.schema import RobotTableDocument
 from cellplan.io.schema.messages import validate
 from cellplan.io.schema.robot_table import BodiesEntry, JointEntry
@@ -58,42 +58,42 @@ def load_robot_table(path: Path, *, file: str, folders: AllowedFolders) -> Robot
         folders: Where its meshes may lie.
 
     Raises:
-        InputError: All complaints about the table at once, or what is wrong with a mesh.
+        InputError: All findings about the table at once, or what is wrong with a mesh.
     """
     document = read_yaml(path, file=file)
-    table, complaints = validate(RobotTableDocument, document)
-    complaints += document.complaints
+    table, findings = validate(RobotTableDocument, document)
+    findings += document.findings
     if table is not None:
-        complaints += _rules(table, document)
+        findings += _rules(table, document)
     meshes = _Meshes(document, folders, table.solids_path if table is not None else ())
-    bodies = tuple(_bodies(table, meshes)) if table is not None and not complaints else ()
-    raise_complaints(file, [*complaints, *meshes.complaints])
+    bodies = tuple(_bodies(table, meshes)) if table is not None and not findings else ()
+    raise_findings(file, [*findings, *meshes.findings])
     if table is None:
         raise InputError(f"{file}: the table cannot be understood")
     return RobotTable(model=_model(table, bodies), digest=document.digest, mesh_files=meshes.files)
 
 
-def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Complaint]:
+def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Finding]:
     """Names that must exist, and names that mean something else already."""
     for name in table.joints:
         if name == FOOT or TOOL_NAME.fullmatch(name):
             text = f"expected another name, '{name}' means {'the foot' if name == FOOT else 'the tool'} of the robot"
-            yield document.key_complaint(("joints", name), text)
+            yield document.key_finding(("joints", name), text)
     links, place = (FOOT, *table.joints), table.solids_path
     for index, body in enumerate(table.solids):
         if body.link not in links:
             hint = did_you_mean(body.link, links)
             text = f"expected a link ({listed(links)}), got {shown(body.link)}{hint}"
-            yield document.complaint((*place, index, "link"), text)
+            yield document.finding((*place, index, "link"), text)
         if body.name is not None and TOOL_NAME.fullmatch(body.name):
             text = f"expected another name, '{body.name}' means the tool of the robot"
-            yield document.complaint((*place, index, "name"), text)
+            yield document.finding((*place, index, "name"), text)
     turning = tuple(name for name, joint in table.joints.items() if joint.type == "revolute")
-    yield from payload_complaints(("payload",), table.payload, turning, document)
+    yield from payload_findings(("payload",), table.payload, turning, document)
     named = [(index, body.name) for index, body in enumerate(table.solids) if body.name is not None]
     for order, (index, name) in enumerate(named):
         if name in {other for _, other in named[:order]}:
-            yield document.complaint((*place, index, "name"), f"expected a name of its own, got '{name}' twice")
+            yield document.finding((*place, index, "name"), f"expected a name of its own, got '{name}' twice")
 
 
 class _Meshes:
@@ -105,22 +105,22 @@ class _Meshes:
         self._folders = folders
         self._read: dict[tuple[str, str], Mesh] = {}
         self.files: dict[str, Path] = {}
-        self.complaints: list[Complaint] = []
+        self.findings: list[Finding] = []
 
     def mesh(self, written: str, unit: str, *, index: int) -> Mesh | None:
-        """Mesh in [m]; None after a complaint."""
+        """Mesh in [m]; None after a finding."""
         if (written, unit) in self._read:
             return self._read[written, unit]
         try:
             path = self._folders.file(written)
         except InputError as error:
-            self.complaints.append(self._document.complaint((*self._place, index, "mesh", "file"), str(error)))
+            self.findings.append(self._document.finding((*self._place, index, "mesh", "file"), str(error)))
             return None
         try:
             guard = Guard(file=written, worker="the mesh reader")
             mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), path, guard=guard)
         except InputError as error:
-            self.complaints.append(self._document.complaint((*self._place, index, "mesh", "file"), str(error)))
+            self.findings.append(self._document.finding((*self._place, index, "mesh", "file"), str(error)))
             return None
         self.files[written] = path
         self._read[written, unit] = replace(mesh, is_leaky=not mesh.is_closed)
@@ -135,7 +135,7 @@ class _Meshes:
 
 
 def _bodies(table: RobotTableDocument, meshes: _Meshes) -> Iterator[Body]:
-    """Link bodies; one whose mesh cannot be read is left out after its complaint."""
+    """Link bodies; one whose mesh cannot be read is left out after its finding."""
     links = {FOOT: BASE, **{name: index for index, name in enumerate(table.joints)}}
     taken = {body.name for body in table.solids if body.name is not None}
     for index, entry in enumerate(table.solids):

@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.io.input.findings import Complaint, did_you_mean, listed, shown
-from cellplan.io.robots.build_payload import build_payload, payload_complaints
+from cellplan.io.input.findings import Finding, did_you_mean, listed, shown
+from cellplan.io.robots.build_payload import build_payload, payload_findings
 from cellplan.io.robots.urdf.limits import JointLimits
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
 from cellplan.io.yaml.reader import YamlDocument
@@ -56,31 +56,31 @@ def limits_in_si(entry: LimitsEntry) -> JointLimits:
     )
 
 
-def robot_complaints(name: str, entry: RobotEntry, model: RobotModel, document: YamlDocument) -> Iterator[Complaint]:
+def robot_findings(name: str, entry: RobotEntry, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:
     """Everything a cell says about a robot that its model contradicts."""
     path = ("robots", name)
-    yield from _configuration_complaints((*path, "start"), entry.given_start, model, document)
-    yield from _configuration_complaints((*path, "home"), entry.given_home, model, document)
-    yield from _unit_complaints(("robots", name), entry, model, document)
+    yield from _configuration_findings((*path, "start"), entry.given_start, model, document)
+    yield from _configuration_findings((*path, "home"), entry.given_home, model, document)
+    yield from _unit_findings(("robots", name), entry, model, document)
     turning = tuple(joint.name for joint in model.joints if joint.is_revolute)
-    yield from payload_complaints(("robots", name, "payload"), entry.payload, turning, document)
+    yield from payload_findings(("robots", name, "payload"), entry.payload, turning, document)
     count = len(model.joints)
     if entry.weights is not None and len(entry.weights) != count:
         text = f"expected {count} weights, one per joint ({listed(model.joint_names)}), got {len(entry.weights)}"
-        yield document.complaint(("robots", name, "weights"), text)
+        yield document.finding(("robots", name, "weights"), text)
     reach = float(np.linalg.norm(model.X_BF[:3, 3] - model.joints[0].point_B))
     if reach > FARTHEST_FLANGE:
         text = f"expected a reach of at most {FARTHEST_FLANGE:g} m, got {reach:.6g} m; is the unit right?"
-        yield document.complaint(("robots", name, "model"), text)
+        yield document.finding(("robots", name, "model"), text)
     length = float(np.linalg.norm(entry.tool.xyz_mm)) / 1000.0
     if length > FARTHEST_FLANGE:
         text = f"expected a tool of at most {FARTHEST_FLANGE:g} m, got {length:.6g} m; is the unit right?"
-        yield document.complaint(("robots", name, "tool", "xyz_mm"), text)
+        yield document.finding(("robots", name, "tool", "xyz_mm"), text)
 
 
-def _configuration_complaints(
+def _configuration_findings(
     path: tuple[str, str, str], given: Given, model: RobotModel, document: YamlDocument
-) -> Iterator[Complaint]:
+) -> Iterator[Finding]:
     """A start posture or a home has one value for each joint, in the joint's unit."""
     if given is None:
         return
@@ -90,42 +90,42 @@ def _configuration_complaints(
         for joint in given:
             if joint not in keys:
                 text = f"unknown key{did_you_mean(joint, keys)}; allowed: {listed(keys)}"
-                yield document.key_complaint((*path, joint), text)
+                yield document.key_finding((*path, joint), text)
         missing = [joint for joint in keys if joint not in given]
         if missing:
-            yield document.complaint(path, f"missing, expected one value per joint: add {listed(missing)}")
+            yield document.finding(path, f"missing, expected one value per joint: add {listed(missing)}")
         return
     as_list = (*robot, f"{key}_deg")
     sliding = [joint.name for joint in model.joints if not joint.is_revolute]
     if sliding:
         expected = ", ".join(f"{joint}: …" for joint in keys)
         text = f"unexpected key, '{sliding[0]}' is a prismatic joint: use {key}: {{{expected}}}"
-        yield document.key_complaint(as_list, text)
+        yield document.key_finding(as_list, text)
     elif len(given) != len(keys):
         text = f"expected {len(keys)} angles, one per joint ({listed(model.joint_names)}), got {len(given)}"
-        yield document.complaint(as_list, text)
+        yield document.finding(as_list, text)
 
 
-def _unit_complaints(
+def _unit_findings(
     path: tuple[str, str], entry: RobotEntry, model: RobotModel, document: YamlDocument
-) -> Iterator[Complaint]:
+) -> Iterator[Finding]:
     """Limits belong to joints that exist and are in the joint's unit."""
     joints = {joint.name: joint for joint in model.joints}
     for name, limits in entry.limits.items():
         if name not in joints:
             text = f"expected a joint of the robot ({listed(joints)}), got {shown(name)}{did_you_mean(name, joints)}"
-            yield document.key_complaint((*path, "limits", name), text)
+            yield document.key_finding((*path, "limits", name), text)
         elif limits.unit is not None and (limits.unit == "deg") != joints[name].is_revolute:
             kind, unit = ("revolute", "deg") if joints[name].is_revolute else ("prismatic", "mm")
             text = f"expected limits in {unit}, the joint is {kind}, got {limits.unit}"
-            yield document.complaint((*path, "limits", name), text)
+            yield document.finding((*path, "limits", name), text)
 
 
 def tightened(
     path: tuple[str, str], entry: RobotEntry, model: RobotModel, document: YamlDocument
-) -> tuple[RobotModel, list[Complaint]]:
+) -> tuple[RobotModel, list[Finding]]:
     """The model within the limits of the cell, which may only be tighter than its own."""
-    complaints: list[Complaint] = []
+    findings: list[Finding] = []
     joints: list[Joint] = []
     for joint in model.joints:
         limits = entry.limits.get(joint.name)
@@ -133,9 +133,9 @@ def tightened(
             joints.append(joint)
             continue
         wider = list(_wider(joint, limits))
-        complaints += [document.complaint((*path, "limits", joint.name, key), text) for key, text in wider]
+        findings += [document.finding((*path, "limits", joint.name, key), text) for key, text in wider]
         joints.append(joint if wider else _within(joint, limits_in_si(limits)))
-    return replace(model, joints=tuple(joints)), complaints
+    return replace(model, joints=tuple(joints)), findings
 
 
 def with_statements(entry: RobotEntry, model: RobotModel) -> RobotModel:

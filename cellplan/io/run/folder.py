@@ -125,10 +125,10 @@ class RunFolder:
                 exchange(self._draft, self.path)
                 raise _holds_foreign(self.path, foreign)
         else:
-            self._put_aside_first()
+            self._move_existing_first()
         _sync_folder(self.path.parent)
 
-    def _put_aside_first(self) -> None:
+    def _move_existing_first(self) -> None:
         """Rename the older run aside and the new one into place; undo the first when the second fails."""
         try:
             self.path.rename(self._aside)

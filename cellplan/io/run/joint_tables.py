@@ -255,7 +255,7 @@ def _parse_rows(rows: str, columns: list[str], *, source: str, first_line: int) 
 def _first_bad_row(
     lines: Iterable[str], row: re.Pattern[str], *, columns: list[str], source: str, first_line: int
 ) -> InputError:
-    """The complaint about the first row that is not a row of plain decimals."""
+    """The finding about the first row that is not a row of plain decimals."""
     number, line = next((n, line) for n, line in enumerate(lines, start=first_line) if not row.fullmatch(line))
     fields = line.split(",")
     if len(fields) != len(columns):

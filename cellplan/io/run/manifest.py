@@ -110,19 +110,19 @@ def parse_manifest(data: bytes, file: str) -> Manifest:
     )
 
 
-def file_complaints(folder: Path, manifest: Manifest) -> dict[str, InputError]:
+def file_findings(folder: Path, manifest: Manifest) -> dict[str, InputError]:
     """Every file of a run folder that is missing, changed, exchanged or not part of the run; one line each, by name."""
-    found, complaints = _walk(folder, manifest)
+    found, findings = _walk(folder, manifest)
     for name, stored in manifest.files.items():
         if name in found:
             error = _change(folder / name, name, stored, manifest=manifest)
-            complaints |= {name: error} if error else {}
-        elif not any(above in complaints for above in (name, *map(str, PurePosixPath(name).parents))):
-            complaints[name] = InputError(f"{folder / name}: missing; the run was written with it")
+            findings |= {name: error} if error else {}
+        elif not any(above in findings for above in (name, *map(str, PurePosixPath(name).parents))):
+            findings[name] = InputError(f"{folder / name}: missing; the run was written with it")
     for name in found:
         if name not in manifest.files and name != MANIFEST:
-            complaints[name] = InputError(f"{folder / name}: not part of the run; remove it, or solve the cell again")
-    return dict(sorted(complaints.items()))
+            findings[name] = InputError(f"{folder / name}: not part of the run; remove it, or solve the cell again")
+    return dict(sorted(findings.items()))
 
 
 def _change(path: Path, name: str, stored: StoredFile, *, manifest: Manifest) -> InputError | None:
@@ -144,10 +144,10 @@ def _change(path: Path, name: str, stored: StoredFile, *, manifest: Manifest) ->
 
 
 def _walk(folder: Path, manifest: Manifest) -> tuple[list[str], dict[str, InputError]]:
-    """Names of all regular files that may be part of the run, and complaints about links and devices."""
+    """Names of all regular files that may be part of the run, and findings about links and devices."""
     listed = {PurePosixPath(name).parts[0] for name in manifest.files}
     names: list[str] = []
-    complaints: dict[str, InputError] = {}
+    findings: dict[str, InputError] = {}
     waiting = [folder]
     while waiting:
         place = waiting.pop()
@@ -155,21 +155,21 @@ def _walk(folder: Path, manifest: Manifest) -> tuple[list[str], dict[str, InputE
             entries = sorted(place.iterdir())
         except OSError as error:
             why = (error.strerror or str(error)).lower()
-            complaints[place.relative_to(folder).as_posix()] = InputError(f"{place}: cannot be read: {why}")
+            findings[place.relative_to(folder).as_posix()] = InputError(f"{place}: cannot be read: {why}")
             continue
         for entry in entries:
             name = entry.relative_to(folder).as_posix()
             if entry.is_symlink():
-                complaints[name] = InputError(f"{entry}: expected a file or folder of the run, got a symbolic link")
+                findings[name] = InputError(f"{entry}: expected a file or folder of the run, got a symbolic link")
             elif name in MADE_LATER - listed:
                 continue
             elif entry.is_dir():
                 waiting.append(entry)
             elif not entry.is_file():
-                complaints[name] = InputError(f"{entry}: expected a regular file, got a pipe or a device")
+                findings[name] = InputError(f"{entry}: expected a regular file, got a pipe or a device")
             elif entry.name != IGNORED:
                 names.append(name)
-    return sorted(names), complaints
+    return sorted(names), findings
 
 
 def _as_text(record: Mapping[str, Any]) -> str:

@@ -13,7 +13,7 @@ from cellplan.io.input.findings import shown
 from cellplan.io.input.json_reader import parse_json, required
 from cellplan.io.run.folder import MANIFEST
 from cellplan.io.run.joint_tables import MM_PER_M, parse_header, parse_table, table_body
-from cellplan.io.run.manifest import SIZE_LIMIT, Manifest, file_complaints, parse_manifest
+from cellplan.io.run.manifest import SIZE_LIMIT, Manifest, file_findings, parse_manifest
 from cellplan.model.motion import JointTable
 
 REPORT_SCHEMA: Final = "cellplan.report/1"
@@ -73,15 +73,15 @@ def read_stored_run(folder: Path) -> StoredRun:
         InputError: The folder is not a run, or its manifest cannot be read.
     """
     manifest, whole = _manifest(folder)
-    changed = file_complaints(folder, manifest)
+    changed = file_findings(folder, manifest)
     if changed:
         raise InvalidFileError([*changed.values(), *_spoilt_tables(folder, changed)])
     record = _record(folder, "report.json", manifest)
     records = _records(folder, record, manifest)
-    complaints = list(_incomplete(folder, manifest, [*records]))
-    complaints += _contradictions(folder, manifest, record=record, records=records)
-    if complaints:
-        raise InvalidFileError(complaints)
+    findings = list(_incomplete(folder, manifest, [*records]))
+    findings += _contradictions(folder, manifest, record=record, records=records)
+    if findings:
+        raise InvalidFileError(findings)
     tables = {place: dict(_tables(folder, manifest, place)) for place in records}
     return StoredRun(folder=folder, digest=whole, manifest=manifest, record=record, records=records, tables=tables)
 

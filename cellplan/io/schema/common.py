@@ -28,7 +28,7 @@ SHORTEST_DIRECTION: Final = 1e-6  # [-] a shorter vector is a slip, not a direct
 
 
 def rule(text: str, key: str = "") -> PydanticCustomError:
-    """Complaint of a rule between several keys; ``key`` is added to the path of the entry that is checked."""
+    """Finding of a rule between several keys; ``key`` is added to the path of the entry that is checked."""
     return PydanticCustomError("rule", "{text}", {"text": text, "key": key})
 
 
@@ -79,7 +79,7 @@ def by_kind(words: str, **kinds: type | tuple[type, ...]) -> Discriminator:
     """Choice by the kind of value: a text takes the branch tagged ``<words>``, others the branch tagged by kind.
 
     Args:
-        words: What is allowed, in words; also the tag of the branch for texts, so that its complaints can say it.
+        words: What is allowed, in words; also the tag of the branch for texts, so that its findings can say it.
         **kinds: Types of value by the tag of their branch, without angle brackets.
     """
 

@@ -1,4 +1,4 @@
-"""Complaints of the file format in plain words: pydantic's findings, told as where, what, got and allowed."""
+"""Findings of the file format in plain words: pydantic's findings, told as where, what, got and allowed."""
 
 import re
 from collections.abc import Mapping
@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get
 
 from pydantic import BaseModel, Tag, ValidationError
 
-from cellplan.io.input.findings import Complaint, KeyPath, did_you_mean, listed, shown
+from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown
 from cellplan.io.schema.common import NAME_WORDS, Entry
 from cellplan.io.yaml.reader import YamlDocument
 
@@ -29,7 +29,7 @@ TAG: Final = re.compile(r"<.*>")
 AnyEntry = TypeVar("AnyEntry", bound=Entry)
 
 
-def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | None, list[Complaint]]:
+def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | None, list[Finding]]:
     """Read a whole file.
 
     Args:
@@ -37,14 +37,14 @@ def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | 
         document: The file.
 
     Returns:
-        The entry, or None when there are complaints; and the complaints that the YAML reader has not made already.
+        The entry, or None when there are findings; and the findings that the YAML reader has not made already.
     """
     try:
         return model.model_validate(document.root), []
     except ValidationError as error:
         findings = error.errors(include_url=False, include_context=True, include_input=False)
-    told = [_Finding(model, document, dict(finding)).complaint() for finding in findings[:FINDING_LIMIT]]
-    return None, [complaint for complaint in dict.fromkeys(told) if complaint is not None]
+    told = [_Finding(model, document, dict(finding)).finding() for finding in findings[:FINDING_LIMIT]]
+    return None, [finding for finding in dict.fromkeys(told) if finding is not None]
 
 
 def understood(model: type[AnyEntry], document: YamlDocument, path: KeyPath) -> AnyEntry | None:
@@ -80,43 +80,43 @@ class _Finding:
         self.text: str = finding["msg"]
         self.context: dict[str, Any] = finding.get("ctx", {})
 
-    def complaint(self) -> Complaint | None:
+    def finding(self) -> Finding | None:
         """The finding in plain words; None when the reader has complained about this value already."""
         if any(self.path[: n + 1] in self.document.unreadable for n in range(len(self.path))):
             return None
         if self.is_key:
-            return self.document.key_complaint(self.path, f"expected {NAME_WORDS}, got {shown(self.path[-1])}")
+            return self.document.key_finding(self.path, f"expected {NAME_WORDS}, got {shown(self.path[-1])}")
         if self.kind == "extra_forbidden":
-            return self.document.key_complaint(self.path, self._unknown_key())
+            return self.document.key_finding(self.path, self._unknown_key())
         return self._rule() if self.kind == "rule" else self._value()
 
-    def _value(self) -> Complaint | None:
-        """Complaint about a value that is absent or not allowed."""
+    def _value(self) -> Finding | None:
+        """Finding about a value that is absent or not allowed."""
         if self.kind == "too_short" and len(value_at(self.document.root, self.path)) >= self.context["min_length"]:
             return None  # short only of entries that are wrong themselves
         if self.kind != "missing":
             return self._about(self.path, self._allowed())
         if isinstance(self.path[-1], int):
             return self._about(self.path[:-1], self._expected(self.location[:-1]))
-        return self.document.complaint(self.path, f"missing, expected {self._description()}")
+        return self.document.finding(self.path, f"missing, expected {self._description()}")
 
-    def _about(self, path: KeyPath, expected: str) -> Complaint:
-        """Complaint about a value: expected, got."""
+    def _about(self, path: KeyPath, expected: str) -> Finding:
+        """Finding about a value: expected, got."""
         value = value_at(self.document.root, path)
         is_word = isinstance(value, str) and self.kind == "literal_error"
         hint = did_you_mean(value, _words(expected)) if is_word else ""
         got = str(len(value)) if expected.startswith("at ") and isinstance(value, dict | tuple) else shown(value)
-        return self.document.complaint(path, f"expected {expected}, got {got}{hint}")
+        return self.document.finding(path, f"expected {expected}, got {got}{hint}")
 
-    def _rule(self) -> Complaint:
-        """Complaint of a rule between several keys."""
+    def _rule(self) -> Finding:
+        """Finding of a rule between several keys."""
         path = self.path
         for key in re.findall(r"[^.\[\]]+", self.context["key"]):
             path = (*path, int(key) if key.isdigit() else key)
         text = self.context["text"]
         if text.startswith("unexpected key"):
-            return self.document.key_complaint(path, text)
-        return self.document.complaint(path, text)
+            return self.document.key_finding(path, text)
+        return self.document.finding(path, text)
 
     def _unknown_key(self) -> str:
         """What to say about a key that nobody knows."""

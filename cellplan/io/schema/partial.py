@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cellplan.io.input.findings import Complaint
+from cellplan.io.input.findings import Finding
 from cellplan.io.schema.acceleration import AccelerationChoice
 from cellplan.io.schema.cell import (
     OBSTACLE_LIMIT,
@@ -60,9 +60,9 @@ class Pieces:
         return len(self.robots) > ROBOT_LIMIT or len(self.tasks) > TASK_LIMIT or not self.names["robots"]
 
 
-def read_pieces(document: YamlDocument) -> tuple[Pieces, list[Complaint]]:
-    """Understand a cell file as far as possible; the complaints tell the rest."""
-    whole, complaints = validate(CellDocument, document)
+def read_pieces(document: YamlDocument) -> tuple[Pieces, list[Finding]]:
+    """Understand a cell file as far as possible; the findings tell the rest."""
+    whole, findings = validate(CellDocument, document)
     pieces = Pieces(
         whole=whole,
         robots=_named(RobotEntry, document, "robots"),
@@ -76,7 +76,7 @@ def read_pieces(document: YamlDocument) -> tuple[Pieces, list[Complaint]]:
         acceleration=None if whole is None else whole.acceleration,
         names={key: tuple(_section(document, key)) for key in ("robots", "tasks", "environment")},
     )
-    return pieces, complaints
+    return pieces, findings
 
 
 def _section(document: YamlDocument, key: str) -> Mapping[str, Any]:

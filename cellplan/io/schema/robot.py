@@ -34,12 +34,12 @@ SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_
 POSTURE_WORDS: Final = "auto or a list of joint angles"
 POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
 
-Posture = Annotated[
+Configuration = Annotated[
     Annotated[Literal["auto"], Tag(f"<{POSTURE_WORDS}>")]
     | Annotated[tuple[Annotated[Angle, Field()], ...], Tag("<list>")],
     by_kind(POSTURE_WORDS, list=tuple),
 ]
-NamedPosture = Annotated[
+NamedConfiguration = Annotated[
     Annotated[Literal["auto"], Tag(f"<{POSITION_WORDS}>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
     by_kind(POSITION_WORDS, mapping=dict),
 ]
@@ -168,20 +168,20 @@ class RobotEntry(Entry):
     attachments: tuple[AttachmentEntry, ...] = Field(
         default=(), max_length=200, description="Solids mounted on links, such as hoses, feeders and valve blocks."
     )
-    start_deg: Posture | None = Field(
+    start_deg: Configuration | None = Field(
         default=None,
         description="Start posture, one angle per joint, for robots with revolute joints only; auto finds one.",
     )
-    start: NamedPosture | None = Field(
+    start: NamedConfiguration | None = Field(
         default=None,
         description="Start posture, one key per joint with its unit (a1_deg, rail_mm); excludes start_deg.",
     )
-    home_deg: Posture | None = Field(
+    home_deg: Configuration | None = Field(
         default=None,
         description="Configuration in which the robot stands while it is idle, one angle per joint, for robots with "
         "revolute joints only; auto finds one near the start.",
     )
-    home: NamedPosture | None = Field(
+    home: NamedConfiguration | None = Field(
         default=None,
         description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes home_deg.",
     )

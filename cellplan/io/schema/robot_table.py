@@ -1,4 +1,4 @@
-"""A robot as a table of joint axes at its reference posture, with the solids of its links."""
+"""A robot as a table of joint axes at its reference configuration, with the solids of its links."""
 
 from typing import Annotated, ClassVar, Final, Literal, Self
 
@@ -30,7 +30,7 @@ SLIDING_KEYS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm
 
 
 class JointEntry(Entry):
-    """One joint: its axis in the base frame at the reference posture, and its limits."""
+    """One joint: its axis in the base frame at the reference configuration, and its limits."""
 
     type: Literal["revolute", "prismatic"] = Field(description="How the joint moves.")
     axis: Vector = Field(description="Unit direction of the axis.")
@@ -74,7 +74,7 @@ class JointEntry(Entry):
 
 
 class SegmentEntry(Entry):
-    """A round solid along a segment in the base frame at the reference posture."""
+    """A round solid along a segment in the base frame at the reference configuration."""
 
     from_mm: Coordinates = Field(description="One end of the middle line.")
     to_mm: Coordinates = Field(description="Other end of the middle line.")
@@ -82,7 +82,7 @@ class SegmentEntry(Entry):
 
 
 class PlacedBoxEntry(Entry):
-    """A cuboid in the base frame at the reference posture."""
+    """A cuboid in the base frame at the reference configuration."""
 
     size_mm: tuple[Size, Size, Size] = Field(description="Edge lengths along its own x, y, z.")
     center_mm: Coordinates = Field(description="Centre.")
@@ -90,13 +90,13 @@ class PlacedBoxEntry(Entry):
 
 
 class PlacedSphereEntry(SphereEntry):
-    """A ball in the base frame at the reference posture."""
+    """A ball in the base frame at the reference configuration."""
 
     center_mm: Coordinates = Field(description="Centre.")
 
 
 class PlacedMeshEntry(Entry):
-    """A mesh in the base frame at the reference posture."""
+    """A mesh in the base frame at the reference configuration."""
 
     file: Text = Field(description="STL, OBJ or PLY file, relative to the table.")
     unit: MeshUnit = Field(description="Unit of the file.")
@@ -140,7 +140,7 @@ class BodiesEntry(Entry):
     solids: tuple[LinkBodyEntry, ...] = Field(
         default=(),
         max_length=BODY_LIMIT,
-        description="Solids of the links, in the base frame at the reference posture.",
+        description="Solids of the links, in the base frame at the reference configuration.",
     )
 
 
@@ -161,7 +161,7 @@ class RobotTableDocument(Entry):
         min_length=1, max_length=AXIS_LIMIT, description="Joints by name, from the base to the flange."
     )
     flange: PoseEntry = Field(
-        description="Flange (mechanical interface) in the base frame at the reference posture, z out of the flange."
+        description="Flange (mechanical interface) in the base frame at zero joints, z out of the flange."
     )
     bodies: BodiesChoice = Field(
         default=(),

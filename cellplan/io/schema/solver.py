@@ -51,7 +51,7 @@ class SearchJointEntry(Entry):
 
 
 class SearchEntry(Entry):
-    """How `heuristic_search` and `recursive_search` look for the next posture."""
+    """How `heuristic_search` and `recursive_search` look for the next configuration."""
 
     tolerance_mm: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(
         default=1e-4, description="Largest root of the cost at which an instant counts as reached."
@@ -108,14 +108,14 @@ class ObstacleGoalEntry(Entry):
     )
 
 
-class PostureGoalEntry(Entry):
-    """A wanted posture."""
+class ConfigurationGoalEntry(Entry):
+    """A desired configuration."""
 
     gain: Gain = Field(
         default=1.0, description="How strongly, in 1/s: the rate at which a joint of weight 1 goes there."
     )
     at: dict[Name, dict[str, JointPosition]] = Field(
-        default={}, description="Wanted positions by robot, one key per joint; robots left out: their start posture."
+        default={}, description="Reference positions by robot, one key per joint; robots left out: their start posture."
     )
 
 
@@ -127,7 +127,7 @@ class SecondaryEntry(Entry):
         default=None, description="Towards the middle of the joint ranges."
     )
     obstacles: ObstacleGoalEntry | None = Field(default=None, description="Away from obstacles and other robots.")
-    posture: PostureGoalEntry | None = Field(default=None, description="Towards a wanted posture.")
+    posture: ConfigurationGoalEntry | None = Field(default=None, description="Towards a desired configuration.")
 
 
 class WeightingEntry(Entry):

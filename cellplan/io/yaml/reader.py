@@ -13,7 +13,7 @@ import yaml
 
 from cellplan.errors import InputError
 from cellplan.io.input.files import digest, read_regular_file
-from cellplan.io.input.findings import Complaint, KeyPath, key_text, shown
+from cellplan.io.input.findings import Finding, KeyPath, key_text, shown
 from cellplan.io.yaml.scalars import SurpriseError, plain_value
 
 SIZE_LIMIT: Final = 2_000_000  # [bytes]
@@ -56,10 +56,10 @@ class YamlDocument:
     Attributes:
         file: Name in messages.
         digest: SHA-256 of the bytes that were read.
-        root: The values: dict, tuple, str, int, float, bool, or ``UNREADABLE`` where a complaint was made.
+        root: The values: dict, tuple, str, int, float, bool, or ``UNREADABLE`` where a finding was made.
         values: Place of each value; a block mapping or list stands at its key.
         keys: Place of each key.
-        complaints: What the reader refused; the caller adds its own and raises all at once.
+        findings: What the reader refused; the caller adds its own and raises all at once.
         unreadable: Key paths whose value was refused.
     """
 
@@ -68,7 +68,7 @@ class YamlDocument:
     root: dict[str, Any]
     values: Mapping[KeyPath, Mark]
     keys: Mapping[KeyPath, Mark]
-    complaints: tuple[Complaint, ...]
+    findings: tuple[Finding, ...]
     unreadable: frozenset[KeyPath]
 
     def line(self, path: KeyPath) -> int:
@@ -77,14 +77,14 @@ class YamlDocument:
             path = path[:-1]
         return self.values[path].line
 
-    def complaint(self, path: KeyPath, text: str) -> Complaint:
-        """A complaint about a value."""
-        return Complaint(line=self.line(path), key=key_text(path), text=text)
+    def finding(self, path: KeyPath, text: str) -> Finding:
+        """A finding about a value."""
+        return Finding(line=self.line(path), key=key_text(path), text=text)
 
-    def key_complaint(self, path: KeyPath, text: str) -> Complaint:
-        """A complaint about a key."""
+    def key_finding(self, path: KeyPath, text: str) -> Finding:
+        """A finding about a key."""
         line = self.keys[path].line if path in self.keys else self.line(path)
-        return Complaint(line=line, key=key_text(path), text=text)
+        return Finding(line=line, key=key_text(path), text=text)
 
     def lines(self) -> dict[str, int]:
         """Line of each value by key path as text."""
@@ -121,7 +121,7 @@ def parse_yaml(data: bytes, *, file: str) -> YamlDocument:
         root=root,
         values=composer.values,
         keys=composer.keys,
-        complaints=tuple(composer.complaints),
+        findings=tuple(composer.findings),
         unreadable=frozenset(composer.unreadable),
     )
 
@@ -196,7 +196,7 @@ class _Composer:
     events: Iterator[Any]
     values: dict[KeyPath, Mark] = field(default_factory=dict)
     keys: dict[KeyPath, Mark] = field(default_factory=dict)
-    complaints: list[Complaint] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     unreadable: set[KeyPath] = field(default_factory=set)
     count: int = 0
 
@@ -323,8 +323,8 @@ class _Composer:
         return UNREADABLE
 
     def _complain(self, event: Any, path: KeyPath, text: str) -> None:
-        """Note a complaint about what an event holds."""
-        self.complaints.append(Complaint(line=_mark(event).line, key=key_text(path), text=text))
+        """Note a finding about what an event holds."""
+        self.findings.append(Finding(line=_mark(event).line, key=key_text(path), text=text))
 
 
 def _mark(event: Any) -> Mark:

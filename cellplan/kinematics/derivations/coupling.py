@@ -46,12 +46,12 @@ def coupling_graph(cell: Cell, plane: PlaneName | None = None, *, measure_grasps
         for coupling in _robot_joints(robot, tool_link(cell, robot, plane, measure_grasps=measure_grasps))
     ]
     for relation in cell.relations:
-        wanted = components(plane)
+        desired = components(plane)
         if isinstance(relation, Grasp) and not measure_grasps:
-            wanted = tuple(component for component in wanted if component not in relation.axes)
-        if wanted:
+            desired = tuple(component for component in desired if component not in relation.axes)
+        if desired:
             tool = tool_link(cell, cell.robot(relation.robot), plane, measure_grasps=measure_grasps)
-            joints += _virtual_chain(relation, wanted, tail=_reference_link(cell, relation), head=tool)
+            joints += _virtual_chain(relation, desired, tail=_reference_link(cell, relation), head=tool)
     links = dict.fromkeys([WORLD, part_link(cell)] + [end for joint in joints for end in (joint.tail, joint.head)])
     return CouplingGraph(links=tuple(links), joints=tuple(joints))
 
@@ -96,18 +96,18 @@ def _robot_joints(robot: Robot, tool: str) -> list[Coupling]:
     ]
 
 
-def _virtual_chain(task: Relation, wanted: tuple[int, ...], *, tail: str, head: str) -> list[Coupling]:
+def _virtual_chain(task: Relation, desired: tuple[int, ...], *, tail: str, head: str) -> list[Coupling]:
     """The virtual joints of one task or grasp, pointing from the part, or the world, to the tool."""
-    inner = [f"{task.name}:{number}" for number in range(1, len(wanted))]
+    inner = [f"{task.name}:{number}" for number in range(1, len(desired))]
     links = [tail, *inner, head]
-    names = [virtual_joint(task, component) for component in wanted]
+    names = [virtual_joint(task, component) for component in desired]
     return [
         Coupling(
             name=name,
             owner=task.name,
             tail=links[place],
             head=links[place + 1],
-            kind=JointKind.PRISMATIC if wanted[place] < 3 else JointKind.REVOLUTE,
+            kind=JointKind.PRISMATIC if desired[place] < 3 else JointKind.REVOLUTE,
             drive=name,
             is_virtual=True,
         )

@@ -12,7 +12,7 @@ from cellplan.kinematics.derivations.graph import Circuit, CouplingGraph, Signs,
 from cellplan.kinematics.derivations.serial_chain import (
     axis_positions,
     chain_to_flange,
-    checked_posture,
+    checked_configuration,
     displacement,
     fixed_part_pose,
     part_holder,
@@ -27,7 +27,7 @@ CLOSURE_TOL = 1e-9  # [-] largest gap left in a circuit, as a share of the impos
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Network:
-    """Circuits of a cell at one posture, and what unit speed of each joint adds to the sum round each of them.
+    """Circuits of a cell at one configuration, and what unit speed of each joint adds to the sum round each of them.
 
     Attributes:
         graph: Links and joints.
@@ -88,10 +88,10 @@ def network(
         measure_grasps: Whether further holders are let go and measured, see `coupling_graph`.
 
     Raises:
-        InputError: The posture does not fit the cell, or a fixed part has no pose.
+        InputError: The configuration does not fit the cell, or a fixed part has no pose.
         NotPlanarError: A joint in a circuit moves out of the plane, or a task is given in the world.
     """
-    q = checked_posture(cell, q)
+    q = checked_configuration(cell, q)
     _refuse_world_in_plane(cell, plane)
     graph = coupling_graph(cell, plane, measure_grasps=measure_grasps)
     found = circuits(graph, spanning_tree(graph, tree_order))
@@ -143,14 +143,14 @@ def davies_cooperation_jacobian(
         relative to and in W.
 
     Raises:
-        InputError: The posture does not fit the cell, or a fixed part has no pose.
+        InputError: The configuration does not fit the cell, or a fixed part has no pose.
         NotPlanarError: A joint in a circuit moves out of the plane, or a task is given in the world.
     """
     net = network(cell, q, plane=plane, tree_order=tree_order, measure_grasps=True)
-    wanted = components(plane)
-    virtual = [virtual_joint(relation, component) for relation in cell.relations for component in wanted]
+    desired = components(plane)
+    virtual = [virtual_joint(relation, component) for relation in cell.relations for component in desired]
     N_s, N_p = partition(net, virtual)
-    J = np.linalg.solve(N_p, N_s).reshape(len(cell.relations), len(wanted), cell.joint_count)
+    J = np.linalg.solve(N_p, N_s).reshape(len(cell.relations), len(desired), cell.joint_count)
     return np.asarray(J, dtype=np.float64)
 
 
@@ -175,11 +175,11 @@ def solve_network(net: Network, imposed: Mapping[str, float], *, weights: Array 
     N_s, N_p = partition(net, imposed)
     sought = [name for name in net.joints if name not in imposed]
     root = np.sqrt(weights[net.columns(sought)])
-    wanted = N_p @ np.array(list(imposed.values()))
-    y, _, rank, _ = np.linalg.lstsq(N_s / root, wanted, rcond=RANK_TOL)
+    desired = N_p @ np.array(list(imposed.values()))
+    y, _, rank, _ = np.linalg.lstsq(N_s / root, desired, rcond=RANK_TOL)
     speeds = y / root
     scale = np.abs(N_p) @ np.abs(np.array(list(imposed.values())))
-    if np.abs(N_s @ speeds - wanted).max(initial=0.0) > CLOSURE_TOL * scale.max(initial=0.0):
+    if np.abs(N_s @ speeds - desired).max(initial=0.0) > CLOSURE_TOL * scale.max(initial=0.0):
         raise PrimaryChoiceError(
             f"imposed speeds of {', '.join(imposed)}: no speeds of the other joints keep the circuits closed; "
             "impose fewer joints, or speeds that fit each other"

@@ -10,7 +10,7 @@ from cellplan.kinematics.derivations.serial_chain import (
     axis_positions,
     axis_shares,
     chain_to_flange,
-    checked_posture,
+    checked_configuration,
     fixed_part_pose,
     part_holder,
 )
@@ -145,9 +145,9 @@ def dh_cooperation_jacobian(cell: Cell, q: Array) -> Array:
         nq): the grasps of further holders follow the tasks (4.5). Of a task in the world, relative to and in W.
 
     Raises:
-        InputError: The posture does not fit the cell, or a fixed part has no pose.
+        InputError: The configuration does not fit the cell, or a fixed part has no pose.
     """
-    q = checked_posture(cell, q)
+    q = checked_configuration(cell, q)
     holder = part_holder(cell)
     arms = {robot.name: _arm(robot, q[cell.columns(robot.name)]) for robot in cell.robots}
     X_WP = fixed_part_pose(cell) if holder is None else arms[holder[0].name].X_WF @ holder[1]
@@ -165,7 +165,7 @@ def dh_cooperation_jacobian(cell: Cell, q: Array) -> Array:
 
 
 def _arm(robot: Robot, q: Array) -> _Arm:
-    """One robot at its own posture."""
+    """One robot at its own configuration."""
     chain = dh_chain(robot.model)
     return _Arm(robot.X_WB[:3, :3], robot.X_WB @ chain.flange_pose(q), *geometric_jacobian(chain, q))
 

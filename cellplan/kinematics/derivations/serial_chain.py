@@ -17,7 +17,7 @@ class ChainAxis:
     Attributes:
         name: Name of the joint or follower.
         kind: Revolute or prismatic.
-        axis_B: Unit direction at the reference posture, shape (3,).
+        axis_B: Unit direction at the reference configuration, shape (3,).
         point_B: A point on the axis in [m], shape (3,).
         leader: Index of the driven joint that moves it, in ``RobotModel.joints``.
         ratio: Its motion per motion of that joint.
@@ -108,7 +108,7 @@ def fixed_part_pose(cell: Cell) -> Array:
     return cell.part.X_WP
 
 
-def checked_posture(cell: Cell, q: Array) -> Array:
+def checked_configuration(cell: Cell, q: Array) -> Array:
     """The stacked joint vector, shape (nq,), after a look at its length and its figures.
 
     Raises:

@@ -8,7 +8,7 @@ from cellplan.geometry.transforms import Array, inverse, skew
 from cellplan.kinematics.derivations.serial_chain import (
     axis_positions,
     chain_to_flange,
-    checked_posture,
+    checked_configuration,
     displacement,
     fixed_part_pose,
     part_holder,
@@ -19,7 +19,7 @@ from cellplan.model.task import Frame
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Step:
-    """One axis on the walk, at the reference posture, expressed in the part frame P.
+    """One axis on the walk, at the reference configuration, expressed in the part frame P.
 
     Attributes:
         s_P: Unit direction, shape (3,): against the table's direction where the axis is passed from tip to base.
@@ -39,7 +39,7 @@ class Step:
 
 
 def walk_from_part(cell: Cell, q: Array, operator: str) -> tuple[list[Step], Array]:
-    """Axes met on the way from the part to an operator's tool, and that tool at the reference posture, in P.
+    """Axes met on the way from the part to an operator's tool, and that tool at the reference configuration, in P.
 
     The positioner is walked from the part back to its base, so its last axis comes first and each of its axes points
     the other way; then the operator is walked from its base to its tool.
@@ -60,7 +60,7 @@ def walk_from_part(cell: Cell, q: Array, operator: str) -> tuple[list[Step], Arr
 
 
 def _walk_from_world(cell: Cell, q: Array, name: str) -> tuple[list[Step], Array]:
-    """Axes met on the way from the world to a robot's tool, and that tool at the reference posture, in W."""
+    """Axes met on the way from the world to a robot's tool, and that tool at the reference configuration, in W."""
     robot = cell.robot(name)
     return _steps(cell, robot, q, X_PB=robot.X_WB), robot.X_WB @ robot.model.X_BF @ robot.tool.X_FT
 
@@ -82,9 +82,9 @@ def screw_cooperation_jacobian(cell: Cell, q: Array) -> Array:
         nq): the grasps of further holders follow the tasks (4.5). Of a task in the world, relative to and in W.
 
     Raises:
-        InputError: The posture does not fit the cell, or a fixed part has no pose.
+        InputError: The configuration does not fit the cell, or a fixed part has no pose.
     """
-    q = checked_posture(cell, q)
+    q = checked_configuration(cell, q)
     J = np.zeros((len(cell.relations), 6, cell.joint_count))
     for block, task in zip(J, cell.relations, strict=True):
         is_on_part = task.relative_to is Frame.PART
@@ -99,7 +99,7 @@ def screw_cooperation_jacobian(cell: Cell, q: Array) -> Array:
 
 
 def displaced_screws(steps: list[Step]) -> tuple[Array, Array]:
-    r"""Screws of the steps at the posture, and the displacement of what lies behind the last step.
+    r"""Screws of the steps at the configuration, and the displacement of what lies behind the last step.
 
     ``$ = [s; s0 x s]`` for a revolute and ``[0; s]`` for a prismatic axis, angular part first as in the source
     ([Ribeiro2010]_ Eqs. B.15, B.16), each moved by the displacements of the steps before it (B.73).

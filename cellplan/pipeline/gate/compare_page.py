@@ -27,7 +27,7 @@ def drawn_again(cell: Cell, motions: Sequence[VerifiedMotion]) -> Drawings:
     return {motion.name or "": pictures(_sheets(motion, cell)) for motion in motions}
 
 
-def page_complaints(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], drawn: Drawings) -> Iterator[str]:
+def page_findings(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], drawn: Drawings) -> Iterator[str]:
     """Every page of a run that is not the one its tables, its report's planner facts and its pictures give.
 
     Args:
@@ -40,7 +40,7 @@ def page_complaints(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMot
         place = motion.name or ""
         yield from _foreign_pieces(stored, place, drawn[place])
         record = _of_the_run(stored, place, run_record(motion.report, cell=cell, provenance=_provenance(stored, place)))
-        yield from _page_complaint(stored, place, cell=cell, motion=motion, record=record)
+        yield from _page_finding(stored, place, cell=cell, motion=motion, record=record)
     if "runs" in stored.record:
         reports = {str(motion.name): motion.report for motion in motions}
         found = summary_record(reports, cell=cell, provenance=_provenance(stored, ""))
@@ -73,16 +73,16 @@ def _sheets(motion: VerifiedMotion, cell: Cell) -> dict[str, Sheet]:
     return motion_sheets(motion.report, cell=cell) | clearance_sheets(motion.report, cell=cell)
 
 
-def _page_complaint(
+def _page_finding(
     stored: StoredRun, place: str, *, cell: Cell, motion: VerifiedMotion, record: Record
 ) -> Iterator[str]:
     """What is wrong with the page of one run."""
-    wanted, drawings = [f"{name}.svg" for name in _sheets(motion, cell)], stored.drawings(place)
-    if sorted(drawings) != sorted(wanted):
-        names = f"expected the pictures {listed(wanted)}, got {listed(drawings)}"
+    desired, drawings = [f"{name}.svg" for name in _sheets(motion, cell)], stored.drawings(place)
+    if sorted(drawings) != sorted(desired):
+        names = f"expected the pictures {listed(desired)}, got {listed(drawings)}"
         yield f"{stored.file(place, 'plots')}: {names}; solve the cell again"
         return
-    in_order = {name: drawings[name] for name in wanted}
+    in_order = {name: drawings[name] for name in desired}
     try:
         page = report_page(record, motion.report.checks, cell=cell, plots=in_order)
     except (KeyError, TypeError, ValueError, AttributeError):  # of what only the planner knows, or of a picture

@@ -26,7 +26,7 @@ from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.model.verified_run import SEAL, VerifiedMotion, VerifiedRun
-from cellplan.pipeline.gate.compare_page import drawn_again, other_pictures, page_complaints
+from cellplan.pipeline.gate.compare_page import drawn_again, other_pictures, page_findings
 from cellplan.pipeline.gate.compare_report import differences
 from cellplan.pipeline.gate.stored_cell import load_stored_cell
 from cellplan.pipeline.write_run import versions
@@ -173,9 +173,9 @@ def _tables(cell: Cell, stored: StoredRun, plan: RunPlan) -> dict[str, JointTabl
 def _refuse_other_header(header: TableHeader, expected: TableHeader, file: str) -> None:
     """Refuse a table of another run, of another cell, or with another verdict than passed."""
     for key in ("cell", "mode", "verdict", "remark"):
-        got, wanted = getattr(header, key), getattr(expected, key)
-        if got != wanted:
-            raise InputError(f"{file}: {key}: expected {shown(wanted)}, got {shown(got)}")
+        got, desired = getattr(header, key), getattr(expected, key)
+        if got != desired:
+            raise InputError(f"{file}: {key}: expected {shown(desired)}, got {shown(got)}")
     for name in dict.fromkeys([*expected.digests, *header.digests]):
         if header.digests.get(name) != expected.digests.get(name):
             raise InputError(f"{file}: {name} digest: is not that of this run; tables of different runs do not mix")
@@ -210,8 +210,8 @@ def _refuse_other_clock(stored: StoredRun, place: str, schedule: Schedule, *, ta
         if len(late):
             row = int(late[0])
             line = _line(stored.tables[place][name], row)
-            wanted, got = float(schedule.times[row]), float(table.times[row])
-            raise InputError(f"{file}:{line}: time_s: expected {wanted!r} as the cell's clock has, got {got!r}")
+            desired, got = float(schedule.times[row]), float(table.times[row])
+            raise InputError(f"{file}:{line}: time_s: expected {desired!r} as the cell's clock has, got {got!r}")
 
 
 def _refuse_other_start(stored: StoredRun, plan: RunPlan, cell: Cell, *, tables: Mapping[str, JointTable]) -> None:
@@ -233,13 +233,13 @@ def _line(text: str, row: int) -> int:
 
 def _refuse_failing(stored: StoredRun, motions: Sequence[VerifiedMotion]) -> None:
     """Refuse a run of which a check fails now, whatever its report says."""
-    complaints = []
+    findings = []
     for motion in motions:
         where = stored.file(motion.name or "", "tables")
-        complaints += [f"{where}: {check.message}" for check in motion.report.checks if not check.passed]
-        complaints += [f"{where}: {what}: not a number" for what in _unproved(motion.report)]
-    if complaints:
-        raise NotVerifiedError(complaints)
+        findings += [f"{where}: {check.message}" for check in motion.report.checks if not check.passed]
+        findings += [f"{where}: {what}: not a number" for what in _unproved(motion.report)]
+    if findings:
+        raise NotVerifiedError(findings)
 
 
 def _unproved(report: Report) -> Iterator[str]:
@@ -268,13 +268,13 @@ def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[Verifi
         reports = {str(motion.name): motion.report for motion in motions}
         found[""] = summary_record(reports, cell=cell, provenance=provenance)
     is_same = _is_of_this_version(stored)
-    complaints = []
+    findings = []
     for place, record in said.items():
-        complaints += [
+        findings += [
             f"{stored.file(place, 'report.json')}: {key}: {shown(old)} stands there, {shown(new)} was found"
             for key, old, new in differences(record, found[place], same_program=is_same)
         ]
-    _refuse_because(stored, complaints)
+    _refuse_because(stored, findings)
 
 
 def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> tuple[str, ...]:
@@ -282,7 +282,7 @@ def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[Verifie
     if not _is_of_this_version(stored):
         return ("the page and the words of the report were not compared: another version of cellplan wrote them",)
     drawn = drawn_again(cell, motions)
-    _refuse_because(stored, list(page_complaints(stored, cell, motions, drawn)))
+    _refuse_because(stored, list(page_findings(stored, cell, motions, drawn)))
     other = list(other_pictures(stored, drawn))
     told = f"drawn here, some pictures look different, by rounding or by hand: {listed(other)}"
     return (told,) if other else ()
@@ -293,14 +293,14 @@ def _is_of_this_version(stored: StoredRun) -> bool:
     return stored.manifest.versions.get("cellplan") == versions()["cellplan"]
 
 
-def _refuse_because(stored: StoredRun, complaints: Sequence[str]) -> None:
-    """Refuse a run when there are complaints about its files, of which the first are told."""
-    if complaints:
-        more = len(complaints) - MOST_DIFFERENCES
-        told = list(complaints[:MOST_DIFFERENCES]) + (
+def _refuse_because(stored: StoredRun, findings: Sequence[str]) -> None:
+    """Refuse a run when there are findings about its files, of which the first are told."""
+    if findings:
+        more = len(findings) - MOST_DIFFERENCES
+        told = list(findings[:MOST_DIFFERENCES]) + (
             [f"{stored.folder}: and {more} more differences"] if more > 0 else []
         )
-        raise InvalidFileError([InputError(complaint) for complaint in told])
+        raise InvalidFileError([InputError(finding) for finding in told])
 
 
 def _other_versions(stored: StoredRun) -> Iterator[str]:

@@ -100,17 +100,17 @@ def _bundled_digest(name: str) -> str:
 
 def _refuse_stale(stored: StoredRun, now: Mapping[str, str], *, where: str) -> None:
     """Refuse inputs that are not what they were when the run was made."""
-    complaints = []
+    findings = []
     for name, digest in stored.manifest.inputs.items():
         if not now.get(name):
-            complaints.append(f"the run rests on '{name}', which {where} does not lead to")
+            findings.append(f"the run rests on '{name}', which {where} does not lead to")
         elif now[name] != digest:
-            complaints.append(f"'{name}' has changed since the run was made; solve the cell again")
-    complaints += [
+            findings.append(f"'{name}' has changed since the run was made; solve the cell again")
+    findings += [
         f"{where} needs '{name}', which the run does not rest on" for name in now if name not in stored.manifest.inputs
     ]
-    if complaints:
-        raise InvalidFileError([InputError(f"{stored.folder}: {complaint}") for complaint in complaints])
+    if findings:
+        raise InvalidFileError([InputError(f"{stored.folder}: {finding}") for finding in findings])
 
 
 def _resolved(stored: StoredRun, *, folder: Path, allow_dirs: Sequence[Path]) -> Cell:

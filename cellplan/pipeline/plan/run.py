@@ -10,7 +10,7 @@ from cellplan.model.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.toolpath import Toolpath
 from cellplan.planning.modes import RunPlan, standing
-from cellplan.planning.refine_motion import resolve_closely
+from cellplan.planning.refine_motion import plan_within_accuracy
 from cellplan.planning.timing.schedule import sample, time_tasks
 
 
@@ -47,5 +47,5 @@ def plan_run(
     schedule = sample(timed)
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     at = standing(cell, plan, start)
-    motion = resolve_closely(cell, timed, schedule, start=at, moving=plan.moving, progress=progress)
+    motion = plan_within_accuracy(cell, timed, schedule, start=at, moving=plan.moving, progress=progress)
     return PlannedRun(plan=plan, schedule=schedule, motion=motion)

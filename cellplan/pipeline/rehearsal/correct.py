@@ -19,7 +19,7 @@ from cellplan.planning.collocation.at_samples import brought_onto_tasks
 from cellplan.planning.euler.integrate import follow
 from cellplan.planning.euler.measured_feedback import (
     corrected_references,
-    follow_measured,
+    integrate_measured,
     measured_start,
     settled_start,
 )
@@ -125,7 +125,7 @@ def correct_within_the_pass(
 
     try:
         start = measured_start(job.cell, job.schedule, start=job.q[0], moving=job.moving, measure=measure)
-        motion = follow_measured(job.cell, job.schedule, start=start, moving=job.moving, measure=measure)
+        motion = integrate_measured(job.cell, job.schedule, start=start, moving=job.moving, measure=measure)
     except NoSolutionError:
         return None
     return real.accuracy(job.schedule, motion.q)

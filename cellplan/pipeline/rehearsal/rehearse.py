@@ -36,7 +36,7 @@ TOOL_ERRORS: Final = frozenset(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Wish:
+class _Options:
     """What is to be done on every real cell."""
 
     feedback: bool
@@ -82,7 +82,7 @@ def rehearse(
     solution = solve(cell, progress=progress)
     trials = errors.trials if errors.is_random else 1
     _refuse_too_many(solution.runs, trials, errors)
-    wish = _Wish(feedback=feedback, in_pass=in_pass, rounds=rounds)
+    wish = _Options(feedback=feedback, in_pass=in_pass, rounds=rounds)
     runs = tuple(
         _rehearse_run(solution.cell, run, errors, trials=trials, wish=wish, progress=progress) for run in solution.runs
     )
@@ -121,7 +121,7 @@ def _refuse_too_many(runs: Sequence[Run], trials: int, errors: CellErrors) -> No
 
 
 def _rehearse_run(
-    cell: Cell, run: Run, errors: CellErrors, *, trials: int, wish: _Wish, progress: Progress
+    cell: Cell, run: Run, errors: CellErrors, *, trials: int, wish: _Options, progress: Progress
 ) -> RunRehearsal:
     """Execute one run on every real cell."""
     job = Pass(
@@ -152,7 +152,7 @@ def _within(progress: Progress, number: int, trials: int) -> Progress:
     return lambda stage, share: progress(stage, (number + share) / trials)
 
 
-def _try(job: Pass, errors: CellErrors, number: int, *, wish: _Wish, progress: Progress) -> Trial:
+def _try(job: Pass, errors: CellErrors, number: int, *, wish: _Options, progress: Progress) -> Trial:
     """One real cell."""
     draw = draw_errors(job.cell, errors, number)
     real = RealCell(perturbed_cell(job.cell, draw))

@@ -1,7 +1,7 @@
-"""Inverse of the arrow-shaped cooperation Jacobian, at thousands of postures at once.
+"""Inverse of the arrow-shaped cooperation Jacobian, at thousands of configurations at once.
 
 Only the columns of the positioner couple the operators, so that the work grows linearly with their number. As in
-`kinematics.lanes` the last axis of every array is that of the postures.
+`kinematics.lanes` the last axis of every array is that of the configurations.
 """
 
 from typing import Final

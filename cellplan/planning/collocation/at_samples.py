@@ -10,7 +10,7 @@ from cellplan.kinematics.batched import IN_CACHE
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.planning.collocation.batch_targets import sampled
-from cellplan.planning.collocation.batch_tasks import LaneTasks
+from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.solver import largest
 from cellplan.planning.tracking.targets import closures
 
@@ -22,29 +22,29 @@ def brought_onto_tasks(cell: Cell, schedule: Schedule, q: Array, *, moving: Sequ
     """Postures near given ones, shape (N, nq), with the tools on their tasks at every instant of the clock.
 
     Newton's method with the weighted pseudo-inverse moves the joints as little as it can. Where that is no small
-    correction, as at a singularity or out of reach, or brings nothing, the posture stays as it is. Joints that fail on
-    the way (``motion.locked_joints``) leave everything as it is.
+    correction, as at a singularity or out of reach, or brings nothing, the configuration stays as it is. Joints that
+    fail on the way (``motion.locked_joints``) leave everything as it is.
 
     Args:
         cell: The cell.
-        schedule: Where the tools are wanted.
-        q: Postures at the instants of the clock, shape (N, nq).
+        schedule: Where the tools are desired.
+        q: Configurations at the instants of the clock, shape (N, nq).
         moving: Names of the robots that may move.
     """
     if cell.motion.locked:
         return q
     grasps = closures(cell, moving)
-    tasks = LaneTasks(cell, [*(each.task for each in schedule.tasks), *grasps], moving)
+    tasks = BatchTasks(cell, [*(each.task for each in schedule.tasks), *grasps], moving)
     placement, everything = tasks.chains.placement(cell), np.ones(cell.joint_count)
     brought = q.copy()
     for first in range(0, len(q), IN_CACHE):
         some = slice(first, first + IN_CACHE)
-        wanted, at = sampled(schedule, some, grasps), q[some].T
-        still, before = np.zeros_like(at), largest(tasks.errors(at, wanted, placement))
+        desired, at = sampled(schedule, some, grasps), q[some].T
+        still, before = np.zeros_like(at), largest(tasks.errors(at, desired, placement))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # what is not a number is left out below
             for _ in range(STEPS):
-                at = at + tasks.look(at, wanted, placement, mobile=everything).correction(still)
-            is_better = largest(tasks.errors(at, wanted, placement)) < before
+                at = at + tasks.look(at, desired, placement, mobile=everything).correction(still)
+            is_better = largest(tasks.errors(at, desired, placement)) < before
         is_better &= np.abs(at - q[some].T).max(axis=0) <= SMALL
         brought[some][is_better] = at.T[is_better]
     return brought

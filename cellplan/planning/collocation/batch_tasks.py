@@ -1,4 +1,4 @@
-"""All tasks of a run at many postures at once: pose errors and the arrow-shaped cooperation Jacobian."""
+"""All tasks of a run at many configurations at once: pose errors and the arrow-shaped cooperation Jacobian."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,39 +6,39 @@ from dataclasses import dataclass
 import numpy as np
 
 from cellplan.geometry.transforms import SMALL_ANGLE, Array, inverse
-from cellplan.kinematics.batched import LaneChains, LaneState, Placement
+from cellplan.kinematics.batched import BatchChains, BatchState, Placement
 from cellplan.model.cell import Cell, Relation
 from cellplan.model.task import Frame
 from cellplan.planning.collocation.arrow_inverse import ArrowInverse
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Wanted:
-    """Where the tools are wanted, one instant per lane, in the frame that each task is relative to.
+class Reference:
+    """Where the tools are desired, one instant per lane, in the frame that each task is relative to.
 
     Attributes:
-        R: Wanted tool orientations, shape (3, 3, tasks, lanes).
-        p: Wanted tool tips in [m], shape (3, tasks, lanes).
-        twists: Wanted tool twists, linear first, shape (6, tasks, lanes).
+        R: Reference tool orientations, shape (3, 3, tasks, lanes).
+        p: Reference tool tips in [m], shape (3, tasks, lanes).
+        twists: Reference tool twists, linear first, shape (6, tasks, lanes).
     """
 
     R: Array
     p: Array
     twists: Array
 
-    def between(self, low: int, high: int) -> "Wanted":
+    def between(self, low: int, high: int) -> "Reference":
         """The instants from one number up to another."""
-        return Wanted(*(part[..., low:high].copy() for part in (self.R, self.p, self.twists)))
+        return Reference(*(part[..., low:high].copy() for part in (self.R, self.p, self.twists)))
 
-    def repeated(self, count: int) -> "Wanted":
+    def repeated(self, count: int) -> "Reference":
         """The same instants for so many cells, one cell after the other."""
         if count == 1:
             return self
-        return Wanted(*(np.concatenate([part] * count, axis=-1) for part in (self.R, self.p, self.twists)))
+        return Reference(*(np.concatenate([part] * count, axis=-1) for part in (self.R, self.p, self.twists)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class ToolPoses:
     """The tools as the tasks see them.
 
     Attributes:
@@ -54,7 +54,7 @@ class Seen:
     p_WT: Array
 
 
-class LaneTasks:
+class BatchTasks:
     """The tasks of one run, and the joints that may move for them.
 
     Attributes:
@@ -63,9 +63,9 @@ class LaneTasks:
     """
 
     def __init__(self, cell: Cell, tasks: Sequence[Relation], moving: Sequence[str]) -> None:
-        """Gather what stays the same from posture to posture."""
+        """Gather what stays the same from configuration to configuration."""
         names, holders = [robot.name for robot in cell.robots], cell.positioners[:1]
-        self.chains, self.joint_count = LaneChains(cell), cell.joint_count
+        self.chains, self.joint_count = BatchChains(cell), cell.joint_count
         self._robots = np.array([names.index(task.robot) for task in tasks], dtype=np.intp)
         self._holder = names.index(holders[0]) if holders else None
         self._X_TP = _part_in_carrier(cell)
@@ -82,19 +82,19 @@ class LaneTasks:
         self._weights = np.concatenate([robot.weights for robot in cell.robots])
         self._may_move = np.concatenate([np.full(len(r.model.joints), float(r.name in moving)) for r in cell.robots])
 
-    def look(self, q: Array, wanted: Wanted, placement: Placement, *, mobile: Array) -> "Look":
+    def look(self, q: Array, desired: Reference, placement: Placement, *, mobile: Array) -> "Look":
         """The tasks at stacked joint vectors, shape (nq, lanes), to first order.
 
         Args:
-            q: The postures.
-            wanted: Where the tools are wanted.
+            q: The configurations.
+            desired: Where the tools are desired.
             placement: Where the robots stand.
             mobile: 1 for joints that are not locked, shape (nq,).
         """
         state = self.chains.state(q, placement)
         seen = self._seen(state)
         mobile = mobile * self._may_move
-        columns, count = self._columns(state, seen, wanted), len(self._robots)
+        columns, count = self._columns(state, seen, desired), len(self._robots)
         shared = mobile[self._shared_columns][:, None, None]
         arrow = ArrowInverse(
             columns[:, :, :count],
@@ -104,20 +104,20 @@ class LaneTasks:
             idle=1.0 - self._kept,
         )
         rows = seen.R_WR if self._is_whole else None
-        errors = self._errors(seen, wanted)
-        return Look(self, arrow, errors=errors, rows=rows, wanted=self._twists(wanted), mobile=mobile)
+        errors = self._errors(seen, desired)
+        return Look(self, arrow, errors=errors, rows=rows, desired=self._twists(desired), mobile=mobile)
 
-    def errors(self, q: Array, wanted: Wanted, placement: Placement) -> Array:
-        """Pose errors, wanted minus actual, as `cooperation.pose_errors` has them, shape (6, tasks, lanes).
+    def errors(self, q: Array, desired: Reference, placement: Placement) -> Array:
+        """Pose errors, desired minus actual, as `cooperation.pose_errors` has them, shape (6, tasks, lanes).
 
-        Components that a task leaves open are zero. With free spin the rotation is given in the wanted tool frame.
+        Components that a task leaves open are zero. With free spin the rotation is given in the desired tool frame.
         """
-        return self._errors(self._seen(self.chains.state(q, placement)), wanted)
+        return self._errors(self._seen(self.chains.state(q, placement)), desired)
 
-    def task_errors(self, q: Array, wanted: Wanted, placement: Placement) -> Array:
+    def task_errors(self, q: Array, desired: Reference, placement: Placement) -> Array:
         """Pose errors with all rotations in the frames of the tasks, shape (6, tasks, lanes)."""
-        errors, free = self.errors(q, wanted, placement), self._is_spin_free
-        errors[3:, free] = np.einsum("ijtb,jtb->itb", wanted.R[:, :, free], errors[3:, free])
+        errors, free = self.errors(q, desired, placement), self._is_spin_free
+        errors[3:, free] = np.einsum("ijtb,jtb->itb", desired.R[:, :, free], errors[3:, free])
         return errors
 
     def stacked(self, own: Array, shared: Array) -> Array:
@@ -132,7 +132,7 @@ class LaneTasks:
         padded = np.concatenate([everything, np.zeros((1, everything.shape[1]))])
         return padded[self._own_columns] * self._own, padded[self._shared_columns]
 
-    def _seen(self, state: LaneState) -> Seen:
+    def _seen(self, state: BatchState) -> ToolPoses:
         """The tools as the tasks see them."""
         p_WT, R_WT = state.p_WT[:, self._robots], state.R_WT[:, :, self._robots]
         R_TP, p_TP = self._X_TP[:3, :3], self._X_TP[:3, 3]
@@ -148,33 +148,33 @@ class LaneTasks:
             p_WR[:, ~self._is_on_part] = 0.0
         R = np.einsum("jitb,jktb->iktb", R_WR, R_WT)
         p = np.einsum("jitb,jtb->itb", R_WR, p_WT - p_WR)
-        return Seen(R_WR, R, p, p_WT)
+        return ToolPoses(R_WR, R, p, p_WT)
 
-    def _errors(self, seen: Seen, wanted: Wanted) -> Array:
+    def _errors(self, seen: ToolPoses, desired: Reference) -> Array:
         """See `errors`."""
         errors = np.empty((6, *seen.p.shape[1:]))
-        errors[:3] = wanted.p - seen.p
-        between = np.einsum("ijtb,kjtb->iktb", wanted.R, seen.R)
+        errors[:3] = desired.p - seen.p
+        between = np.einsum("ijtb,kjtb->iktb", desired.R, seen.R)
         across = between[[2, 0, 1], [1, 2, 0]] - between[[1, 2, 0], [2, 0, 1]]
         errors[3:] = _rotation(0.5 * across, 0.5 * (np.einsum("iitb->tb", between) - 1.0))
         if self._is_spin_free.any():
             free = self._is_spin_free
-            z, goal = seen.R[:, 2, free], wanted.R[:, 2, free]
-            across_tool = np.einsum("jitb,jtb->itb", wanted.R[:, :, free], _cross(z, goal))
+            z, goal = seen.R[:, 2, free], desired.R[:, 2, free]
+            across_tool = np.einsum("jitb,jtb->itb", desired.R[:, :, free], _cross(z, goal))
             errors[3:, free] = _rotation(across_tool, np.einsum("itb,itb->tb", z, goal))
         return errors if self._is_whole else errors * self._kept
 
-    def _twists(self, wanted: Wanted) -> Array:
-        """Wanted twists of the components that the tasks keep, in the frames of `errors`, shape (6, tasks, lanes)."""
+    def _twists(self, desired: Reference) -> Array:
+        """Reference twists of the constrained components, in the frames of `errors`, shape (6, tasks, batch)."""
         if self._is_whole:
-            return wanted.twists
-        twists = wanted.twists.copy()
+            return desired.twists
+        twists = desired.twists.copy()
         free = self._is_spin_free
-        twists[3:, free] = np.einsum("jitb,jtb->itb", wanted.R[:, :, free], twists[3:, free])
+        twists[3:, free] = np.einsum("jitb,jtb->itb", desired.R[:, :, free], twists[3:, free])
         twists *= self._kept
         return twists
 
-    def _columns(self, state: LaneState, seen: Seen, wanted: Wanted) -> Array:
+    def _columns(self, state: BatchState, seen: ToolPoses, desired: Reference) -> Array:
         """Tool twists per unit speed of joints: of each task's own robot, then of the positioner at each tip.
 
         Shape (6, joints, 2 tasks, lanes), expressed in W, or in the frames of `errors` where a task leaves components
@@ -193,12 +193,12 @@ class LaneTasks:
             columns[3:] *= turning
         if not chains.is_plain:
             columns = np.einsum("iltb,ljt->ijtb", columns, chains.to_joints[:, :, robots])
-        return columns if self._is_whole else self._in_rows(columns, seen, wanted)
+        return columns if self._is_whole else self._in_rows(columns, seen, desired)
 
-    def _in_rows(self, columns: Array, seen: Seen, wanted: Wanted) -> Array:
+    def _in_rows(self, columns: Array, seen: ToolPoses, desired: Reference) -> Array:
         """Columns in the frames of `errors`, zero in the rows that a task leaves open."""
         R, turned, free = seen.R_WR, seen.R_WR.copy(), self._is_spin_free
-        turned[:, :, free] = np.einsum("ijtb,jktb->iktb", R[:, :, free], wanted.R[:, :, free])
+        turned[:, :, free] = np.einsum("ijtb,jktb->iktb", R[:, :, free], desired.R[:, :, free])
         rows = np.empty_like(columns)
         for half in (slice(None, len(free)), slice(len(free), None)):
             rows[:3, :, half] = np.einsum("jitb,jltb->iltb", R, columns[:3, :, half])
@@ -208,32 +208,39 @@ class LaneTasks:
 
 
 class Look:
-    """The tasks at many postures, to first order.
+    """The tasks at many configurations, to first order.
 
     Attributes:
-        errors: Pose errors, see `LaneTasks.errors`, shape (6, tasks, lanes).
+        errors: Pose errors, see `BatchTasks.errors`, shape (6, tasks, lanes).
     """
 
     def __init__(
-        self, tasks: LaneTasks, arrow: ArrowInverse, *, errors: Array, rows: Array | None, wanted: Array, mobile: Array
+        self,
+        tasks: BatchTasks,
+        arrow: ArrowInverse,
+        *,
+        errors: Array,
+        rows: Array | None,
+        desired: Array,
+        mobile: Array,
     ) -> None:
         """Keep what was found; ``rows`` turn errors and twists into the frame of the columns, if it is another."""
-        self._tasks, self._arrow, self._rows, self._wanted, self._mobile = tasks, arrow, rows, wanted, mobile
+        self._tasks, self._arrow, self._rows, self._desired, self._mobile = tasks, arrow, rows, desired, mobile
         self.errors = errors
 
     def speeds(self, drift: Array | None = None) -> Array:
-        r"""Joint speeds ``J^# x_dot + (I - J^# J) u`` for the wanted twists and a drift ``u``, shape (nq, lanes).
+        r"""Joint speeds ``J^# x_dot + (I - J^# J) u`` for the desired twists and a drift ``u``, shape (nq, lanes).
 
         The drift has the shape (nq,) or (nq, lanes).
         """
-        b = self._turned(self._wanted)
+        b = self._turned(self._desired)
         if drift is None:
             return self._tasks.stacked(*self._arrow.speeds(b))
         u = np.broadcast_to((self._mobile * drift.T).T.reshape(len(drift), -1), (len(drift), b.shape[2]))
         return u + self._tasks.stacked(*self._arrow.speeds(b - self._arrow.twists(*self._tasks.unstacked(u))))
 
     def correction(self, moved: Array) -> Array:
-        """Newton's correction ``J^# (e - J d)`` of postures that will be moved by ``d``, shape (nq, lanes)."""
+        """Newton's correction ``J^# (e - J d)`` of configurations that will be moved by ``d``, shape (nq, lanes)."""
         b = self._turned(self.errors) - self._arrow.twists(*self._tasks.unstacked(moved))
         return self._tasks.stacked(*self._arrow.speeds(b))
 

@@ -18,7 +18,7 @@ from cellplan.planning.tracking.problem import TrackingProblem
 PERIODIC: Final = 3e-9  # [rad] or [m] by which joints may be off after a cycle that is repeated: they would jump by it
 
 
-class _LostWayError(NoSolutionError):
+class _NoConvergenceError(NoSolutionError):
     """The accurate mode finds no way through a cycle."""
 
 
@@ -52,7 +52,7 @@ def closed_path(run: AccurateRun, problem: TrackingProblem, schedule: Schedule, 
             path = joined(path, cycle)
             before = cycle if np.max(np.abs(cycle.last - cycle.start)) <= PERIODIC else None
         return joined(path, _whole(run, path.last, begin=bounds[-1], end=run.end))
-    except _LostWayError:
+    except _NoConvergenceError:
         return None
 
 
@@ -88,5 +88,5 @@ def _whole(run: AccurateRun, q: Array, *, begin: float, end: float, drift: Array
     """Motion up to an instant, not less far."""
     path = run.path(q, begin=begin, end=end, drift=drift)
     if path.end < end - INSTANT_ROOM:
-        raise _LostWayError("no way leads through the cycle")
+        raise _NoConvergenceError("no way leads through the cycle")
     return path

@@ -12,8 +12,8 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import INSTANT_ROOM
-from cellplan.planning.collocation.batch_targets import LaneTargets
-from cellplan.planning.collocation.batch_tasks import LaneTasks
+from cellplan.planning.collocation.batch_targets import BatchTargets
+from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.joint_polynomials import JointPath
 from cellplan.planning.collocation.solver import Collocation, Indices, largest
 from cellplan.planning.collocation.start_offset import start_offset
@@ -26,7 +26,9 @@ from cellplan.planning.tracking.targets import closures
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
 SHORTEST_SHARE: Final = 1.0 / 4096.0  # of the motion: panels may be that short where steps of the clock are longer
 TO_CLOSE: Final = 1e-7  # [m] and [rad]: what no tool is back to brings no joint back
-STEADY: Final = 1e-11  # [rad] and [m]: postures this near to their limit depend smoothly on a drift, as a search asks
+STEADY: Final = (
+    1e-11  # [rad] and [m]: configurations this near to their limit depend smoothly on a drift, as a search asks
+)
 ONLY: Final = np.zeros(1, dtype=np.intp)  # the one cell among all of a collocation
 
 
@@ -52,16 +54,16 @@ class AccurateRun:
         """
         grasps = closures(cell, moving)
         accuracy = min(cell.solver.accuracy, TO_CLOSE) if cell.motion.cyclic else cell.solver.accuracy
-        tasks = LaneTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
-        targets, placement = LaneTargets(timed, grasps), tasks.chains.placement(cell)
+        tasks = BatchTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
+        targets, placement = BatchTargets(timed, grasps), tasks.chains.placement(cell)
         breaks, jumps = timed.breaks, timed.jumps
         until, first = _settled(cell, timed, len(grasps)), breaks[:2]
-        wanted = targets.at(first[:1], first[:1], first[1:])
-        targets.offset = start_offset(tasks, wanted, placement, start=start, until=until, accuracy=accuracy)
+        desired = targets.at(first[:1], first[:1], first[1:])
+        targets.offset = start_offset(tasks, desired, placement, start=start, until=until, accuracy=accuracy)
         self.collocation = Collocation(tasks, targets, placement, accuracy=accuracy)
         self.end = float(timed.times[-1])
         if cell.motion.cyclic:
-            self.collocation.posture_room = STEADY
+            self.collocation.configuration_room = STEADY
         self.collocation.shortest = min(cell.motion.step, SHORTEST_SHARE * self.end)
         self._tasks, self._targets, self._placement = tasks, targets, placement
         self._locked_since, self._progress = locked_since(cell), progress
@@ -70,10 +72,10 @@ class AccurateRun:
         self._knots = breaks
 
     def path(self, q: Array, *, begin: float, end: float, drift: Array | None = None) -> JointPath:
-        """Motion from a posture at ``begin``, shape (nq,), up to ``end``, or as far as a way leads.
+        """Motion from a configuration at ``begin``, shape (nq,), up to ``end``, or as far as a way leads.
 
         Args:
-            q: The posture.
+            q: The configuration.
             begin: First instant in [s].
             end: Last instant in [s].
             drift: Joint speeds that are asked for in the null space of the tasks, shape (nq,), on average: they begin
@@ -100,20 +102,20 @@ class AccurateRun:
         return JointPath(q, begin, panels, nodes, max(errors))
 
     def gaps(self, begin: float, end: float) -> Array:
-        """How far each tool is wanted at one instant from where it is wanted at a later one, in pose entries."""
+        """How far each tool is desired at one instant from where it is desired at a later one, in pose entries."""
         inside = np.array([begin, end - INSTANT_ROOM])
-        wanted = self._targets.on_path(np.array([begin, end]), inside, inside + INSTANT_ROOM)
-        turned = np.abs(np.diff(wanted.R))[..., 0].max(axis=(0, 1))
-        farthest: Array = np.maximum(turned, np.abs(np.diff(wanted.p))[..., 0].max(axis=0))
+        desired = self._targets.on_path(np.array([begin, end]), inside, inside + INSTANT_ROOM)
+        turned = np.abs(np.diff(desired.R))[..., 0].max(axis=(0, 1))
+        farthest: Array = np.maximum(turned, np.abs(np.diff(desired.p))[..., 0].max(axis=0))
         return farthest
 
     def errors(self, schedule: Schedule, q: Array) -> Array:
-        """Largest tool errors in [m] or [rad] at the first N instants of the clock, at postures, shape (N, nq)."""
+        """Largest tool errors in [m] or [rad] at the first N samples, at configurations of shape (N, nq)."""
         worst = np.empty(len(q))
         for first in range(0, len(q), IN_CACHE):
             some = slice(first, min(first + IN_CACHE, len(q)))
-            wanted = self._targets.sampled(schedule, some)
-            worst[some] = largest(self._tasks.errors(q[some].T, wanted, self._placement))
+            desired = self._targets.sampled(schedule, some)
+            worst[some] = largest(self._tasks.errors(q[some].T, desired, self._placement))
         return worst
 
     def repeated(self, cycle: JointPath, *, begin: float) -> JointPath | None:

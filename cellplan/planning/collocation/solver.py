@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.batched import Placement
-from cellplan.planning.collocation.batch_targets import LaneTargets
-from cellplan.planning.collocation.batch_tasks import LaneTasks, Wanted
+from cellplan.planning.collocation.batch_targets import BatchTargets
+from cellplan.planning.collocation.batch_tasks import BatchTasks, Reference
 from cellplan.planning.collocation.windows import Window
 
 Indices = NDArray[np.intp]
@@ -33,7 +33,7 @@ FREE_PASSES: Final = 3  # before a pass is judged by that
 LONGEST_MOVE: Final = np.pi  # [rad] or [m]: a pass that moves a joint farther has lost its way
 OVERSHOOT: Final = 2.0  # largest error anywhere, of the largest that is looked at; see `_errors`
 TOOL_SHARE: Final = 0.25  # of the accuracy: tool errors at the nodes that passes may leave
-POSTURE_SHARE: Final = 10.0  # postures may be this many times as far from their limit as tools, in [rad] for [m]
+POSTURE_SHARE: Final = 10.0  # configurations may be this many times as far from their limit as tools, in [rad] for [m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +41,7 @@ class Attempt:
     """What came of one window.
 
     Attributes:
-        q: Postures at the nodes, shape (nq, cells, nodes).
+        q: Configurations at the nodes, shape (nq, cells, nodes).
         is_settled: Whether the passes came to an end, shape (cells,).
         errors: Bound of the tool errors at the nodes and between them, [m] or [rad], by panel, shape (panels, cells).
     """
@@ -60,16 +60,16 @@ class Collocation:
         mobile: 1 for joints that are not locked, shape (nq,).
         drift: Joint speeds that are asked for in the null space of the tasks at instants in [s], as a function of
             shape (K,) to (nq, K); None for none.
-        posture_room: How far postures may be from the limit of the passes, in [rad] and [m].
+        configuration_room: How far configurations may be from the limit of the passes, in [rad] and [m].
         shortest: Length in [s] below which no panel is made by halving.
     """
 
-    def __init__(self, tasks: LaneTasks, targets: LaneTargets, placement: Placement, *, accuracy: float) -> None:
+    def __init__(self, tasks: BatchTasks, targets: BatchTargets, placement: Placement, *, accuracy: float) -> None:
         """Begin with all joints free.
 
         Args:
             tasks: The tasks of the run.
-            targets: Where the tools are wanted.
+            targets: Where the tools are desired.
             placement: Where the robots of the cells stand; one for all, or one per cell.
             accuracy: Largest tool error at the nodes and between them, in [m] and [rad].
         """
@@ -77,28 +77,28 @@ class Collocation:
         self.sweeps = self.solves = 0
         self.mobile: Array = np.ones(tasks.joint_count)
         self.drift: Callable[[Array], Array] | None = None
-        self.shortest, self.posture_room = 0.0, POSTURE_SHARE * accuracy
+        self.shortest, self.configuration_room = 0.0, POSTURE_SHARE * accuracy
 
     def carry(self, windows: tuple[Window, ...], q: Array, cells: Indices, record: Record) -> Indices:
         """Carry cells through windows, refined where that is needed; returns those that came to the end.
 
         Args:
             windows: Windows in order.
-            q: Postures of all cells, shape (nq, all cells); those of the cells are carried on in place.
+            q: Configurations of all cells, shape (nq, all cells); those of the cells are carried on in place.
             cells: Indices of the cells to carry.
             record: Is told of every window that cells passed, in order for each of them.
         """
         for first in range(0, len(windows), AT_ONCE):
             batch = windows[first : first + AT_ONCE]
-            for window, wanted in zip(batch, self._targets.in_windows(batch), strict=True):
+            for window, desired in zip(batch, self._targets.in_windows(batch), strict=True):
                 if not len(cells):
                     return cells
-                cells = self._carry_on(window, wanted, q, cells, record=record)
+                cells = self._carry_on(window, desired, q, cells, record=record)
         return cells
 
-    def _carry_on(self, window: Window, wanted: Wanted, q: Array, cells: Indices, *, record: Record) -> Indices:
+    def _carry_on(self, window: Window, desired: Reference, q: Array, cells: Indices, *, record: Record) -> Indices:
         """Carry cells through one window; those for which it is too coarse go through finer ones."""
-        attempt = self.attempt(window, wanted, q[:, cells], self._placement.of(cells))
+        attempt = self.attempt(window, desired, q[:, cells], self._placement.of(cells))
         is_exact = attempt.is_settled & np.all(attempt.errors <= self._accuracy, axis=0)
         through = cells[is_exact]
         if len(through):
@@ -116,36 +116,36 @@ class Collocation:
         return np.sort(np.concatenate(arrived))
 
     @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # what is not a number does not settle
-    def attempt(self, window: Window, wanted: Wanted, q0: Array, placement: Placement) -> Attempt:
+    def attempt(self, window: Window, desired: Reference, q0: Array, placement: Placement) -> Attempt:
         """Resolve one window from start postures, shape (nq, cells)."""
         cells, nodes = q0.shape[1], window.count
         q = np.repeat(q0[:, :, None], nodes, axis=2)
         is_settled, before = np.zeros(cells, dtype=bool), np.full(cells, np.inf)
         going = np.arange(cells)
         for number in range(MOST_PASSES):
-            at_nodes, spread = wanted.between(0, nodes).repeated(len(going)), placement.of(going).repeated(nodes)
+            at_nodes, spread = desired.between(0, nodes).repeated(len(going)), placement.of(going).repeated(nodes)
             moved, errors = self._pass(window, at_nodes, q[:, going], spread, q0=q0[:, going])
             q[:, going] += moved
             change = np.abs(moved).max(axis=(0, 2))
             ratio = change / before[going] if number else np.full(cells, SLOW)
             left = change * ratio / np.maximum(1.0 - ratio, 1.0 - SLOW)
             is_near = errors * ratio <= TOOL_SHARE * self._accuracy  # where blocks are nearly singular, Newton is slow
-            is_there = is_near & (left <= self.posture_room)
+            is_there = is_near & (left <= self.configuration_room)
             is_lost = ~(change < LONGEST_MOVE) | ((ratio > SLOW) & (number >= FREE_PASSES))
             is_settled[going[is_there]] = True
             before[going] = change
             going = going[~is_there & ~is_lost]
             if not len(going):
                 break
-        return Attempt(q, is_settled, self._errors(window, wanted.repeated(cells), q, placement))
+        return Attempt(q, is_settled, self._errors(window, desired.repeated(cells), q, placement))
 
     def _pass(
-        self, window: Window, wanted: Wanted, q: Array, placement: Placement, *, q0: Array
+        self, window: Window, desired: Reference, q: Array, placement: Placement, *, q0: Array
     ) -> tuple[Array, Array]:
-        """What one pass adds to the postures at the nodes, (nq, cells, nodes), and tool errors before it, (cells,)."""
+        """Corrections of q at the nodes in one pass, (nq, cells, nodes), and tool errors before it, (cells,)."""
         self.sweeps += 1
         self.solves += q.shape[1] * q.shape[2]
-        look = self._tasks.look(q.reshape(len(q), -1), wanted, placement, mobile=self.mobile)
+        look = self._tasks.look(q.reshape(len(q), -1), desired, placement, mobile=self.mobile)
         drift = None if self.drift is None else np.tile(self.drift(window.instants[: window.count]), q.shape[1])
         speeds = look.speeds(drift).reshape(q.shape)
         picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
@@ -153,7 +153,7 @@ class Collocation:
         moved[:, :, 0] = 0.0
         return moved, np.abs(look.errors).max(axis=(0, 1)).reshape(q.shape[1:]).max(axis=1)
 
-    def _errors(self, window: Window, wanted: Wanted, q: Array, placement: Placement) -> Array:
+    def _errors(self, window: Window, desired: Reference, q: Array, placement: Placement) -> Array:
         r"""Bounds of the tool errors at the nodes and between them, by panel, shape (panels, cells).
 
         The nodes of a panel and the points between them are ``2 n + 1`` Chebyshev points. A polynomial of degree ``m``
@@ -162,7 +162,7 @@ class Collocation:
         """
         everywhere = np.concatenate([q, q @ window.between.T], axis=2)
         cells, instants = everywhere.shape[1:]
-        errors = self._tasks.errors(everywhere.reshape(len(q), -1), wanted, placement.repeated(instants))
+        errors = self._tasks.errors(everywhere.reshape(len(q), -1), desired, placement.repeated(instants))
         by_panel = np.zeros((len(window.panels), cells))
         np.maximum.at(by_panel, window.panel_of, largest(errors).reshape(cells, instants).T)
         return OVERSHOOT * by_panel

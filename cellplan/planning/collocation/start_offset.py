@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, rotation_exp
 from cellplan.kinematics.batched import Placement
-from cellplan.planning.collocation.batch_tasks import LaneTasks, Wanted
+from cellplan.planning.collocation.batch_tasks import BatchTasks, Reference
 from cellplan.planning.timing.approach_retract import REST_TO_REST
 from cellplan.planning.timing.time_law import advance
 
@@ -17,14 +17,14 @@ ROUNDS: Final = 8  # of looking at the offset through the components that a task
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StartOffset:
-    r"""How far the tools stand from where they are wanted at first, and when they have to be there.
+    r"""How far the tools stand from where they are desired at first, and when they have to be there.
 
     Targets are moved by ``v (1 - \sigma(t / T))`` with the quintic law ``\sigma``: from the tool's own pose to the
     path, from rest to rest.
 
     Attributes:
-        linear: Wanted tip minus actual one at the start in the frame of each task, in [m], shape (3, tasks).
-        angular: Rotation vector from the actual to the wanted orientation, in [rad], shape (3, tasks).
+        linear: Reference tip minus actual one at the start in the frame of each task, in [m], shape (3, tasks).
+        angular: Rotation vector from the actual to the desired orientation, in [rad], shape (3, tasks).
         until: Instants in [s] from which on nothing is left of it, shape (tasks,).
     """
 
@@ -37,9 +37,9 @@ class StartOffset:
 
         Args:
             times: Instants in [s], shape (N,).
-            R: Wanted orientations, shape (3, 3, tasks, N).
-            p: Wanted tips, shape (3, tasks, N).
-            twists: Wanted twists, shape (6, tasks, N).
+            R: Reference orientations, shape (3, 3, tasks, N).
+            p: Reference tips, shape (3, tasks, N).
+            twists: Reference twists, shape (6, tasks, N).
         """
         law = advance(REST_TO_REST, np.clip(times / self.until[:, None], 0.0, 1.0))
         left, rate = 1.0 - law.share, law.rate / self.until[:, None]
@@ -51,13 +51,13 @@ class StartOffset:
 
 
 def start_offset(
-    tasks: LaneTasks, wanted: Wanted, placement: Placement, *, start: Array, until: Array, accuracy: float
+    tasks: BatchTasks, desired: Reference, placement: Placement, *, start: Array, until: Array, accuracy: float
 ) -> StartOffset | None:
     """How far the tools stand beside their paths at the start; None when they stand on them.
 
     Args:
         tasks: The tasks.
-        wanted: Where the tools are wanted at first, one lane.
+        desired: Where the tools are desired at first, one lane.
         placement: Where the robots stand.
         start: Stacked start posture, shape (nq,).
         until: Instants in [s] from which on they have to be there, shape (tasks,).
@@ -66,7 +66,7 @@ def start_offset(
     offset = StartOffset(np.zeros((3, len(until))), np.zeros((3, len(until))), until)
     at_start = np.zeros(1)
     for number in range(ROUNDS):
-        moved = Wanted(*offset.applied(at_start, wanted.R, wanted.p, wanted.twists))
+        moved = Reference(*offset.applied(at_start, desired.R, desired.p, desired.twists))
         error = tasks.task_errors(start[:, None], moved, placement)[:, :, 0]
         if np.max(np.abs(error), initial=0.0) <= QUIET * accuracy:
             return offset if number else None

@@ -82,7 +82,7 @@ def closing_drift(
 
     Args:
         problem: The tasks.
-        start: Stacked posture at the beginning of the cycle, shape (nq,).
+        start: Stacked configuration at the beginning of the cycle, shape (nq,).
         moved: How far the joints are from where they began after one cycle, by the mean of the drift, shape (nq,).
         duration: Time ``T`` of the cycle in [s].
         instant: Number of the instant of the clock at which the cycle begins.

@@ -15,7 +15,7 @@ from cellplan.planning.methods import method_named
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
 from cellplan.planning.tracking.singularity import singular_words
 
-TOLD_EVERY: Final = 200  # [samples] between two words on progress
+PROGRESS_EVERY: Final = 200  # [samples] between two words on progress
 LARGEST_STEP: Final = np.pi  # [rad] or [m]: a joint that goes farther in one step is not integrated any more
 
 
@@ -28,7 +28,7 @@ def follow(
 
     Args:
         cell: The cell.
-        schedule: Wanted tool poses and twists on the common clock.
+        schedule: Reference tool poses and twists on the common clock.
         start: Stacked start posture, shape (nq,), in [rad] or [m].
         moving: Names of the robots that may move.
         progress: Who wants to know how far it is.
@@ -62,7 +62,7 @@ def carry(problem: TrackingProblem, start: Array, *, first: int = 0, last: int, 
             singular = singular_words(problem, k, q[k])
             raise type(error)(f"{cell.origin.at('motion')}: at {problem.times[k]:.3f} s {error}{singular}") from None
         q[k + 1], iterations[k], slack[k] = step.q, step.iterations, step.slack
-        if k % TOLD_EVERY == 0:
+        if k % PROGRESS_EVERY == 0:
             progress("planning", k / len(q))
     return Motion(times=problem.times[: last + 1], q=q, iterations=iterations, slack=slack)
 

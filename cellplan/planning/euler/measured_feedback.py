@@ -1,6 +1,6 @@
-"""Feedback: references corrected so that the tools of a real cell come where they are wanted, not those of the model.
+"""Feedback: references corrected so that the tools of a real cell come where they are desired, not those of the model.
 
-[Nicolato2007]_ section 3.5, Eq. 3.31: ``s_d* = g(r_d - r_n) + s~_n`` replaces the wanted pose by the nominal one plus
+[Nicolato2007]_ section 3.5, Eq. 3.31: ``s_d* = g(r_d - r_n) + s~_n`` replaces the desired pose by the nominal one plus
 the *measured* error, so that the method cancels what is measured instead of what is modelled.
 """
 
@@ -27,7 +27,7 @@ START_MEASUREMENTS: Final = 6  # times that standing tools are measured and put 
 Measure = Callable[[Array], Sequence[Array]]  # stacked joints (1, nq) -> X_PT of every task, (1, 4, 4) each
 
 
-def corrected_references(wanted: Schedule, references: Schedule, measured: Sequence[Array]) -> Schedule:
+def corrected_references(desired: Schedule, references: Schedule, measured: Sequence[Array]) -> Schedule:
     r"""References for the next pass from what was measured in the last one.
 
     .. math:: X_{ref}^{i+1}(k) = \Delta(k) \, X_{ref}^{i}(k), \quad \Delta = X_{PT,d} \, X_{PT,measured}^{-1}
@@ -37,23 +37,23 @@ def corrected_references(wanted: Schedule, references: Schedule, measured: Seque
     pass. In general the error shrinks as long as ``E`` changes less than its argument, which is so for small errors.
 
     Args:
-        wanted: What the tasks want.
+        desired: What the tasks want.
         references: What the model was told in the last pass.
         measured: Measured tool poses of that pass, shape (N, 4, 4) for each task.
     """
-    told = zip(wanted.tasks, references.tasks, measured, strict=True)
+    told = zip(desired.tasks, references.tasks, measured, strict=True)
     return Schedule(
-        times=wanted.times,
+        times=desired.times,
         tasks=tuple(
-            _with_poses(reference, displaced(task.task, task.X_PT, seen, nominal=reference.X_PT), wanted.times)
+            _with_poses(reference, displaced(task.task, task.X_PT, seen, nominal=reference.X_PT), desired.times)
             for task, reference, seen in told
         ),
     )
 
 
-def displaced(task: Task, X_wanted: Array, X_measured: Array, *, nominal: Array) -> Array:
-    """Nominal poses moved by the displacement in P that takes the measured ones to the wanted ones, shape (N, 4, 4)."""
-    error = pose_errors(X_wanted, X_measured, [task.is_spin_free] * len(X_wanted))
+def displaced(task: Task, X_desired: Array, X_measured: Array, *, nominal: Array) -> Array:
+    """Nominal poses moved in P by the displacement from measured to desired ones, shape (N, 4, 4)."""
+    error = pose_errors(X_desired, X_measured, [task.is_spin_free] * len(X_desired))
     error[:, [axis for axis in range(6) if axis not in task.axes]] = 0.0
     turn, tip = rotation_exp(error[:, 3:]), X_measured[:, :3, 3]
     lever = (turn @ (nominal[:, :3, 3] - tip)[..., None])[..., 0]
@@ -61,7 +61,7 @@ def displaced(task: Task, X_wanted: Array, X_measured: Array, *, nominal: Array)
 
 
 def settled_start(cell: Cell, references: Schedule, *, start: Array, moving: Sequence[str]) -> Array:
-    """The posture near a start posture from which the model's tools stand on the first references, shape (nq,).
+    """The configuration near a start posture from which the model's tools stand on the first references, shape (nq,).
 
     Raises:
         NoSolutionError: The tools cannot be brought there.
@@ -79,16 +79,16 @@ def settled_start(cell: Cell, references: Schedule, *, start: Array, moving: Seq
     return settled
 
 
-def measured_start(cell: Cell, wanted: Schedule, *, start: Array, moving: Sequence[str], measure: Measure) -> Array:
+def measured_start(cell: Cell, desired: Schedule, *, start: Array, moving: Sequence[str], measure: Measure) -> Array:
     """Start posture from which the real tools stand on the first poses of their tasks, shape (nq,).
 
     The standing tools are measured and put right several times: a pass that began with the whole error would begin with
-    a jerk. The arguments are those of `follow_measured`.
+    a jerk. The arguments are those of `integrate_measured`.
 
     Raises:
         NoSolutionError: The tools cannot be brought there.
     """
-    first = Schedule(times=wanted.times[:1], tasks=tuple(_standing(task, 1) for task in wanted.tasks))
+    first = Schedule(times=desired.times[:1], tasks=tuple(_standing(task, 1) for task in desired.tasks))
     references, q = first, start
     for _ in range(START_MEASUREMENTS):
         references = corrected_references(first, references, measure(q[None]))
@@ -96,15 +96,17 @@ def measured_start(cell: Cell, wanted: Schedule, *, start: Array, moving: Sequen
     return q
 
 
-def follow_measured(cell: Cell, wanted: Schedule, *, start: Array, moving: Sequence[str], measure: Measure) -> Motion:
+def integrate_measured(
+    cell: Cell, desired: Schedule, *, start: Array, moving: Sequence[str], measure: Measure
+) -> Motion:
     r"""Follow a schedule with the error measured at each instant fed back at once ([Nicolato2007]_ section 3.5).
 
-    At instant k the method is told ``Delta(k) X_nominal(q_k)`` in place of the wanted pose, with ``Delta`` of
-    `corrected_references`, and for the next instant the displacement from what is measured now to what is wanted then.
+    At instant k the method is told ``Delta(k) X_nominal(q_k)`` in place of the desired pose, with ``Delta`` of
+    `corrected_references`, and for the next instant the displacement from what is measured now to what is desired then.
 
     Args:
         cell: The written cell: what the method knows.
-        wanted: What the tasks want.
+        desired: What the tasks want.
         start: Stacked start posture, shape (nq,), in [rad] or [m].
         moving: Names of the robots that may move.
         measure: The measuring system.
@@ -112,25 +114,25 @@ def follow_measured(cell: Cell, wanted: Schedule, *, start: Array, moving: Seque
     Raises:
         NoSolutionError: A tool lost its path, or the method found no way on.
     """
-    problem = TrackingProblem(cell, wanted, moving)
+    problem = TrackingProblem(cell, desired, moving)
     advance = method_named(cell.solver.method)(problem)
-    targets = problem.wanted.copy()
-    q = np.empty((len(wanted.times), cell.joint_count))
+    targets = problem.desired.copy()
+    q = np.empty((len(desired.times), cell.joint_count))
     q[0] = start
     for k in range(len(q) - 1):
         state = problem.state(q[k])
         nominal = inverse(reference_frames(state, problem.tasks)) @ state.X_WT[problem.operators]
-        for place, (scheduled, X_seen) in enumerate(zip(wanted.tasks, measure(q[k : k + 1]), strict=True)):
+        for place, (scheduled, X_seen) in enumerate(zip(desired.tasks, measure(q[k : k + 1]), strict=True)):
             seen, told = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
-            problem.wanted[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=told)
+            problem.desired[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=told)
         try:
             step = advance(k, q[k])
             refuse_leap(cell, q[k], step)
         except NoSolutionError as error:
             singular = singular_words(problem, k, q[k])
-            raise type(error)(f"{cell.origin.at('motion')}: at {wanted.times[k]:.3f} s {error}{singular}") from None
+            raise type(error)(f"{cell.origin.at('motion')}: at {desired.times[k]:.3f} s {error}{singular}") from None
         q[k + 1] = step.q
-    return Motion(times=wanted.times, q=q)
+    return Motion(times=desired.times, q=q)
 
 
 def _with_poses(scheduled: TaskSchedule, X_PT: Array, times: Array) -> TaskSchedule:

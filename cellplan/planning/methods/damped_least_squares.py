@@ -1,4 +1,4 @@
-"""Damped least squares: near a singularity, part of the wanted twist is given up for moderate joint speeds."""
+"""Damped least squares: near a singularity, part of the desired twist is given up for moderate joint speeds."""
 
 from collections.abc import Callable
 from typing import Final
@@ -33,7 +33,7 @@ def damped_least_squares(problem: TrackingProblem) -> Callable[[int, Array], Adv
         share = gain_share(measure, settings.region) if settings.shapes_gain else 1.0
         speeds = inverse.speeds(tasks.twist + share * problem.gain * tasks.error, lambda_squared)
         if tasks.secondary is not None:
-            speeds += tasks.bounded(inverse.unnoticed(tasks.secondary), beside=speeds)
+            speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), beside=speeds)
         return Advance(q=q + speeds * problem.step(k))
 
     return advance

@@ -1,4 +1,4 @@
-"""Filtered inverse, law I: an inverse that follows the Jacobian as a filter does multiplies the wanted twist."""
+"""Filtered inverse, law I: an inverse that follows the Jacobian as a filter does multiplies the desired twist."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,7 @@ from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
 
 def filtered_inverse(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
-    r"""Joint speeds ``u_I = Theta v`` ([Vargas2012]_ Eq. 35), with ``v`` the wanted twist and its feedback."""
+    r"""Joint speeds ``u_I = Theta v`` ([Vargas2012]_ Eq. 35), with ``v`` the desired twist and its feedback."""
 
     def law(theta: Array, _J: Array) -> Array:
         return theta

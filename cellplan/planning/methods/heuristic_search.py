@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.methods.support.configuration_search import Bounds, Pass, PostureSearch, position_bounds
+from cellplan.planning.methods.support.configuration_search import Bounds, ConfigurationSearch, Pass, position_bounds
 from cellplan.planning.methods.support.joint_line import joint_lines
 from cellplan.planning.methods.support.search_cost import NO_EFFECT, Look, SearchCost
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
@@ -24,12 +24,12 @@ def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     Besides the paper: joints stop dead at their position limits, and their speeds are not limited (`recursive_search`
     limits speeds and can brake). A search begins where the last step leads to, scaled so that it fits the goal best, if
     that costs less than the present posture: otherwise small changes of the goal change the order of the joints, and
-    redundant cells shake. Rounds that gain little are carried on (see `PostureSearch`). A joint that moves no tool
-    stays: rounding alone would turn it by any angle.
+    redundant cells shake. Rounds that gain little are carried on (see `ConfigurationSearch`). A joint that moves no
+    tool stays: rounding alone would turn it by any angle.
     """
     tolerance = problem.cell.solver.search.tolerance
-    search = PostureSearch(problem, lambda cost: _best_first(cost, tolerance**2))
-    before: dict[int, Array] = {}  # posture at the instant before the last one, by that one's number
+    search = ConfigurationSearch(problem, lambda cost: _best_first(cost, tolerance**2))
+    before: dict[int, Array] = {}  # configuration at the instant before the last one, by that one's number
 
     def advance(k: int, q: Array) -> Advance:
         problem.first_order(k, q)  # refuses a lost path

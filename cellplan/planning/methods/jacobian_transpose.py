@@ -9,7 +9,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
 SHORTENED: Final = 0.9  # of the step after which the error would be smallest: a little less ends the zigzag
-LEFT_OPEN: Final = 1e-3  # share of the wanted correction below which it counts as made
+LEFT_OPEN: Final = 1e-3  # share of the desired correction below which it counts as made
 LONGEST_PULL: Final = 1.0 / 0.02**2  # sum of all steps: what has a smaller singular value than 0.02 is not followed
 MOST_STEPS: Final = 200  # of the law within one look; four robots need about ninety
 LONGEST_MOVE: Final = 0.1  # [rad] or [m] of a joint between two looks: the first order holds to about a hundredth
@@ -50,16 +50,16 @@ def jacobian_transpose(problem: TrackingProblem) -> Callable[[int, Array], Advan
     return advance
 
 
-def pulled(J: Array, wanted: Array, weights: Array) -> tuple[Array, int]:
-    r"""Joint motion that repeated steps of the transpose make of a wanted motion of the tools.
+def pulled(J: Array, desired: Array, weights: Array) -> tuple[Array, int]:
+    r"""Joint motion that repeated steps of the transpose make of a desired motion of the tools.
 
     The step that makes what is left smallest is ``alpha = <r, A r> / |A r|^2`` with ``A = J W^-1 J^T``; any step
     shorter than twice that makes it smaller. The sum of all steps is bounded, and so is the motion: it stays below
-    about a hundred times what is wanted, however near a singularity is.
+    about a hundred times what is desired, however near a singularity is.
 
     Args:
         J: Task rows, shape (m, nq).
-        wanted: Wanted motion of the tools, shape (m,).
+        desired: Reference motion of the tools, shape (m,).
         weights: Diagonal of W, shape (nq,).
 
     Returns:
@@ -67,8 +67,8 @@ def pulled(J: Array, wanted: Array, weights: Array) -> tuple[Array, int]:
     """
     JW = (J / weights).T
     A = J @ JW
-    r, pull, open_ = wanted, np.zeros_like(wanted), LONGEST_PULL
-    enough = LEFT_OPEN * float(np.linalg.norm(wanted))
+    r, pull, open_ = desired, np.zeros_like(desired), LONGEST_PULL
+    enough = LEFT_OPEN * float(np.linalg.norm(desired))
     for step in range(MOST_STEPS):
         Ar = A @ r
         square = float(Ar @ Ar)

@@ -59,7 +59,7 @@ def bounded_speeds(
 
     Args:
         tasks: Rows, weights and secondary speeds.
-        xdot: Wanted twist components with error feedback, shape (m,).
+        xdot: Reference twist components with error feedback, shape (m,).
         bounds: Bounds on the joint speeds.
         mobile: Whether a joint may move, shape (nq,); the others have speed 0.
         slack_weight: ``rho``.
@@ -74,15 +74,15 @@ def bounded_speeds(
     if not mobile.any():
         return speeds
     J, root = tasks.J[:, mobile], np.sqrt(tasks.weights[mobile])
-    wanted = speeds[mobile] if tasks.secondary is None else tasks.secondary[mobile]
+    desired = speeds[mobile] if tasks.secondary is None else tasks.secondary[mobile]
     U, s, Vt = np.linalg.svd(J / root, full_matrices=True)
     lambda_squared = max(1.0 / slack_weight, float(s[0]) ** 2 / STEEPEST)
-    z_0 = Vt[: len(s)].T @ (s / (s**2 + lambda_squared) * (U[:, : len(s)].T @ (xdot - J @ wanted)))
+    z_0 = Vt[: len(s)].T @ (s / (s**2 + lambda_squared) * (U[:, : len(s)].T @ (xdot - J @ desired)))
     steepness = np.ones(len(root))
     steepness[: len(s)] += s**2 / lambda_squared
     A = Vt.T / np.sqrt(steepness)
     lower, upper = bounds.lower[mobile], bounds.upper[mobile]
-    offset = z_0 + root * wanted
+    offset = z_0 + root * desired
     y = nearest_to_origin(A, lower=root * lower - offset, upper=root * upper - offset)
     speeds[mobile] = np.clip((offset + A @ y) / root, lower, upper)
     return speeds

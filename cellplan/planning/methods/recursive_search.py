@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
-from cellplan.planning.methods.support.configuration_search import Bounds, Pass, PostureSearch, speed_bounds
+from cellplan.planning.methods.support.configuration_search import Bounds, ConfigurationSearch, Pass, speed_bounds
 from cellplan.planning.methods.support.search_cost import NO_EFFECT, Look, SearchCost
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
@@ -43,7 +43,7 @@ def recursive_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     As all angles are small, rounds over the sequence are made on one look at the cell (``e`` follows each move to first
     order) until nothing is left of ``e``, nothing can be gained or many are made; then the cell is looked at again. A
     look that turns out no better than the one before is forgotten and the same rounds are made with less room. Looks
-    that gain little are carried on (see `PostureSearch`).
+    that gain little are carried on (see `ConfigurationSearch`).
     """
     sequence = _sequence(problem.cell)
 
@@ -55,7 +55,7 @@ def recursive_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
 
     stands = ~np.isin(np.arange(problem.cell.joint_count), sequence)
     rounds = _Rounds(problem.cell, sequence)
-    search = PostureSearch(problem, rounds.on)
+    search = ConfigurationSearch(problem, rounds.on)
     return advance
 
 
@@ -106,7 +106,7 @@ class _Rounds:
         return improve
 
     def _to_first_order(self, look: Look, bounds: Bounds, rounds: int) -> tuple[Array, int]:
-        """Rounds over the sequence on one look: the posture they lead to and how many they were."""
+        """Rounds over the sequence on one look: the configuration they lead to and how many they were."""
         chosen = self._sequence
         a, e, q = look.a[:, chosen], look.e, look.q[chosen]
         k0 = np.einsum("ij,ij->j", a, a)
@@ -125,12 +125,12 @@ class _Rounds:
             q, before, cost, used = reached, cost, float(e @ e), used + 1
             if not cost < (1.0 - STALLED) * before:
                 break
-        posture = look.q.copy()
-        posture[chosen] = q
-        return posture, used
+        configuration = look.q.copy()
+        configuration[chosen] = q
+        return configuration, used
 
     def _brakes(self, q: Array, moves: NDArray[np.bool_]) -> Array:
-        """Factors of moves downwards and upwards from a posture, shape (2, n): Eq. 3.29 towards the nearer limit."""
+        """Factors of moves down and up from a configuration, shape (2, n): Eq. 3.29 towards the nearer limit."""
         factors = np.ones((2, len(q)))
         lower, upper, braked = self._lower[moves], self._upper[moves], self._has_range[moves] & self._has_brakes
         lower, upper, here = lower[braked], upper[braked], q[braked]
@@ -148,7 +148,7 @@ def _one_by_one(q: Array, a: Array, *, e: Array, factors: Array, bounds: Bounds)
     Args:
         q: Positions in the order of the sequence, shape (n,).
         a: Derivatives of the actual by them, shape (m, n).
-        e: Wanted minus actual, shape (m,).
+        e: Reference minus actual, shape (m,).
         factors: What ``e . a_i`` is multiplied by for a move downwards and upwards, shape (2, n).
         bounds: Lowest and highest positions, shape (n,).
     """

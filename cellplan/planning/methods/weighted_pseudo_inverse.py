@@ -1,4 +1,4 @@
-"""Weighted, damped pseudo-inverse: the smallest weighted joint speeds that give the wanted tool twists."""
+"""Weighted, damped pseudo-inverse: the smallest weighted joint speeds that give the desired tool twists."""
 
 from collections.abc import Callable
 from typing import Final
@@ -25,7 +25,7 @@ def weighted_pseudo_inverse(problem: TrackingProblem) -> Callable[[int, Array], 
         inverse = WeightedInverse(tasks.J, tasks.weights)
         speeds = damped_speeds(inverse, tasks.twist + problem.gain * tasks.error, problem.damping)
         if tasks.secondary is not None:
-            speeds += tasks.bounded(inverse.unnoticed(tasks.secondary), beside=speeds)
+            speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), beside=speeds)
         return Advance(q=q + speeds * problem.step(k))
 
     return advance
@@ -40,7 +40,7 @@ def damped_speeds(inverse: WeightedInverse, xdot: Array, damping: float | None) 
 
     Args:
         inverse: Inverse of the task rows.
-        xdot: Wanted twist components with error feedback, shape (m,).
+        xdot: Reference twist components with error feedback, shape (m,).
         damping: Largest damping factor; None for the program's choice, 0 for none.
 
     Returns:

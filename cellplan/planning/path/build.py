@@ -12,10 +12,10 @@ from cellplan.geometry.transforms import Array, is_rigid, pose_from
 from cellplan.model.cell import Origin, Part
 from cellplan.model.task import Task, TimedPath
 from cellplan.model.toolpath import Toolpath, Trajectory
-from cellplan.planning.path.curve import draw_path
+from cellplan.planning.path.curve import path_curve
 from cellplan.planning.path.formatting import in_mm
 from cellplan.planning.path.plausible_size import refuse_unlikely_path
-from cellplan.planning.path.projection import lay_path
+from cellplan.planning.path.projection import project_path
 from cellplan.planning.path.tool_orientation import orient_tool
 
 STANDSTILL: Final = 1e-4  # [-] of the largest speed by the parameter: a curve slower than this has a cusp there
@@ -29,14 +29,14 @@ def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
     Args:
         task: The task.
         part: The part it works on.
-        origin: Where the words of the task stand, for complaints.
+        origin: Where the words of the task stand, for findings.
 
     Raises:
         InputError: The path cannot be drawn, misses the part, runs over an edge, leaves the tool's turn open, or is to
             be gone through again and does not come back to its start.
     """
-    drawing = draw_path(task, origin)
-    laid = lay_path(drawing, task, part, origin)
+    drawing = path_curve(task, origin)
+    laid = project_path(drawing, task, part, origin)
     arc = measure(laid.tip)
     refuse_unlikely_path(laid.tip, arc, task=task, part=part, where=origin.at(f"tasks.{task.name}.path"))
     orientation = orient_tool(task, drawing, laid, origin)

@@ -1,4 +1,4 @@
-"""Drawing of a path as its task words it: a curve in the part frame with its stops, not yet laid on the part."""
+"""PathCurve of a path as its task words it: a curve in the part frame with its stops, not yet laid on the part."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -30,7 +30,7 @@ IN_PLANE: Final = np.sin(np.deg2rad(1.0))  # [-] a side seen at a flatter angle 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Drawing:
+class PathCurve:
     """A curve in P before it is laid on the part.
 
     Attributes:
@@ -48,7 +48,7 @@ class Drawing:
     runs_on: bool = False
 
 
-def draw_path(task: Task, origin: Origin) -> Drawing:
+def path_curve(task: Task, origin: Origin) -> PathCurve:
     """Draw the path of a task in the part frame.
 
     Listed points are passed in their order; shapes that have none run the way round that their task says.
@@ -60,21 +60,21 @@ def draw_path(task: Task, origin: Origin) -> Drawing:
     where = origin.at(f"tasks.{task.name}.path")
     match path:
         case CirclePath():
-            return _draw_circle(path, task, where)
+            return _circle(path, task, where)
         case PolygonPath():
-            return _draw_sides(_polygon_points(path, task, where), task, origin)
+            return _sides(_polygon_points(path, task, where), task, origin)
         case SpacePolylinePath():
             _refuse_poor_points(np.asarray(path.points), path.is_closed, where=where)
-            return _draw_sides(_closed(np.asarray(path.points, dtype=float), path.is_closed), task, origin)
+            return _sides(_closed(np.asarray(path.points, dtype=float), path.is_closed), task, origin)
         case SampledPath():
             _refuse_poor_points(path.points, path.is_closed, where=where, source=path.source)
             points = _closed(path.points, path.is_closed)
-            return _draw_smooth(points, path.is_closed) if path.is_smooth else _draw_sides(points, task, origin)
+            return _smooth(points, path.is_closed) if path.is_smooth else _sides(points, task, origin)
         case TimedPath():
-            return _draw_timed(path)
+            return _timed(path)
 
 
-def _draw_circle(path: CirclePath, task: Task, where: str) -> Drawing:
+def _circle(path: CirclePath, task: Task, where: str) -> PathCurve:
     """Full circle from its start."""
     if not path.radius > SAME_POINT:
         raise InputError(f"{where}: expected a circle with a radius above zero, got {length(path.radius)} mm")
@@ -88,7 +88,7 @@ def _draw_circle(path: CirclePath, task: Task, where: str) -> Drawing:
         first=path.radius * (u * first + v * second),
         second=turn * path.radius * (u * second - v * first),
     )
-    return Drawing(curve=curve, stops=curve.knots, given=curve.knots, is_closed=True, runs_on=True)
+    return PathCurve(curve=curve, stops=curve.knots, given=curve.knots, is_closed=True, runs_on=True)
 
 
 def _polygon_points(path: PolygonPath, task: Task, where: str) -> Array:
@@ -149,19 +149,19 @@ def _closed(points: Array, is_closed: bool) -> Array:
     return np.vstack([points, points[:1]]) if is_closed else points
 
 
-def _draw_smooth(points: Array, is_closed: bool) -> Drawing:
+def _smooth(points: Array, is_closed: bool) -> PathCurve:
     """Smooth curve through points; a closed one passes its start smoothly."""
     given = chord_lengths(points)
     breaks = np.zeros(len(points), dtype=bool)
     breaks[[0, -1]] = not is_closed
     curve = smooth_through(given, points, breaks=breaks)
-    return Drawing(curve=curve, stops=given[[0, -1]], given=given, is_closed=is_closed, runs_on=is_closed)
+    return PathCurve(curve=curve, stops=given[[0, -1]], given=given, is_closed=is_closed, runs_on=is_closed)
 
 
-def _draw_timed(path: TimedPath) -> Drawing:
+def _timed(path: TimedPath) -> PathCurve:
     """Smooth curve over time."""
     curve = spline_through(path.times, path.points, is_closed=path.is_closed)
-    return Drawing(
+    return PathCurve(
         curve=curve,
         stops=path.times[[0, -1]],
         given=path.times,
@@ -170,7 +170,7 @@ def _draw_timed(path: TimedPath) -> Drawing:
     )
 
 
-def _draw_sides(points: Array, task: Task, origin: Origin) -> Drawing:
+def _sides(points: Array, task: Task, origin: Origin) -> PathCurve:
     """Straight sides that stop at every corner, or rounded corners without a stop."""
     given = chord_lengths(points)
     is_closed = bool(np.linalg.norm(points[-1] - points[0]) <= SAME_POINT)
@@ -180,12 +180,12 @@ def _draw_sides(points: Array, task: Task, origin: Origin) -> Drawing:
         _refuse_hidden_sides(points, task.project, origin.at(f"tasks.{task.name}.path"))
     if task.blend is None:
         curve = straight_sides(given, points)
-        return Drawing(curve=curve, stops=given[is_corner], given=given, is_closed=is_closed)
+        return PathCurve(curve=curve, stops=given[is_corner], given=given, is_closed=is_closed)
     corners, at = points[is_corner], given[is_corner]
     seen = corners if task.project is None else corners - np.outer(corners @ task.project, task.project)
     _refuse_blend(corners, np.maximum(_turns(corners), _turns(seen)), task.blend, _corners_at(task, origin))
     rounded: BezierCurve = rounded_sides(at, corners, task.blend)
-    return Drawing(curve=rounded, stops=given[[0, -1]], given=given, is_closed=is_closed)
+    return PathCurve(curve=rounded, stops=given[[0, -1]], given=given, is_closed=is_closed)
 
 
 def _refuse_hidden_sides(points: Array, direction: Array, where: str) -> None:

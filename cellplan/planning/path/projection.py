@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from cellplan.errors import InputError
 from cellplan.geometry.curves.arc_length import measure
 from cellplan.geometry.curves.curve import BezierCurve, Curve, smooth_through
-from cellplan.geometry.curves.surface_patch import LaidCurve, Patch, patches_facing
+from cellplan.geometry.curves.surface_patch import Patch, ProjectedCurve, patches_facing
 from cellplan.geometry.mesh.load import corner_normals, ray_hits
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere, bounding_sphere, support
 from cellplan.geometry.transforms import Array, inverse, transform_points
 from cellplan.model.cell import Origin, Part
 from cellplan.model.task import Task
-from cellplan.planning.path.curve import Drawing
+from cellplan.planning.path.curve import PathCurve
 from cellplan.planning.path.formatting import AXIS_NAMES, direction_name, in_mm, length
 
 SAMPLES: Final = 4096  # points at which a path is looked at to see whether it stays on the part
@@ -30,7 +30,7 @@ AXIS_ALIGNED: Final = 1e-9  # [-] a direction this near to an axis leaves the ot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LaidPath:
+class ProjectedPath:
     """A path where the tool tip goes.
 
     Attributes:
@@ -44,23 +44,23 @@ class LaidPath:
     inward: BezierCurve | None = None
 
 
-def lay_path(drawing: Drawing, task: Task, part: Part, origin: Origin) -> LaidPath:
+def project_path(drawing: PathCurve, task: Task, part: Part, origin: Origin) -> ProjectedPath:
     """Lay a drawn path on the part from the side its task names; a path without a side stays where it is.
 
     Raises:
         InputError: A point misses the part, or the path runs over an edge of it.
     """
     if task.project is None:
-        return LaidPath(tip=drawing.curve)
+        return ProjectedPath(tip=drawing.curve)
     where = origin.at(f"tasks.{task.name}.path")
     match part.shape:
         case Mesh():
-            return _lay_on_mesh(drawing, task.project, part, where=where, mesh=part.shape)
+            return _project_onto_mesh(drawing, task.project, part, where=where, mesh=part.shape)
         case Capsule():
             raise InputError(f"{where}: expected a box, cylinder, sphere or mesh to lay the path on, got a capsule")
         case Box() | Cylinder() | Sphere():
             patches = patches_facing(part.shape, part.X_PS, task.project)
-            return _lay_on_patch(drawing, task.project, patches, part=part, where=where)
+            return _project_onto_patch(drawing, task.project, patches, part=part, where=where)
 
 
 def along(curve: Curve) -> Array:
@@ -76,9 +76,9 @@ def points_along(curve: Curve) -> Array:
     return points
 
 
-def _lay_on_patch(
-    drawing: Drawing, direction: Array, patches: tuple[Patch, ...], *, part: Part, where: str
-) -> LaidPath:
+def _project_onto_patch(
+    drawing: PathCurve, direction: Array, patches: tuple[Patch, ...], *, part: Part, where: str
+) -> ProjectedPath:
     """Lay a path on the one patch that holds all of it."""
     points = points_along(drawing.curve)
     hits = [patch.hits(points, direction) for patch in patches]
@@ -89,8 +89,8 @@ def _lay_on_patch(
         _refuse_edge(where, _last_before_edge(held, hits))
     chosen = int(np.argmax(held.all(axis=1)))
     _refuse_flat_view(hits[chosen], patches[chosen].normals(hits[chosen]), direction, where=where)
-    tip = LaidCurve(curve=drawing.curve, patch=patches[chosen], direction=direction)
-    return LaidPath(tip=tip, patch=patches[chosen])
+    tip = ProjectedCurve(curve=drawing.curve, patch=patches[chosen], direction=direction)
+    return ProjectedPath(tip=tip, patch=patches[chosen])
 
 
 def _last_before_edge(held: Array, hits: list[Array]) -> Array:
@@ -101,7 +101,7 @@ def _last_before_edge(held: Array, hits: list[Array]) -> Array:
     return last
 
 
-def _lay_on_mesh(drawing: Drawing, direction: Array, part: Part, *, where: str, mesh: Mesh) -> LaidPath:
+def _project_onto_mesh(drawing: PathCurve, direction: Array, part: Part, *, where: str, mesh: Mesh) -> ProjectedPath:
     """Lay a path on a mesh: a smooth curve through the hits of close rays, broken at the stops only."""
     u = _ray_parameters(drawing)
     points, _ = drawing.curve.evaluate(u, (u[0], u[-1]))
@@ -117,10 +117,10 @@ def _lay_on_mesh(drawing: Drawing, direction: Array, part: Part, *, where: str, 
     _refuse_flat_view(p, normals, direction, where=where)
     _refuse_creases(p, normals, where)
     breaks = np.isin(u, drawing.stops)
-    return LaidPath(tip=smooth_through(u, p, breaks=breaks), inward=smooth_through(u, -normals, breaks=breaks))
+    return ProjectedPath(tip=smooth_through(u, p, breaks=breaks), inward=smooth_through(u, -normals, breaks=breaks))
 
 
-def _ray_parameters(drawing: Drawing) -> Array:
+def _ray_parameters(drawing: PathCurve) -> Array:
     """Parameters of the rays: even between two stops, the stops included."""
     arc = measure(drawing.curve)
     step = max(min(RAY_STEP, arc.total / FEWEST_RAYS), arc.total / MOST_RAYS)

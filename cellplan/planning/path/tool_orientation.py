@@ -11,9 +11,9 @@ from cellplan.geometry.curves.spline import spline_through
 from cellplan.geometry.transforms import Array, frame_from_axes, is_rigid, pose_from, rotation_vector
 from cellplan.model.cell import Origin
 from cellplan.model.task import SampledPath, Task, TimedPath
-from cellplan.planning.path.curve import Drawing
+from cellplan.planning.path.curve import PathCurve
 from cellplan.planning.path.formatting import direction_name, in_mm
-from cellplan.planning.path.projection import LaidPath, along
+from cellplan.planning.path.projection import ProjectedPath, along
 
 PARALLEL: Final = 1e-3  # [rad] tool_x and tool axis nearer than this leave the turn about the axis to rounding
 WIDEST_TURN: Final = np.deg2rad(170.0)  # [rad] between neighbouring orientations: beyond it the way round is not clear
@@ -23,7 +23,7 @@ UNIT: Final = 1e-6  # [-] room for axes and rotations that were computed elsewhe
 _CHOICES: Final = tuple(sign * axis for axis in np.eye(3) for sign in (1.0, -1.0))
 
 
-def orient_tool(task: Task, drawing: Drawing, laid: LaidPath, origin: Origin) -> Orientation:
+def orient_tool(task: Task, drawing: PathCurve, laid: ProjectedPath, origin: Origin) -> Orientation:
     """Tool frames along a laid path: z is the tool axis, x leans to the task's ``tool_x``.
 
     Rotations of a file are taken as they are. Between points of a file, axes and rotations are interpolated with
@@ -60,7 +60,7 @@ def orient_tool(task: Task, drawing: Drawing, laid: LaidPath, origin: Origin) ->
     )
 
 
-def _from_file(path: SampledPath | TimedPath, task: Task, drawing: Drawing, *, origin: Origin) -> Orientation:
+def _from_file(path: SampledPath | TimedPath, task: Task, drawing: PathCurve, *, origin: Origin) -> Orientation:
     """Interpolate the axes or rotations of a file over the parameters of its points."""
     where = origin.at(f"tasks.{task.name}.path")
     breaks = np.isin(drawing.given, drawing.stops)
@@ -88,7 +88,7 @@ def _from_file(path: SampledPath | TimedPath, task: Task, drawing: Drawing, *, o
     return AxisFrame(axes=curve, x_hint=task.tool_x)
 
 
-def _returning(values: Array, drawing: Drawing) -> Array:
+def _returning(values: Array, drawing: PathCurve) -> Array:
     """Values at the listed points, the first repeated where the path returns to it."""
     return values if len(values) == len(drawing.given) else np.concatenate([values, values[:1]])
 

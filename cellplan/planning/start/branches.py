@@ -16,8 +16,8 @@ from cellplan.planning.start.given import is_off, part_pose, tool_distance
 from cellplan.planning.start.inverse_kinematics import (
     finite_limits,
     joint_margin_shares,
-    random_postures,
-    reaching_postures,
+    random_configurations,
+    reaching_configurations,
     smallest_singular_values,
     within_limits,
 )
@@ -66,12 +66,12 @@ class StartSearch:
         """Where a tool is to be at the start: on its task, or on its grasp."""
         return relation.X_PT if isinstance(relation, Grasp) else self.toolpaths[relation.name].X_PT_start
 
-    def random_postures(self, robot: Robot, count: int) -> Array:
+    def random_configurations(self, robot: Robot, count: int) -> Array:
         """Configurations of a robot drawn from its own random numbers, shape (count, n)."""
-        return random_postures(robot.model, count, self.random[robot.name])
+        return random_configurations(robot.model, count, self.random[robot.name])
 
 
-def holder_postures(search: StartSearch) -> list[Array | None]:
+def holder_configurations(search: StartSearch) -> list[Array | None]:
     """Configurations of the positioner to try: the given one, those that suit a given operator, or drawn ones."""
     cell = search.cell
     if not cell.positioners:
@@ -79,53 +79,53 @@ def holder_postures(search: StartSearch) -> list[Array | None]:
     holder = cell.robot(cell.positioners[0])
     if holder.start is not None:
         return [holder.start]
-    found = _postures_of_holder(search, holder)
+    found = _configurations_of_holder(search, holder)
     search.failures.reached(holder.name, found, None)
     return list(found)
 
 
-def _postures_of_holder(search: StartSearch, holder: Robot) -> Array:
+def _configurations_of_holder(search: StartSearch, holder: Robot) -> Array:
     """Configurations of a positioner whose start is to be found, best first, shape (K, n)."""
     cell = search.cell
     for relation in cell.relations:
         if relation.robot == holder.name:
-            return _postures_at(search, holder, relation, search.X_PT_start(relation))
+            return _configurations_at(search, holder, relation, search.X_PT_start(relation))
     for relation in cell.relations:
         operator = cell.robot(relation.robot)
         if operator.start is not None and relation.relative_to is Frame.PART:
-            return _postures_meeting(search, relation, operator.start)
-    return _promising_postures(search, holder)
+            return _configurations_meeting(search, relation, operator.start)
+    return _promising_configurations(search, holder)
 
 
-def branches_of(search: StartSearch, robot: Robot, holder_posture: Array | None) -> list[Branch]:
+def branches_of(search: StartSearch, robot: Robot, holder_configuration: Array | None) -> list[Branch]:
     """Configurations of one robot with what they are worth, best first; one entry when there is no choice."""
     cell = search.cell
-    if holder_posture is not None and robot.name == cell.positioners[0]:
-        return [(np.inf, holder_posture)]
+    if holder_configuration is not None and robot.name == cell.positioners[0]:
+        return [(np.inf, holder_configuration)]
     relation = next((each for each in cell.relations if each.robot == robot.name), None)
     if robot.start is not None:
-        is_off = relation is not None and _is_off(search, robot, relation, holder_posture)
+        is_off = relation is not None and _is_off(search, robot, relation, holder_configuration)
         return [] if is_off else [(np.inf, robot.start)]
     if relation is None:
         neutral = np.clip(np.zeros(len(robot.model.joints)), *finite_limits(robot.model))
         neutral = neutral if robot.home is None else robot.home
-        search.failures.reached(robot.name, neutral[None], holder_posture)
+        search.failures.reached(robot.name, neutral[None], holder_configuration)
         return [(np.inf, neutral)]
-    scored = _scored_branches(search, robot, relation, holder_posture)
+    scored = _scored_branches(search, robot, relation, holder_configuration)
     if isinstance(relation, Grasp):
-        return [*_as_stated(search, robot, relation, holder_posture), *scored[:BRANCHES]]
+        return [*_as_stated(search, robot, relation, holder_configuration), *scored[:BRANCHES]]
     if search.is_holder_open:
         return scored[:BRANCHES]
-    return _tried_alone(search, relation, scored[:TRIED_ALONE], holder_posture)[:BRANCHES]
+    return _tried_alone(search, relation, scored[:TRIED_ALONE], holder_configuration)[:BRANCHES]
 
 
-def _is_off(search: StartSearch, robot: Robot, relation: Relation, holder_posture: Array | None) -> bool:
+def _is_off(search: StartSearch, robot: Robot, relation: Relation, holder_configuration: Array | None) -> bool:
     """Whether a given start is off its task or grasp while the positioner, which is searched, holds the part so."""
     if not search.is_holder_open or relation.relative_to is not Frame.PART or robot.start is None:
         return False
     if isinstance(relation, Task) and relation.settle > 0.0:
         return False
-    X_WP = part_pose(search.cell, holder_posture)
+    X_WP = part_pose(search.cell, holder_configuration)
     if X_WP is None:
         return False
     distance = tool_distance(search.chains[robot.name], relation, robot.start, search.X_PT_start(relation), X_WR=X_WP)
@@ -135,46 +135,48 @@ def _is_off(search: StartSearch, robot: Robot, relation: Relation, holder_postur
     return True
 
 
-def _tried_alone(search: StartSearch, task: Task, branches: list[Branch], holder_posture: Array | None) -> list[Branch]:
+def _tried_alone(
+    search: StartSearch, task: Task, branches: list[Branch], holder_configuration: Array | None
+) -> list[Branch]:
     """Branches of an operator by the shares that the motion from each leaves free, best first."""
     if not branches:
         return []
-    shares = np.array([search.trials.judge_alone(task, q, holder_posture) for _, q in branches])
+    shares = np.array([search.trials.judge_alone(task, q, holder_configuration) for _, q in branches])
     order = best_first(np.column_stack([shares, np.array([q for _, q in branches])]))
     return [(float(shares[index, 0]), branches[index][1]) for index in order]
 
 
-def _as_stated(search: StartSearch, robot: Robot, grasp: Grasp, holder_posture: Array | None) -> list[Branch]:
+def _as_stated(search: StartSearch, robot: Robot, grasp: Grasp, holder_configuration: Array | None) -> list[Branch]:
     """Configurations that bring a tool to its grasp just as it is stated, where that leaves components free.
 
     They are worth more than all others: with any other lean a tool may well dig into the part.
     """
-    X_WP = part_pose(search.cell, holder_posture)
+    X_WP = part_pose(search.cell, holder_configuration)
     if len(grasp.axes) == ALL_AXES or X_WP is None:
         return []
     closed = replace(grasp, axes=tuple(range(ALL_AXES)))
-    seeds = search.random_postures(robot, SEEDS_PER_HOLDER if search.is_holder_open else SEEDS)
+    seeds = search.random_configurations(robot, SEEDS_PER_HOLDER if search.is_holder_open else SEEDS)
     chain = search.chains[robot.name]
-    q = within_limits(robot.model, reaching_postures(chain, closed, grasp.X_PT, X_WP=X_WP, seeds=seeds))
+    q = within_limits(robot.model, reaching_configurations(chain, closed, grasp.X_PT, X_WP=X_WP, seeds=seeds))
     margins = np.sort(joint_margin_shares(robot.model, q), axis=1)
     order = best_first(np.column_stack([margins, q]))
     return [(1.0 + float(margins[index, 0]), q[index]) for index in order[:BRANCHES]]
 
 
 def _scored_branches(
-    search: StartSearch, robot: Robot, relation: Relation, holder_posture: Array | None
+    search: StartSearch, robot: Robot, relation: Relation, holder_configuration: Array | None
 ) -> list[Branch]:
     """Configurations that bring a tool to the start of its task or to its grasp, by joint margin times manipulability.
 
     Where two are worth the same, the joints with the next smaller margins decide, and then the configuration itself.
     """
-    X_WP = part_pose(search.cell, holder_posture) if relation.relative_to is Frame.PART else np.eye(4)
+    X_WP = part_pose(search.cell, holder_configuration) if relation.relative_to is Frame.PART else np.eye(4)
     if X_WP is None:
         return []
     X_PT = search.X_PT_start(relation)
     chain = search.chains[robot.name]
-    seeds = search.random_postures(robot, SEEDS_PER_HOLDER if search.is_holder_open else SEEDS)
-    found = reaching_postures(chain, relation, X_PT, X_WP=X_WP, seeds=seeds)
+    seeds = search.random_configurations(robot, SEEDS_PER_HOLDER if search.is_holder_open else SEEDS)
+    found = reaching_configurations(chain, relation, X_PT, X_WP=X_WP, seeds=seeds)
     q = within_limits(robot.model, found)
     if not len(q):
         search.failures.unreached(robot.name, Goal(relation=relation, X_PT=X_PT, X_WP=X_WP), beyond=found)
@@ -182,21 +184,21 @@ def _scored_branches(
     manipulability = np.minimum(1.0, smallest_singular_values(chain, relation, X_PT, q) / COMFORTABLE)
     scores = np.sort(joint_margin_shares(robot.model, q), axis=1) * manipulability[:, None]
     order = best_first(np.column_stack([scores, q]))
-    search.failures.reached(robot.name, q[order], holder_posture)
+    search.failures.reached(robot.name, q[order], holder_configuration)
     return [(float(scores[index, 0]), q[index]) for index in order]
 
 
-def _promising_postures(search: StartSearch, holder: Robot) -> Array:
+def _promising_configurations(search: StartSearch, holder: Robot) -> Array:
     """Configurations of the positioner that hold the part where the tools of operators like to be, best first."""
     cell = search.cell
     lower, upper = finite_limits(holder.model)
     middle = 0.5 * (lower + upper)
-    q = middle + HOLDER_RANGE * (search.random_postures(holder, HOLDER_DRAWS) - middle)
+    q = middle + HOLDER_RANGE * (search.random_configurations(holder, HOLDER_DRAWS) - middle)
     X_WP = search.chains[holder.name].tool_poses(q) @ inverse(cell.part.held_by[0].X_PT)
     awkwardness = np.zeros(len(q))
     for relation in cell.relations:
         operator = cell.robot(relation.robot)
-        usual = search.chains[relation.robot].tool_poses(search.random_postures(operator, HOLDER_DRAWS))
+        usual = search.chains[relation.robot].tool_poses(search.random_configurations(operator, HOLDER_DRAWS))
         goal = (X_WP if relation.relative_to is Frame.PART else np.eye(4)) @ search.X_PT_start(relation)
         base = operator.X_WB[:3, 3]
         awkwardness = np.maximum(awkwardness, _awkwardness(goal, usual, base))
@@ -219,19 +221,19 @@ def _awkwardness(goal: Array, usual: Array, base: Array) -> Array:
     return measure
 
 
-def _postures_meeting(search: StartSearch, relation: Relation, operator_start: Array) -> Array:
+def _configurations_meeting(search: StartSearch, relation: Relation, operator_start: Array) -> Array:
     """Configurations of the positioner that bring the start of a task, or a grasp, to a tool that stands."""
     cell, chains = search.cell, search.chains
     holder = cell.robot(cell.positioners[0])
     X_WT = chains[relation.robot].tool_poses(operator_start[None])[0]
     X_W_holder = X_WT @ inverse(search.X_PT_start(relation)) @ cell.part.held_by[0].X_PT
-    return _postures_at(search, holder, cell.part.held_by[0], X_W_holder)
+    return _configurations_at(search, holder, cell.part.held_by[0], X_W_holder)
 
 
-def _postures_at(search: StartSearch, holder: Robot, relation: Relation, X_W_holder: Array) -> Array:
+def _configurations_at(search: StartSearch, holder: Robot, relation: Relation, X_W_holder: Array) -> Array:
     """Configurations of the positioner that bring its tool to a place in the world, those with most margin first."""
-    seeds = search.random_postures(holder, SEEDS)
-    found = reaching_postures(search.chains[holder.name], relation, X_W_holder, X_WP=np.eye(4), seeds=seeds)
+    seeds = search.random_configurations(holder, SEEDS)
+    found = reaching_configurations(search.chains[holder.name], relation, X_W_holder, X_WP=np.eye(4), seeds=seeds)
     inside = within_limits(holder.model, found)
     if not len(inside):
         goal = Goal(relation=relation, X_PT=X_W_holder, X_WP=np.eye(4))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.seeds import generator
-from cellplan.planning.start.inverse_kinematics import finite_limits, random_postures
+from cellplan.planning.start.inverse_kinematics import finite_limits, random_configurations
 from cellplan.planning.start.trial_motion import StartTrials
 from cellplan.scene.bodies import Kind, SceneBody
 
@@ -57,8 +57,8 @@ def contacts_of(
     """
     among = _own_pairs(trials, cell, robot)
     counts: Counter[tuple[str, str]] = Counter()
-    for q, holder_posture in tried:
-        counts.update(trials.contacts(_placed(cell, robot, q, holder_posture), among=among))
+    for q, holder_configuration in tried:
+        counts.update(trials.contacts(_placed(cell, robot, q, holder_configuration), among=among))
     bodies = {body.name: body for body in trials.bodies}
     found = [
         Contact(robot=robot.name, bodies=_own_first(robot, bodies, pair), count=count, of=len(tried))
@@ -67,13 +67,13 @@ def contacts_of(
     return sorted(found, key=lambda each: (-each.count, [body.name for body in each.bodies]))
 
 
-def touches_anywhere(trials: StartTrials, cell: Cell, contact: Contact, holder_posture: Array | None) -> bool:
+def touches_anywhere(trials: StartTrials, cell: Cell, contact: Contact, holder_configuration: Array | None) -> bool:
     """Whether two bodies touch at configurations from the whole range of their robot's joints as well."""
     robot = cell.robot(contact.robot)
     names = {body.name for body in contact.bodies}
     among = _own_pairs(trials, cell, robot) & np.array([set(pair) == names for pair in trials.pair_names], dtype=bool)
-    drawn = random_postures(robot.model, ANYWHERE, generator(f"{robot.name} anywhere", cell.solver.seed))
-    return all(trials.contacts(_placed(cell, robot, q, holder_posture), among=among) for q in drawn)
+    drawn = random_configurations(robot.model, ANYWHERE, generator(f"{robot.name} anywhere", cell.solver.seed))
+    return all(trials.contacts(_placed(cell, robot, q, holder_configuration), among=among) for q in drawn)
 
 
 def contacts_between(trials: StartTrials, tried: Sequence[Array]) -> list[tuple[tuple[str, str], int]]:
@@ -101,13 +101,13 @@ def _own_pairs(trials: StartTrials, cell: Cell, robot: Robot) -> Flags:
     return among
 
 
-def _placed(cell: Cell, robot: Robot, q: Array, holder_posture: Array | None) -> Array:
-    """The whole cell with one robot and the positioner where they are wanted, shape (nq,)."""
+def _placed(cell: Cell, robot: Robot, q: Array, holder_configuration: Array | None) -> Array:
+    """The whole cell with one robot and the positioner where they are desired, shape (nq,)."""
     whole = np.concatenate(
         [each.start if each.start is not None else np.clip(0.0, *finite_limits(each.model)) for each in cell.robots]
     )
-    if holder_posture is not None:
-        whole[cell.columns(cell.positioners[0])] = holder_posture
+    if holder_configuration is not None:
+        whole[cell.columns(cell.positioners[0])] = holder_configuration
     whole[cell.columns(robot.name)] = q
     return whole
 

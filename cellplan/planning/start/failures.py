@@ -14,7 +14,7 @@ MOST_GOALS: Final = 6  # goals of a robot that are looked at again
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Goal:
-    """Where a tool was wanted: a task or grasp, the wanted tip, and the frame that it is given in, in the world."""
+    """Where a tool was desired: a task or grasp, the desired tip, and the frame that it is given in, in the world."""
 
     relation: Relation
     X_PT: Array
@@ -41,10 +41,10 @@ class Failures:
     off: dict[str, tuple[float, float]] = field(default_factory=dict)
     touching: list[Array] = field(default_factory=list)
 
-    def reached(self, robot: str, q: Array, holder_posture: Array | None) -> None:
+    def reached(self, robot: str, q: Array, holder_configuration: Array | None) -> None:
         """Keep configurations of a robot, shape (K, n), that reach its goal with the positioner at one of its own."""
         kept = self.arrived.setdefault(robot, [])
-        kept += [(each, holder_posture) for each in q[: MOST_KEPT - len(kept)]]
+        kept += [(each, holder_configuration) for each in q[: MOST_KEPT - len(kept)]]
 
     def unreached(self, robot: str, goal: Goal, *, beyond: Array) -> None:
         """Keep a goal that a robot does not reach, and configurations that do outside its limits, shape (K, n)."""

@@ -52,18 +52,18 @@ def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
         StartOffTaskError: A tool does not start on its task.
         InvalidFileError: More than one of these.
     """
-    complaints: list[InputError] = [complaint for robot in cell.robots for complaint in _outside(cell, robot)]
-    if not complaints:
-        complaints += [complaint for grasp in cell.closures for complaint in _off_grasp(cell, grasp)]
-        complaints += [complaint for task in cell.tasks for complaint in _off_task(cell, task, toolpaths[task.name])]
-    if len(complaints) == 1:
-        raise complaints[0]
-    if complaints:
-        raise InvalidFileError(complaints)
+    findings: list[InputError] = [finding for robot in cell.robots for finding in _outside(cell, robot)]
+    if not findings:
+        findings += [finding for grasp in cell.closures for finding in _off_grasp(cell, grasp)]
+        findings += [finding for task in cell.tasks for finding in _off_task(cell, task, toolpaths[task.name])]
+    if len(findings) == 1:
+        raise findings[0]
+    if findings:
+        raise InvalidFileError(findings)
 
 
 def part_pose(cell: Cell, holder_start: Array | None) -> Array | None:
-    """The part at the start; None while its holder's posture is still to be found."""
+    """The part at the start; None while its holder's configuration is still to be found."""
     if not cell.part.held_by:
         return cell.part.X_WP
     if holder_start is None:
@@ -75,25 +75,25 @@ def part_pose(cell: Cell, holder_start: Array | None) -> Array | None:
 
 
 def tool_distance(
-    chain: ScrewChain, relation: Relation, q: Array, X_PT_wanted: Array, *, X_WR: Array
+    chain: ScrewChain, relation: Relation, q: Array, X_PT_desired: Array, *, X_WR: Array
 ) -> tuple[float, float]:
-    """How far a configuration, shape (n,), puts a tool from where it is wanted, in [m] and [rad].
+    """How far a configuration, shape (n,), puts a tool from where it is desired, in [m] and [rad].
 
     Args:
         chain: The robot.
         relation: The task or grasp, which says which components of the pose count.
         q: The configuration.
-        X_PT_wanted: Wanted tool tip, shape (4, 4), in the frame that the relation refers to.
+        X_PT_desired: Reference tool tip, shape (4, 4), in the frame that the relation refers to.
         X_WR: That frame in the world, shape (4, 4).
     """
-    X_PT, wanted = inverse(X_WR) @ chain.tool_poses(q[None]), X_PT_wanted[None]
-    rows = constraint_rows(relation, wanted)[0]
-    error = rows.T @ (rows @ pose_errors(wanted, X_PT, [relation.is_spin_free])[0])
+    X_PT, desired = inverse(X_WR) @ chain.tool_poses(q[None]), X_PT_desired[None]
+    rows = constraint_rows(relation, desired)[0]
+    error = rows.T @ (rows @ pose_errors(desired, X_PT, [relation.is_spin_free])[0])
     return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
 
 
 def is_off(cell: Cell, relation: Relation, off: tuple[float, float]) -> bool:
-    """Whether a tool is farther, in [m] or [rad], from where it is wanted at the start than is allowed."""
+    """Whether a tool is farther, in [m] or [rad], from where it is desired at the start than is allowed."""
     position, orientation = _allowed(cell, relation)
     return off[0] > position or off[1] > orientation
 
@@ -105,7 +105,7 @@ def off_words(cell: Cell, relation: Relation, off: tuple[float, float], *, at_be
         cell: The cell.
         relation: The task or grasp.
         off: Distance and angle.
-        at_best: Words before them where they are the smallest of several.
+        at_best: Label before them where they are the smallest of several.
     """
     goal = f"the start of task '{relation.name}'"
     if isinstance(relation, Grasp):
@@ -126,7 +126,7 @@ def _allowed(cell: Cell, relation: Relation) -> tuple[float, float]:
 
 
 def _outside(cell: Cell, robot: Robot) -> list[InputError]:
-    """One complaint for each joint that is outside its limits at the start or at home."""
+    """One finding for each joint that is outside its limits at the start or at home."""
     found: list[InputError] = [
         StartOutsideLimitsError(f"{start_place(cell, robot)}: joint '{joint.name}' starts at {words}")
         for joint, words in _outside_limits(robot, robot.start)
@@ -148,7 +148,7 @@ def _outside_limits(robot: Robot, q: Array | None) -> Iterator[tuple[Joint, str]
 
 
 def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
-    """A complaint when a given start does not put the tool on the start of its task, within the task's tolerance.
+    """A finding when a given start does not put the tool on the start of its task, within the task's tolerance.
 
     A task that gives its tool time to settle may start beside its path.
     """
@@ -159,15 +159,15 @@ def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
 
 
 def _off_grasp(cell: Cell, grasp: Grasp) -> list[InputError]:
-    """A complaint when a given start does not put a further holder's tool on its grasp, within the allowed closure."""
+    """A finding when a given start does not put a further holder's tool on its grasp, within the allowed closure."""
     off = _distance(cell, grasp, grasp.X_PT)
     if off is None or not is_off(cell, grasp, off):
         return []
     return [StartOffGraspError(off_words(cell, grasp, off))]
 
 
-def _distance(cell: Cell, task: Relation, X_PT_wanted: Array) -> tuple[float, float] | None:
-    """How far a given start puts a tool from where it is wanted, in [m] and [rad]; None while a start is missing."""
+def _distance(cell: Cell, task: Relation, X_PT_desired: Array) -> tuple[float, float] | None:
+    """How far a given start puts a tool from where it is desired, in [m] and [rad]; None while a start is missing."""
     robot = cell.robot(task.robot)
     X_WR = np.eye(4)
     if task.relative_to is Frame.PART:
@@ -178,7 +178,7 @@ def _distance(cell: Cell, task: Relation, X_PT_wanted: Array) -> tuple[float, fl
         X_WR = at_start
     if robot.start is None:
         return None
-    return tool_distance(ScrewChain(robot), task, robot.start, X_PT_wanted, X_WR=X_WR)
+    return tool_distance(ScrewChain(robot), task, robot.start, X_PT_desired, X_WR=X_WR)
 
 
 def _shown(joint: Joint, position: float) -> str:

@@ -1,4 +1,4 @@
-"""All postures that bring one operator's tool to one place on the part, by multi-start."""
+"""All configurations that bring one operator's tool to one place on the part, by multi-start."""
 
 from typing import Final
 
@@ -10,16 +10,16 @@ from cellplan.model.cell import Relation
 from cellplan.model.robot import RobotModel
 from cellplan.planning.tracking.cooperation_jacobian import constraint_rows, pose_errors
 
-CLOSED: Final = 1e-12  # [m, rad] a posture counts as found when the tool is this near its goal: rounding is 1e-15
+CLOSED: Final = 1e-12  # [m, rad] a configuration counts as found when the tool is this near its goal: rounding is 1e-15
 SAME_POSTURE: Final = 1e-3  # [rad, m] solutions nearer to each other are one branch
 LONGEST_MOVE: Final = 0.4  # [rad, m] largest change of a joint in one iteration: farther, the linear model is wrong
-DAMPING: Final = 1e-3  # keeps iterations finite at singular postures; small enough to converge to CLOSED
+DAMPING: Final = 1e-3  # keeps iterations finite at singular configurations; small enough to converge to CLOSED
 ITERATIONS: Final = 50  # most starts that arrive at all do so in 15 to 25
 TRIAL: Final = 25  # iterations after which starts that are still far away are given up
 FAR: Final = 1e-2  # [m, rad] far away: convergence is quadratic well inside this
 
 
-def random_postures(model: RobotModel, count: int, rng: np.random.Generator) -> Array:
+def random_configurations(model: RobotModel, count: int, rng: np.random.Generator) -> Array:
     """Postures drawn evenly within the joint limits (one turn for endless joints), shape (count, n)."""
     lower, upper = finite_limits(model)
     return rng.uniform(lower, upper, (count, len(lower)))
@@ -31,20 +31,20 @@ def finite_limits(model: RobotModel) -> tuple[Array, Array]:
     return np.where(endless, -np.pi, model.lower), np.where(endless, np.pi, model.upper)
 
 
-def reaching_postures(chain: ScrewChain, task: Relation, X_PT: Array, *, X_WP: Array, seeds: Array) -> Array:
+def reaching_configurations(chain: ScrewChain, task: Relation, X_PT: Array, *, X_WP: Array, seeds: Array) -> Array:
     """Run damped Newton iterations from all seeds at once and keep what arrives.
 
-    Joint limits are not looked at here: a posture out of limits may have an equal one a turn away.
+    Joint limits are not looked at here: a configuration out of limits may have an equal one a turn away.
 
     Args:
         chain: The operator.
         task: The task or grasp, which says which components of the pose count.
-        X_PT: Wanted tool tip in P, shape (4, 4).
+        X_PT: Reference tool tip in P, shape (4, 4).
         X_WP: The part, shape (4, 4).
-        seeds: Postures to start from, shape (B, n).
+        seeds: Configurations to start from, shape (B, n).
 
     Returns:
-        Postures with the tool within ``CLOSED`` of the goal, shape (K, n).
+        Configurations with the tool within ``CLOSED`` of the goal, shape (K, n).
     """
     rows = constraint_rows(task, X_PT[None])[0]
     R_PW = X_WP[:3, :3].T
@@ -74,7 +74,7 @@ def _damped_move(J: Array, error: Array) -> Array:
 
 
 def within_limits(model: RobotModel, q: Array) -> Array:
-    """Turn joints by whole turns as near to mid-range as they go and drop postures out of limits, shape (K, n)."""
+    """Turn joints by whole turns nearest to mid-range and drop configurations out of limits, shape (K, n)."""
     lower, upper = finite_limits(model)
     q = on_nearest_turns(model, q)
     inside = q[np.all((q >= lower) & (q <= upper), axis=1)]
@@ -104,7 +104,7 @@ def joint_margin_shares(model: RobotModel, q: Array) -> Array:
 
 
 def smallest_singular_values(chain: ScrewChain, task: Relation, X_PT: Array, q: Array) -> Array:
-    """Smallest singular value of the operator's constrained Jacobian at each posture, shape (K,)."""
+    """Smallest singular value of the operator's constrained Jacobian at each configuration, shape (K,)."""
     X_WT = chain.tool_poses(q)
     R_PW = X_PT[:3, :3] @ np.swapaxes(X_WT[:, :3, :3], 1, 2)
     rows = constraint_rows(task, X_PT[None])[0]
@@ -121,9 +121,9 @@ def tip_jacobian(screws_W: Array, p_WT: Array, R_PW: Array) -> Array:
 
 
 def _distinct(q: Array) -> Array:
-    """One posture of each branch, in the order they were found."""
+    """One configuration of each branch, in the order they were found."""
     kept: list[Array] = []
-    for posture in q:
-        if all(np.abs(posture - other).max() > SAME_POSTURE for other in kept):
-            kept.append(posture)
+    for configuration in q:
+        if all(np.abs(configuration - other).max() > SAME_POSTURE for other in kept):
+            kept.append(configuration)
     return np.array(kept).reshape(len(kept), q.shape[1])

@@ -32,7 +32,7 @@ def nearest_reach(
     Args:
         robot: The robot.
         relation: The task or grasp, which says which components of the pose count.
-        X_PT: Wanted tool tip in P, shape (4, 4).
+        X_PT: Reference tool tip in P, shape (4, 4).
         X_WP: The part, shape (4, 4).
         seeds: Configurations to start from, shape (B, n).
         tip_only: Whether the direction of the tool is left aside.
@@ -62,7 +62,7 @@ def nearest_reach(
 def _error_and_jacobian(
     chain: ScrewChain, relation: Relation, q: Array, X_PT: Array, *, X_WP: Array, rows: Array
 ) -> tuple[Array, Array]:
-    """Wanted minus actual, shape (B, m), and the Jacobian of the actual, shape (B, m, n)."""
+    """Reference minus actual, shape (B, m), and the Jacobian of the actual, shape (B, m, n)."""
     X_WT, screws_W = chain.tool_motion(q)
     goals = np.broadcast_to(X_PT, (len(q), 4, 4))
     error = pose_errors(goals, inverse(X_WP) @ X_WT, [relation.is_spin_free] * len(q)) @ rows.T

@@ -12,7 +12,7 @@ from cellplan.model.seeds import generator
 from cellplan.planning.start.branches import SEEDS, SEEDS_PER_HOLDER, StartSearch
 from cellplan.planning.start.contacts import Contact, contacts_between, contacts_of, touches_anywhere
 from cellplan.planning.start.given import off_words, start_place
-from cellplan.planning.start.inverse_kinematics import on_nearest_turns, random_postures
+from cellplan.planning.start.inverse_kinematics import on_nearest_turns, random_configurations
 from cellplan.planning.start.nearest_reach import nearest_reach
 from cellplan.scene.bodies import Kind
 
@@ -75,8 +75,8 @@ def _unavoidable_words(search: StartSearch, contact: Contact, *others: Contact) 
 
 def _is_everywhere(search: StartSearch, contact: Contact) -> bool:
     """Whether a contact is there wherever its robot is."""
-    holder_posture = search.failures.arrived[contact.robot][0][1]
-    return touches_anywhere(search.trials, search.cell, contact, holder_posture)
+    holder_configuration = search.failures.arrived[contact.robot][0][1]
+    return touches_anywhere(search.trials, search.cell, contact, holder_configuration)
 
 
 def _cure(contact: Contact) -> str:
@@ -117,7 +117,7 @@ def _arrives(search: StartSearch, name: str) -> str:
 
 
 def _unreached_words(search: StartSearch, holder_count: int) -> str:
-    """What to say of a robot that does not come to where it is wanted."""
+    """What to say of a robot that does not come to where it is desired."""
     cell, failures = search.cell, search.failures
     usual = (*cell.positioners, cell.robots[0].name)[0]
     name = max(sorted(failures.misses), key=lambda robot: failures.misses[robot], default=usual)
@@ -128,15 +128,15 @@ def _unreached_words(search: StartSearch, holder_count: int) -> str:
     tried = f"{SEEDS} attempts of the inverse kinematics"
     if search.is_holder_open and name not in cell.positioners[:1]:
         tried = f"{holder_count} configuration(s) of the positioner, {SEEDS_PER_HOLDER} attempts for each"
-    wanted = f"the tool of '{name}' to {_goal_words(search, name)}"
+    desired = f"the tool of '{name}' to {_goal_words(search, name)}"
     return (
-        f"{start_place(cell, robot)}: no configuration within the joint limits brings {wanted} ({tried}): "
+        f"{start_place(cell, robot)}: no configuration within the joint limits brings {desired} ({tried}): "
         f"{_shortfall(search, robot)}"
     )
 
 
 def _goal_words(search: StartSearch, name: str) -> str:
-    """Where a robot's tool is wanted at the start."""
+    """Where a robot's tool is desired at the start."""
     relation = next((each for each in search.cell.relations if each.robot == name), None)
     if relation is None:
         return "where the part meets the robots that stand"
@@ -144,11 +144,11 @@ def _goal_words(search: StartSearch, name: str) -> str:
 
 
 def _shortfall(search: StartSearch, robot: Robot) -> str:
-    """By how much a robot fails to come where it is wanted, and the cure."""
+    """By how much a robot fails to come where it is desired, and the cure."""
     goals = search.failures.missed.get(robot.name, [])
     if not goals:
         return "move its base or change its tool"
-    seeds = random_postures(robot.model, SEEDS, generator(f"{robot.name} nearest", search.cell.solver.seed))
+    seeds = random_configurations(robot.model, SEEDS, generator(f"{robot.name} nearest", search.cell.solver.seed))
     left = [
         nearest_reach(robot, goal.relation, goal.X_PT, X_WP=goal.X_WP, seeds=seeds, tip_only=True) for goal in goals
     ]

@@ -14,7 +14,7 @@ from cellplan.model.name_order import NameOrder
 from cellplan.model.progress import Progress, silent
 from cellplan.model.seeds import generator
 from cellplan.model.toolpath import Toolpath
-from cellplan.planning.start.branches import Branch, StartSearch, branches_of, holder_postures
+from cellplan.planning.start.branches import Branch, StartSearch, branches_of, holder_configurations
 from cellplan.planning.start.combinations import Picks, best_combinations
 from cellplan.planning.start.failures import Failures
 from cellplan.planning.start.near_ties import best_first, levels
@@ -121,24 +121,24 @@ def _candidates(search: StartSearch, progress: Progress) -> Iterator[Array]:
     Raises:
         StartNotFoundError: There is none.
     """
-    postures = holder_postures(search)
+    configurations = holder_configurations(search)
     found = 0
-    for index, posture in enumerate(postures):
-        progress("searching start configurations", index / len(postures))
-        room = CANDIDATES * ROUNDS if len(postures) == 1 else COMBINATIONS_PER_HOLDER
-        for candidate in islice(_combinations(search, posture), room):
+    for index, configuration in enumerate(configurations):
+        progress("searching start configurations", index / len(configurations))
+        room = CANDIDATES * ROUNDS if len(configurations) == 1 else COMBINATIONS_PER_HOLDER
+        for candidate in islice(_combinations(search, configuration), room):
             found += 1
             yield candidate
     if not found:
-        raise StartNotFoundError(why_nothing(search, len(postures)))
+        raise StartNotFoundError(why_nothing(search, len(configurations)))
 
 
-def _combinations(search: StartSearch, holder_posture: Array | None) -> Iterator[Array]:
+def _combinations(search: StartSearch, holder_configuration: Array | None) -> Iterator[Array]:
     """Configurations of the whole cell for one of the positioner, best first, that touch nothing."""
     cell = search.cell
     choices: list[list[Branch]] = []
     for robot in cell.robots:
-        branches = branches_of(search, robot, holder_posture)
+        branches = branches_of(search, robot, holder_configuration)
         if not branches:
             return
         choices.append(branches)

@@ -25,12 +25,12 @@ from cellplan.planning.timing.schedule import schedule_tasks, time_tasks
 from cellplan.scene.mounting import Mount
 from cellplan.scene.scene import Scene
 
-SAMPLES: Final = 160  # instants of the coarse motion that a posture is judged by
+SAMPLES: Final = 160  # instants of the coarse motion that a configuration is judged by
 GAIN: Final = 0.5  # feedback gain times step of the coarse motion
 TOUCH_INSTANTS: Final = 12  # instants of the coarse motion that are looked at for collisions
-TRIED_WITH: Final = "weighted_pseudo_inverse"  # fast, and it shows how far a posture would go beyond its limits
+TRIED_WITH: Final = "weighted_pseudo_inverse"  # fast, and it shows how far a configuration would go beyond its limits
 CLOSE_ENOUGH: Final = 1e-4  # [m] and [rad] tool error of the closer look: it is about joints
-MOST_BREAKS: Final = 500  # of the wanted motion up to which a closer look costs some tenths of a second
+MOST_BREAKS: Final = 500  # of the desired motion up to which a closer look costs some tenths of a second
 LOST: Final = -1e6  # stands for the share that a motion leaves free which loses its path
 
 
@@ -167,16 +167,16 @@ class StartTrials:
             for k, trial in enumerate(trials)
         ]
 
-    def judge_alone(self, task: Task, posture: Array, holder_posture: Array | None) -> Array:
+    def judge_alone(self, task: Task, configuration: Array, holder_configuration: Array | None) -> Array:
         """Shares that one operator's configuration leaves free if its task were the only one, the worst first.
 
         Of the other robots only the first holder moves. Collisions and the other holders are not looked at.
         """
         cell = self._cell_alone(task.robot)
         start = np.concatenate([np.clip(0.0, *finite_limits(robot.model)) for robot in cell.robots])
-        start[cell.columns(task.robot)] = posture
+        start[cell.columns(task.robot)] = configuration
         for name in cell.positioners[:1]:
-            start[cell.columns(name)] = holder_posture
+            start[cell.columns(name)] = holder_configuration
         movers = () if cell.motion.mode is Mode.PART_AT_REST else cell.positioners
         is_together = cell.motion.mode is Mode.SIMULTANEOUS
         tasks = tuple(
@@ -238,7 +238,7 @@ def _first_cycle(task: Task, clock: float | None) -> Task:
 
 
 def _open_pairs(scene: Scene) -> NDArray[np.bool_]:
-    """Pairs of bodies that a choice of the search moves; what given postures make collide is for the report to say."""
+    """Pairs of bodies that a choice of the search moves; collisions of given configurations are left to the report."""
     given = {None, *(robot.name for robot in scene.cell.robots if robot.start is not None)}
     bodies = scene.bodies
     is_open = [not {bodies[pair.first].robot, bodies[pair.second].robot} <= given for pair in scene.pairs]
@@ -248,7 +248,7 @@ def _open_pairs(scene: Scene) -> NDArray[np.bool_]:
 def _whole_turns(cell: Cell, q: Array) -> Array:
     """Whole turns in [rad] that bring the motion of each joint nearest to mid-range; none where the start is given.
 
-    A posture does not show on which turn its joints are, and a wrist may need a whole turn of room on one side.
+    A configuration does not show on which turn its joints are, and a wrist may need a whole turn of room on one side.
     """
     turns = np.zeros(q.shape[1])
     for robot in cell.robots:

@@ -18,8 +18,8 @@ def stand_off(times: Array, task: Task, X_PT: Array, *, V_PT_P: Array, end: floa
     Args:
         times: Instants in [s], shape (N,).
         task: The task.
-        X_PT: Wanted poses, held still before the start and after the end of the path, shape (N, 4, 4).
-        V_PT_P: Wanted twists, zero there, shape (N, 6).
+        X_PT: Reference poses, held still before the start and after the end of the path, shape (N, 4, 4).
+        V_PT_P: Reference twists, zero there, shape (N, 6).
         end: End of the path in [s].
     """
     if task.approach is not None:

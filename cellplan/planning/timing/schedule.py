@@ -127,7 +127,7 @@ def _rounded_up(seconds: float) -> float:
 
 
 def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
-    """Wanted pose and twist of one tool at each instant; at a corner the later side counts, and the rest at the end."""
+    """Reference pose and twist of one tool at each sample; at a corner the later side counts, at the end the rest."""
     task, corners = path.task, path.corners
     X_PT, V_PT_P, travelled = path.targets(times, path.stretches(times + INSTANT_ROOM))
     corners = corners[[0, -1]] if isinstance(path.toolpath, Trajectory) else corners

@@ -33,7 +33,7 @@ class ClockedPath:
             start and stop of the time law. The cycles of a trajectory are its stretches.
         behind: Length in [m] behind each stop of one cycle, shape (pieces + 1,).
         quick: Way from lengths to parameters of the path for a few instants at a time.
-        where: Place of the path in the cell file, for complaints.
+        where: Place of the path in the cell file, for findings.
     """
 
     task: Task
@@ -60,7 +60,7 @@ class ClockedPath:
 
     @property
     def breaks(self) -> Array:
-        """Instants in [s], increasing, at which the wanted pose or one of its derivatives may jump, shape (B,).
+        """Instants in [s], increasing, at which the desired pose or one of its derivatives may jump, shape (B,).
 
         These are the ends of an approach, of the stretches, of the cycles, of the ramps of a trapezoid and of a
         retreat, and all knots of the tip's curve and of the orientation. Between two neighbours the motion is
@@ -90,7 +90,7 @@ class ClockedPath:
         return distinct(np.concatenate(found))
 
     def at(self, times: Array, within: Interval) -> tuple[Array, Array]:
-        """Wanted poses and twists at instants of a smooth stretch of time, its ends seen from inside.
+        """Reference poses and twists at instants of a smooth stretch of time, its ends seen from inside.
 
         Args:
             times: Instants in [s], shape (N,).
@@ -222,7 +222,7 @@ class TimedTasks:
         return self._within([path.jumps for path in self.paths])
 
     def poses(self, times: Array) -> tuple[Array, ...]:
-        """Wanted poses X_PT of all tasks at instants in [s], shape (M,), shape (M, 4, 4) each."""
+        """Reference poses X_PT of all tasks at instants in [s], shape (M,), shape (M, 4, 4) each."""
         found = []
         for path in self.paths:
             X_PT, V_PT_P, _ = path.targets(times, path.stretches(times + INSTANT_ROOM))

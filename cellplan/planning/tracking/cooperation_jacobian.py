@@ -70,9 +70,9 @@ def cooperation_jacobian(state: CellState, p_WT: Array, signs: Array, *, X_WR: A
 
 
 def constraint_rows(task: Relation, X_PT: Array) -> Array:
-    """Rows that pick what a task constrains from a relative twist, shape (N, m, 6) for N wanted poses.
+    """Rows that pick what a task constrains from a relative twist, shape (N, m, 6) for N desired poses.
 
-    Components named by ``axes`` are taken in P. With free spin the two rotations across the wanted tool axis are
+    Components named by ``axes`` are taken in P. With free spin the two rotations across the desired tool axis are
     taken instead of the three about the axes of P.
     """
     rows = np.broadcast_to(np.eye(6)[list(task.axes)], (len(X_PT), len(task.axes), 6)).copy()
@@ -84,13 +84,13 @@ def constraint_rows(task: Relation, X_PT: Array) -> Array:
     return np.concatenate([linear, across], axis=1)
 
 
-def pose_errors(X_PT_wanted: Array, X_PT: Array, is_spin_free: Sequence[bool]) -> Array:
-    """Errors of tool poses on the part, in P: wanted minus actual position, then rotation vector of ``R_d R^T``.
+def pose_errors(X_PT_desired: Array, X_PT: Array, is_spin_free: Sequence[bool]) -> Array:
+    """Errors of tool poses on the part, in P: desired minus actual position, then rotation vector of ``R_d R^T``.
 
-    With free spin the rotation is the smallest one that lays the tool axis on the wanted one.
+    With free spin the rotation is the smallest one that lays the tool axis on the desired one.
 
     Args:
-        X_PT_wanted: Wanted poses, one per task, shape (n, 4, 4).
+        X_PT_desired: Reference poses, one per task, shape (n, 4, 4).
         X_PT: Actual poses, shape (n, 4, 4).
         is_spin_free: Whether rotation about the tool axis is left open, per task.
 
@@ -98,22 +98,22 @@ def pose_errors(X_PT_wanted: Array, X_PT: Array, is_spin_free: Sequence[bool]) -
         Errors in [m] and [rad], shape (n, 6).
     """
     errors = np.empty((len(X_PT), 6))
-    errors[:, :3] = X_PT_wanted[:, :3, 3] - X_PT[:, :3, 3]
-    errors[:, 3:] = rotation_vector(X_PT_wanted[:, :3, :3] @ np.swapaxes(X_PT[:, :3, :3], 1, 2))
+    errors[:, :3] = X_PT_desired[:, :3, 3] - X_PT[:, :3, 3]
+    errors[:, 3:] = rotation_vector(X_PT_desired[:, :3, :3] @ np.swapaxes(X_PT[:, :3, :3], 1, 2))
     free = np.asarray(is_spin_free)
     if free.any():
-        errors[free, 3:] = _tilts(X_PT[free, :3, 2], X_PT_wanted[free, :3, 2])
+        errors[free, 3:] = _tilts(X_PT[free, :3, 2], X_PT_desired[free, :3, 2])
     return errors
 
 
-def _tilts(z: Array, z_wanted: Array) -> Array:
-    """Smallest rotation vectors that turn unit vectors ``z`` onto ``z_wanted``, shape (n, 3).
+def _tilts(z: Array, z_desired: Array) -> Array:
+    """Smallest rotation vectors that turn unit vectors ``z`` onto ``z_desired``, shape (n, 3).
 
     Opposite vectors are a half turn apart about any axis across them.
     """
-    across = np.cross(z, z_wanted)
+    across = np.cross(z, z_desired)
     sine = np.linalg.norm(across, axis=1, keepdims=True)
-    cosine = np.sum(z * z_wanted, axis=1, keepdims=True)
+    cosine = np.sum(z * z_desired, axis=1, keepdims=True)
     angle = np.arctan2(sine, cosine)
     tilts: Array = across * np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 1.0)
     opposite = ((sine == 0.0) & (cosine < 0.0))[:, 0]

@@ -16,7 +16,7 @@ HEADING_DAMPING: Final = 1e-4  # squared damping factor of the motion that tells
 
 
 class JointWeights:
-    """The diagonal of W along the motion; it depends on instant and posture only, not on what went before."""
+    """The diagonal of W along the motion; it depends on instant and configuration only, not on what went before."""
 
     def __init__(self, cell: Cell, model: CombinedModel) -> None:
         """Take the constant weights, the limits and the masses of all robots."""
@@ -33,7 +33,7 @@ class JointWeights:
         self._varies = self._near_limits > 0.0 or self._load > 0.0
 
     def at(self, state: CellState, q: Array, *, J: Array, xdot: Array, secondary: Array | None) -> Array:
-        r"""Weights at one instant and posture.
+        r"""Weights at one instant and configuration.
 
         .. math:: w_i = w_{0i} \left(1 + a \left|\partial H / \partial q_i\right|\right) \left(1 + b \, g_i\right)
 
@@ -41,10 +41,10 @@ class JointWeights:
         weights, and the load of gravity. A joint that turns round changes its weight gradually.
 
         Args:
-            state: Kinematics at the posture.
+            state: Kinematics at the configuration.
             q: Stacked joint vector, shape (nq,).
             J: Task rows, shape (m, nq).
-            xdot: Wanted twist components with error feedback, shape (m,).
+            xdot: Reference twist components with error feedback, shape (m,).
             secondary: Joint speeds that the secondary goals ask for, shape (nq,); None when there are none.
 
         Returns:
@@ -57,7 +57,7 @@ class JointWeights:
             inverse = WeightedInverse(J, self._constant)
             heading = inverse.speeds(xdot, HEADING_DAMPING)
             if secondary is not None:
-                heading += inverse.unnoticed(secondary)
+                heading += inverse.null_space_projection(secondary)
             slope = limit_slope(q, self._lower, self._upper)
             towards = np.clip(np.sign(slope) * heading / self._turning, 0.0, 1.0)
             factors *= 1.0 + self._near_limits * np.abs(slope) * towards

@@ -1,4 +1,4 @@
-"""Manipulability of the tasks: how far the joints are from a posture in which some tool motion is lost."""
+"""Manipulability of the tasks: how far the joints are from a configuration in which some tool motion is lost."""
 
 from collections.abc import Sequence
 

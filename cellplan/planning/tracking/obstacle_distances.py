@@ -1,4 +1,4 @@
-"""Pairs of bodies that are near each other at one posture, and how their distances change with the joints."""
+"""Pairs of bodies that are near each other at one configuration, and how their distances change with the joints."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -39,7 +39,7 @@ class ClosestPair:
 
 
 class ClosestPairs:
-    """What is near what in one scene, posture by posture.
+    """What is near what in one scene, configuration by configuration.
 
     Looked at are pairs that must keep the demanded clearance. Pairs whose distance is a matter of design, and tools at
     work on the part, are left out. Bounding spheres and boxes clear what is far away; only what is left is measured.

@@ -27,17 +27,19 @@ from cellplan.planning.tracking.targets import targets
 
 Drift = Callable[[int, Array], Array]
 
-LOST_DISTANCE: Final = 0.5  # [m] a tool this far from its path has left it for good: the posture means nothing any more
+LOST_DISTANCE: Final = (
+    0.5  # [m] a tool this far from its path has left it for good: the configuration means nothing any more
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstOrder:
-    """All tasks at one instant and posture, to first order; only the components that they constrain.
+    """All tasks at one instant and configuration, to first order; only the components that they constrain.
 
     Attributes:
         J: Rows of the cooperation Jacobian, shape (m, nq); zero columns for joints that may not move.
-        twist: Wanted tool twists relative to the part, shape (m,).
-        error: Pose errors, wanted minus actual, shape (m,).
+        twist: Reference tool twists relative to the part, shape (m,).
+        error: Pose errors, desired minus actual, shape (m,).
         weights: Joint weights, the diagonal of W, shape (nq,).
         secondary: Joint speeds that the secondary goals ask for, shape (nq,); None when there are none.
         bounds: Lowest and highest joint speeds that goals may lead to, shape (nq,) each; None when there are no goals.
@@ -50,19 +52,19 @@ class FirstOrder:
     secondary: Array | None
     bounds: tuple[Array, Array] | None = None
 
-    def bounded(self, unnoticed: Array, *, beside: Array) -> Array:
+    def bounded(self, null_space_projection: Array, *, beside: Array) -> Array:
         """What of joint speeds that no task notices may be added to the speeds that the tasks need, shape (nq,).
 
         They are scaled together, so they still move no tool.
 
         Args:
-            unnoticed: What the tasks leave of the secondary goals, shape (nq,).
+            null_space_projection: What the tasks leave of the secondary goals, shape (nq,).
             beside: Joint speeds that the tasks need, shape (nq,).
         """
         if self.bounds is None:
-            return unnoticed
+            return null_space_projection
         lowest, highest = self.bounds
-        return share_within(beside, unnoticed, lowest=lowest, highest=highest) * unnoticed
+        return share_within(beside, null_space_projection, lowest=lowest, highest=highest) * null_space_projection
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,13 +90,13 @@ class TrackingProblem:
         times: Instants in [s], shape (N,).
         tasks: The tasks, then the grasps of further holders, one block row each.
         operators: Index of each one's robot in the cell.
-        wanted: Wanted tool poses X_PT, shape (N, tasks, 4, 4).
-        twists: Wanted tool twists in P, linear first, shape (N, tasks, 6).
+        desired: Reference tool poses X_PT, shape (N, tasks, 4, 4).
+        twists: Reference tool twists in P, linear first, shape (N, tasks, 6).
         signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
         gain: Error feedback gain in [1/s].
         damping: Largest damping factor; None leaves it to the method.
-        drift: Joint speeds that are asked for at instant k and posture q besides the tasks, shape (nq,): what closes a
-            cycle.
+        drift: Joint speeds that are asked for at instant k and configuration q besides the tasks, shape (nq,): what
+            closes a cycle.
     """
 
     def __init__(self, cell: Cell, schedule: Schedule, moving: Sequence[str], *, start: Array | None = None) -> None:
@@ -102,7 +104,7 @@ class TrackingProblem:
 
         Args:
             cell: The cell.
-            schedule: Wanted tool poses and twists on the common clock.
+            schedule: Reference tool poses and twists on the common clock.
             moving: Names of the robots that may move.
             start: Stacked start posture, shape (nq,), which goals may lead back to; needed with goals only.
         """
@@ -120,7 +122,7 @@ class TrackingProblem:
         self._weights = JointWeights(cell, self._model)
         self.cell, self.times, self.tasks = cell, schedule.times, tasks
         self.operators = [names.index(task.robot) for task in tasks]
-        self.wanted = np.stack([target.X_PT for target in asked], axis=1)
+        self.desired = np.stack([target.X_PT for target in asked], axis=1)
         self.twists = np.stack([target.V_PT_P for target in asked], axis=1)
         self.signs = column_signs(cell, self._model, tasks, moving)
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
@@ -143,14 +145,14 @@ class TrackingProblem:
         return mobile
 
     def rows(self, k: int, q: Array) -> list[Array]:
-        """Rows of the cooperation Jacobian that each task constrains at instant k and posture q, shape (m, nq) each."""
+        """Rows of the cooperation Jacobian for each task at sample k and configuration q, shape (m, nq) each."""
         state = self.state(q)
         X_WT, X_WR = state.X_WT[self.operators], reference_frames(state, self.tasks)
         J = cooperation_jacobian(state, X_WT[:, :3, 3], self.signs * self.mobile(k), X_WR=X_WR)
         return [rows[k] @ block for rows, block in zip(self._rows, J, strict=True)]
 
     def first_order(self, k: int, q: Array) -> FirstOrder:
-        """The tasks at instant k and posture q, to first order.
+        """The tasks at instant k and configuration q, to first order.
 
         Raises:
             DivergedError: A tool lost its path.
@@ -161,7 +163,7 @@ class TrackingProblem:
         X_WR = None if self._is_on_part else reference_frames(state, self.tasks)
         J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
         X_RT = inverse(state.X_WP if X_WR is None else X_WR) @ X_WT
-        error = pose_errors(self.wanted[k], X_RT, self._is_spin_free)
+        error = pose_errors(self.desired[k], X_RT, self._is_spin_free)
         self._refuse_lost_path(k, error)
         rows, twist, errors = self._constrained(k, J, error)
         drift = self._drift(k, q)
@@ -169,7 +171,7 @@ class TrackingProblem:
         return self._with_goals(k, q, state, FirstOrder(rows, twist, errors, weights, drift), signs=signs)
 
     def _constrained(self, k: int, J: Array, error: Array) -> tuple[Array, Array, Array]:
-        """Rows, wanted twists and errors of the components that the tasks and grasps constrain."""
+        """Rows, desired twists and errors of the components that the tasks and grasps constrain."""
         if self._is_whole:
             return J.reshape(-1, J.shape[2]), self.twists[k].reshape(-1), error.reshape(-1)
         picks = [rows[k] for rows in self._rows]

@@ -34,7 +34,7 @@ FADE_SHARE: Final = 0.25  # [-] of the whole motion that this may take at most
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stance:
-    """The cell at one instant and posture, as goals look at it.
+    """The cell at one instant and configuration, as goals look at it.
 
     Attributes:
         q: Stacked joint vector, shape (nq,), in [rad] or [m].
@@ -82,7 +82,7 @@ class SecondaryGoals:
             model: The combined model of its robots.
             tasks: The tasks and closures, one block row each.
             times: Instants of the motion in [s], shape (N,).
-            start: Stacked posture at the first instant, shape (nq,).
+            start: Stacked configuration at the first instant, shape (nq,).
             rests: Instants in [s] at which the goals ask for nothing: the ends of the motion and of cycles to close.
         """
         self._pulls = [(goal.gain, _pull(goal, cell, model, tasks=tasks, start=start)) for goal in cell.solver.goals]
@@ -108,11 +108,11 @@ class SecondaryGoals:
             slope = pull(stance)
             speeds = gain / (1.0 + gain * self._step * slope.curvature) * slope.gradient * stance.mobility
             asked += speeds / max(1.0, float(np.max(np.abs(speeds) / self._limits, initial=0.0)))
-        wanted: Array = self._fade[k] * asked
-        return wanted
+        desired: Array = self._fade[k] * asked
+        return desired
 
     def bounds(self, q: Array) -> tuple[Array, Array]:
-        """Lowest and highest joint speeds that a goal may lead to at a posture, shape (nq,) each."""
+        """Lowest and highest joint speeds that a goal may lead to at a configuration, shape (nq,) each."""
         return (
             np.maximum(-self._limits, (self._lower - q) / BRAKING),
             np.minimum(self._limits, (self._upper - q) / BRAKING),
@@ -154,7 +154,7 @@ def _pull(goal: SecondaryGoal, cell: Cell, model: CombinedModel, *, tasks: Seque
         case GoalKind.OBSTACLES:
             return _obstacles(cell, goal.within)
         case GoalKind.POSTURE:
-            return _posture(cell, goal.postures, start=start)
+            return _configuration(cell, goal.configurations, start=start)
 
 
 def _manipulability(cell: Cell, model: CombinedModel, tasks: Sequence[Relation]) -> Pull:
@@ -193,11 +193,11 @@ def _joint_limits(cell: Cell) -> Pull:
     return _springs(np.concatenate(stiffness), np.concatenate(middles))
 
 
-def _posture(cell: Cell, wanted: Mapping[str, Array], *, start: Array) -> Pull:
-    """``w = -1/2 |q - q_wanted|^2``; robots without a wanted posture are drawn back to where they start."""
+def _configuration(cell: Cell, desired: Mapping[str, Array], *, start: Array) -> Pull:
+    """``w = -1/2 |q - q_desired|^2``; robots without a desired configuration are drawn back to where they start."""
     middle = start.copy()
-    for robot, posture in wanted.items():
-        middle[cell.columns(robot)] = posture
+    for robot, configuration in desired.items():
+        middle[cell.columns(robot)] = configuration
     return _springs(np.ones(len(middle)), middle)
 
 

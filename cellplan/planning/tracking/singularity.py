@@ -34,7 +34,7 @@ def nearest_to_singular(problem: TrackingProblem, k: int, q: Array) -> NearestSi
 
 
 def singular_words(problem: TrackingProblem, k: int, q: Array) -> str:
-    """What to add to a complaint about a motion that finds no way on; nothing where there is nothing to say."""
+    """What to add to a finding about a motion that finds no way on; nothing where there is nothing to say."""
     nearest = nearest_to_singular(problem, k, q)
     return "" if nearest is None else f"; {nearest.words}"
 

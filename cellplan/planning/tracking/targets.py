@@ -1,4 +1,4 @@
-"""Closures: where the tools of further holders are wanted on the part while it moves, beside the tools at work."""
+"""Closures: where the tools of further holders are desired on the part while it moves, beside the tools at work."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from cellplan.model.motion import Schedule
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Target:
-    """Where one tool is wanted at each of N instants.
+    """Where one tool is desired at each of N instants.
 
     Attributes:
         relation: The task, or the grasp of a further holder.
-        X_PT: Wanted tool tip in P, shape (N, 4, 4).
-        V_PT_P: Wanted twist of the tool relative to the part in P, linear first, shape (N, 6).
+        X_PT: Reference tool tip in P, shape (N, 4, 4).
+        V_PT_P: Reference twist of the tool relative to the part in P, linear first, shape (N, 6).
         tolerance: Allowed distance in [m].
         settled: Instant in [s] until which the tool may be on its way; -inf when it is there from the start.
     """

@@ -40,7 +40,7 @@ class WeightedInverse:
         .. math:: \dot q = W^{-1} J^T (J W^{-1} J^T + \lambda^2 I)^{-1} \dot x
 
         Args:
-            xdot: Wanted twist components, shape (m,).
+            xdot: Reference twist components, shape (m,).
             lambda_squared: Square of the damping factor; above 0 where a row is lost.
 
         Returns:
@@ -49,7 +49,7 @@ class WeightedInverse:
         speeds: Array = self._JW.T @ (self._U @ ((self._U.T @ xdot) / (self._s_squared + lambda_squared)))
         return speeds
 
-    def unnoticed(self, speeds: Array) -> Array:
+    def null_space_projection(self, speeds: Array) -> Array:
         r"""What of given joint speeds moves no task ([Ribeiro2010]_ Eq. D.43), projected in the metric of W.
 
         .. math:: (I - J^\# J) \dot q_0

@@ -16,12 +16,12 @@ def no_backend() -> Iterator[None]:
     Afterwards the environment is as it was, and so is the choice of a display that it does know: a program that uses
     this one may want to draw windows of its own.
     """
-    wanted = None if "matplotlib" in sys.modules else os.environ.pop(VARIABLE, None)
+    desired = None if "matplotlib" in sys.modules else os.environ.pop(VARIABLE, None)
     try:
         yield
     finally:
-        if wanted is not None:
-            os.environ[VARIABLE] = wanted
-    if wanted:
+        if desired is not None:
+            os.environ[VARIABLE] = desired
+    if desired:
         with suppress(ValueError):
-            sys.modules["matplotlib"].rcParams["backend"] = wanted
+            sys.modules["matplotlib"].rcParams["backend"] = desired

@@ -264,7 +264,7 @@ def _singularity_sheet(report: Report, colours: Mapping[str, str]) -> Sheet:
 
 
 def _power_of_ten(largest: float) -> tuple[str, float]:
-    """Words and factor that make small values readable; what is too small for that becomes zero."""
+    """Label and factor that make small values readable; what is too small for that becomes zero."""
     if largest >= LEAST_PLAIN:
         return "", 1.0
     if largest < SMALLEST_DRAWN:

@@ -44,7 +44,7 @@ class Area(NamedTuple):
     look: Mapping[str, Any]
 
 
-class Words(NamedTuple):
+class Label(NamedTuple):
     """A line of text at a place in inches."""
 
     x: float
@@ -53,7 +53,7 @@ class Words(NamedTuple):
     look: Mapping[str, Any]
 
 
-Mark = Line | Area | Words
+Mark = Line | Area | Label
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,7 +153,7 @@ class Sheet:
     def write(self, x: float, y: float, text: str, **look: Any) -> None:
         """Write a line of text at a place on the sheet."""
         if text:
-            self.marks.append(Words(x, y, text.replace("-", "−") if _is_number(text) else text, look))
+            self.marks.append(Label(x, y, text.replace("-", "−") if _is_number(text) else text, look))
 
     def _draw_frame(self, panel: Panel, ticks: Sequence[float], *, with_times: bool) -> None:
         """Grid lines at round numbers, the two axis lines, and the numbers."""

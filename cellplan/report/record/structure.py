@@ -64,12 +64,12 @@ def _robot_record(cell: Cell, robot: Robot) -> dict[str, Any]:
 
 
 def _task_record(task: Task) -> dict[str, Any]:
-    wanted = [COMPONENTS[axis] for axis in task.axes if axis < 3 or not task.is_spin_free]
+    desired = [COMPONENTS[axis] for axis in task.axes if axis < 3 or not task.is_spin_free]
     return {
         "name": task.name,
         "robot": task.robot,
         "relative_to": str(task.relative_to),
-        "constrained": [*wanted, *(TOOL_AXIS if task.is_spin_free else ())],
+        "constrained": [*desired, *(TOOL_AXIS if task.is_spin_free else ())],
     }
 
 

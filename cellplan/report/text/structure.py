@@ -52,10 +52,10 @@ def _task_lines(tasks: list[Record]) -> Iterator[str]:
     yield "tasks, and what they ask for on the part"
     task_width, robot_width = _width(task["name"] for task in tasks), _width(task["robot"] for task in tasks)
     for task in tasks:
-        wanted = [name for name in task["constrained"] if not name.startswith("across")]
-        wanted += ["tool axis (spin is free)"] if len(wanted) < len(task["constrained"]) else []
+        desired = [name for name in task["constrained"] if not name.startswith("across")]
+        desired += ["tool axis (spin is free)"] if len(desired) < len(task["constrained"]) else []
         place = "" if task["relative_to"] == "part" else "  in the world"
-        yield f"  {task['name']:<{task_width}}  {task['robot']:<{robot_width}}  {' '.join(wanted)}{place}"
+        yield f"  {task['name']:<{task_width}}  {task['robot']:<{robot_width}}  {' '.join(desired)}{place}"
 
 
 def _closure_lines(part: Record) -> Iterator[str]:

@@ -132,12 +132,12 @@ def test_the_cure_fits_the_task() -> None:
         assert check.message.endswith("allow it with tool_depth_mm if the process cuts")
 
 
-def test_the_wanted_path_is_measured_where_the_task_keeps_the_axis() -> None:
+def test_the_desired_path_is_measured_where_the_task_keeps_the_axis() -> None:
     cell = cell_with(BARE, Box((0.4, 0.4, 0.1)))
     X_PT = pose((0.0, 0.0, 0.035), (np.pi, 0.0, 0.0))[None]
 
-    wanted = path_depth(cell, cell.tasks[0], X_PT)
+    desired = path_depth(cell, cell.tasks[0], X_PT)
 
-    assert wanted is not None
-    assert wanted.depth == pytest.approx(0.015, abs=1e-12)
+    assert desired is not None
+    assert desired.depth == pytest.approx(0.015, abs=1e-12)
     assert path_depth(cell, replace(cell.tasks[0], axes=(0, 1, 2)), X_PT) is None

@@ -31,8 +31,8 @@ def swinger() -> RobotModel:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
-    """A tool that is wanted where the arm is at the rows and on straight lines between them, or late by a corner."""
+class Reference:
+    """A tool that is desired where the arm is at the rows and on straight lines between them, or late by a corner."""
 
     times: Array
     jumps: Array
@@ -40,19 +40,19 @@ class Wanted:
     corner: float = 0.0
 
     def poses(self, times: Array) -> tuple[Array, ...]:
-        wanted = np.tile(np.eye(4), (len(times), 1, 1))
+        desired = np.tile(np.eye(4), (len(times), 1, 1))
         for axis in range(3):
-            wanted[:, axis, 3] = np.interp(times, self.times, self.rows[:, axis, 3])
+            desired[:, axis, 3] = np.interp(times, self.times, self.rows[:, axis, 3])
         step = self.times[1]
         inside = 1.0 - np.abs(times - self.jumps[0]) / (0.5 * step) if len(self.jumps) else np.zeros(len(times))
-        wanted[:, 2, 3] += self.corner * np.clip(inside, 0.0, 1.0)
-        return (wanted,)
+        desired[:, 2, 3] += self.corner * np.clip(inside, 0.0, 1.0)
+        return (desired,)
 
 
 def looked(
     turn: float, tolerance: Tolerance, corner: float = 0.0, jumps: tuple[float, ...] = ()
 ) -> tuple[BetweenRows, tuple[Check, ...]]:
-    """The arm swings by ``turn`` in each step of 0.1 s, and is wanted on the chords of its circle."""
+    """The arm swings by ``turn`` in each step of 0.1 s, and is desired on the chords of its circle."""
     task = replace(work("arm"), axes=(0, 1, 2), tolerance=tolerance)
     cell = make_cell(placed("arm", swinger()), part=fixed_part(Sphere(0.01), np.eye(4)), tasks=(task,))
     scene, q = Scene.from_cell(cell), turn * np.arange(ROWS)[:, None]
@@ -60,8 +60,8 @@ def looked(
     plain = schedule(ROWS, task)
     scheduled = replace(plain.tasks[0], X_PT=rows)
     instants = np.array([0.35] if corner else jumps)
-    wanted = Wanted(times=plain.times, jumps=instants, rows=rows, corner=corner)
-    known = Schedule(times=plain.times, tasks=(scheduled,), desired=wanted)
+    desired = Reference(times=plain.times, jumps=instants, rows=rows, corner=corner)
+    known = Schedule(times=plain.times, tasks=(scheduled,), desired=desired)
     accuracy = task_accuracy(scheduled, scene.chains["arm"], q=q, X_WP=part_poses(cell, scene.chains, {"arm": q}))
     ((found,), _) = look_between(scene, known, {"arm": q}, accuracy=(accuracy,), closures=())
     assert found.between is not None
@@ -69,7 +69,7 @@ def looked(
 
 
 @pytest.mark.parametrize("turn", [0.01, 0.1])
-def test_an_arm_that_is_wanted_on_chords_strays_by_the_height_of_its_arc(turn: float) -> None:
+def test_an_arm_that_is_desired_on_chords_strays_by_the_height_of_its_arc(turn: float) -> None:
     sagitta = ARM * (1.0 - np.cos(0.5 * turn))
 
     between, checks = looked(turn, Tolerance(position=10.0 * sagitta, orientation=1.0))
@@ -162,9 +162,9 @@ def test_no_instant_is_worse_than_the_bound(seed: int) -> None:
     }
     scene = Scene.from_cell(cell)
     X_WP = part_poses(cell, scene.chains, q)
-    for scheduled, accuracy, wanted in zip(run.schedule.tasks, report.accuracy, desired.poses(fine), strict=True):
+    for scheduled, accuracy, X_PT in zip(run.schedule.tasks, report.accuracy, desired.poses(fine), strict=True):
         robot = scheduled.task.robot
-        truth = task_accuracy(replace(scheduled, X_PT=wanted), scene.chains[robot], q=q[robot], X_WP=X_WP)
+        truth = task_accuracy(replace(scheduled, X_PT=X_PT), scene.chains[robot], q=q[robot], X_WP=X_WP)
         between = accuracy.between
         assert between is not None
         for error, found in ((truth.position_error, between.position), (truth.orientation_error, between.orientation)):

@@ -123,7 +123,7 @@ def jacobian_by_differences(cell, chains, tasks, q):
 
 
 def measured(cell, tasks, q):
-    """What the report says at the postures q, shape (N, nq), with all robots free to move."""
+    """What the report says at the configurations q, shape (N, nq), with all robots free to move."""
     chains = {r.name: ScrewChain(r) for r in cell.robots}
     by_name = {r.name: q[:, cell.columns(r.name)] for r in cell.robots}
     X_WP = part_poses(cell, chains, by_name)
@@ -140,8 +140,8 @@ def test_manipulability_and_condition_follow_from_the_derivative_of_the_tool_pos
 
     found = measured(cell, tasks, q)
 
-    for k, posture in enumerate(q):
-        J = jacobian_by_differences(cell, chains, tasks, posture)
+    for k, configuration in enumerate(q):
+        J = jacobian_by_differences(cell, chains, tasks, configuration)
         squares = np.linalg.eigvalsh(J @ J.T)  # in rising order: squared singular values, by another way
         assert found.manipulability[k] == pytest.approx(np.sqrt(np.linalg.det(J @ J.T)), rel=1e-6)
         assert found.squared_condition[k] == pytest.approx(squares[0] / squares[-1], rel=1e-6)

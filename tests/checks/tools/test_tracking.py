@@ -55,12 +55,12 @@ def random_poses(n):
 
 
 def accuracy_of(offset, turn, **options):
-    """Displace a tool from its wanted place by a known offset and turn in P."""
-    wanted, X_WP = random_poses(len(offset)), random_poses(len(offset))
-    actual = wanted.copy()
+    """Displace a tool from its desired place by a known offset and turn in P."""
+    desired, X_WP = random_poses(len(offset)), random_poses(len(offset))
+    actual = desired.copy()
     actual[:, :3, 3] -= offset
-    actual[:, :3, :3] = rotation_exp(-turn) @ wanted[:, :3, :3]
-    scheduled = scheduled_task(wanted, **options)
+    actual[:, :3, :3] = rotation_exp(-turn) @ desired[:, :3, :3]
+    scheduled = scheduled_task(desired, **options)
     return accuracy_at(scheduled, X_WP @ actual, X_WP)
 
 
@@ -91,16 +91,16 @@ def test_open_components_do_not_count():
 
 
 def test_free_spin_counts_the_tilt_alone():
-    wanted, eye = random_poses(20), np.eye(4)[None]
-    spun = wanted.copy()
+    desired, eye = random_poses(20), np.eye(4)[None]
+    spun = desired.copy()
     spins = np.zeros((20, 3))
     spins[:, 2] = RNG.uniform(-3, 3, 20)
-    spun[:, :3, :3] = wanted[:, :3, :3] @ rotation_exp(spins)
-    tilts = np.cross(wanted[:, :3, 2], RNG.normal(size=(20, 3)))
+    spun[:, :3, :3] = desired[:, :3, :3] @ rotation_exp(spins)
+    tilts = np.cross(desired[:, :3, 2], RNG.normal(size=(20, 3)))
     tilts *= 0.1 / np.linalg.norm(tilts, axis=1, keepdims=True)
     tilted = spun.copy()
     tilted[:, :3, :3] = rotation_exp(-tilts) @ spun[:, :3, :3]
-    scheduled = scheduled_task(wanted, is_spin_free=True)
+    scheduled = scheduled_task(desired, is_spin_free=True)
 
     only_spun = accuracy_at(scheduled, spun, eye)
     also_tilted = accuracy_at(scheduled, tilted, eye)

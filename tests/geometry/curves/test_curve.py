@@ -184,13 +184,13 @@ def test_length_of_an_ellipse_agrees_with_the_complete_elliptic_integral() -> No
 def test_parameters_at_lengths_invert_the_length(curve: Curve) -> None:
     arc = measure(curve)
     whole = (float(curve.knots[0]), float(curve.knots[-1]))
-    wanted = np.linspace(0.0, arc.total, 57)
+    desired = np.linspace(0.0, arc.total, 57)
 
-    u = arc.parameters(wanted, whole)
+    u = arc.parameters(desired, whole)
 
     assert np.all(np.diff(u) > 0.0)
     nodes, weights = np.polynomial.legendre.leggauss(20)
-    for low, high, way in zip(u[:-1], u[1:], np.diff(wanted), strict=True):
+    for low, high, way in zip(u[:-1], u[1:], np.diff(desired), strict=True):
         cuts = np.concatenate([[low], curve.knots[(curve.knots > low) & (curve.knots < high)], [high]])
         length = 0.0
         for a, b in pairwise(cuts):
@@ -206,13 +206,13 @@ def test_parameters_at_lengths_invert_the_length(curve: Curve) -> None:
 def test_the_quick_way_to_parameters_leads_to_the_same(curve: Curve, count: int) -> None:
     arc = measure(curve)
     whole = (float(curve.knots[0]), float(curve.knots[-1]))
-    wanted = np.sort(np.random.default_rng(count).uniform(0.0, arc.total, count))
+    desired = np.sort(np.random.default_rng(count).uniform(0.0, arc.total, count))
 
-    u = quickly(arc).parameters(wanted, whole)
+    u = quickly(arc).parameters(desired, whole)
 
     # both are roots to rounding of the length; the flat ellipse is slow at its ends
-    assert np.abs(arc.lengths(u) - wanted).max() <= 1e-14 * arc.total
-    assert np.allclose(u, arc.parameters(wanted, whole), rtol=0.0, atol=1e-11)
+    assert np.abs(arc.lengths(u) - desired).max() <= 1e-14 * arc.total
+    assert np.allclose(u, arc.parameters(desired, whole), rtol=0.0, atol=1e-11)
 
 
 def test_the_quick_way_keeps_within_its_interval() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cellplan.geometry.curves.curve import CircleCurve
-from cellplan.geometry.curves.surface_patch import Ball, Cap, Face, LaidCurve, Patch, Wall, patches_facing
+from cellplan.geometry.curves.surface_patch import Ball, Cap, Face, Patch, ProjectedCurve, Wall, patches_facing
 from cellplan.geometry.shapes import Box, Cylinder, Sphere
 from cellplan.geometry.transforms import Array, inverse, pose, transform_points
 
@@ -71,7 +71,7 @@ def test_laid_curves_move_within_the_surface_and_their_normals_turn_as_told(shap
     circle = CircleCurve(centre=X[:3, 3], first=np.array([0.03, 0.01, 0.0]), second=np.array([0.0, 0.02, 0.04]))
     u, h, whole = np.linspace(0.0, 6.0, 41), 1e-5, (0.0, 2.0 * np.pi)
     for patch in patches_facing(shape, X, TILTED):
-        curve = LaidCurve(curve=circle, patch=patch, direction=TILTED)
+        curve = ProjectedCurve(curve=circle, patch=patch, direction=TILTED)
         p, dp = curve.evaluate(u, whole)
         above, below = curve.evaluate(u + h, whole)[0], curve.evaluate(u - h, whole)[0]
         steady = np.all(np.isfinite(p), axis=1) & (patch.normals(p) @ TILTED > 0.1)

@@ -1,4 +1,4 @@
-"""Pedestals and attachments in a cell file: what they become, and every complaint about them."""
+"""Pedestals and attachments in a cell file: what they become, and every finding about them."""
 
 from collections.abc import Callable
 from pathlib import Path

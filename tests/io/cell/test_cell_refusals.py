@@ -1,4 +1,4 @@
-"""Cells as a whole, parts and settings: every complaint about them, word for word."""
+"""Cells as a whole, parts and settings: every finding about them, word for word."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -232,7 +232,7 @@ def test_a_mistake_in_a_cell_is_named_with_its_line_key_and_cure(
     assert refuse((old, new)) == message.splitlines()
 
 
-def test_all_complaints_come_at_once_in_the_order_of_the_file(refuse: Refuse) -> None:
+def test_all_findings_come_at_once_in_the_order_of_the_file(refuse: Refuse) -> None:
     told = refuse(
         ("start_deg: [0, -93, 108, 0, -15, 0]", "start_deg: [0, 010, 108]"),
         ("weights: [1, 1, 1, 1, 1, 1]", "weights: [1, 1]"),
@@ -252,11 +252,11 @@ def test_all_complaints_come_at_once_in_the_order_of_the_file(refuse: Refuse) ->
     ]
 
 
-def test_a_flood_of_complaints_is_cut_short(refuse: Refuse) -> None:
+def test_a_flood_of_findings_is_cut_short(refuse: Refuse) -> None:
     told = refuse(("name: pair\n", "name: pair\n" + "".join(f"key_{k}: 1\n" for k in range(150))))
 
     assert len(told) == 101
-    assert told[-1] == "c: and more than 49 other complaints"
+    assert told[-1] == "c: and more than 49 other findings"
 
 
 def test_the_robot_limit_is_named(refuse: Refuse) -> None:
@@ -265,7 +265,7 @@ def test_the_robot_limit_is_named(refuse: Refuse) -> None:
     assert refuse(("robots:\n", "robots:\n" + more)) == ["c:3: robots: expected at most 64 entries, got 65"]
 
 
-def test_complaints_about_a_robot_table_follow_those_about_the_cell(refuse: Refuse, tmp_path: Path) -> None:
+def test_findings_about_a_robot_table_follow_those_about_the_cell(refuse: Refuse, tmp_path: Path) -> None:
     (tmp_path / "arm.yaml").write_text("robot: arm\nflange: {}\njoints: {A: {type: revolute}}\n", encoding="utf-8")
 
     told = refuse(("model: abb_irb1600", "model: arm.yaml"), ("duration_s: 4", "duration_s: -4"))
@@ -277,13 +277,13 @@ def test_complaints_about_a_robot_table_follow_those_about_the_cell(refuse: Refu
 
 
 def test_names_that_do_not_exist_are_told_beside_other_mistakes_of_the_same_entry(refuse: Refuse) -> None:
-    complaints = refuse(
+    findings = refuse(
         ("model: kuka_kr6", "model: kuka_kr7\n    bse: {}"),
         ("radius_mm: 250", "radius_mm: -250"),
         ("{robot: holder, at", "{robot: hodler, at"),
         ("    robot: worker", "    robot: wroker\n    start_s: soon"),
     )
-    assert [complaint.split(": ")[1] for complaint in complaints] == [
+    assert [finding.split(": ")[1] for finding in findings] == [
         "robots.holder.model",
         "robots.holder.bse",
         "part.geometry.cylinder.radius_mm",

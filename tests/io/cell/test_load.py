@@ -1,4 +1,4 @@
-"""Cell files: what is read from a sound one, and every complaint about an unsound one, word for word."""
+"""Cell files: what is read from a sound one, and every finding about an unsound one, word for word."""
 
 import math
 import os

@@ -70,7 +70,7 @@ def test_the_accuracy_is_read_in_millimetres(load: Load, settings: str, accuracy
 
 
 @pytest.mark.parametrize(
-    ("settings", "complaints"),
+    ("settings", "findings"),
     [
         (
             "method: jacobian_transpose",
@@ -98,13 +98,13 @@ def test_the_accuracy_is_read_in_millimetres(load: Load, settings: str, accuracy
     ],
 )
 def test_what_is_in_the_way_of_the_accurate_mode_is_told_line_by_line(
-    refuse: Refuse, settings: str, complaints: list[str]
+    refuse: Refuse, settings: str, findings: list[str]
 ) -> None:
-    assert refuse(with_solver(f"integrator: accurate, {settings}")) == complaints
+    assert refuse(with_solver(f"integrator: accurate, {settings}")) == findings
 
 
 @pytest.mark.parametrize(
-    ("settings", "complaint"),
+    ("settings", "finding"),
     [
         ("integrator: rk4", "c:22: solver.integrator: expected accurate or euler, got 'rk4'"),
         ("integrator: eulr", "c:22: solver.integrator: expected accurate or euler, got 'eulr', did you mean 'euler'?"),
@@ -116,8 +116,8 @@ def test_what_is_in_the_way_of_the_accurate_mode_is_told_line_by_line(
         ("accuracy_mm: 1.5", "c:22: solver.accuracy_mm: expected a number of millimetres of at most 1, got 1.5"),
     ],
 )
-def test_other_integrators_and_accuracies_are_refused(refuse: Refuse, settings: str, complaint: str) -> None:
-    assert refuse(with_solver(settings)) == [complaint]
+def test_other_integrators_and_accuracies_are_refused(refuse: Refuse, settings: str, finding: str) -> None:
+    assert refuse(with_solver(settings)) == [finding]
 
 
 @pytest.mark.parametrize("settings", ["seed: 0", "method: damped_least_squares", "integrator: euler, accuracy_mm: 0.3"])

@@ -1,4 +1,4 @@
-"""Tasks of a cell: every complaint about them, word for word."""
+"""Tasks of a cell: every finding about them, word for word."""
 
 from collections.abc import Callable
 from pathlib import Path

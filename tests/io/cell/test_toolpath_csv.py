@@ -1,4 +1,4 @@
-"""Toolpath tables are read as they are meant, and complaints name line and column."""
+"""Toolpath tables are read as they are meant, and findings name line and column."""
 
 import os
 from pathlib import Path
@@ -23,7 +23,7 @@ def read(tmp_path: Path):
     return read_text
 
 
-def complaints_of(read, text: str | bytes) -> list[str]:
+def findings_of(read, text: str | bytes) -> list[str]:
     with pytest.raises(InputError) as caught:
         read(text)
     return str(caught.value).split("\n")
@@ -104,7 +104,7 @@ REFUSED = {
 def test_rows_that_are_no_numbers_are_refused_with_line_and_column(read, name: str) -> None:
     rows, expected = REFUSED[name]
 
-    assert complaints_of(read, HEADER + rows) == expected
+    assert findings_of(read, HEADER + rows) == expected
 
 
 HEADERS = {
@@ -138,39 +138,39 @@ HEADERS = {
 def test_headers_that_name_other_columns_are_refused(read, name: str) -> None:
     header, expected = HEADERS[name]
 
-    assert complaints_of(read, header + "\n0,0,0\n1,0,0\n") == expected
+    assert findings_of(read, header + "\n0,0,0\n1,0,0\n") == expected
 
 
 def test_an_empty_file_is_refused(read) -> None:
-    assert complaints_of(read, "")[0].startswith("weld.csv:1: unknown column ''")
+    assert findings_of(read, "")[0].startswith("weld.csv:1: unknown column ''")
 
 
 def test_axes_and_quaternions_that_are_not_of_length_one_are_refused(read) -> None:
-    assert complaints_of(read, "x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,0,0.9\n1,0,0,0,0,1\n2,0,0,0,0,0\n") == [
+    assert findings_of(read, "x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,0,0.9\n1,0,0,0,0,1\n2,0,0,0,0,0\n") == [
         "weld.csv:2: expected a tool axis (i, j, k) of length 1, got 0.9",
         "weld.csv:4: expected a tool axis (i, j, k) of length 1, got 0",
     ]
-    assert complaints_of(read, "x_mm,y_mm,z_mm,qw,qx,qy,qz\n0,0,0,1,1,0,0\n1,0,0,1,0,0,0\n") == [
+    assert findings_of(read, "x_mm,y_mm,z_mm,qw,qx,qy,qz\n0,0,0,1,1,0,0\n1,0,0,1,0,0,0\n") == [
         "weld.csv:2: expected a quaternion (qw, qx, qy, qz) of length 1, got 1.41421"
     ]
 
 
-def test_nobody_has_to_read_more_than_twenty_complaints(read) -> None:
-    lines = complaints_of(read, HEADER + "a,0,0\n" * 100)
+def test_nobody_has_to_read_more_than_twenty_findings(read) -> None:
+    lines = findings_of(read, HEADER + "a,0,0\n" * 100)
 
     assert len(lines) == 21
-    assert lines[-1] == "weld.csv:22: and so on: stopped reading after 20 complaints"
+    assert lines[-1] == "weld.csv:22: and so on: stopped reading after 20 findings"
 
 
-def test_all_complaints_come_as_one_error(read) -> None:
+def test_all_findings_come_as_one_error(read) -> None:
     with pytest.raises(InvalidFileError) as caught:
         read(HEADER + "a,0,0\nb,0,0\n")
 
-    assert len(caught.value.complaints) == 2
+    assert len(caught.value.findings) == 2
 
 
 def test_bytes_that_are_not_utf_8_are_refused(read) -> None:
-    assert complaints_of(read, HEADER.encode() + b"0,0,0\n1,\xff,0\n") == [
+    assert findings_of(read, HEADER.encode() + b"0,0,0\n1,\xff,0\n") == [
         "weld.csv:3: expected text in UTF-8, got byte 0xff"
     ]
 
@@ -190,7 +190,7 @@ def test_a_missing_file_is_said_to_be_missing(tmp_path: Path) -> None:
 
 
 def test_too_many_points_are_refused(read) -> None:
-    assert complaints_of(read, HEADER + "0,0,0\n" * 200_001) == ["weld.csv: expected at most 200000 points, got 200001"]
+    assert findings_of(read, HEADER + "0,0,0\n" * 200_001) == ["weld.csv: expected at most 200000 points, got 200001"]
 
 
 def test_too_large_a_file_is_refused_unread(tmp_path: Path) -> None:
@@ -215,22 +215,22 @@ def test_a_column_of_instants_makes_a_trajectory(read) -> None:
 
 
 def test_instants_must_start_at_zero_and_increase(read) -> None:
-    assert complaints_of(read, TIMED + "0.1,0,0,0\n0.2,1,0,0\n0.2,2,0,0\n0.1,3,0,0\n") == [
+    assert findings_of(read, TIMED + "0.1,0,0,0\n0.2,1,0,0\n0.2,2,0,0\n0.1,3,0,0\n") == [
         "weld.csv:2: column 't_s': expected 0 in the first row, got 0.1; a task is shifted by its start_s",
         "weld.csv:4: column 't_s': expected an instant after 0.2 of the row before, got 0.2",
         "weld.csv:5: column 't_s': expected an instant after 0.2 of the row before, got 0.1",
     ]
-    assert complaints_of(read, TIMED + "0,0,0,0\n1e7,1,0,0\n") == [
+    assert findings_of(read, TIMED + "0,0,0,0\n1e7,1,0,0\n") == [
         "weld.csv:3: column 't_s': expected at most 1000000 s either way, got 1e7"
     ]
-    assert complaints_of(read, TIMED + "0,0,0,0\n1e-9,1,0,0\n") == [
+    assert findings_of(read, TIMED + "0,0,0,0\n1e-9,1,0,0\n") == [
         "weld.csv:3: column 't_s': expected an instant after 0 of the row before, got 1e-09"
     ]
 
 
 @pytest.mark.parametrize("word", ["t", "time", "Time_s", "t_ms"])
 def test_other_words_for_time_are_corrected(read, word: str) -> None:
-    (line,) = complaints_of(read, f"{word},x_mm,y_mm,z_mm\n0,0,0,0\n1,1,0,0\n")
+    (line,) = findings_of(read, f"{word},x_mm,y_mm,z_mm\n0,0,0,0\n1,1,0,0\n")
 
     assert line == f"weld.csv:1: unknown column '{word}', times are in s: write t_s"
 

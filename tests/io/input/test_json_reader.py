@@ -14,7 +14,7 @@ def test_an_object_reads_as_it_was_written() -> None:
 
 
 @pytest.mark.parametrize(
-    ("data", "complaint"),
+    ("data", "finding"),
     [
         (b'{"a": 1, "a": 2}', "r.json: key 'a' stands twice"),
         (b'{"a": NaN}', "r.json: expected finite numbers, got NaN"),
@@ -26,23 +26,23 @@ def test_an_object_reads_as_it_was_written() -> None:
         (b'{"a":' * 100_000, "r.json: expected JSON of a few levels, got a deeply nested one"),
     ],
 )
-def test_anything_else_is_refused(data: bytes, complaint: str) -> None:
+def test_anything_else_is_refused(data: bytes, finding: str) -> None:
     with pytest.raises(InputError) as refusal:
         parse_json(data, "r.json")
 
-    assert str(refusal.value).startswith(complaint)
+    assert str(refusal.value).startswith(finding)
 
 
 @pytest.mark.parametrize(
-    ("record", "complaint"),
+    ("record", "finding"),
     [
         ({}, "r.json: n: missing"),
         ({"n": "1"}, "r.json: n: expected a whole number, got '1'"),
         ({"n": True}, "r.json: n: expected a whole number, got true"),
     ],
 )
-def test_a_required_value_has_its_type(record: dict[str, object], complaint: str) -> None:
+def test_a_required_value_has_its_type(record: dict[str, object], finding: str) -> None:
     with pytest.raises(InputError) as refusal:
         required(record, "n", int, file="r.json")
 
-    assert str(refusal.value) == complaint
+    assert str(refusal.value) == finding

@@ -1,4 +1,4 @@
-"""Joint-axis tables: axes, limits and bodies in metres, and every complaint about an unsound table."""
+"""Joint-axis tables: axes, limits and bodies in metres, and every finding about an unsound table."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Robots of a cell: every complaint about them, word for word."""
+"""Robots of a cell: every finding about them, word for word."""
 
 from collections.abc import Callable
 

@@ -180,7 +180,7 @@ def test_joint_name_that_would_break_the_table_is_refused(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "complaint"),
+    ("old", "new", "finding"),
     [
         (
             "table v1",
@@ -212,11 +212,11 @@ def test_joint_name_that_would_break_the_table_is_refused(name: str) -> None:
         ("6.0,1.0\n", "6.0,1", "t.csv: expected the last row to end with a line break; the file is cut off"),
     ],
 )
-def test_damaged_table_is_refused_with_its_line(old: str, new: str, complaint: str) -> None:
+def test_damaged_table_is_refused_with_its_line(old: str, new: str, finding: str) -> None:
     assert old in TEXT
     with pytest.raises(InputError) as caught:
         parse_table(TEXT.replace(old, new, 1), "t.csv")
-    assert str(caught.value) == complaint
+    assert str(caught.value) == finding
 
 
 @pytest.mark.parametrize("text", ["", "#", "\n", "hello", "# cellplan joint table v1", "# cellplan joint table v1\n"])

@@ -9,7 +9,7 @@ import pytest
 
 from cellplan.errors import InputError
 from cellplan.io.run.folder import RunFolder
-from cellplan.io.run.manifest import Manifest, file_complaints, parse_manifest, render_manifest
+from cellplan.io.run.manifest import Manifest, file_findings, parse_manifest, render_manifest
 
 SHA = "0" * 64
 
@@ -27,10 +27,10 @@ def run(tmp_path: Path, load: Any) -> tuple[Path, Manifest]:
 
 
 def told(folder: Path, manifest: Manifest) -> list[str]:
-    return [str(error).removeprefix(f"{folder}/") for error in file_complaints(folder, manifest).values()]
+    return [str(error).removeprefix(f"{folder}/") for error in file_findings(folder, manifest).values()]
 
 
-def test_an_untouched_folder_gives_no_complaint(run: tuple[Path, Manifest]) -> None:
+def test_an_untouched_folder_gives_no_finding(run: tuple[Path, Manifest]) -> None:
     folder, manifest = run
 
     assert told(folder, manifest) == []
@@ -86,7 +86,7 @@ def test_a_folder_that_became_a_link_is_told_once(run: tuple[Path, Manifest], tm
 
 
 @pytest.mark.parametrize(
-    ("change", "complaint"),
+    ("change", "finding"),
     [
         ({"schema": "cellplan.manifest/9"}, "m: schema: expected 'cellplan.manifest/1', got 'cellplan.manifest/9'"),
         ({"status": "good"}, "m: status: expected passed or failed, got 'good'"),
@@ -103,13 +103,13 @@ def test_a_folder_that_became_a_link_is_told_once(run: tuple[Path, Manifest], tm
         ({"files": []}, "m: files: expected an object, got a list of 0"),
     ],
 )
-def test_a_manifest_of_another_form_is_refused(run: tuple[Path, Manifest], change: Any, complaint: str) -> None:
+def test_a_manifest_of_another_form_is_refused(run: tuple[Path, Manifest], change: Any, finding: str) -> None:
     record = json.loads((run[0] / "manifest.json").read_text()) | change
 
     with pytest.raises(InputError) as refusal:
         parse_manifest((json.dumps(record, indent=2) + "\n").encode(), "m")
 
-    assert str(refusal.value).startswith(complaint)
+    assert str(refusal.value).startswith(finding)
 
 
 def test_a_manifest_laid_out_by_somebody_else_is_refused(run: tuple[Path, Manifest]) -> None:

@@ -50,24 +50,24 @@ def owner(document: Any, place: Place) -> Any:
 
 
 def told(text: str) -> list[str]:
-    """Complaints about a cell; none when it is accepted. Anything but our own error fails the test."""
+    """Findings about a cell; none when it is accepted. Anything but our own error fails the test."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cell.yaml"
         path.write_text(text, encoding="utf-8")
         try:
             load_cell(path)
         except InvalidFileError as error:
-            return [str(complaint).removeprefix(str(path)) for complaint in error.complaints]
+            return [str(finding).removeprefix(str(path)) for finding in error.findings]
     return []
 
 
-def lines_of(complaints: list[str]) -> list[int]:
-    return [int(line.split(":")[1]) for line in complaints]
+def lines_of(findings: list[str]) -> list[int]:
+    return [int(line.split(":")[1]) for line in findings]
 
 
 @settings(max_examples=40, deadline=None)
 @given(place=st.sampled_from(PLACES))
-def test_a_dropped_key_is_a_default_or_a_located_complaint(place: Place) -> None:
+def test_a_dropped_key_is_a_default_or_a_located_finding(place: Place) -> None:
     document = four_robots()
     del owner(document, place)[place[-1]]
 
@@ -87,12 +87,12 @@ def test_a_renamed_key_is_named_with_its_own_line(place: Place) -> None:
     new_place = (*place[:-1], f"{place[-1]}q")
 
     text = yaml_text(document)
-    complaints = told(text)
+    findings = told(text)
 
     names = {("robots",), ("tasks",), ("environment",)}
     if place[:-1] not in names:  # names are free; elsewhere the key is unknown
         line = parse_yaml(text.encode(), file="cell").keys[new_place].line
-        assert any(found.startswith(f":{line}: {key_text(new_place)}: unknown key") for found in complaints)
+        assert any(found.startswith(f":{line}: {key_text(new_place)}: unknown key") for found in findings)
 
 
 WRONG = [True, "wrong word", [], {}, [1, 2], {"a": 1}, -1, 1e300, 5e-324, "", -7.5, ["x"], 10**25]
@@ -105,14 +105,14 @@ def test_a_value_of_another_kind_is_fine_or_named_with_its_line(place: Place, wr
     owner(document, place)[place[-1]] = wrong
 
     text = yaml_text(document)
-    complaints = told(text)
+    findings = told(text)
 
-    assert all(1 <= line <= len(text.splitlines()) for line in lines_of(complaints))
-    assert all("Input should" not in found and "<" not in found for found in complaints)
+    assert all(1 <= line <= len(text.splitlines()) for line in lines_of(findings))
+    assert all("Input should" not in found and "<" not in found for found in findings)
     kind_differs = isinstance(wrong, bool | list | dict) and wrong not in ([], {})
     if kind_differs and not isinstance(owner(four_robots(), place)[place[-1]], type(wrong)):
         line = parse_yaml(text.encode(), file="cell").line(place)
-        assert any(found.startswith(f":{line}: {key_text(place)}") for found in complaints)
+        assert any(found.startswith(f":{line}: {key_text(place)}") for found in findings)
 
 
 @settings(max_examples=50, deadline=None)
@@ -128,9 +128,9 @@ def test_words_that_are_no_number_are_refused_where_they_stand(place: Place, wor
     text = yaml_text(document)
     line = parse_yaml(text.encode(), file="cell").line(place)
 
-    complaints = told(text.replace("987654321", word))
+    findings = told(text.replace("987654321", word))
 
-    named = [found for found in complaints if f": {key_text(place)}: " in found]
+    named = [found for found in findings if f": {key_text(place)}: " in found]
     assert named
     assert named[0].startswith(f":{line}: ")
 

@@ -11,14 +11,14 @@ from cellplan.errors import InputError
 from cellplan.io.yaml.reader import parse_yaml, read_yaml
 
 
-def complaints(text: str) -> list[str]:
+def findings(text: str) -> list[str]:
     document = parse_yaml(text.encode(), file="f.yaml")
-    return [str(complaint.to_error("f.yaml")) for complaint in document.complaints]
+    return [str(finding.to_error("f.yaml")) for finding in document.findings]
 
 
 def told(data: bytes) -> list[str]:
     try:
-        return [complaint.text for complaint in parse_yaml(data, file="f.yaml").complaints]
+        return [finding.text for finding in parse_yaml(data, file="f.yaml").findings]
     except InputError as error:
         return [str(error)]
 
@@ -103,11 +103,11 @@ def test_plain_values_mean_what_they_say(text: str, value: object) -> None:
     ],
 )
 def test_what_could_mean_two_things_is_refused_where_it_stands(text: str, message: str) -> None:
-    assert complaints(text) == [message]
+    assert findings(text) == [message]
 
 
 def test_an_alias_is_refused_and_the_rest_is_still_read() -> None:
-    assert complaints("a: &x [1]\nb: *x\nc: 010\n") == [
+    assert findings("a: &x [1]\nb: *x\nc: 010\n") == [
         "f.yaml:1: a: YAML anchors (&) are not allowed, got 'x'",
         "f.yaml:2: b: YAML aliases (*) are not allowed, got 'x'; write it out",
         "f.yaml:3: c: expected a number without leading zeros, got 010; it can be read as octal",

@@ -24,13 +24,13 @@ SOLVE_TOL = 1e-9  # [-] of the largest speed: rounding times the condition of a 
 
 @pytest.fixture
 def pair():
-    """Positioner and operator with six joints each, at a posture without singularity."""
+    """Positioner and operator with six joints each, at a configuration without singularity."""
     cell = random_cell(31, operators=1, joints=6)
     q = np.random.default_rng(31).uniform(-1.5, 1.5, 12)
     return cell, q, network(cell, q)
 
 
-def wanted_twist(cell, V):
+def desired_twist(cell, V):
     """A tool's twist on the part as speeds of the virtual joints."""
     task = cell.tasks[0]
     return {f"{task.name}:{name}": speed for name, speed in zip(("px", "py", "pz", "rx", "ry", "rz"), V, strict=True)}
@@ -64,12 +64,12 @@ def test_secondary_and_primary_sides_are_the_closure(pair):
 
 
 def test_imposed_tool_motion_with_a_locked_and_a_driven_joint_agrees_with_the_matrix(pair):
-    """Twelve joints, six wanted components; one joint locked, five imposed: six are left, and there is one answer."""
+    """Twelve joints, six desired components; one joint locked, five imposed: six are left, and there is one answer."""
     cell, q, net = pair
     V = np.array([0.1, -0.2, 0.05, 0.3, -0.1, 0.2])
     imposed = {"holder/j0": 0.0, "op0/j1": 0.4, "holder/j1": -0.3, "holder/j2": 0.2, "holder/j5": 0.1, "op0/j2": 0.25}
 
-    solved = solve_network(net, wanted_twist(cell, V) | imposed)
+    solved = solve_network(net, desired_twist(cell, V) | imposed)
 
     J = planners_jacobian(cell, q)[0]
     known = [net.joints.index(name) for name in imposed]
@@ -89,7 +89,7 @@ def test_monitored_tool_motion_is_what_the_joints_give(pair):
 
     solved = solve_network(net, dict(zip(net.joints[:12], qdot, strict=True)))
 
-    measured = [solved.speeds[name] for name in wanted_twist(cell, np.zeros(6))]
+    measured = [solved.speeds[name] for name in desired_twist(cell, np.zeros(6))]
     expected = planners_jacobian(cell, q)[0] @ qdot
     assert np.abs(measured - expected).max() <= AGREEMENT * np.abs(expected).max() * 10  # one more solve
     assert solved.freedom == 0
@@ -100,7 +100,7 @@ def test_freedom_is_counted_and_spent_on_the_least_weighted_motion(pair):
     V = np.array([0.1, -0.2, 0.05, 0.3, -0.1, 0.2])
     weights = np.random.default_rng(2).uniform(0.5, 3.0, len(net.joints))
 
-    solved = solve_network(net, wanted_twist(cell, V), weights=weights)
+    solved = solve_network(net, desired_twist(cell, V), weights=weights)
 
     J, W_inv = planners_jacobian(cell, q)[0], np.diag(1.0 / weights[:12])
     expected = W_inv @ J.T @ np.linalg.solve(J @ W_inv @ J.T, V)  # weighted pseudo-inverse, D.28
@@ -114,7 +114,7 @@ def test_a_driven_positioner_joint_moves_the_operator_that_holds_its_place(pair)
     cell, q, net = pair
     locked = {f"holder/j{i}": 0.0 for i in range(1, 6)}
 
-    solved = solve_network(net, wanted_twist(cell, np.zeros(6)) | {"holder/j0": 1.0} | locked)
+    solved = solve_network(net, desired_twist(cell, np.zeros(6)) | {"holder/j0": 1.0} | locked)
 
     J = planners_jacobian(cell, q)[0]
     follow = np.linalg.solve(J[:, 6:], -J[:, 0])
@@ -124,7 +124,7 @@ def test_a_driven_positioner_joint_moves_the_operator_that_holds_its_place(pair)
 
 def test_too_many_imposed_speeds_are_refused(pair):
     cell, _, net = pair
-    imposed = dict.fromkeys(net.joints[:12], 0.0) | wanted_twist(cell, [0.1, 0, 0, 0, 0, 0])
+    imposed = dict.fromkeys(net.joints[:12], 0.0) | desired_twist(cell, [0.1, 0, 0, 0, 0, 0])
     with pytest.raises(PrimaryChoiceError, match="no speeds of the other joints keep the circuits closed"):
         solve_network(net, imposed)
 
@@ -134,7 +134,7 @@ def test_a_choice_that_leaves_too_few_turning_joints_is_refused(pair):
     cell, _, net = pair
     imposed = dict.fromkeys(["holder/j0", "holder/j1", "holder/j3", "holder/j4", "op0/j1", "op0/j4"], 0.0)
     with pytest.raises(PrimaryChoiceError, match="no speeds of the other joints keep the circuits closed"):
-        solve_network(net, wanted_twist(cell, [0, 0, 0, 0.3, -0.1, 0.2]) | imposed)
+        solve_network(net, desired_twist(cell, [0, 0, 0, 0.3, -0.1, 0.2]) | imposed)
 
 
 def test_all_imposed_is_accepted_when_it_fits(pair):
@@ -142,7 +142,7 @@ def test_all_imposed_is_accepted_when_it_fits(pair):
     qdot = np.random.default_rng(3).normal(size=12)
     V = planners_jacobian(cell, q)[0] @ qdot
 
-    solved = solve_network(net, dict(zip(net.joints[:12], qdot, strict=True)) | wanted_twist(cell, V))
+    solved = solve_network(net, dict(zip(net.joints[:12], qdot, strict=True)) | desired_twist(cell, V))
 
     assert solved.freedom == 0
 
@@ -239,7 +239,7 @@ def test_a_further_holder_closes_a_real_circuit_without_a_virtual_chain():
     assert len(chords) == 2
     assert not any(name.startswith("op1@part") for name in net.joints)
 
-    found = solve_network(net, {**wanted_twist(cell, np.zeros(6)), "holder/j0": 0.3})
+    found = solve_network(net, {**desired_twist(cell, np.zeros(6)), "holder/j0": 0.3})
 
     J = planners_jacobian(cell, q)
     speeds = np.array([found.speeds[name] for name in net.joints[: cell.joint_count]])
@@ -253,7 +253,7 @@ def test_what_a_grasp_leaves_open_is_a_joint_that_nobody_measures():
     net = network(cell, q)
     twist = planners_jacobian(cell, q)[1]
 
-    found = solve_network(net, wanted_twist(cell, np.zeros(6)) | {"holder/j0": 0.3})
+    found = solve_network(net, desired_twist(cell, np.zeros(6)) | {"holder/j0": 0.3})
 
     speeds = np.array([found.speeds[name] for name in net.joints[: cell.joint_count]])
     turn = [found.speeds[f"op1@part:{name}"] for name in ("rx", "ry", "rz")]

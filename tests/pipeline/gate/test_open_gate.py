@@ -136,7 +136,7 @@ def test_a_failed_run_is_told_with_its_reason(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "complaint"),
+    ("make", "finding"),
     [
         (lambda path: None, "expected the folder of a run, got nothing"),
         (lambda path: path.write_text("x"), "expected the folder of a run, got a file"),
@@ -144,10 +144,10 @@ def test_a_failed_run_is_told_with_its_reason(tmp_path: Path) -> None:
     ],
     ids=["nothing", "a file", "an empty folder"],
 )
-def test_what_is_no_run_is_refused(make: Any, complaint: str, tmp_path: Path) -> None:
+def test_what_is_no_run_is_refused(make: Any, finding: str, tmp_path: Path) -> None:
     make(tmp_path / "run")
 
-    assert refusal(tmp_path / "run") == f"{tmp_path / 'run'}: {complaint}"
+    assert refusal(tmp_path / "run") == f"{tmp_path / 'run'}: {finding}"
 
 
 def test_a_run_without_a_manifest_is_to_be_solved_again(copy: Path) -> None:

@@ -1,16 +1,16 @@
-"""The tasks at many postures against the planner's Jacobian, its dense inverse and derivatives."""
+"""The tasks at many configurations against the planner's Jacobian, its dense inverse and derivatives."""
 
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from builders.lane_cells import CELLS, everyone, postures, random_wanted, relations, seen_poses
+from builders.batch_cells import CELLS, configurations, everyone, random_desired, relations, seen_poses
 
 from cellplan.geometry.transforms import Array, inverse, rotation_exp, rotation_vector
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Cell
-from cellplan.planning.collocation.batch_tasks import LaneTasks, Look, Wanted
+from cellplan.planning.collocation.batch_tasks import BatchTasks, Look, Reference
 from cellplan.planning.tracking.cooperation_jacobian import (
     column_signs,
     constraint_rows,
@@ -26,7 +26,7 @@ ONES = {name: np.ones(cell.joint_count) for name, cell in CELLS.items()}
 
 
 class Dense:
-    """The tasks of one cell at one posture by the planner's other way: rows over the stacked joint vector."""
+    """The tasks of one cell at one configuration by the planner's other way: rows over the stacked joint vector."""
 
     def __init__(self, cell: Cell, q: Array, X: Array, twists: Array, *, moving: list[str], mobile: Array) -> None:
         tasks, model = relations(cell), CombinedModel(cell)
@@ -53,20 +53,20 @@ class Dense:
 
 
 def looked(
-    cell: Cell, q: Array, wanted: Wanted, *, moving: list[str] | None = None, mobile: Array | None = None
+    cell: Cell, q: Array, desired: Reference, *, moving: list[str] | None = None, mobile: Array | None = None
 ) -> Look:
-    tasks = LaneTasks(cell, relations(cell), moving or everyone(cell))
+    tasks = BatchTasks(cell, relations(cell), moving or everyone(cell))
     mobile = np.ones(cell.joint_count) if mobile is None else mobile
-    return tasks.look(q, wanted, tasks.chains.placement(cell), mobile=mobile)
+    return tasks.look(q, desired, tasks.chains.placement(cell), mobile=mobile)
 
 
 @pytest.mark.parametrize("name", CELLS)
 def test_errors_are_those_of_the_planner_in_the_rows_that_a_task_keeps(name: str) -> None:
     cell = CELLS[name]
-    q, tasks = postures(cell, LANES), LaneTasks(cell, relations(cell), everyone(cell))
-    wanted, X = random_wanted(len(relations(cell)), LANES)
+    q, tasks = configurations(cell, LANES), BatchTasks(cell, relations(cell), everyone(cell))
+    desired, X = random_desired(len(relations(cell)), LANES)
 
-    found = tasks.task_errors(q, wanted, tasks.chains.placement(cell))
+    found = tasks.task_errors(q, desired, tasks.chains.placement(cell))
 
     seen = seen_poses(cell, q.T)
     for lane in range(LANES):
@@ -82,20 +82,20 @@ def test_errors_are_those_of_the_planner_in_the_rows_that_a_task_keeps(name: str
 @pytest.mark.parametrize("name", CELLS)
 def test_speeds_are_the_smallest_weighted_ones_and_the_drift_that_no_task_notices(name: str) -> None:
     cell = CELLS[name]
-    q = postures(cell, LANES)
-    wanted, X = random_wanted(len(relations(cell)), LANES)
+    q = configurations(cell, LANES)
+    desired, X = random_desired(len(relations(cell)), LANES)
     drift = np.random.default_rng(5).normal(size=cell.joint_count)
-    look = looked(cell, q, wanted)
+    look = looked(cell, q, desired)
 
     plain, drifting = look.speeds(), look.speeds(drift)
 
     for lane in range(LANES):
-        dense = Dense(cell, q[:, lane], X[lane], wanted.twists[..., lane], moving=everyone(cell), mobile=ONES[name])
+        dense = Dense(cell, q[:, lane], X[lane], desired.twists[..., lane], moving=everyone(cell), mobile=ONES[name])
         assert dense.rank == len(dense.J), "drawn so that all tasks can be done"
         expected = dense.inverse.speeds(dense.twist, 0.0)
         room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2  # damping of 1e-10, some ten rows
         np.testing.assert_allclose(plain[:, lane], expected, atol=room * np.abs(expected).max())
-        expected += dense.inverse.unnoticed(drift)
+        expected += dense.inverse.null_space_projection(drift)
         np.testing.assert_allclose(drifting[:, lane], expected, atol=room * np.abs(expected).max())
 
 
@@ -103,17 +103,17 @@ def test_speeds_are_the_smallest_weighted_ones_and_the_drift_that_no_task_notice
 def test_corrections_lead_onto_the_tasks_in_quadratic_steps(name: str) -> None:
     """Newton's method from 1e-2 beside: 1e-4, 1e-8, then rounding, whatever the factor."""
     cell = CELLS[name]
-    goal = postures(cell, LANES)
+    goal = configurations(cell, LANES)
     X = seen_poses(cell, goal.T)
-    wanted = Wanted(
+    desired = Reference(
         np.moveaxis(X[..., :3, :3], (0, 1), (3, 2)),
         np.moveaxis(X[..., :3, 3], (0, 1), (2, 1)),
         np.zeros((6, X.shape[1], LANES)),
     )
-    q = goal + 2e-4 * postures(cell, LANES, seed=9)
+    q = goal + 2e-4 * configurations(cell, LANES, seed=9)
     found = []
     for _ in range(6):
-        look = looked(cell, q, wanted)
+        look = looked(cell, q, desired)
         found.append(np.abs(look.errors).max())
         q = q + look.correction(np.zeros_like(q))
 
@@ -126,13 +126,13 @@ def test_corrections_lead_onto_the_tasks_in_quadratic_steps(name: str) -> None:
 def test_a_correction_allows_for_what_the_posture_moves_anyway(name: str) -> None:
     """``J (d + J^# (e - J d)) = e`` for any ``d``."""
     cell = CELLS[name]
-    q, d = postures(cell, LANES), postures(cell, LANES, seed=4)
-    wanted, X = random_wanted(len(relations(cell)), LANES)
+    q, d = configurations(cell, LANES), configurations(cell, LANES, seed=4)
+    desired, X = random_desired(len(relations(cell)), LANES)
 
-    total = d + looked(cell, q, wanted).correction(d)
+    total = d + looked(cell, q, desired).correction(d)
 
     for lane in range(LANES):
-        dense = Dense(cell, q[:, lane], X[lane], wanted.twists[..., lane], moving=everyone(cell), mobile=ONES[name])
+        dense = Dense(cell, q[:, lane], X[lane], desired.twists[..., lane], moving=everyone(cell), mobile=ONES[name])
         room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2
         np.testing.assert_allclose(dense.J @ total[:, lane], dense.error, atol=room * 10.0)
 
@@ -142,16 +142,16 @@ def test_a_part_at_rest_is_left_to_the_operators(name: str) -> None:
     cell = CELLS[name]
     operators = [task.robot for task in cell.tasks]
     at_rest = replace(cell, part=replace(cell.part, held_by=cell.part.held_by[:1]))  # further holders rest as well
-    q = postures(cell, LANES)
-    wanted, X = random_wanted(len(cell.tasks), LANES)
-    look = looked(at_rest, q, wanted, moving=operators)
+    q = configurations(cell, LANES)
+    desired, X = random_desired(len(cell.tasks), LANES)
+    look = looked(at_rest, q, desired, moving=operators)
 
     speeds = look.speeds()
 
     for robot in cell.robots:
         assert robot.name in operators or not speeds[cell.columns(robot.name)].any()
     for lane in range(LANES):
-        twists = wanted.twists[..., lane]
+        twists = desired.twists[..., lane]
         dense = Dense(at_rest, q[:, lane], X[lane], twists, moving=operators, mobile=ONES[name])
         expected = np.linalg.pinv(dense.J / np.sqrt(dense.weights), rcond=1e-9) @ dense.twist / np.sqrt(dense.weights)
         if dense.rank == len(dense.J):
@@ -162,17 +162,17 @@ def test_a_part_at_rest_is_left_to_the_operators(name: str) -> None:
 @pytest.mark.parametrize("name", CELLS)
 def test_locked_joints_get_exactly_nothing_and_the_others_make_up_for_it(name: str) -> None:
     cell = CELLS[name]
-    q = postures(cell, LANES)
+    q = configurations(cell, LANES)
     mobile = np.ones(cell.joint_count)
     mobile[[0, cell.columns(cell.tasks[0].robot).start]] = 0.0
-    wanted, X = random_wanted(len(relations(cell)), LANES)
-    look = looked(cell, q, wanted, mobile=mobile)
+    desired, X = random_desired(len(relations(cell)), LANES)
+    look = looked(cell, q, desired, mobile=mobile)
     drift = np.ones(cell.joint_count)
 
     for found in (look.speeds(), look.speeds(drift), look.correction(np.zeros_like(q))):
         assert not found[mobile == 0.0].any()
     for lane in range(LANES):
-        dense = Dense(cell, q[:, lane], X[lane], wanted.twists[..., lane], moving=everyone(cell), mobile=mobile)
+        dense = Dense(cell, q[:, lane], X[lane], desired.twists[..., lane], moving=everyone(cell), mobile=mobile)
         if dense.rank == len(dense.J):
             room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2
             expected = dense.inverse.speeds(dense.twist, 0.0)
@@ -180,27 +180,27 @@ def test_locked_joints_get_exactly_nothing_and_the_others_make_up_for_it(name: s
 
 
 @pytest.mark.parametrize("name", ["plain", "sliding", "followers", "mixed", "fixture", "closed", "carried"])
-def test_speeds_move_the_tools_as_wanted(name: str) -> None:
+def test_speeds_move_the_tools_as_desired(name: str) -> None:
     """By central differences of poses from successive screws: shares no code with the lanes."""
     cell = CELLS[name]
-    q = postures(cell, LANES)
-    wanted, _ = random_wanted(len(relations(cell)), LANES)
-    speeds = looked(cell, q, wanted).speeds()
+    q = configurations(cell, LANES)
+    desired, _ = random_desired(len(relations(cell)), LANES)
+    speeds = looked(cell, q, desired).speeds()
 
     ahead, behind = (seen_poses(cell, (q + h * speeds).T) for h in (H, -H))
 
     linear = (ahead - behind)[..., :3, 3] / (2.0 * H)
     angular = rotation_vector(ahead[..., :3, :3] @ np.swapaxes(behind[..., :3, :3], -1, -2)) / (2.0 * H)
     found = np.moveaxis(np.concatenate([linear, angular], axis=-1), -1, 0)
-    expected = np.swapaxes(wanted.twists, 1, 2)
+    expected = np.swapaxes(desired.twists, 1, 2)
     scale = np.abs(speeds).max()
     np.testing.assert_allclose(found, expected, atol=1e-7 * max(scale, 1.0) ** 2)  # damping, and eps / H of rounding
 
 
 def test_what_belongs_to_the_joints_is_sorted_there_and_back() -> None:
     for cell in CELLS.values():
-        tasks = LaneTasks(cell, relations(cell), everyone(cell))
-        q = postures(cell, LANES)
+        tasks = BatchTasks(cell, relations(cell), everyone(cell))
+        q = configurations(cell, LANES)
         working = np.zeros(cell.joint_count, dtype=bool)
         for name in {*cell.positioners[:1], *(task.robot for task in relations(cell))}:
             working[cell.columns(name)] = True
@@ -211,21 +211,21 @@ def test_what_belongs_to_the_joints_is_sorted_there_and_back() -> None:
 @pytest.mark.parametrize("name", ["plain", "spin"])
 def test_errors_of_any_size_are_seen(name: str, angle: float) -> None:
     cell = CELLS[name]
-    q, tasks = postures(cell, 1), LaneTasks(cell, relations(cell), everyone(cell))
+    q, tasks = configurations(cell, 1), BatchTasks(cell, relations(cell), everyone(cell))
     X = seen_poses(cell, q.T)[0]
     axis = np.array([0.6, -0.8, 0.0])  # across the tool's axis, so that free spin does not hide it
     R = X[:, :3, :3] @ rotation_exp(angle * axis)
-    wanted = Wanted(np.moveaxis(R, 0, -1)[..., None], X[:, :3, 3].T[..., None], np.zeros((6, len(X), 1)))
+    desired = Reference(np.moveaxis(R, 0, -1)[..., None], X[:, :3, 3].T[..., None], np.zeros((6, len(X), 1)))
 
-    found = tasks.errors(q, wanted, tasks.chains.placement(cell))
+    found = tasks.errors(q, desired, tasks.chains.placement(cell))
 
     np.testing.assert_allclose(np.linalg.norm(found[3:, :, 0], axis=0), angle, atol=1e-9)
     np.testing.assert_allclose(found[:3], 0.0, atol=1e-12)
 
 
-def test_wanted_poses_are_cut_and_repeated() -> None:
-    wanted, _ = random_wanted(2, 6)
-    part = wanted.between(2, 5)
-    assert np.array_equal(part.R, wanted.R[..., 2:5])
-    assert wanted.repeated(1) is wanted
+def test_desired_poses_are_cut_and_repeated() -> None:
+    desired, _ = random_desired(2, 6)
+    part = desired.between(2, 5)
+    assert np.array_equal(part.R, desired.R[..., 2:5])
+    assert desired.repeated(1) is desired
     assert np.array_equal(part.repeated(2).twists, np.concatenate([part.twists, part.twists], axis=-1))

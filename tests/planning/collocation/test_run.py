@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders.lane_cells import CELLS, seen_poses
+from builders.batch_cells import CELLS, seen_poses
 from builders.roller_paths import sampled
 from builders.timed_cells import Case, between_samples, case_of, largest_error, shipped, slowly_clocked, triangles
 

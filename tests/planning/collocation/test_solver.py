@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders.lane_cells import CELLS, everyone
+from builders.batch_cells import CELLS, everyone
 from builders.timed_cells import Case, triangles
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array, pose_from, rotation_exp
 from cellplan.kinematics.batched import Placement
 from cellplan.model.cell import Cell
-from cellplan.planning.collocation.batch_targets import LaneTargets
-from cellplan.planning.collocation.batch_tasks import LaneTasks, Wanted
+from cellplan.planning.collocation.batch_targets import BatchTargets
+from cellplan.planning.collocation.batch_tasks import BatchTasks, Reference
 from cellplan.planning.collocation.solver import Collocation
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
 from cellplan.planning.tracking.targets import closures
@@ -23,9 +23,9 @@ CELL = triangles(CELLS["mixed"])
 
 def collocation(case: Case, placement: Placement | None = None, *, accuracy: float = ACCURACY) -> Collocation:
     grasps = closures(case.cell, case.moving)
-    tasks = LaneTasks(case.cell, [*case.cell.tasks, *grasps], case.moving)
+    tasks = BatchTasks(case.cell, [*case.cell.tasks, *grasps], case.moving)
     placed = tasks.chains.placement(case.cell) if placement is None else placement
-    return Collocation(tasks, LaneTargets(case.timed, grasps), placed, accuracy=accuracy)
+    return Collocation(tasks, BatchTargets(case.timed, grasps), placed, accuracy=accuracy)
 
 
 def moved_bases(cell: Cell, count: int) -> list[Cell]:
@@ -38,13 +38,13 @@ def moved_bases(cell: Cell, count: int) -> list[Cell]:
 
 
 def placement_of(cells: list[Cell]) -> Placement:
-    chains = LaneTasks(cells[0], cells[0].tasks, everyone(cells[0])).chains
+    chains = BatchTasks(cells[0], cells[0].tasks, everyone(cells[0])).chains
     each = [chains.placement(cell) for cell in cells]
     return Placement(*(np.concatenate([getattr(p, part) for p in each], axis=-1) for part in Placement.__slots__))
 
 
 def carried_through(found: Collocation, case: Case, q: Array, cells: NDArray[np.intp]) -> tuple[Array, list[int], dict]:
-    """The last postures, who arrived, and the panels that each cell passed."""
+    """The last configurations, who arrived, and the panels that each cell passed."""
     passed: dict[int, list[Panel]] = {int(cell): [] for cell in cells}
 
     def record(window: Window, which: NDArray[np.intp], nodes: Array, errors: Array) -> None:
@@ -106,18 +106,18 @@ def test_panels_come_in_order_without_gaps() -> None:
 
 
 def test_an_attempt_that_does_not_settle_says_so_in_silence() -> None:
-    """Even where no robot may move and the tools are wanted elsewhere; no warning is let out."""
+    """Even where no robot may move and the tools are desired elsewhere; no warning is let out."""
     found = collocation(CELL)
     found.mobile = np.zeros(CELL.cell.joint_count)
     window = Window((Panel(0.0, 1.0 / 3.0, 12),))
     times, (begins, ends) = window.instants, window.stretches
-    wanted = LaneTargets(CELL.timed, ()).at(times, begins, ends)
+    desired = BatchTargets(CELL.timed, ()).at(times, begins, ends)
 
     attempt = found.attempt(
         window,
-        wanted,
+        desired,
         CELL.start[:, None],
-        LaneTasks(CELL.cell, CELL.cell.tasks, CELL.moving).chains.placement(CELL.cell),
+        BatchTasks(CELL.cell, CELL.cell.tasks, CELL.moving).chains.placement(CELL.cell),
     )
 
     assert not (attempt.is_settled & np.all(attempt.errors <= ACCURACY, axis=0)).any()
@@ -134,18 +134,18 @@ def test_work_is_counted() -> None:
 def test_targets_of_windows_are_those_of_the_tasks(name: str) -> None:
     case = triangles(CELLS[name])
     grasps = closures(case.cell, case.moving)
-    targets = LaneTargets(case.timed, grasps)
+    targets = BatchTargets(case.timed, grasps)
     windows = windows_between(case.timed.breaks, whole=1.0)
 
     found = targets.in_windows(windows)
 
-    for window, wanted in zip(windows, found, strict=True):
-        assert isinstance(wanted, Wanted)
+    for window, desired in zip(windows, found, strict=True):
+        assert isinstance(desired, Reference)
         for index, path in enumerate(case.timed.paths):
             X, V = path.at(window.instants, window.stretches)
-            np.testing.assert_array_equal(np.moveaxis(wanted.R[:, :, index], -1, 0), X[:, :3, :3])
-            np.testing.assert_array_equal(wanted.p[:, index].T, X[:, :3, 3])
-            np.testing.assert_array_equal(wanted.twists[:, index].T, V)
+            np.testing.assert_array_equal(np.moveaxis(desired.R[:, :, index], -1, 0), X[:, :3, :3])
+            np.testing.assert_array_equal(desired.p[:, index].T, X[:, :3, 3])
+            np.testing.assert_array_equal(desired.twists[:, index].T, V)
         for index, grasp in enumerate(grasps, start=len(case.timed.paths)):
-            assert np.all(wanted.p[:, index] == grasp.X_PT[:3, 3, None])
-            assert not wanted.twists[:, index].any()
+            assert np.all(desired.p[:, index] == grasp.X_PT[:3, 3, None])
+            assert not desired.twists[:, index].any()

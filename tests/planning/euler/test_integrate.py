@@ -96,7 +96,7 @@ def test_feedback_removes_a_start_error_at_the_rate_of_the_gain():
 
 
 def test_equal_motion_of_positioner_and_operators_is_never_needed():
-    """Without a wanted twist nothing moves at all."""
+    """Without a desired twist nothing moves at all."""
     cell = random_cell(34, operators=2, joints=7)
     cell = replace(cell, solver=replace(cell.solver, gain=100.0))
     start = np.random.default_rng(2).uniform(-1, 1, cell.joint_count)

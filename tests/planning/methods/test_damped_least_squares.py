@@ -92,7 +92,7 @@ def test_feedback_fades_between_four_regions_and_one(ratio, share):
     assert gain_share(ratio * 0.02, 0.02) == pytest.approx(share)
 
 
-def test_shaped_gain_leaves_only_the_wanted_twist_in_the_region():
+def test_shaped_gain_leaves_only_the_desired_twist_in_the_region():
     settings = replace(BY_VALUE, shapes_gain=True)
     _, _, shaped = one_step((0.3, 0.02, -0.02), settings=settings, damping=0.1)
     J, _, whole = one_step((0.3, 0.02, -0.02), damping=0.1)
@@ -123,7 +123,7 @@ def test_speeds_are_bounded_by_the_damping_wherever_the_arm_stands(q, near, meas
     assert np.linalg.norm(speeds) <= 1.01 * np.linalg.norm(xdot) * 5.0  # 1.01: lambda is a little below its largest
 
 
-def test_secondary_motion_stays_unnoticed_in_a_damped_posture():
+def test_secondary_motion_stays_unnoticed_in_a_damped_configuration():
     drift = np.array([0.4, -0.7, 0.9])
     J, _, with_drift = one_step((0.3, 0.05, 0.1), damping=0.1, drift=drift)
     _, _, without = one_step((0.3, 0.05, 0.1), damping=0.1)

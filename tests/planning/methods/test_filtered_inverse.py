@@ -114,9 +114,9 @@ def test_filter_that_has_not_begun_moves_nothing(method):
 def test_secondary_motion_stays_unnoticed_while_the_filter_lags(method):
     q, drift = np.array([0.2, 0.9, -1.4]), np.array([0.3, -0.2, 0.5])
     speeds = []
-    for wanted in (None, lambda _k, _q: drift):
+    for desired in (None, lambda _k, _q: drift):
         problem = arm_problem(q, filter_gain=3.0, zero=True)
-        problem.drift = wanted
+        problem.drift = desired
         speeds.append((method_named(method)(problem)(0, q).q - q) / STEP)
     change = speeds[1] - speeds[0]
     assert np.linalg.norm(change) > 0.01
@@ -137,7 +137,7 @@ def test_a_far_tip_is_fetched_in_sub_steps(method, filter_gain):
         q, looks = step.q, looks + step.iterations
     assert looks > 20
     if filter_gain > 1.0:
-        assert np.linalg.norm(tips(LENGTHS, q[None])[0] - problem.wanted[19, 0, :2, 3]) < 0.01
+        assert np.linalg.norm(tips(LENGTHS, q[None])[0] - problem.desired[19, 0, :2, 3]) < 0.01
 
 
 @pytest.mark.parametrize("method", METHODS[1:])

@@ -1,4 +1,4 @@
-"""The best-first search on the published examples of one arm, at singular postures and in cooperative cells."""
+"""The best-first search on the published examples of one arm, at singular configurations and in cooperative cells."""
 
 from dataclasses import replace
 
@@ -67,10 +67,10 @@ def test_line_of_singular_points_only_is_followed():
 @pytest.mark.parametrize(
     ("posture", "goal"), [([0, 0, 0, 0], 0.799), ([0, 0, 0, 0], 0.75), ([0.4] * 1 + [0] * 3, 0.79)]
 )
-def test_stretched_arm_gets_away_towards_a_goal_on_its_own_line(method, posture, goal):
+def test_stretched_arm_gets_away_towards_a_goal_on_its_own_line(method, configuration, goal):
     """The only singular situation (3.2.2): no joint alone can gain anything."""
     cell = arm_cell(dh_arm(FOUR_LINKS), method=method, axes=(0, 1))
-    start = np.array(posture, dtype=float)
+    start = np.array(configuration, dtype=float)
     points = goal * np.tile([np.cos(start[0]), np.sin(start[0]), 0.0], (2, 1))
     schedule = points_schedule(cell, np.array([0.0, 1.0]), points)
     motion = followed(cell, schedule, start)
@@ -80,7 +80,7 @@ def test_stretched_arm_gets_away_towards_a_goal_on_its_own_line(method, posture,
 
 @pytest.mark.parametrize("method", BOTH)
 def test_goal_out_of_reach_is_approached_and_what_is_missing_is_reported(method):
-    """The nearest posture of a stretched arm is the stretched arm itself."""
+    """The nearest configuration of a stretched arm is the stretched arm itself."""
     cell = arm_cell(dh_arm(FOUR_LINKS), method=method, axes=(0, 1), rounds=300)
     schedule = points_schedule(cell, np.array([0.0, 0.5]), np.tile([0.9, 0.0, 0.0], (2, 1)))
     motion = followed(cell, schedule, [0.1, -0.2, 0.1, 0.1])

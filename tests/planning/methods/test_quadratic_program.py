@@ -47,11 +47,11 @@ def with_some_held(tasks, xdot, held, rho):
     free = [i for i in range(n) if i not in held]
     qd = np.array([held.get(i, 0.0) for i in range(n)])
     rows = np.concatenate([np.diag(np.sqrt(tasks.weights)), np.sqrt(rho) * tasks.J])
-    wanted = np.concatenate([np.sqrt(tasks.weights) * q0, np.sqrt(rho) * xdot])
+    desired = np.concatenate([np.sqrt(tasks.weights) * q0, np.sqrt(rho) * xdot])
     if free:
-        qd[free] = np.linalg.lstsq(rows[:, free], wanted - rows @ qd, rcond=None)[0]
-    gradient = rows.T @ (rows @ qd - wanted)
-    return qd, gradient, 0.5 * np.sum((rows @ qd - wanted) ** 2)
+        qd[free] = np.linalg.lstsq(rows[:, free], desired - rows @ qd, rcond=None)[0]
+    gradient = rows.T @ (rows @ qd - desired)
+    return qd, gradient, 0.5 * np.sum((rows @ qd - desired) ** 2)
 
 
 @pytest.mark.parametrize("limit", [10.0, 1.0, 0.3, 0.05])
@@ -85,7 +85,9 @@ def test_far_from_all_bounds_it_is_the_weighted_pseudo_inverse():
     inverse = WeightedInverse(tasks.J, tasks.weights)
 
     exact = solve(tasks, xdot, 1e3, rho=1e12)
-    np.testing.assert_allclose(exact, inverse.speeds(xdot, 0.0) + inverse.unnoticed(tasks.secondary), atol=1e-8)
+    np.testing.assert_allclose(
+        exact, inverse.speeds(xdot, 0.0) + inverse.null_space_projection(tasks.secondary), atol=1e-8
+    )
 
     by_default = solve(replace(tasks, secondary=None), xdot, 1e3)
     np.testing.assert_allclose(by_default, inverse.speeds(xdot, 1.0 / RHO), atol=1e-11)

@@ -6,7 +6,7 @@ import pytest
 from cellplan import load_cell
 from cellplan.geometry.transforms import pose
 from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.planning.start.inverse_kinematics import random_postures
+from cellplan.planning.start.inverse_kinematics import random_configurations
 from cellplan.planning.start.nearest_reach import nearest_reach
 
 
@@ -18,7 +18,7 @@ def arm(cells):
 
 
 def tip_left(robot, task, goal):
-    seeds = random_postures(robot.model, 12, np.random.default_rng(0))
+    seeds = random_configurations(robot.model, 12, np.random.default_rng(0))
     return nearest_reach(robot, task, goal, X_WP=np.eye(4), seeds=seeds, tip_only=True)[0]
 
 

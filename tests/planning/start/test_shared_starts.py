@@ -30,7 +30,7 @@ def toolpaths_of(cell):
 
 
 def with_starts(cell, q, *names):
-    """The cell with the postures of some robots given."""
+    """The cell with the configurations of some robots given."""
     robots = tuple(replace(r, start=q[cell.columns(r.name)] if r.name in names else None) for r in cell.robots)
     return replace(cell, robots=robots)
 
@@ -55,8 +55,8 @@ def test_found_starts_close_the_loop_reach_the_task_and_touch_nothing(shared, fo
     assert_loops_are_closed(shared, found)
     tools = tools_in_world(shared, found)
     X_WP = tools["left"] @ inverse(shared.part.held_by[0].X_PT)
-    wanted = X_WP @ toolpaths_of(shared)["rectangle"].X_PT_start
-    np.testing.assert_allclose(tools["abb"], wanted, atol=1e-9)
+    desired = X_WP @ toolpaths_of(shared)["rectangle"].X_PT_start
+    np.testing.assert_allclose(tools["abb"], desired, atol=1e-9)
     assert Scene.from_cell(shared).touching(found) is None
 
 

@@ -15,7 +15,12 @@ from cellplan.model.cell import Obstacle
 from cellplan.planning.euler.integrate import follow
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
-from cellplan.planning.start.inverse_kinematics import margin_shares, random_postures, reaching_postures, within_limits
+from cellplan.planning.start.inverse_kinematics import (
+    margin_shares,
+    random_configurations,
+    reaching_configurations,
+    within_limits,
+)
 from cellplan.planning.start.search import find_start
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.scene.scene import Scene
@@ -38,8 +43,8 @@ def distance_from_task(cell, task, q):
     holder, operator = cell.robot(cell.positioners[0]), cell.robot(task.robot)
     X_WP = ScrewChain(holder).tool_poses(q[None, cell.columns(holder.name)])[0] @ inverse(cell.part.held_by[0].X_PT)
     X_WT = ScrewChain(operator).tool_poses(q[None, cell.columns(operator.name)])[0]
-    wanted = toolpaths_of(cell)[task.name].X_PT_start
-    return np.abs(inverse(X_WP) @ X_WT - wanted).max()
+    desired = toolpaths_of(cell)[task.name].X_PT_start
+    return np.abs(inverse(X_WP) @ X_WT - desired).max()
 
 
 def test_given_starts_of_the_reference_cell_are_accepted(cell):
@@ -199,12 +204,12 @@ def test_multi_start_finds_the_branches_of_a_six_axis_arm(cell):
     robot, task = cell.robot("staubli"), cell.task("rectangle")
     chain = ScrewChain(robot)
     goal = chain.tool_poses(np.radians([[20.0, -30.0, 80.0, 40.0, 50.0, -20.0]]))[0]
-    seeds = random_postures(robot.model, 200, np.random.default_rng(0))
+    seeds = random_configurations(robot.model, 200, np.random.default_rng(0))
 
-    q = reaching_postures(chain, task, goal, X_WP=np.eye(4), seeds=seeds)
+    q = reaching_configurations(chain, task, goal, X_WP=np.eye(4), seeds=seeds)
 
     assert np.abs(chain.tool_poses(q) - goal).max() < 1e-11
-    branches = {tuple(np.round(np.cos(posture) + 2 * np.sin(posture), 4)) for posture in q}
+    branches = {tuple(np.round(np.cos(configuration) + 2 * np.sin(configuration), 4)) for configuration in q}
     assert len(branches) == 8
 
 

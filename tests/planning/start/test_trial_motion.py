@@ -42,7 +42,7 @@ def share_left_free(report, robots):
 def test_the_coarse_clock_foretells_what_the_full_motion_leaves_free(cell):
     trial = trials_of(cell).judge(start_of(cell))
 
-    np.testing.assert_array_equal(trial.start, start_of(cell))  # given postures stay on their turn
+    np.testing.assert_array_equal(trial.start, start_of(cell))  # given configurations stay on their turn
     expected = share_left_free(solve(cell).runs[0].report, {robot.name for robot in cell.robots})
     assert trial.shares[0] == pytest.approx(expected, abs=0.02)  # 160 samples against 4001
     assert trial.is_sound

@@ -244,8 +244,8 @@ def test_a_task_too_short_to_be_judged_by_its_samples_is_refused(words: Any, got
         examine_times(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])
 
     told = str(caught.value)
-    wanted = "expected a task of at least 0.01 s (10 times motion.step_s), got "
-    assert told.startswith(f"cell.yaml:7: tasks.a.{key}: {wanted}{got or ''}")
+    desired = "expected a task of at least 0.01 s (10 times motion.step_s), got "
+    assert told.startswith(f"cell.yaml:7: tasks.a.{key}: {desired}{got or ''}")
     assert told.endswith("; slow the task down or shorten the step")
 
 

@@ -153,30 +153,30 @@ def test_planar_pair_has_the_closed_form():
 
 
 def test_feedback_on_the_pose_error_closes_it():
-    """Moving along the error by its full length must land on the wanted pose."""
+    """Moving along the error by its full length must land on the desired pose."""
     rng = np.random.default_rng(6)
     X = pose_from(rotation_exp(rng.normal(size=(20, 3))), rng.normal(size=(20, 3)))
-    wanted = pose_from(rotation_exp(rng.normal(size=(20, 3))), rng.normal(size=(20, 3)))
+    desired = pose_from(rotation_exp(rng.normal(size=(20, 3))), rng.normal(size=(20, 3)))
 
-    error = pose_errors(wanted, X, [False] * 20)
+    error = pose_errors(desired, X, [False] * 20)
 
-    np.testing.assert_allclose(X[:, :3, 3] + error[:, :3], wanted[:, :3, 3], atol=1e-14)
-    np.testing.assert_allclose(rotation_exp(error[:, 3:]) @ X[:, :3, :3], wanted[:, :3, :3], atol=1e-12)
+    np.testing.assert_allclose(X[:, :3, 3] + error[:, :3], desired[:, :3, 3], atol=1e-14)
+    np.testing.assert_allclose(rotation_exp(error[:, 3:]) @ X[:, :3, :3], desired[:, :3, :3], atol=1e-12)
 
 
 def test_free_spin_error_lays_the_axis_and_ignores_the_turn():
     rng = np.random.default_rng(8)
-    wanted = pose_from(rotation_exp(rng.normal(size=(20, 3))), np.zeros((20, 3)))
-    turned = wanted.copy()
-    turned[:, :3, :3] = wanted[:, :3, :3] @ rotation_about(np.array([0.0, 0, 1]), rng.uniform(-3, 3, 20))
+    desired = pose_from(rotation_exp(rng.normal(size=(20, 3))), np.zeros((20, 3)))
+    turned = desired.copy()
+    turned[:, :3, :3] = desired[:, :3, :3] @ rotation_about(np.array([0.0, 0, 1]), rng.uniform(-3, 3, 20))
     tilt = rotation_exp(0.3 * rng.normal(size=(20, 3)))
     tilted = turned.copy()
     tilted[:, :3, :3] = tilt @ turned[:, :3, :3]
 
-    assert np.abs(pose_errors(wanted, turned, [True] * 20)).max() < 1e-14
-    error = pose_errors(wanted, tilted, [True] * 20)
+    assert np.abs(pose_errors(desired, turned, [True] * 20)).max() < 1e-14
+    error = pose_errors(desired, tilted, [True] * 20)
     corrected = (rotation_exp(error[:, 3:]) @ tilted[:, :3, :3])[:, :, 2]
-    np.testing.assert_allclose(corrected, wanted[:, :3, 2], atol=1e-12)
+    np.testing.assert_allclose(corrected, desired[:, :3, 2], atol=1e-12)
 
 
 def test_constraint_rows_pick_named_axes_and_leave_the_spin():

@@ -88,7 +88,7 @@ def test_load_is_the_derivative_of_the_potential_energy():
     cell, masses = loaded_cell()
     model = CombinedModel(cell)
     q, h = np.random.default_rng(1).uniform(-1, 1, cell.joint_count), 1e-6
-    centre = np.linalg.inv(model.state(q).X_WP) @ model.state(q).X_WT @ np.eye(4)  # tips in P at this posture
+    centre = np.linalg.inv(model.state(q).X_WP) @ model.state(q).X_WT @ np.eye(4)  # tips in P at this configuration
     p_TS = [np.linalg.inv(X) @ np.append(cell.part.X_PS[:3, 3], 1.0) for X in centre]
 
     def energies(q):

@@ -21,7 +21,7 @@ H = 1e-5  # [rad] or [m]: central differences leave H^2 and eps / H times the co
 
 
 class Tasks:
-    """The task rows of a random cell as a function of the posture."""
+    """The task rows of a random cell as a function of the configuration."""
 
     def __init__(self, cell, *, held: bool, moving=None) -> None:
         self.tasks = cell.tasks

@@ -156,17 +156,19 @@ def test_obstacles_pull_along_the_gradient_of_their_distances() -> None:
     np.testing.assert_allclose(asked / gain, expected, atol=1e-3 * np.abs(expected).max())  # kinks of flat faces
 
 
-def test_posture_pulls_to_the_wanted_posture_and_else_to_the_start() -> None:
+def test_posture_pulls_to_the_desired_posture_and_else_to_the_start() -> None:
     cell = random_cell(4, operators=2, joints=7)
     start = np.random.default_rng(4).uniform(-1.0, 1.0, cell.joint_count)
     gain = 1e-3
-    goal = SecondaryGoal(kind=GoalKind.POSTURE, gain=gain, postures={"op1": np.full(7, 0.25)})
+    goal = SecondaryGoal(kind=GoalKind.POSTURE, gain=gain, configurations={"op1": np.full(7, 0.25)})
     problem = problem_at_rest(with_goals(cell, goal), start)
     q = start + 0.01
-    wanted = start.copy()
-    wanted[cell.columns("op1")] = 0.25
+    desired = start.copy()
+    desired[cell.columns("op1")] = 0.25
     first = problem.first_order(10, q)
-    np.testing.assert_allclose(first.secondary * first.weights / gain, wanted - q, rtol=1e-3)  # 1 / (1 + k h c) is left
+    np.testing.assert_allclose(
+        first.secondary * first.weights / gain, desired - q, rtol=1e-3
+    )  # 1 / (1 + k h c) is left
 
 
 @pytest.mark.parametrize("kind", [kind for kind in GOALS if kind is not GoalKind.OBSTACLES])
@@ -174,9 +176,9 @@ def test_posture_pulls_to_the_wanted_posture_and_else_to_the_start() -> None:
 def test_no_task_notices_and_the_goal_grows(kind: GoalKind, seed: int) -> None:
     """``grad w . qdot >= 0`` after the projection, in the metric of unequal weights."""
     problem, start = random_problem(seed, GOALS[kind])
-    q = start + 0.002  # off the start posture, which is the wanted one
+    q = start + 0.002  # off the start posture, which is the desired one
     tasks = problem.first_order(10, q)
-    motion = WeightedInverse(tasks.J, tasks.weights).unnoticed(tasks.secondary)
+    motion = WeightedInverse(tasks.J, tasks.weights).null_space_projection(tasks.secondary)
     if len(tasks.J) < len(q):
         assert np.abs(motion).max() > 0.0
     assert np.abs(tasks.J @ motion).max() <= UNNOTICED
@@ -214,7 +216,7 @@ def test_robots_that_stand_and_joints_that_are_locked_are_not_moved() -> None:
     stands = np.zeros(cell.joint_count, dtype=bool)
     stands[cell.columns("holder")] = True
     stands[cell.columns("op0").start + 4] = True
-    left = WeightedInverse(tasks.J, tasks.weights).unnoticed(tasks.secondary)
+    left = WeightedInverse(tasks.J, tasks.weights).null_space_projection(tasks.secondary)
     np.testing.assert_array_equal(tasks.secondary[stands], 0.0)
     np.testing.assert_array_equal(left[stands], 0.0)
     assert np.all(tasks.secondary[~stands] != 0.0)
@@ -254,7 +256,7 @@ def test_huge_gain_breaks_no_speed_limit_and_takes_no_joint_to_its_end(kind: Goa
     cell, start = planar_pair()
     goal = replace(GOALS[kind], gain=HUGE)
     if kind is GoalKind.POSTURE:  # far outside of what the arms can do
-        goal = replace(goal, postures={"left": np.radians([500.0, 500.0, 500.0])})
+        goal = replace(goal, configurations={"left": np.radians([500.0, 500.0, 500.0])})
     _, motion = planned(with_goals(cell, goal), start)
     for robot in cell.robots:
         q = motion.q[:, cell.columns(robot.name)]
@@ -323,7 +325,7 @@ def test_no_step_of_a_whole_motion_is_noticed_by_a_task(kind: GoalKind) -> None:
     largest = 0.0
     for k in range(0, len(motion.q), 5):
         tasks = problem.first_order(k, motion.q[k])
-        left = WeightedInverse(tasks.J, tasks.weights).unnoticed(tasks.secondary)
+        left = WeightedInverse(tasks.J, tasks.weights).null_space_projection(tasks.secondary)
         largest = max(largest, float(np.abs(tasks.J @ tasks.bounded(left, beside=np.zeros(6))).max()))
     assert largest <= UNNOTICED
 

@@ -83,7 +83,7 @@ def test_only_the_kept_components_of_a_closure_become_rows():
 
     with pytest.raises(DivergedError, match="from its grasp on the part"):
         problem.first_order(0, q)
-    problem.wanted[:] = relative_poses(cell, q)
+    problem.desired[:] = relative_poses(cell, q)
     tasks = problem.first_order(0, q)
 
     np.testing.assert_allclose(tasks.J, planners_jacobian(cell, q)[:, [0, 1, 5]].reshape(6, -1), atol=1e-12)

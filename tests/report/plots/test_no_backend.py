@@ -18,11 +18,11 @@ print(matplotlib.rcParams._get("backend"))
 
 
 @pytest.mark.parametrize(
-    ("wanted", "left"),
+    ("desired", "left"),
     [("module://matplotlib_inline.backend_inline", None), ("nonsense", None), ("", None), ("svg", "svg")],
 )
-def test_plots_are_painted_whatever_display_is_wanted(wanted: str, left: str | None) -> None:
-    environment = {**os.environ, "MPLBACKEND": wanted}
+def test_plots_are_painted_whatever_display_is_desired(desired: str, left: str | None) -> None:
+    environment = {**os.environ, "MPLBACKEND": desired}
 
     run = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=False)
 

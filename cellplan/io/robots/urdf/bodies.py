@@ -11,7 +11,7 @@ from cellplan.geometry.shapes import Mesh, Solid
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.findings import listed
 from cellplan.io.robots.urdf.document import UrdfLink, UrdfMesh, UrdfSolid
-from cellplan.io.robots.urdf.tree import UrdfTree, ZeroPosture, links_in_order
+from cellplan.io.robots.urdf.tree import UrdfTree, ZeroConfiguration, links_in_order
 from cellplan.model.robot import Body
 
 PACKAGE: Final = "package://"
@@ -35,16 +35,16 @@ class MeshShelf:
     files: list[Path] = field(default_factory=list)
     _read: dict[tuple[Path, tuple[float, float, float]], Mesh] = field(default_factory=dict)
 
-    def mesh(self, wanted: UrdfMesh) -> Mesh:
+    def mesh(self, desired: UrdfMesh) -> Mesh:
         """The mesh in [m].
 
         Raises:
             InputError: It is not found, cannot be read, or is flat.
         """
-        path = find_mesh(wanted.uri, self.folder, package_dirs=self.package_dirs, within=self.within)
-        key = (path, wanted.scale)
+        path = find_mesh(desired.uri, self.folder, package_dirs=self.package_dirs, within=self.within)
+        key = (path, desired.scale)
         if key not in self._read:
-            mesh = read_mesh(path, scale=wanted.scale)
+            mesh = read_mesh(path, scale=desired.scale)
             if is_flat(mesh):
                 raise InputError(f"{path.name}: expected a body with a volume, got a flat one")
             self._read[key] = replace(mesh, is_leaky=not mesh.is_closed)
@@ -53,7 +53,7 @@ class MeshShelf:
         return self._read[key]
 
 
-def link_bodies(tree: UrdfTree, posture: ZeroPosture, shelf: MeshShelf) -> tuple[Body, ...]:
+def link_bodies(tree: UrdfTree, configuration: ZeroConfiguration, shelf: MeshShelf) -> tuple[Body, ...]:
     """One body for each collision element, named after its link; further ones of a link are numbered from 2.
 
     Raises:
@@ -66,8 +66,10 @@ def link_bodies(tree: UrdfTree, posture: ZeroPosture, shelf: MeshShelf) -> tuple
         for place, solid in enumerate(link.solids):
             name = link.name if place == 0 else _free_name(link.name, taken)
             taken.add(name)
-            X_BS = posture.X_BL[link.name] @ solid.X_LS
-            bodies.append(Body(name=name, link=posture.carrier[link.name], shape=_solid(link, solid, shelf), X_BS=X_BS))
+            X_BS = configuration.X_BL[link.name] @ solid.X_LS
+            bodies.append(
+                Body(name=name, link=configuration.carrier[link.name], shape=_solid(link, solid, shelf), X_BS=X_BS)
+            )
     return tuple(bodies)
 
 
@@ -139,7 +141,7 @@ def _plain_place(uri: str, folder: Path, *, package_dirs: tuple[Path, ...]) -> P
 
 
 def _solid(link: UrdfLink, solid: UrdfSolid, shelf: MeshShelf) -> Solid:
-    """Shape of one element; complaints about its mesh get the line of the element."""
+    """Shape of one element; findings about its mesh get the line of the element."""
     if not isinstance(solid.shape, UrdfMesh):
         return solid.shape
     try:

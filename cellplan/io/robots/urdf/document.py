@@ -97,7 +97,7 @@ class UrdfJoint:
         return self.kind == "fixed"
 
     def error(self, what: str) -> InputError:
-        """Complaint about this joint, with its line."""
+        """Finding about this joint, with its line."""
         return self.element.error(f"joint '{self.name}': {what}")
 
 

@@ -50,48 +50,48 @@ class Range:
     rated_velocity: float | None = None
 
 
-def joint_range(joint: UrdfJoint, wanted: JointLimits, followers: Iterable[UrdfJoint]) -> Range:
+def joint_range(joint: UrdfJoint, desired: JointLimits, followers: Iterable[UrdfJoint]) -> Range:
     """Limits of a driven joint: the tightest of the URDF's, the cell's and those of the joints that follow it.
 
     Raises:
         InputError: A limit is missing, is widened by the cell, leaves no room or has an unlikely size.
     """
-    lower, upper = _positions(joint, wanted)
-    velocity = _speed(joint, wanted)
+    lower, upper = _positions(joint, desired)
+    velocity = _speed(joint, desired)
     for follower in followers:
         lower, upper, velocity = _within_follower(follower, lower, upper, velocity=velocity)
     if not lower < upper:
         got = f"{in_user_unit(joint, lower)} and {in_user_unit(joint, upper)}"
         raise joint.error(f"expected the lower limit below the upper one, got {got}")
     _require_likely(joint, Range(lower=lower, upper=upper, velocity=velocity))
-    rated = None if wanted.velocity is None else joint.limit.velocity
+    rated = None if desired.velocity is None else joint.limit.velocity
     return Range(lower=lower, upper=upper, velocity=velocity, rated_velocity=rated)
 
 
-def _positions(joint: UrdfJoint, wanted: JointLimits) -> tuple[float, float]:
+def _positions(joint: UrdfJoint, desired: JointLimits) -> tuple[float, float]:
     """Lower and upper limit."""
-    if wanted.wraps:
-        return _endless(joint, wanted)
+    if desired.wraps:
+        return _endless(joint, desired)
     given = joint.limit
     if given.lower is None or given.upper is None:
-        if wanted.lower is None or wanted.upper is None:
+        if desired.lower is None or desired.upper is None:
             raise joint.error(_missing_positions(joint))
-        return wanted.lower, wanted.upper
+        return desired.lower, desired.upper
     for name, own, new, is_wider in (
-        ("lower", given.lower, wanted.lower, wanted.lower is not None and wanted.lower < given.lower - ROOM),
-        ("upper", given.upper, wanted.upper, wanted.upper is not None and wanted.upper > given.upper + ROOM),
+        ("lower", given.lower, desired.lower, desired.lower is not None and desired.lower < given.lower - ROOM),
+        ("upper", given.upper, desired.upper, desired.upper is not None and desired.upper > given.upper + ROOM),
     ):
         if is_wider and new is not None:
             got = f"{in_user_unit(joint, new)} against {in_user_unit(joint, own)} in the URDF"
             raise joint.error(f"expected the {name} limit of the cell to tighten the URDF's, got {got}")
-    return max(given.lower, _or(wanted.lower, given.lower)), min(given.upper, _or(wanted.upper, given.upper))
+    return max(given.lower, _or(desired.lower, given.lower)), min(given.upper, _or(desired.upper, given.upper))
 
 
-def _endless(joint: UrdfJoint, wanted: JointLimits) -> tuple[float, float]:
+def _endless(joint: UrdfJoint, desired: JointLimits) -> tuple[float, float]:
     """Limits of a joint that the cell lets turn without end."""
     if joint.kind != "continuous":
         raise joint.error(f"expected `wrap: true` only for a continuous joint, got a {joint.kind} one")
-    if wanted.lower is not None or wanted.upper is not None:
+    if desired.lower is not None or desired.upper is not None:
         raise joint.error("expected either `wrap: true` or limits, got both")
     return -np.inf, np.inf
 
@@ -107,9 +107,9 @@ def _missing_positions(joint: UrdfJoint) -> str:
     return f"has no room between 'lower' and 'upper' in the URDF: give it {bounds}"
 
 
-def _speed(joint: UrdfJoint, wanted: JointLimits) -> float:
+def _speed(joint: UrdfJoint, desired: JointLimits) -> float:
     """Speed limit."""
-    own, new = joint.limit.velocity, wanted.velocity
+    own, new = joint.limit.velocity, desired.velocity
     unit = "mm_s" if joint.kind == "prismatic" else "deg_s"
     if own is None and new is None:
         cure = f"give it `limits: {{{joint.name}: {{velocity_{unit}: …}}}}`"

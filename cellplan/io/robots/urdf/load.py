@@ -1,4 +1,4 @@
-"""Robot from a URDF: joint axes and link bodies at the zero posture, with nothing of the file lost."""
+"""Robot from a URDF: joint axes and link bodies at the zero configuration, with nothing of the file lost."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,13 +13,13 @@ from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_docum
 from cellplan.io.robots.urdf.limits import JointLimits, joint_range
 from cellplan.io.robots.urdf.tree import (
     Roles,
-    ZeroPosture,
+    ZeroConfiguration,
     assign_roles,
     build_tree,
     choose_flange,
     known_joint,
     links_in_order,
-    zero_posture,
+    zero_configuration,
 )
 from cellplan.model.robot import FollowerJoint, Joint, JointKind, Link, RobotModel
 
@@ -80,18 +80,18 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     flange = choose_flange(tree, options.flange)
     roles = assign_roles(tree, flange, options.locked)
     _require_known_limits(document, roles, options.limits)
-    posture = zero_posture(tree, roles)
+    configuration = zero_configuration(tree, roles)
     shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
     model = RobotModel(
         name=document.name,
         source=path.name,
-        joints=tuple(_driven(joint, roles, posture, limits=options.limits) for joint in roles.driven),
-        followers=tuple(_follower(joint, roles, posture) for joint in roles.followers),
-        flange_link=posture.carrier[flange],
-        X_BF=posture.X_BL[flange],
-        bodies=link_bodies(tree, posture, shelf),
+        joints=tuple(_driven(joint, roles, configuration, limits=options.limits) for joint in roles.driven),
+        followers=tuple(_follower(joint, roles, configuration) for joint in roles.followers),
+        flange_link=configuration.carrier[flange],
+        X_BF=configuration.X_BL[flange],
+        bodies=link_bodies(tree, configuration, shelf),
         links=tuple(
-            Link(name=link.name, index=posture.carrier[link.name], X_BL=posture.X_BL[link.name])
+            Link(name=link.name, index=configuration.carrier[link.name], X_BL=configuration.X_BL[link.name])
             for link in links_in_order(tree)
         ),
     )
@@ -118,35 +118,37 @@ def _require_lock_units(document: UrdfDocument, units: Mapping[str, str]) -> Non
             raise joint.error(f"is {joint.kind}: expected to be locked in {required}, got {unit}")
 
 
-def _driven(joint: UrdfJoint, roles: Roles, posture: ZeroPosture, *, limits: Mapping[str, JointLimits]) -> Joint:
+def _driven(
+    joint: UrdfJoint, roles: Roles, configuration: ZeroConfiguration, *, limits: Mapping[str, JointLimits]
+) -> Joint:
     """A driven joint with its axis in B."""
     followers = [other for other in roles.followers if other.mimic and other.mimic.leader == joint.name]
-    wanted = limits.get(joint.name, JointLimits())
-    allowed = joint_range(joint, wanted, followers)
-    axis_B, point_B = _axis_in_base(joint, posture)
+    desired = limits.get(joint.name, JointLimits())
+    allowed = joint_range(joint, desired, followers)
+    axis_B, point_B = _axis_in_base(joint, configuration)
     return Joint(
         name=joint.name,
         kind=_kind(joint),
-        parent=posture.carrier[joint.parent],
+        parent=configuration.carrier[joint.parent],
         axis_B=axis_B,
         point_B=point_B,
         lower=allowed.lower,
         upper=allowed.upper,
         velocity=allowed.velocity,
-        acceleration=wanted.acceleration,
-        jerk=wanted.jerk,
+        acceleration=desired.acceleration,
+        jerk=desired.jerk,
         rated_velocity=allowed.rated_velocity,
     )
 
 
-def _follower(joint: UrdfJoint, roles: Roles, posture: ZeroPosture) -> FollowerJoint:
+def _follower(joint: UrdfJoint, roles: Roles, configuration: ZeroConfiguration) -> FollowerJoint:
     """A joint that a driven one moves, with its axis in B."""
-    axis_B, point_B = _axis_in_base(joint, posture)
+    axis_B, point_B = _axis_in_base(joint, configuration)
     leader = next(i for i, other in enumerate(roles.driven) if joint.mimic and other.name == joint.mimic.leader)
     return FollowerJoint(
         name=joint.name,
         kind=_kind(joint),
-        parent=posture.carrier[joint.parent],
+        parent=configuration.carrier[joint.parent],
         axis_B=axis_B,
         point_B=point_B,
         leader=leader,
@@ -155,9 +157,9 @@ def _follower(joint: UrdfJoint, roles: Roles, posture: ZeroPosture) -> FollowerJ
     )
 
 
-def _axis_in_base(joint: UrdfJoint, posture: ZeroPosture) -> tuple[Array, Array]:
+def _axis_in_base(joint: UrdfJoint, configuration: ZeroConfiguration) -> tuple[Array, Array]:
     """Unit axis and a point on it in B."""
-    X_BJ = posture.X_BJ[joint.name]
+    X_BJ = configuration.X_BJ[joint.name]
     return X_BJ[:3, :3] @ joint.axis_J, X_BJ[:3, 3]
 
 

@@ -58,7 +58,7 @@ class Roles:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ZeroPosture:
+class ZeroConfiguration:
     """Where everything is when all joints read zero.
 
     Attributes:
@@ -105,17 +105,17 @@ def build_tree(document: UrdfDocument) -> UrdfTree:
     return UrdfTree(document=document, root=roots[0], joints=tuple(ordered), above=above)
 
 
-def choose_flange(tree: UrdfTree, wanted: str | None) -> str:
-    """Name of the flange link: the wanted one, else ``tool0``, else ``flange``, else the only moving leaf.
+def choose_flange(tree: UrdfTree, desired: str | None) -> str:
+    """Name of the flange link: the desired one, else ``tool0``, else ``flange``, else the only moving leaf.
 
     Raises:
-        InputError: The wanted link does not exist, or there is no obvious one.
+        InputError: The desired link does not exist, or there is no obvious one.
     """
     links = tree.document.links
-    if wanted is not None:
-        if wanted not in links:
-            raise InputError(f"{tree.document.file}: flange: unknown link '{wanted}'{_known(wanted, links)}")
-        return wanted
+    if desired is not None:
+        if desired not in links:
+            raise InputError(f"{tree.document.file}: flange: unknown link '{desired}'{_known(desired, links)}")
+        return desired
     for name in FLANGE_NAMES:
         if name in links:
             return name
@@ -164,7 +164,7 @@ def assign_roles(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> Ro
     return Roles(driven=tuple(driven), followers=tuple(followers), still=still)
 
 
-def zero_posture(tree: UrdfTree, roles: Roles) -> ZeroPosture:
+def zero_configuration(tree: UrdfTree, roles: Roles) -> ZeroConfiguration:
     """Poses of all links with every moving joint at zero and every other one where it is held."""
     moving = [joint.name for joint in (*roles.driven, *roles.followers)]
     X_BL: dict[str, Array] = {tree.root: np.eye(4)}
@@ -175,7 +175,7 @@ def zero_posture(tree: UrdfTree, roles: Roles) -> ZeroPosture:
         X_BL[joint.child] = X_BJ[joint.name] @ _travel(joint, roles.still.get(joint.name, 0.0))
         is_moving = joint.name in moving
         carrier[joint.child] = moving.index(joint.name) if is_moving else carrier[joint.parent]
-    return ZeroPosture(X_BL=X_BL, X_BJ=X_BJ, carrier=carrier)
+    return ZeroConfiguration(X_BL=X_BL, X_BJ=X_BJ, carrier=carrier)
 
 
 def known_joint(document: UrdfDocument, name: str, key: str) -> UrdfJoint:

@@ -31,7 +31,7 @@ class Element:
     children: list["Element"] = field(default_factory=list)
 
     def error(self, what: str) -> InputError:
-        """Complaint about this element, with its line."""
+        """Finding about this element, with its line."""
         return InputError(f"{self.file}:{self.line}: {what}")
 
     def all(self, *tags: str) -> list["Element"]:
@@ -62,8 +62,8 @@ class Element:
         except ValueError:
             values = np.empty(0)
         if len(values) != count or not np.all(np.isfinite(values)):
-            wanted = "a finite number" if count == 1 else f"{count} finite numbers"
-            raise self.error(f"{owner}: expected {wanted} in '{name}', got {shown(text)}")
+            desired = "a finite number" if count == 1 else f"{count} finite numbers"
+            raise self.error(f"{owner}: expected {desired} in '{name}', got {shown(text)}")
         return values
 
     def number(self, name: str, owner: str, *, default: float | None = None) -> float:

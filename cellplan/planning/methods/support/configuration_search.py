@@ -1,4 +1,4 @@
-"""Posture search: from one posture to one that reaches the tasks, pass by pass, within bounds."""
+"""Posture search: from one configuration to one that reaches the tasks, pass by pass, within bounds."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ SLOW: Final = 0.01  # share of the cost that a pass leaves at least when it coun
 WAYS: Final = 6  # passes that are carried on together
 DEPENDENT: Final = 1e-6  # share of the largest singular value below which two passes led the tools the same way
 FARTHEST: Final = 30.0  # times their own length that passes are carried on at most
-NUDGE: Final = 1e-2  # [rad] or [m]: disturbance of a posture from which no single joint can go on
+NUDGE: Final = 1e-2  # [rad] or [m]: disturbance of a configuration from which no single joint can go on
 WORTH_IT: Final = 1e-6  # share of the cost that must be gained for a nudge to be kept
 
 
@@ -29,14 +29,14 @@ class Bounds:
     highest: Array
 
     def held(self, q: Array) -> Array:
-        """A posture brought within the bounds."""
+        """A configuration brought within the bounds."""
         return np.clip(q, self.lowest, self.highest)
 
 
 Pass = Callable[[Look, Bounds, int], tuple[Look, int]]  # from a look, with so many rounds left, to a better one
 
 
-class PostureSearch:
+class ConfigurationSearch:
     """Repeats the passes of a method until all tools are reached, nothing is gained any more or the rounds are used up.
 
     Where joints hinder each other, moves of one joint at a time gain less and less. After a pass that gained little the
@@ -44,8 +44,8 @@ class PostureSearch:
     turns out less there: to passes of single moves that is what conjugate directions are to steepest descent.
 
     The only singular situation ([Nicolato2007]_ 3.2.2) is an arm stretched out towards a goal on its own line: no joint
-    alone can gain anything there. The posture is then disturbed a little, always in the same way, and searched from
-    again; the disturbance is forgotten if it led nowhere, as with a goal out of reach.
+    alone can gain anything there. The configuration is then disturbed a little, always in the same way, and searched
+    from again; the disturbance is forgotten if it led nowhere, as with a goal out of reach.
     """
 
     def __init__(self, problem: TrackingProblem, improve: Callable[[SearchCost], Pass]) -> None:
@@ -58,17 +58,17 @@ class PostureSearch:
         self._rounds = settings.rounds
 
     def advance(self, k: int, start: Array, bounds: Bounds, *, momentum: Array | None = None) -> Advance:
-        """Search for the posture at the instant after k.
+        """Search for the configuration at the instant after k.
 
         Args:
             k: The instant.
-            start: Posture there, shape (nq,); it sets which joints may move and which way tools lean.
+            start: Configuration there, shape (nq,); it sets which joints may move and which way tools lean.
             bounds: Where the joints may go.
             momentum: What the joints moved in the step before, shape (nq,): the search begins as far along it as
                 brings the tools nearest, at most as far as it went, if that costs less than the start.
 
         Returns:
-            The best posture found; its slack is the root of the cost that is left over the step.
+            The best configuration found; its slack is the root of the cost that is left over the step.
         """
         self._cost.aim(k + 1, start)
         look = self._cost.look(start)

@@ -83,7 +83,7 @@ class FilteredMotion:
         self.theta: Array | None = None
 
     def advance(self, k: int, q: Array) -> Advance:
-        """One step, in as many sub-steps as it needs; between two instants the wanted twist is held.
+        """One step, in as many sub-steps as it needs; between two instants the desired twist is held.
 
         Raises:
             DivergedError: No sub-step is short enough.
@@ -136,4 +136,4 @@ def _besides(tasks: FirstOrder) -> Array:
     """Joint speeds for the secondary goals that no task notices, shape (nq,)."""
     if tasks.secondary is None:
         return np.zeros_like(tasks.weights)
-    return WeightedInverse(tasks.J, tasks.weights).unnoticed(tasks.secondary)
+    return WeightedInverse(tasks.J, tasks.weights).null_space_projection(tasks.secondary)

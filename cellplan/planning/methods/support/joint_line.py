@@ -86,7 +86,7 @@ class JointLines:
 
 
 def joint_lines(look: Look) -> JointLines:
-    """The cost along every joint from a posture."""
+    """The cost along every joint from a configuration."""
     return JointLines(
         ae=look.e @ look.a,
         ne=look.e @ look.n,

@@ -21,17 +21,17 @@ COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    r"""The cost at one posture, and the circle on which each joint moves the tools seen from the part.
+    r"""The cost at one configuration, and the circle on which each joint moves the tools seen from the part.
 
-    The cost ``h = e^T e`` is a sum of squared distances: of each tool tip from its wanted place, and of each
-    constrained axis of the tool from its wanted direction, the latter times ``gamma`` ([Nicolato2007]_ Eq. 3.1, as
+    The cost ``h = e^T e`` is a sum of squared distances: of each tool tip from its desired place, and of each
+    constrained axis of the tool from its desired direction, the latter times ``gamma`` ([Nicolato2007]_ Eq. 3.1, as
     ``tr((R_d - R)^T (R_d - R))`` is the sum over the columns of R). With joint i alone at ``q_i + theta`` it is
 
     .. math:: h_i = |e - \sin\theta \, a_i - (1 - \cos\theta) \, n_i|^2
 
     Attributes:
         q: Stacked joint vector, shape (nq,).
-        e: Wanted minus actual, all entries, shape (m,).
+        e: Reference minus actual, all entries, shape (m,).
         a: First derivative of the actual by each joint, shape (m, nq).
         n: Second derivative of the actual by each joint, shape (m, nq); zero for joints that do not turn on a circle.
         turns: Whether a joint moves the tools on circles; False also for one that drives others through a linkage,
@@ -68,12 +68,12 @@ class SearchCost:
     **What counts.** Places: the axes of P that the task constrains. Directions: all three of the tool when all three
     rotations are constrained; the tool's z axis when its spin is free; none when no rotation is constrained. Of any
     other set of rotations only a single one is taken, about an axis that all movable joints of the task are parallel
-    to, as in a planar cell: then the joints cannot touch the other two, and what the wanted turn about that axis makes
+    to, as in a planar cell: then the joints cannot touch the other two, and what the desired turn about that axis makes
     of the present directions is what is aimed at.
     """
 
     def __init__(self, problem: TrackingProblem) -> None:
-        """List the points and directions that count; the joints are looked at when the first posture is known."""
+        """List the points and directions that count; the joints are looked at when the first configuration is known."""
         self._problem = problem
         self._signs = problem.signs
         self._turns = turning_joints(problem.cell)
@@ -94,17 +94,17 @@ class SearchCost:
         self._is_tip = (self._columns == 3).astype(float)[:, None, None]
 
     def aim(self, k: int, q: Array) -> None:
-        """Take the wanted poses at instant k as the goal, and the joints that may move on the way there from q."""
+        """Take the desired poses at instant k as the goal, and the joints that may move on the way there from q."""
         problem = self._problem
         self._signs = problem.signs * problem.mobile(k - 1)
-        wanted = problem.wanted[k]
+        desired = problem.desired[k]
         if "turn" in self._kinds:
             self._require_parallel_axes(q)
-            wanted = self._with_reachable_turns(wanted, q)
-        self._goal = wanted[self._owners, :3, self._columns]
+            desired = self._with_reachable_turns(desired, q)
+        self._goal = desired[self._owners, :3, self._columns]
 
     def look(self, q: Array) -> Look:
-        """The cost at a posture, and what each joint does to it."""
+        """The cost at a configuration, and what each joint does to it."""
         state = self._problem.state(q)
         X_WR = reference_frames(state, self._problem.tasks)
         R, p = np.swapaxes(X_WR[:, :3, :3], 1, 2), X_WR[:, :3, 3]
@@ -143,20 +143,20 @@ class SearchCost:
                 if turning.size and (len(rotations) != 1 or np.abs(others).max() > PARALLEL):
                     raise InputError(_refusal(self._problem.cell, task))
 
-    def _with_reachable_turns(self, wanted: Array, q: Array) -> Array:
-        r"""Wanted poses whose tilt is the present one where a task asks for a turn about one axis u only.
+    def _with_reachable_turns(self, desired: Array, q: Array) -> Array:
+        r"""Reference poses whose tilt is the present one where a task asks for a turn about one axis u only.
 
         The turn left to do is the twist of ``E = R_d R^T`` about u: ``psi = atan2(u . vee(E), tr E - u^T E u)``.
         """
-        wanted = wanted.copy()
+        desired = desired.copy()
         state = self._problem.state(q)
         X_WR = reference_frames(state, self._problem.tasks)
         for index, (task, kind) in enumerate(zip(self._problem.tasks, self._kinds, strict=True)):
             if kind == "turn":
                 rotations = [axis - 3 for axis in task.axes if axis >= 3]
                 R = X_WR[index, :3, :3].T @ state.X_WT[self._problem.operators[index], :3, :3]
-                wanted[index, :3, :3] = _twist(wanted[index, :3, :3] @ R.T, rotations) @ R
-        return wanted
+                desired[index, :3, :3] = _twist(desired[index, :3, :3] @ R.T, rotations) @ R
+        return desired
 
 
 def turning_joints(cell: Cell) -> NDArray[np.bool_]:

@@ -42,7 +42,7 @@ class JointBounds:
         self._acceleration = np.where(np.isnan(known), by_ramp, known)
 
     def refuse_outside(self, q: Array) -> None:
-        """Refuse a posture from which no bounded speed is right.
+        """Refuse a configuration from which no bounded speed is right.
 
         Args:
             q: Stacked joint vector, shape (nq,).

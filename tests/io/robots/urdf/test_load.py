@@ -1,4 +1,4 @@
-"""A URDF becomes joint axes and bodies at the zero posture, and moves as pinocchio says."""
+"""A URDF becomes joint axes and bodies at the zero configuration, and moves as pinocchio says."""
 
 from pathlib import Path
 
@@ -138,9 +138,9 @@ def test_limits_and_names_are_taken_over(tmp_path: Path) -> None:
 
 
 def test_the_cell_tightens_and_supplies_limits(tmp_path: Path) -> None:
-    def limits_of(inside: str, wanted: JointLimits, kind: str = "revolute") -> tuple[float, float, float]:
+    def limits_of(inside: str, desired: JointLimits, kind: str = "revolute") -> tuple[float, float, float]:
         path = write(tmp_path, link("base"), link("tip"), joint("a1", "base", "tip", inside, kind=kind))
-        made = read_urdf(path, UrdfOptions(limits={"a1": wanted})).joints[0]
+        made = read_urdf(path, UrdfOptions(limits={"a1": desired})).joints[0]
         return made.lower, made.upper, made.velocity
 
     assert limits_of(LIMIT, JointLimits(lower=0.0)) == (0.0, 2.0, 3.0)
@@ -156,8 +156,8 @@ def test_the_cell_tightens_and_supplies_limits(tmp_path: Path) -> None:
 
 def test_the_cell_supplies_an_acceleration_limit(tmp_path: Path) -> None:
     path = write(tmp_path, *arm())
-    wanted = {"a1": JointLimits(acceleration=5.0)}
-    assert [joint.acceleration for joint in read_urdf(path, UrdfOptions(limits=wanted)).joints][:1] == [5.0]
+    desired = {"a1": JointLimits(acceleration=5.0)}
+    assert [joint.acceleration for joint in read_urdf(path, UrdfOptions(limits=desired)).joints][:1] == [5.0]
 
 
 def test_a_follower_limits_its_leader(tmp_path: Path) -> None:

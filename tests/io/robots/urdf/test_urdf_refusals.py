@@ -374,12 +374,12 @@ def _without(root: ET.Element, victim: ET.Element) -> ET.Element:
     return copy
 
 
-@pytest.mark.parametrize(("kind", "unit", "wanted"), [("prismatic", "deg", "mm"), ("revolute", "mm", "deg")])
-def test_a_joint_is_locked_in_its_own_unit(tmp_path: Path, kind: str, unit: str, wanted: str) -> None:
+@pytest.mark.parametrize(("kind", "unit", "desired"), [("prismatic", "deg", "mm"), ("revolute", "mm", "deg")])
+def test_a_joint_is_locked_in_its_own_unit(tmp_path: Path, kind: str, unit: str, desired: str) -> None:
     lines = [*ARM, '<link name="tool0"/>', joint("t", "tip", "tool0", "", kind="fixed")]
     lines += ['<link name="f"/>', joint("g", "base", "f", kind=kind)]
     options = UrdfOptions(locked={"g": 0.0}, lock_units={"g": unit})
 
     assert refused(tmp_path, *lines, options=options) == (
-        f"r.urdf:8: joint 'g': is {kind}: expected to be locked in {wanted}, got {unit}"
+        f"r.urdf:8: joint 'g': is {kind}: expected to be locked in {desired}, got {unit}"
     )

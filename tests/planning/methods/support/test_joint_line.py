@@ -88,7 +88,7 @@ def test_error_of_the_cost_is_the_sum_of_squares_of_the_paper():
     state = problem.state(q)
     X_PT = np.linalg.inv(state.X_WP) @ state.X_WT[problem.operators]
     gamma = cell.solver.search.orientation_weight
-    difference = problem.wanted[1] - X_PT
+    difference = problem.desired[1] - X_PT
     expected = np.sum(difference[:, :3, 3] ** 2) + gamma * np.sum(difference[:, :3, :3] ** 2)
     assert cost.look(q).cost == pytest.approx(expected, rel=1e-12)
 

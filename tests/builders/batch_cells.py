@@ -11,7 +11,7 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Relation
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import Frame
-from cellplan.planning.collocation.batch_tasks import Wanted
+from cellplan.planning.collocation.batch_tasks import Reference
 
 
 def side_arm(model: RobotModel) -> RobotModel:
@@ -91,17 +91,17 @@ def everyone(cell: Cell) -> list[str]:
     return [robot.name for robot in cell.robots]
 
 
-def postures(cell: Cell, lanes: int, *, seed: int = 0) -> Array:
+def configurations(cell: Cell, lanes: int, *, seed: int = 0) -> Array:
     """Random stacked joint vectors, shape (nq, lanes)."""
     return np.random.default_rng(seed).uniform(-1.5, 1.5, size=(cell.joint_count, lanes))
 
 
-def random_wanted(count: int, lanes: int, *, seed: int = 0) -> tuple[Wanted, Array]:
+def random_desired(count: int, lanes: int, *, seed: int = 0) -> tuple[Reference, Array]:
     """Random poses and twists, and the poses as matrices, shape (lanes, tasks, 4, 4)."""
     rng = np.random.default_rng(seed)
     X = np.array([[random_pose(rng) for _ in range(count)] for _ in range(lanes)])
     twists = rng.normal(size=(6, count, lanes))
-    return Wanted(np.moveaxis(X[..., :3, :3], (0, 1), (3, 2)), np.moveaxis(X[..., :3, 3], (0, 1), (2, 1)), twists), X
+    return Reference(np.moveaxis(X[..., :3, :3], (0, 1), (3, 2)), np.moveaxis(X[..., :3, 3], (0, 1), (2, 1)), twists), X
 
 
 def seen_poses(cell: Cell, q: Array) -> Array:
