@@ -18,7 +18,7 @@ from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.run import PlannedRun, plan_run
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.planning.modes import plan_runs, standing
+from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.timing.schedule import examine_times
@@ -49,7 +49,7 @@ def solve(
     examine_given_starts(cell, toolpaths)
     choice = chosen_start(scene, toolpaths, progress=progress)
     started = with_start(cell, choice.start)
-    plans = plan_runs(cell, only=task)
+    plans = plan_phases(cell, only=task).program
     planned = [plan_run(started, toolpaths, plan, progress=progress) for plan in plans]
     solved = with_homes(started, find_homes(replace(scene, cell=started), planned, progress=progress), given=cell)
     if depends_on_homes(started, planned):
@@ -61,14 +61,14 @@ def solve(
 
 def _run(scene: Scene, planned: PlannedRun, *, progress: Progress, drawing: BackgroundPlots | None) -> Run:
     """Verify what would be written of one run."""
-    cell, plan = scene.cell, planned.plan
+    cell, plan = scene.cell, planned.phase
     motion = replace(planned.motion, q=standing(cell, plan, planned.motion.q))
     program = render_program(cell, motion)
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
     preview = None if drawing is None else partial(drawing.begin, cell=cell)
     report = verify(scene, planned.schedule, tables, moving=plan.moving, progress=progress, preview=preview)
     return Run(
-        name=plan.name,
+        name=plan.task,
         moving=plan.moving,
         schedule=planned.schedule,
         motion=motion,

@@ -9,7 +9,7 @@ from cellplan.io.run.joint_tables import parse_table
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
-from cellplan.planning.modes import plan_runs
+from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.scene.scene import Scene
@@ -27,9 +27,9 @@ def verify(cell: Cell, tables: Mapping[str, str], *, task: str | None = None, pr
     Raises:
         InputError: A table is missing, unreadable, or does not fit the cell; there is no such task.
     """
-    plans = plan_runs(cell, only=task)
+    plans = plan_phases(cell, only=task).program
     if len(plans) > 1:
-        names = ", ".join(str(plan.name) for plan in plans)
+        names = ", ".join(str(plan.task) for plan in plans)
         raise InputError(f"task: this cell has one run per task: name one of {names}")
     plan = plans[0]
     toolpaths = [build_toolpath(cell.task(name), cell.part, cell.origin) for name in plan.tasks]
