@@ -60,9 +60,7 @@ class Plan:
         Args:
             sigma: Nominal times of the rows in [s], shape (N,), increasing.
         """
-        return {
-            int(np.searchsorted(sigma, phase.end)): phase.name for phase in self.phases if not phase.in_program
-        }
+        return {int(np.searchsorted(sigma, phase.end)): phase.name for phase in self.phases if not phase.in_program}
 
 
 def rows_of(phase: Phase, sigma: Array) -> slice:

@@ -22,7 +22,7 @@ def verify(cell: Cell, tables: Mapping[str, str], *, task: str | None = None, pr
         cell: The cell the tables were made for.
         tables: Text of one joint table per robot, by robot name.
         task: Name of the only task that was worked on; needed when the cell's mode has one run per task.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: A table is missing, unreadable, or does not fit the cell; there is no such task.

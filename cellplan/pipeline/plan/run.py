@@ -30,9 +30,7 @@ class PlannedRun:
     motion: Motion
 
 
-def plan_run(
-    cell: Cell, toolpaths: Mapping[str, Toolpath], phase: Phase, *, progress: Progress = silent
-) -> PlannedRun:
+def plan_run(cell: Cell, toolpaths: Mapping[str, Toolpath], phase: Phase, *, progress: Progress = silent) -> PlannedRun:
     """Follow the tasks of one phase; idle robots stand at their homes, or at their starts while these are unknown.
 
     Args:

@@ -180,9 +180,7 @@ class StartTrials:
             start[cell.columns(name)] = holder_configuration
         of_task = next(phase for phase in self._phases if task.name in phase.tasks)
         phase = of_task.among({*cell.positioners, task.robot})
-        chosen = np.concatenate(
-            [np.full(len(robot.model.joints), robot.name in phase.moving) for robot in cell.robots]
-        )
+        chosen = np.concatenate([np.full(len(robot.model.joints), robot.name in phase.moving) for robot in cell.robots])
         try:
             motions = self._motions(cell, start, [phase])
         except NoSolutionError:
