@@ -11,8 +11,9 @@ from cellplan.pipeline.gate.compare_report import KNOWN_TO_THE_PLANNER
 from cellplan.pipeline.gate.equal_text import first_difference
 from cellplan.pipeline.gate.picture_text import foreign_piece
 from cellplan.report.page.render import overview_page, report_page
+from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import clearance_sheets, motion_sheets
-from cellplan.report.plots.sheet import Sheet, pictures
+from cellplan.report.plots.sheet import Sheet
 from cellplan.report.record.run import Provenance, Record
 from cellplan.report.record.write import run_record, summary_record
 
