@@ -4,7 +4,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from cellplan.guard import BackgroundProcess
-from cellplan.report.plots.sheet import Sheet, get_ready, pictures
+from cellplan.report.plots.rendering import pictures, warm_up
+from cellplan.report.plots.sheet import Sheet
 
 if TYPE_CHECKING:  # the child is to begin before these are imported
     from cellplan.model.cell import Cell
@@ -21,7 +22,7 @@ class BackgroundPlots:
         self._background = background
         self._begun: list[tuple[Report, Callable[[], Pictures]]] = []
         if background is not None:
-            background.begin(get_ready)
+            background.begin(warm_up)
 
     def begin(self, report: "Report", *, cell: "Cell") -> None:
         """Begin with the plots of a run of which all is known but the clearance."""

@@ -16,6 +16,7 @@ from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.report.page.render import overview_html, report_html
 from cellplan.report.record.run import Provenance
+from cellplan.report.record.series import series_json
 from cellplan.report.record.write import report_json, summary_json
 
 ENGINES: Final = (
@@ -38,7 +39,7 @@ def write_run(
 ) -> None:
     """Write a run folder; it appears whole or not at all.
 
-    Every run has ``report.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only when the whole
+    Every run has ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only if the
     solution passed. A cell with one run per task gets a subfolder for each and an overview above them. Last comes
     ``manifest.json``, which names every file.
 
@@ -89,6 +90,7 @@ def _write_one(target: RunFolder, cell: Cell, run: Run, plots: BackgroundPlots) 
     begun = plots.pictures(run.report, cell=cell)
     record = report_json(run.report, cell=cell, provenance=provenance, motion=run.motion)
     target.write_text(f"{place}report.json", record)
+    target.write_text(f"{place}series.json", series_json(run.report, run.motion))
     pictures = begun()
     for name, picture in pictures.items():
         target.write_bytes(f"{place}plots/{name}", picture)

@@ -19,7 +19,7 @@ from cellplan.io.run.joint_tables import (
     program_digest,
     table_body,
 )
-from cellplan.io.run.stored import CELL, StoredRun, read_stored_run
+from cellplan.io.run.stored import CELL, SERIES, StoredRun, read_stored_run
 from cellplan.model.cell import Cell
 from cellplan.model.idle import not_in_program
 from cellplan.model.motion import JointTable, Schedule
@@ -28,7 +28,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.model.verified_run import SEAL, VerifiedMotion, VerifiedRun
 from cellplan.pipeline.gate.compare_page import drawn_again, other_pictures, page_findings
-from cellplan.pipeline.gate.compare_report import differences
+from cellplan.pipeline.gate.compare_report import differences, misshapen_series
 from cellplan.pipeline.gate.stored_cell import load_stored_cell
 from cellplan.pipeline.write_run import versions
 from cellplan.planning.modes import homeless, plan_phases
@@ -257,11 +257,7 @@ def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[Verifi
     """Refuse reports that say something else than was found."""
     provenance = Provenance(versions=stored.manifest.versions, digests={})
     found: dict[str, Record] = {
-        motion.name or "": {
-            **run_record(motion.report, cell=cell, provenance=provenance),
-            "series": series(motion.report),
-        }
-        for motion in motions
+        motion.name or "": run_record(motion.report, cell=cell, provenance=provenance) for motion in motions
     }
     said: dict[str, Record] = dict(stored.records)
     if "runs" in stored.record:
@@ -275,7 +271,19 @@ def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[Verifi
             f"{stored.file(place, 'report.json')}: {key}: {shown(old)} stands there, {shown(new)} was found"
             for key, old, new in differences(record, found[place], same_program=is_same)
         ]
+    for motion in motions:
+        findings += _series_findings(stored, motion, is_same=is_same)
     _refuse_because(stored, findings)
+
+
+def _series_findings(stored: StoredRun, motion: VerifiedMotion, *, is_same: bool) -> Iterator[str]:
+    """Differences between the series of one run and those of its tables."""
+    place = motion.name or ""
+    said, found = stored.series(place), series(motion.report)
+    different = list(differences(said, found, same_program=is_same))
+    different += misshapen_series(said, len(found["times_s"]) - 1) if is_same else []
+    for key, old, new in different:
+        yield f"{stored.file(place, SERIES)}: {key}: {shown(old)} stands there, {shown(new)} was found"
 
 
 def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> tuple[str, ...]:
