@@ -202,12 +202,13 @@ def test_failed_run_leaves_no_tables_unless_asked(cells, tmp_path):
         assert "# verdict: REJECTED: joint kuka/B2 goes" in table.read_text()
 
 
-def test_pairwise_writes_a_subfolder_for_each_task(cells, tmp_path):
+def test_pairwise_writes_one_program_and_a_report_for_each_task(cells, tmp_path):
     cell = with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise")
     write_run(solve(cell, task="circle"), tmp_path / "run")
     record = json.loads((tmp_path / "run" / "report.json").read_text())
     assert list(record["runs"]) == ["circle"]
-    assert (tmp_path / "run" / "circle" / "tables" / "kuka.csv").is_file()
+    assert (tmp_path / "run" / "tables" / "kuka.csv").is_file()
+    assert not (tmp_path / "run" / "circle" / "tables").exists()
     assert json.loads((tmp_path / "run" / "circle" / "report.json").read_text())["status"] == "passed"
 
 
@@ -240,5 +241,5 @@ def test_one_failed_run_withholds_the_tables_of_all(cells, tmp_path):
 
     assert not list((tmp_path / "plain").rglob("*.csv"))
     assert not list((tmp_path / "kept").rglob("tables"))
-    header = (tmp_path / "kept" / "rhombus" / "rejected" / "abb.csv").read_text()
-    assert "# verdict: REJECTED: another run of the same job failed" in header
+    header = (tmp_path / "kept" / "rejected" / "abb.csv").read_text()
+    assert "# verdict: REJECTED: circle: position error of task 'circle'" in header

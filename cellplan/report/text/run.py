@@ -162,11 +162,9 @@ def _failure_lines(checks: list[Record]) -> Iterator[str]:
 
 def _place_lines(record: Record, folder: Path) -> Iterator[str]:
     yield f"report: {folder / 'report.html'}"
-    runs = list(record.get("runs", {}))
-    for place in [folder / run for run in runs] or [folder]:
-        for tables in (place / "tables", place / "rejected"):
-            if tables.is_dir():
-                yield f"tables: {tables}"
+    for tables in (folder / "tables", folder / "rejected"):
+        if tables.is_dir():
+            yield f"tables: {tables}"
 
 
 def _short(value: float | None) -> str:
