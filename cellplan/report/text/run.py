@@ -28,7 +28,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
         *figure_lines(record),
         *_failure_lines(record["checks"]),
         *(f"  {line}" for line in record.get("not_in_program", [])),
-        *_place_lines(record, folder),
+        *_place_lines(folder),
     ]
 
 
@@ -160,7 +160,7 @@ def _failure_lines(checks: list[Record]) -> Iterator[str]:
             yield f"  FAILED {run}{check['message']}"
 
 
-def _place_lines(record: Record, folder: Path) -> Iterator[str]:
+def _place_lines(folder: Path) -> Iterator[str]:
     yield f"report: {folder / 'report.html'}"
     for tables in (folder / "tables", folder / "rejected"):
         if tables.is_dir():
