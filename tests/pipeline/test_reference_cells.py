@@ -166,9 +166,10 @@ def test_run_folder_holds_what_it_promises(four_robots, tmp_path):
         "plots",
         "report.html",
         "report.json",
+        "series.json",
         "tables",
     }
-    assert {path.stem for path in (folder / "tables").iterdir()} == {"reis", "kuka", "abb", "staubli"}
+    assert {path.stem for path in (folder / "tables").iterdir()} == {"reis", "kuka", "abb", "staubli", "clock"}
     assert record["status"] == "passed"
     assert record["cycle_time_s"] == 4.0
     assert record["tasks"]["circle"]["max_position_error_mm"] <= 0.003
