@@ -37,7 +37,7 @@ def plan_run(cell: Cell, toolpaths: Mapping[str, Toolpath], phase: Phase, *, pro
         cell: The cell, every start posture filled in.
         toolpaths: Toolpath of every task, by task name.
         phase: The phase.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         NoSolutionError: A tool lost its path.
