@@ -125,7 +125,7 @@ class _Search:
         self._failed = Counter[str]()
 
     def home(self) -> Array | None:
-        """The candidate nearest to the start that is certified to be free, with extra clearance if possible; or None."""
+        """The candidate nearest to the start certified to be free, with extra clearance if possible; or None."""
         robot = self._robot
         rng = generator(robot.name, self._cell.solver.seed)
         candidates = home_candidates(robot.model, self._chain, self._start(), rng)
