@@ -14,10 +14,11 @@ from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.report.page.render import overview_html, report_html
-from cellplan.report.record.run import Provenance
+from cellplan.report.page.render import overview_page, report_page
+from cellplan.report.record.common import Provenance, Record, as_json
+from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series_json
-from cellplan.report.record.write import report_json, summary_json
+from cellplan.report.record.summary import summary_record
 
 ENGINES: Final = (
     "numpy",
@@ -36,12 +37,12 @@ def write_run(
     keep_rejected: bool = False,
     progress: Progress = silent,
     plots: BackgroundPlots | None = None,
-) -> None:
+) -> Record:
     """Write a run folder; it appears whole or not at all.
 
-    Every run has ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only if the
-    solution passed. A cell with one run per task gets a subfolder for each and an overview above them. Last comes
-    ``manifest.json``, which names every file.
+    Every run has ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/``
+    only if the solution passed. A cell with one run per task gets a subfolder for each and an overview above them.
+    ``manifest.json``, which names every file, is written last.
 
     Args:
         solution: What was solved.
@@ -50,6 +51,9 @@ def write_run(
         progress: Called with the stage and the fraction done.
         plots: Draws the plots; those that it has begun are not drawn again.
 
+    Returns:
+        The record in the ``report.json`` of the folder.
+
     Raises:
         InputError: The folder cannot be written, or holds something else than a run.
     """
@@ -57,7 +61,7 @@ def write_run(
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            _write_one(target, solution.cell, run, background)
+            record = _write_one(target, solution.cell, run, background)
             if solution.passed:
                 _write_tables(target, run, "tables")
             elif keep_rejected:
@@ -65,11 +69,13 @@ def write_run(
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
             provenance = Provenance(versions=versions(), digests={})
-            target.write_text("report.json", summary_json(reports, cell=solution.cell, provenance=provenance))
-            target.write_text("report.html", overview_html(reports, cell=solution.cell, provenance=provenance))
+            record = summary_record(reports, cell=solution.cell, provenance=provenance)
+            target.write_text("report.json", as_json(record))
+            target.write_text("report.html", overview_page(record, cell=solution.cell))
             target.write_text("cell.yaml", render_cell(solution.cell))
         manifest = render_manifest(solution.cell, passed=solution.passed, versions=versions(), files=target.written)
         target.write_text(MANIFEST, manifest)
+    return record
 
 
 def versions() -> dict[str, str]:
@@ -83,20 +89,20 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _write_one(target: RunFolder, cell: Cell, run: Run, plots: BackgroundPlots) -> None:
-    """Report, plots and resolved cell of one run."""
+def _write_one(target: RunFolder, cell: Cell, run: Run, plots: BackgroundPlots) -> Record:
+    """Report, series, plots and resolved cell of one run; returns the record in its ``report.json``."""
     place = _place(run)
     provenance = Provenance(versions=versions(), digests={"program": program_digest(run.program.tables)})
     begun = plots.pictures(run.report, cell=cell)
-    record = report_json(run.report, cell=cell, provenance=provenance, motion=run.motion)
-    target.write_text(f"{place}report.json", record)
+    record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion)
+    target.write_text(f"{place}report.json", as_json(record))
     target.write_text(f"{place}series.json", series_json(run.report, run.motion))
     pictures = begun()
     for name, picture in pictures.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    page = report_html(run.report, cell=cell, provenance=provenance, plots=pictures, motion=run.motion)
-    target.write_text(f"{place}report.html", page)
+    target.write_text(f"{place}report.html", report_page(record, run.report.checks, cell=cell, plots=pictures))
     target.write_text(f"{place}cell.yaml", render_cell(cell))
+    return record
 
 
 def _write_tables(target: RunFolder, run: Run, folder: str) -> None:

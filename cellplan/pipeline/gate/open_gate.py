@@ -35,10 +35,11 @@ from cellplan.planning.modes import homeless, plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.report.record.accelerations import table_line
+from cellplan.report.record.common import Provenance, Record
 from cellplan.report.record.idle import missing_moves
-from cellplan.report.record.run import Provenance, Record
+from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series
-from cellplan.report.record.write import run_record, summary_record
+from cellplan.report.record.summary import summary_record
 from cellplan.scene.scene import Scene
 
 MOST_DIFFERENCES: Final = 10  # of a report that are told; the rest is counted
