@@ -1,12 +1,16 @@
-"""Schedule, motion and program: where each tool must be, what all joints do, and what is written for each robot."""
+"""Schedule, motion and program: desired tool poses, joint positions of all robots, and the tables as text."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.phase import Phase
+from cellplan.model.plan import Plan, rows_of
 from cellplan.model.solver import Integrator
 from cellplan.model.task import Task
 
@@ -24,6 +28,7 @@ class TaskSchedule:
         end: Instant in [s] at which the path is done.
         cycle_ends: Instants in [s] at which the tool has come back to the pose of its start, all constrained
             components together, one per cycle; none when it does not come back.
+        stops: Times in [s] at which a stretch of the path with its own start and stop of the time law begins or ends.
     """
 
     task: Task
@@ -33,6 +38,7 @@ class TaskSchedule:
     length: float
     end: float
     cycle_ends: tuple[float, ...] = ()
+    stops: tuple[float, ...] = ()
 
 
 class DesiredMotion(Protocol):
@@ -133,11 +139,13 @@ class Resolution:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Motion:
-    """Joint positions of all robots on the common clock.
+    """Joint positions of all robots in the rows of a program, or of one phase of it.
 
     Attributes:
-        times: Instants in [s], shape (N,).
+        times: Times of the rows in [s], shape (N,).
         q: Stacked joint positions in [rad] or [m], shape (N, nq), in the order of ``Cell.robots``.
+        sigma: Nominal time of each row in [s], shape (N,); the time itself where it is not given.
+        plan: The phases of the program on its nominal time; without phases for the motion of a single one.
         iterations: How often the method looked at the tasks for each step, shape (N - 1,); None when nobody counted.
         slack: By how much each step leaves the tasks on purpose, as the norm of the twist that it gives up (metres
             and radians per second as they come), shape (N - 1,); None when nobody measured it.
@@ -146,6 +154,8 @@ class Motion:
 
     times: Array
     q: Array
+    sigma: Array = field(default_factory=lambda: np.empty(0))
+    plan: Plan = field(default_factory=Plan)
     iterations: Array | None = None
     slack: Array | None = None
     resolution: Resolution | None = None
@@ -156,27 +166,69 @@ class Motion:
             raise ValueError(f"motion: {len(self.q)} rows for {len(self.times)} instants")
         if not np.all(np.isfinite(self.q)):
             raise ValueError("motion: a joint position is not finite")
+        if not len(self.sigma):
+            object.__setattr__(self, "sigma", self.times)
+        if self.sigma.shape != self.times.shape:
+            raise ValueError(f"motion: {len(self.sigma)} nominal times for {len(self.times)} times")
+
+    @property
+    def gaps(self) -> dict[int, str]:
+        """Name of what is not part of the program, by the first row after it."""
+        return self.plan.gaps(self.sigma)
+
+    def rows(self, phase: Phase) -> slice:
+        """The rows of a phase, both ends included."""
+        return rows_of(phase, self.sigma)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointTable:
-    """What one robot is told to do: the content of its written table, read back.
+    """The joint positions of one robot: the content of its written table, read back.
 
     Attributes:
         robot: Name of the robot.
         joints: Joint names in the order of the columns.
-        times: Instants in [s], shape (N,).
+        times: Times of the rows in [s], shape (N,).
         q: Joint positions in [rad] or [m], shape (N, n).
+        gaps: Name of what is not part of the program, by the first row after it.
     """
 
     robot: str
     joints: tuple[str, ...]
     times: Array
     q: Array
+    gaps: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ClockTable:
+    """What happens at each row of a program: the content of its written clock.
+
+    Attributes:
+        times: Times of the rows in [s], shape (N,).
+        sigma: Nominal time of each row in [s], shape (N,).
+        phases: Name of the phase of each row.
+        lengths: Length of path in [m] behind the tool of each task, shape (N,), by task.
+        process: Whether the tool of each task is on its path, shape (N,), by task.
+        gaps: Name of what is not part of the program, by the first row after it.
+    """
+
+    times: Array
+    sigma: Array
+    phases: tuple[str, ...]
+    lengths: Mapping[str, Array]
+    process: Mapping[str, NDArray[np.bool_]]
+    gaps: Mapping[int, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Program:
-    """One rendered joint table per robot: file text by robot name."""
+    """A program as text.
+
+    Attributes:
+        tables: The joint table of every robot, by robot name.
+        clock: What happens at each row of these; empty where it is not written.
+    """
 
     tables: dict[str, str]
+    clock: str = ""

@@ -32,6 +32,7 @@ def test_a_sound_cell_is_told_and_written(
     assert lines[-2:] == [f"report: {folder / 'report.html'}", f"tables: {folder / 'tables'}"]
     assert sorted(path.name for path in (folder / "tables").iterdir()) == [
         "abb.csv",
+        "clock.csv",
         "kuka.csv",
         "reis.csv",
         "staubli.csv",

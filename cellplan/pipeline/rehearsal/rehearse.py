@@ -1,6 +1,6 @@
 """Rehearse a cell with errors: solve it, execute the program on real cells, and correct it from measurements."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -11,12 +11,12 @@ from cellplan.checks.real_cell.iso9283 import path_figures, pose_figures
 from cellplan.checks.real_cell.true_errors import check_true_errors
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError
-from cellplan.geometry.transforms import Array
 from cellplan.io.run.joint_tables import parse_table
 from cellplan.kinematics.perturbed_cell import draw_errors, perturbed_cell
 from cellplan.model.cell import Cell
 from cellplan.model.cell_errors import CellErrors
 from cellplan.model.motion import Motion, Schedule
+from cellplan.model.phase import Phase
 from cellplan.model.progress import Progress, silent
 from cellplan.model.rehearsal import CorrectedProgram, IsoFigures, Rehearsal, RunRehearsal, Trial
 from cellplan.model.report import Check, Report, TaskAccuracy
@@ -129,13 +129,13 @@ def _rehearse_run(
         schedule=run.schedule,
         moving=run.moving,
         judged_from=_judged_from(run.schedule),
-        q=_written(cell, run.program.tables),
+        q=np.concatenate([run.report.q[robot.name] for robot in cell.robots], axis=1),
     )
     made = []
     for number in range(trials):
         progress("rehearsing", number / trials)
         made.append(_try(job, errors, number, wish=wish, progress=_within(progress, number, trials)))
-    corrected = _corrected(job, made[0], progress) if trials == 1 and wish.feedback else None
+    corrected = _corrected(job, made[0], run.phase, progress) if trials == 1 and wish.feedback else None
     return RunRehearsal(
         name=run.name,
         times=run.schedule.times,
@@ -175,7 +175,7 @@ def _try(job: Pass, errors: CellErrors, number: int, *, wish: _Options, progress
     return Trial(draw=draw, before=before, correction=correction, in_pass=in_pass)
 
 
-def _corrected(job: Pass, trial: Trial, progress: Progress) -> CorrectedProgram | None:
+def _corrected(job: Pass, trial: Trial, phase: Phase, progress: Progress) -> CorrectedProgram | None:
     """The corrected joint tables, verified on the written cell against the corrected references."""
     if trial.correction is None:
         return None
@@ -187,14 +187,8 @@ def _corrected(job: Pass, trial: Trial, progress: Progress) -> CorrectedProgram 
     )
     kept = trial.correction.best
     remark = f"corrected for measured errors, round {kept}: right for the measured cell, not for the written one"
-    return CorrectedProgram(program=with_verdict(cell, program, report, remark=remark), report=report)
-
-
-def _written(cell: Cell, tables: Mapping[str, str]) -> Array:
-    """Stacked joint positions as they stand in the tables, shape (N, nq)."""
-    return np.concatenate(
-        [parse_table(tables[robot.name], f"tables/{robot.name}.csv").q for robot in cell.robots], axis=1
-    )
+    alone = replace(phase, begin=0.0, end=float(references.times[-1]))  # a program of its own
+    return CorrectedProgram(program=with_verdict(cell, program, [alone], [report], remark=remark), report=report)
 
 
 def _judged_from(schedule: Schedule) -> dict[str, int]:

@@ -143,6 +143,7 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
         length=path.toolpath.length,
         end=path.end,
         cycle_ends=_cycle_ends(task, path.toolpath, corners),
+        stops=tuple(corners.tolist()),
     )
 
 

@@ -29,7 +29,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
         *figure_lines(record),
         *_failure_lines(record["checks"]),
         *(f"  {line}" for line in record.get("not_in_program", [])),
-        *_place_lines(record, folder),
+        *_place_lines(folder),
     ]
 
 
@@ -161,13 +161,11 @@ def _failure_lines(checks: Iterable[Record]) -> Iterator[str]:
             yield f"  FAILED {run}{check['message']}"
 
 
-def _place_lines(record: Record, folder: Path) -> Iterator[str]:
+def _place_lines(folder: Path) -> Iterator[str]:
     yield f"report: {folder / 'report.html'}"
-    runs = list(record.get("runs", {}))
-    for place in [folder / run for run in runs] or [folder]:
-        for tables in (place / "tables", place / "rejected"):
-            if tables.is_dir():
-                yield f"tables: {tables}"
+    for tables in (folder / "tables", folder / "rejected"):
+        if tables.is_dir():
+            yield f"tables: {tables}"
 
 
 def _short(value: float | None) -> str:

@@ -101,14 +101,13 @@ def test_sliding_and_turning_joints_are_not_compared(record: dict[str, Any], tmp
     assert "  smallest joint margin 500 mm: rail X at 1.500 s" in lines
 
 
-def test_runs_of_their_own_have_tables_of_their_own(record: dict[str, Any], tmp_path: Path) -> None:
-    for task in ("ring", "line"):
-        (tmp_path / task / "tables").mkdir(parents=True)
+def test_the_tables_of_all_phases_lie_in_one_folder(record: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "rejected").mkdir()
     record["runs"] = {"ring": {}, "line": {}}
 
     lines = summary_lines(record, tmp_path)
 
-    assert lines[-2:] == [f"tables: {tmp_path / 'ring' / 'tables'}", f"tables: {tmp_path / 'line' / 'tables'}"]
+    assert lines[-2:] == [f"report: {tmp_path / 'report.html'}", f"tables: {tmp_path / 'rejected'}"]
 
 
 def test_what_is_not_known_is_left_out(record: dict[str, Any], tmp_path: Path) -> None:
