@@ -15,10 +15,11 @@ from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.report.page.render import overview_html, report_html
-from cellplan.report.record.run import Provenance
+from cellplan.report.page.render import overview_page, report_page
+from cellplan.report.record.common import Provenance, Record, as_json
+from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series_json
-from cellplan.report.record.write import report_json, summary_json
+from cellplan.report.record.summary import summary_record
 
 ENGINES: Final = (
     "numpy",
@@ -37,7 +38,7 @@ def write_run(
     keep_rejected: bool = False,
     progress: Progress = silent,
     plots: BackgroundPlots | None = None,
-) -> None:
+) -> Record:
     """Write a run folder; it appears whole or not at all.
 
     The folder holds ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only
@@ -51,6 +52,9 @@ def write_run(
         progress: Called with the stage and the fraction done.
         plots: Draws the plots; those that it has begun are not drawn again.
 
+    Returns:
+        The record in the ``report.json`` of the folder.
+
     Raises:
         InputError: The folder cannot be written, or holds something else than a run.
     """
@@ -60,16 +64,18 @@ def write_run(
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            _write_report(target, cell, run, provenance, background)
+            record = _write_report(target, cell, run, provenance, background)
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
-            target.write_text("report.json", summary_json(reports, cell=cell, provenance=provenance))
-            target.write_text("report.html", overview_html(reports, cell=cell, provenance=provenance))
+            record = summary_record(reports, cell=cell, provenance=provenance)
+            target.write_text("report.json", as_json(record))
+            target.write_text("report.html", overview_page(record, cell=cell))
         target.write_text("cell.yaml", render_cell(cell))
         if solution.passed or keep_rejected:
             _write_tables(target, program, "tables" if solution.passed else "rejected")
         manifest = render_manifest(cell, passed=solution.passed, versions=versions(), files=target.written)
         target.write_text(MANIFEST, manifest)
+    return record
 
 
 def versions() -> dict[str, str]:
@@ -83,18 +89,18 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _write_report(target: RunFolder, cell: Cell, run: Run, provenance: Provenance, plots: BackgroundPlots) -> None:
-    """Report, series and plots of one phase; a phase of its own has a subfolder."""
+def _write_report(target: RunFolder, cell: Cell, run: Run, provenance: Provenance, plots: BackgroundPlots) -> Record:
+    """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
     place = "" if run.name is None else f"{run.name}/"
     begun = plots.pictures(run.report, cell=cell)
-    record = report_json(run.report, cell=cell, provenance=provenance, motion=run.motion)
-    target.write_text(f"{place}report.json", record)
+    record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion)
+    target.write_text(f"{place}report.json", as_json(record))
     target.write_text(f"{place}series.json", series_json(run.report, run.motion))
     pictures = begun()
     for name, picture in pictures.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    page = report_html(run.report, cell=cell, provenance=provenance, plots=pictures, motion=run.motion)
-    target.write_text(f"{place}report.html", page)
+    target.write_text(f"{place}report.html", report_page(record, run.report.checks, cell=cell, plots=pictures))
+    return record
 
 
 def _write_tables(target: RunFolder, program: Program, folder: str) -> None:

@@ -14,8 +14,9 @@ from cellplan.report.page.render import overview_page, report_page
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import clearance_sheets, motion_sheets
 from cellplan.report.plots.sheet import Sheet
-from cellplan.report.record.run import Provenance, Record
-from cellplan.report.record.write import run_record, summary_record
+from cellplan.report.record.common import Provenance, Record
+from cellplan.report.record.run import run_record
+from cellplan.report.record.summary import summary_record
 
 Drawings = Mapping[str, Mapping[str, bytes]]
 
@@ -118,4 +119,4 @@ def _of_the_run(stored: StoredRun, place: str, found: Record) -> Record:
     """A record with the inputs of the run, and with what only its planner knew as its report has it."""
     said: Any = stored.records.get(place, stored.record).get("solver", {})
     solver = {key: said.get(key) if key in PLANNER_KEYS else value for key, value in found["solver"].items()}
-    return found | {"inputs": dict(stored.manifest.inputs), "solver": solver}
+    return {**found, "inputs": dict(stored.manifest.inputs), "solver": solver}

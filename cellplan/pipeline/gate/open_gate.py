@@ -25,10 +25,11 @@ from cellplan.pipeline.plan.headers import table_headers
 from cellplan.pipeline.plan.program import ProgramClock
 from cellplan.pipeline.write_run import versions
 from cellplan.planning.modes import homeless, plan_phases
+from cellplan.report.record.common import Provenance, Record
 from cellplan.report.record.idle import missing_moves
-from cellplan.report.record.run import Provenance, Record
+from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series
-from cellplan.report.record.write import run_record, summary_record
+from cellplan.report.record.summary import summary_record
 from cellplan.scene.scene import Scene
 
 MOST_DIFFERENCES: Final = 10  # of a report that are listed; the rest is counted
