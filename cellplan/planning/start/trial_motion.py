@@ -265,17 +265,14 @@ def _whole_turns(cell: Cell, q: Array) -> Array:
 
 def _shares_left_free(cell: Cell, q: Array, step: float) -> tuple[Array, Array]:
     """Shares of half its range and of its speed limit that each joint leaves free in a motion, shape (nq,) each."""
-    lower, upper, velocity = (
-        np.concatenate([getattr(robot.model, name) for robot in cell.robots]) for name in ("lower", "upper", "velocity")
-    )
-    ranges = _range_shares(cell, np.minimum(q.min(axis=0) - lower, upper - q.max(axis=0)))
-    speeds: Array = 1.0 - np.abs(np.diff(q, axis=0)).max(axis=0, initial=0.0) / step / velocity
-    return ranges, speeds
+    limits = cell.joint_limits
+    ranges = _range_shares(cell, np.minimum(q.min(axis=0) - limits.lower, limits.upper - q.max(axis=0)))
+    return ranges, 1.0 - np.abs(np.diff(q, axis=0)).max(axis=0, initial=0.0) / step / limits.velocity
 
 
 def _range_shares(cell: Cell, margins: Array) -> Array:
     """Distances of joints from their limits as shares of half their ranges, 1 without limits, shape (..., nq)."""
-    half = np.concatenate([0.5 * (robot.model.upper - robot.model.lower) for robot in cell.robots])
+    half = 0.5 * (cell.joint_limits.upper - cell.joint_limits.lower)
     half = np.where(np.isfinite(half), half, np.pi)
     shares: Array = np.minimum(margins / np.where(half > 0.0, half, 1.0), 1.0)
     return shares
