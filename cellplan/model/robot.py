@@ -9,6 +9,7 @@ import numpy as np
 from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import Array, is_rigid
 from cellplan.model.payload import Payload
+from cellplan.model.units import DisplayUnit, joint_unit
 
 BASE = -1  # index of the link that does not move, where a link is named by the joint that carries it
 
@@ -59,6 +60,11 @@ class Joint:
     def is_revolute(self) -> bool:
         """Whether the joint turns rather than slides."""
         return self.kind == JointKind.REVOLUTE
+
+    @property
+    def display_unit(self) -> DisplayUnit:
+        """Unit in which its positions are printed."""
+        return joint_unit(is_revolute=self.is_revolute)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
