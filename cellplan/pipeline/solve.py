@@ -20,7 +20,7 @@ from cellplan.pipeline.solution import Run, Solution
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
-from cellplan.planning.timing.schedule import examine_times
+from cellplan.planning.timing.schedule import clock_paths
 from cellplan.report.record.accelerations import table_line
 from cellplan.scene.scene import Scene
 
@@ -64,15 +64,15 @@ def _solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[
     """All runs, verified but for their clearance, and the scene of the solved cell."""
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
-    examine_times(cell, tuple(toolpaths.values()))
+    paths = clock_paths(cell, toolpaths.values())
     examine_given_starts(cell, toolpaths)
-    choice = chosen_start(scene, toolpaths, progress=progress)
+    choice = chosen_start(scene, paths, progress=progress)
     started = with_start(cell, choice.start)
     plans = plan_phases(cell, only=task).program
-    planned = [plan_run(started, toolpaths, plan, progress=progress) for plan in plans]
+    planned = [plan_run(started, paths, plan, progress=progress) for plan in plans]
     solved = with_homes(started, find_homes(replace(scene, cell=started), planned, progress=progress), given=cell)
     if depends_on_homes(started, planned):
-        planned = [plan_run(solved, toolpaths, plan, progress=progress) for plan in plans]
+        planned = [plan_run(solved, paths, plan, progress=progress) for plan in plans]
     scene = replace(scene, cell=solved)
     runs = tuple(_run(scene, each, progress=progress) for each in planned)
     return scene, Solution(cell=solved, runs=runs, remark=choice.warning)

@@ -19,11 +19,11 @@ PERIODIC: Final = 3e-9  # [rad] or [m] by which joints may be off after a cycle 
 
 
 class _NoConvergenceError(NoSolutionError):
-    """The accurate mode finds no way through a cycle."""
+    """Collocation does not converge over a cycle."""
 
 
-def closed_path(run: AccurateRun, problem: TrackingProblem, schedule: Schedule, *, start: Array) -> JointPath | None:
-    """A path that closes in every cycle; None where the accurate mode finds no way.
+def closed_path(run: AccurateRun, problem: TrackingProblem) -> JointPath | None:
+    """A path that closes in every cycle; None where collocation does not converge.
 
     Each cycle gets a drift of its own, in one direction and at rest at both ends. Where the targets of a cycle are
     those of the one before, it repeats its motion: a drift alone would let rounding grow from cycle to cycle, as the
@@ -33,14 +33,12 @@ def closed_path(run: AccurateRun, problem: TrackingProblem, schedule: Schedule, 
     Args:
         run: The run.
         problem: Its tasks.
-        schedule: Their schedule.
-        start: Stacked start posture, shape (nq,).
 
     Raises:
         InputError: A path is open.
         NoSolutionError: A cycle does not close.
     """
-    bounds = _bounds(run, schedule)
+    bounds, start = _bounds(run, problem.motion.schedule), problem.motion.start
     for begin, end in pairwise(bounds):
         _refuse_open(run, problem, begin, end)
     try:
@@ -88,5 +86,5 @@ def _whole(run: AccurateRun, q: Array, *, begin: float, end: float, drift: Array
     """Motion up to an instant, not less far."""
     path = run.path(q, begin=begin, end=end, drift=drift)
     if path.end < end - INSTANT_ROOM:
-        raise _NoConvergenceError("no way leads through the cycle")
+        raise _NoConvergenceError("collocation did not converge over the first cycle")
     return path

@@ -204,12 +204,12 @@ class TimedTasks:
     Attributes:
         times: Instants of the clock in [s], evenly spaced from 0, shape (N,).
         paths: The paths of the tasks that are worked on.
-        looked_at: Further instants in [s] that count as jumps, because somebody wants a closer look, shape (K,).
+        extra_breaks: Further times in [s] that count as jumps: ends of panels where errors were too large, shape (K,).
     """
 
     times: Array
     paths: tuple[ClockedPath, ...]
-    looked_at: Array = field(default_factory=lambda: np.zeros(0))
+    extra_breaks: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def breaks(self) -> Array:
@@ -233,7 +233,7 @@ class TimedTasks:
     def _within(self, found: Sequence[Array]) -> Array:
         """Instants of all paths within the clock, and its ends."""
         end = float(self.times[-1])
-        every = np.concatenate([self.looked_at, *found])
+        every = np.concatenate([self.extra_breaks, *found])
         inner = distinct(every[(every > INSTANT_ROOM) & (every < end - INSTANT_ROOM)])
         return np.concatenate([[0.0], inner, [end]])
 

@@ -43,9 +43,9 @@ def circling(**words: Any) -> Case:
 
 
 def closed(case: Case) -> JointPath:
-    run = AccurateRun(case.cell, case.timed, start=case.start, moving=case.moving)
-    problem = TrackingProblem(case.cell, case.schedule, case.moving, start=case.start)
-    path = closed_path(run, problem, case.schedule, start=case.start)
+    run = AccurateRun(case.task)
+    problem = TrackingProblem(case.task)
+    path = closed_path(run, problem)
     assert path is not None
     return path
 
@@ -133,9 +133,9 @@ def test_no_way_through_a_cycle_leaves_it_to_the_steps() -> None:
     (task,) = case.cell.tasks
     far = replace(task.path, radius=4.5, center=(task.path.center[0] - 4.2, task.path.center[1]))
     case = case_of(replace(case.cell, tasks=(replace(task, path=far),)), start=case.start)
-    run = AccurateRun(case.cell, case.timed, start=case.start, moving=case.moving)
-    problem = TrackingProblem(case.cell, case.schedule, case.moving, start=case.start)
-    assert closed_path(run, problem, case.schedule, start=case.start) is None
+    run = AccurateRun(case.task)
+    problem = TrackingProblem(case.task)
+    assert closed_path(run, problem) is None
 
 
 @pytest.mark.slow
