@@ -109,15 +109,13 @@ class Screening:
     @property
     def is_followed(self) -> NDArray[np.bool_]:
         """Which candidates did the whole job, shape (K,)."""
-        followed: NDArray[np.bool_] = self.lost_at == ALL_WAY
-        return followed
+        return self.lost_at == ALL_WAY
 
     @property
     def is_feasible(self) -> NDArray[np.bool_]:
         """Which did it within all joint limits and speeds, shape (K,); nothing is known of collisions yet."""
         within = np.all(self.margins >= 0.0, axis=1) & np.all(self.speed_ratios <= 1.0, axis=1)
-        feasible: NDArray[np.bool_] = self.is_followed & within
-        return feasible
+        return self.is_followed & within
 
 
 def screen_layouts(

@@ -11,7 +11,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.solver import Integrator
 from cellplan.model.task import INSTANT_ROOM
 from cellplan.planning.collocation.cyclic import closed_path
-from cellplan.planning.collocation.joint_polynomials import JointPath
+from cellplan.planning.collocation.joint_polynomials import CollocatedPath
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.euler.integrate import integrate, integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
@@ -45,13 +45,13 @@ def plan_motion(task: MotionTask, *, progress: Progress = silent) -> Motion:
     if closed is None:
         motion = integrate_schedule(task, progress=progress)
         lost = nearest_to_singular(problem, 0, task.start)
-        nothing = JointPath(task.start, 0.0, (), ())
+        nothing = CollocatedPath(task.start, 0.0, (), ())
         return replace(motion, resolution=_resolution(run, nothing, euler_from=0.0, lost=lost))
     return _sampled(run, closed, lambda: problem, task.schedule.times, progress)
 
 
 def _sampled(
-    run: AccurateRun, path: JointPath, problem: Callable[[], TrackingProblem], times: Array, progress: Progress
+    run: AccurateRun, path: CollocatedPath, problem: Callable[[], TrackingProblem], times: Array, progress: Progress
 ) -> Motion:
     """The path at the instants of the clock; from where it ends, Euler's steps."""
     last = len(times) - 1
@@ -69,7 +69,7 @@ def _sampled(
 
 
 def _resolution(
-    run: AccurateRun, path: JointPath, *, euler_from: float | None, lost: NearestSingular | None
+    run: AccurateRun, path: CollocatedPath, *, euler_from: float | None, lost: NearestSingular | None
 ) -> Resolution:
     """What the run took in all, and the path that came of it."""
     return Resolution(

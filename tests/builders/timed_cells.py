@@ -17,7 +17,7 @@ from cellplan.model.motion import Motion, Schedule
 from cellplan.model.solver import Integrator
 from cellplan.model.task import SpacePolylinePath
 from cellplan.model.toolpath import Toolpath
-from cellplan.planning.collocation.joint_polynomials import JointPath
+from cellplan.planning.collocation.joint_polynomials import CollocatedPath
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.plan_motion import plan_motion
@@ -53,7 +53,7 @@ class Case:
         cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
         return plan_motion(replace(self.task, cell=cell))
 
-    def path(self, **changes: Any) -> JointPath:
+    def path(self, **changes: Any) -> CollocatedPath:
         """The whole motion as polynomials."""
         cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
         run = AccurateRun(replace(self.task, cell=cell))
@@ -91,7 +91,7 @@ def slowly_clocked(cell: Cell, step: float, **changes: Any) -> Cell:
     )
 
 
-def largest_error(case: Case, path: JointPath, times: Array) -> float:
+def largest_error(case: Case, path: CollocatedPath, times: Array) -> float:
     """Largest distance in [m] or angle in [rad] of any tool from where it belongs, by successive screws.
 
     The times must increase and keep off the breaks, at which a target may have two values.
@@ -111,7 +111,7 @@ def largest_error(case: Case, path: JointPath, times: Array) -> float:
     return worst
 
 
-def between_samples(case: Case, path: JointPath, *, count: int = 10) -> Array:
+def between_samples(case: Case, path: CollocatedPath, *, count: int = 10) -> Array:
     """Instants strictly between all samples of the clock and the panels of a path, so many in each gap."""
     ends = distinct(np.concatenate([case.timed.times, case.timed.breaks, [panel.end for panel in path.panels]]))
     shares = (np.arange(count) + 0.5) / count

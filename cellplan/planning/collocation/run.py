@@ -13,7 +13,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.task import INSTANT_ROOM
 from cellplan.planning.collocation.batch_targets import BatchTargets
 from cellplan.planning.collocation.batch_tasks import BatchTasks
-from cellplan.planning.collocation.joint_polynomials import JointPath
+from cellplan.planning.collocation.joint_polynomials import CollocatedPath
 from cellplan.planning.collocation.solver import Collocation, Drift, Indices, Precision, largest
 from cellplan.planning.collocation.start_offset import start_offset
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
@@ -67,7 +67,7 @@ class AccurateRun:
         self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
         self._knots = breaks
 
-    def path(self, q: Array, *, begin: float, end: float, drift: Array | None = None) -> JointPath:
+    def path(self, q: Array, *, begin: float, end: float, drift: Array | None = None) -> CollocatedPath:
         """Motion from a configuration at ``begin``, shape (nq,), up to ``end``, or as far as collocation converges.
 
         Args:
@@ -99,7 +99,7 @@ class AccurateRun:
             self.sweeps, self.solves = self.sweeps + collocation.sweeps, self.solves + collocation.solves
             if not len(arrived):
                 break
-        return JointPath(q, begin, panels, nodes, max(errors))
+        return CollocatedPath(q, begin, panels, nodes, max(errors))
 
     def gaps(self, begin: float, end: float) -> Array:
         """How far each tool is desired at one instant from where it is desired at a later one, in pose entries."""
@@ -117,7 +117,7 @@ class AccurateRun:
             worst[some] = largest(self._tasks.errors(q[some].T, desired, self._placement))
         return worst
 
-    def repeated(self, cycle: JointPath, *, begin: float) -> JointPath | None:
+    def repeated(self, cycle: CollocatedPath, *, begin: float) -> CollocatedPath | None:
         """The motion of a cycle once more from another instant on; None where its tasks ask for something else."""
         again = cycle.shifted(begin - cycle.begin)
         if np.any((self._locked_since > cycle.begin) & (self._locked_since < again.end)):

@@ -197,5 +197,4 @@ class Collocation:
 def largest(errors: Array) -> Array:
     """Largest distance in [m] or angle in [rad] of all tasks, shape (6, tasks, lanes) to (lanes,)."""
     squares = np.maximum(np.sum(errors[:3] ** 2, axis=0), np.sum(errors[3:] ** 2, axis=0))
-    worst: Array = np.sqrt(squares.max(axis=0))
-    return worst
+    return np.sqrt(squares.max(axis=0))

@@ -40,16 +40,14 @@ def closed(problem: TrackingProblem, integrate: Callable[[TrackingProblem, int],
     pace = drift_pace(middles) / drift_pace(middles).mean()  # of each step of the cycle, as Euler takes it
 
     def drifting(k: int, mean: Array) -> Array:
-        speeds: Array = mean * pace[(k - begin) % (end - begin)] if k >= begin else np.zeros_like(mean)
-        return speeds
+        return mean * pace[(k - begin) % (end - begin)] if k >= begin else np.zeros_like(mean)
 
     def cycle(mean: Array) -> Array:
         return integrate(problem.with_drift(lambda k, _q: drifting(k, mean)), end)
 
     def gap(mean: Array) -> Array:
         q = cycle(mean)
-        moved: Array = q[-1] - q[begin]
-        return moved
+        return q[-1] - q[begin]
 
     mean = closing_drift(problem, start, gap, duration=float(schedule.times[end] - schedule.times[begin]))
     first = cycle(mean)
@@ -64,8 +62,7 @@ def closed(problem: TrackingProblem, integrate: Callable[[TrackingProblem, int],
 
 def drift_pace(share: Array) -> Array:
     """Speed of a drift as a multiple of its mean, at shares 0..1 of the cycle: at rest at both ends, 1 on average."""
-    pace: Array = 30.0 * (share * (1.0 - share)) ** 2
-    return pace
+    return 30.0 * (share * (1.0 - share)) ** 2
 
 
 def closing_drift(
@@ -95,8 +92,7 @@ def closing_drift(
     B = np.eye(len(u)) / duration  # inverse of the derivative
 
     def gap(u: Array) -> Array:
-        gap: Array = N.T @ moved(N @ u)
-        return gap
+        return N.T @ moved(N @ u)
 
     drift = gap(u)
     for _ in range(ROUNDS):

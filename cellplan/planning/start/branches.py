@@ -203,8 +203,7 @@ def _promising_configurations(search: StartSearch, holder: Robot) -> Array:
         base = operator.X_WB[:3, 3]
         awkwardness = np.maximum(awkwardness, _awkwardness(goal, usual, base))
     order = best_first(np.column_stack([-awkwardness, q]))
-    chosen: Array = q[order[:HOLDER_POSTURES]]
-    return chosen
+    return q[order[:HOLDER_POSTURES]]
 
 
 def _awkwardness(goal: Array, usual: Array, base: Array) -> Array:
@@ -217,8 +216,7 @@ def _awkwardness(goal: Array, usual: Array, base: Array) -> Array:
     distance, usual_distance = np.linalg.norm(away, axis=1), np.linalg.norm(usual_away, axis=1)
     spread = max(float(usual_distance.std()), 1e-6)  # a robot that cannot move has none
     outward = np.sum(goal[:, :3, 2] * away, axis=1) / np.maximum(distance, 1e-9)
-    measure: Array = np.abs(distance - np.median(usual_distance)) / spread + (1.0 - outward)
-    return measure
+    return np.abs(distance - np.median(usual_distance)) / spread + (1.0 - outward)
 
 
 def _configurations_meeting(search: StartSearch, relation: Relation, operator_start: Array) -> Array:
@@ -240,5 +238,4 @@ def _configurations_at(search: StartSearch, holder: Robot, relation: Relation, X
         search.failures.unreached(holder.name, goal, beyond=found)
         return inside
     order = best_first(np.column_stack([np.sort(joint_margin_shares(holder.model, inside), axis=1), inside]))
-    chosen: Array = inside[order]
-    return chosen
+    return inside[order]

@@ -58,8 +58,7 @@ class Trial:
     @property
     def shares(self) -> Array:
         """All shares, the worst first, shape (2 nq,)."""
-        shares: Array = np.sort(np.concatenate([self.ranges, self.speeds]))
-        return shares
+        return np.sort(np.concatenate([self.ranges, self.speeds]))
 
     @property
     def is_sound(self) -> bool:
@@ -287,5 +286,4 @@ def _range_shares(cell: Cell, margins: Array) -> Array:
     """Distances of joints from their limits as shares of half their ranges, 1 without limits, shape (..., nq)."""
     half = 0.5 * (cell.joint_limits.upper - cell.joint_limits.lower)
     half = np.where(np.isfinite(half), half, np.pi)
-    shares: Array = np.minimum(margins / np.where(half > 0.0, half, 1.0), 1.0)
-    return shares
+    return np.minimum(margins / np.where(half > 0.0, half, 1.0), 1.0)

@@ -199,8 +199,7 @@ class TrackingProblem:
         """Joint speeds that are asked for to close a cycle, of those joints that may move."""
         if self.drift is None:
             return None
-        speeds: Array = self.drift(k, q) * self.mobile(k)
-        return speeds
+        return self.drift(k, q) * self.mobile(k)
 
     def _with_goals(self, k: int, q: Array, state: CellState, first: FirstOrder, *, signs: Array) -> FirstOrder:
         """The tasks, with what the secondary goals ask for besides."""
