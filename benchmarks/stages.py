@@ -32,13 +32,13 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     "bodies, hulls and pairs": {"cellplan.scene.scene": ("Scene.from_cell",)},
     "paths and times of the tools": {
         "cellplan.planning.path.build": ("build_toolpath",),
-        "cellplan.planning.timing.schedule": ("time_tasks", "sample", "examine_times"),
+        "cellplan.planning.timing.schedule": ("time_tasks", "sample", "clock_paths"),
     },
     "start postures": {
         "cellplan.planning.start.given": ("examine_given_starts",),
-        "cellplan.planning.start.search": ("find_start",),
+        "cellplan.planning.start.search": ("choose_start",),
     },
-    "joint motion": {"cellplan.planning.plan_motion": ("resolve",)},
+    "joint motion": {"cellplan.planning.plan_motion": ("plan_motion",)},
     "writing and reading back the tables": {
         "cellplan.io.run.joint_tables": ("render_table", "parse_table", "replace_header")
     },

@@ -16,13 +16,14 @@ from cellplan.model.motion import Schedule
 from cellplan.model.rehearsal import Correction, Outcome, Round
 from cellplan.model.report import TaskAccuracy
 from cellplan.planning.collocation.at_samples import brought_onto_tasks
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.euler.measured_feedback import (
     corrected_references,
     integrate_measured,
     measured_start,
     settled_start,
 )
+from cellplan.planning.tracking.motion_task import MotionTask
 
 FAR_WITHIN: Final = 0.02  # [-] share of the tolerance below which errors are not reduced further
 PROGRESS: Final = 0.9  # [-] an error that is not below this share of the last one falls no more
@@ -93,7 +94,7 @@ def correct_from_pass_to_pass(
         on_round(last.figures.number + 1)
         references = corrected_references(job.schedule, last.references, last.measured)
         try:
-            start = settled_start(job.cell, references, start=last.q[0], moving=job.moving)
+            start = settled_start(MotionTask(job.cell, references, job.moving, last.q[0]))
             q = _planned(job, references, start)
         except NoSolutionError:
             outcome = Outcome.DIVERGED
@@ -124,8 +125,8 @@ def correct_within_the_pass(
         return measured_poses(real.tool_poses(job.operators, q), system, rng)
 
     try:
-        start = measured_start(job.cell, job.schedule, start=job.q[0], moving=job.moving, measure=measure)
-        motion = integrate_measured(job.cell, job.schedule, start=start, moving=job.moving, measure=measure)
+        start = measured_start(MotionTask(job.cell, job.schedule, job.moving, job.q[0]), measure=measure)
+        motion = integrate_measured(MotionTask(job.cell, job.schedule, job.moving, start), measure=measure)
     except NoSolutionError:
         return None
     return real.accuracy(job.schedule, motion.q)
@@ -133,8 +134,10 @@ def correct_within_the_pass(
 
 def _planned(job: Pass, references: Schedule, start: Array) -> Array:
     """Motion on new references, which are known at the samples only: by steps, then corrected at the samples."""
-    q = follow(job.cell, references, start=start, moving=job.moving).q
-    return brought_onto_tasks(job.cell, references, q, moving=job.moving) if job.cell.solver.is_accurate else q
+    q = integrate_schedule(MotionTask(job.cell, references, job.moving, start)).q
+    return (
+        brought_onto_tasks(MotionTask(job.cell, references, job.moving, q[0]), q) if job.cell.solver.is_accurate else q
+    )
 
 
 class _Executions:
