@@ -11,6 +11,8 @@ from cellplan.model.acceleration import UNKNOWN_ACCELERATIONS, MotionAcceleratio
 from cellplan.model.between_rows import BetweenRows
 from cellplan.model.left_out import LeftOut
 from cellplan.model.payload import LoadUse
+from cellplan.model.phase import Phase
+from cellplan.model.units import DisplayUnit, joint_unit
 
 CAUTION = (
     "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
@@ -141,6 +143,11 @@ class JointUse:
     velocity_limit: float
     peak_velocity_at_s: float
     travel: float
+
+    @property
+    def display_unit(self) -> DisplayUnit:
+        """Unit in which its positions are printed."""
+        return joint_unit(is_revolute=self.is_revolute)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -289,6 +296,11 @@ class JointDrift:
     worst: float
     at_cycle: int
 
+    @property
+    def display_unit(self) -> DisplayUnit:
+        """Unit in which its positions are printed."""
+        return joint_unit(is_revolute=self.is_revolute)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Repeatability:
@@ -339,6 +351,8 @@ class Report:
         depths: How deep tools stand in the part, one entry per task on it.
         accelerations: Accelerations, jerk and process speeds.
         loads: What each robot carries.
+        phases: All phases of the program on its nominal time, those that are not part of it among them; the times of
+            this report count from the begin of the phase that it is for.
     """
 
     cell: str
@@ -359,6 +373,7 @@ class Report:
     depths: tuple[ToolDepth, ...] = ()
     accelerations: MotionAccelerations = UNKNOWN_ACCELERATIONS
     loads: tuple[LoadUse, ...] = ()
+    phases: tuple[Phase, ...] = ()
 
     @property
     def passed(self) -> bool:

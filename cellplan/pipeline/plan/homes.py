@@ -27,9 +27,9 @@ from cellplan.planning.start.home_candidates import home_candidates
 from cellplan.scene.scene import Scene
 
 STAGE: Final = "searching homes of idle robots"
-INSTANTS: Final = 32  # of each run at which candidates are looked at before one is certified
+INSTANTS: Final = 32  # samples of each phase at which candidates are tried before one is certified
 ROOMS: Final = (0.05, 0.02, 0.0)  # [m] beyond the demanded clearance that the part and other robots are to leave a home
-MOST_CERTIFIED: Final = 24  # candidates per robot of which certification is tried; each failure adds its instant
+MOST_CERTIFIED: Final = 24  # candidates per robot of which certification is tried; each failure adds its sample
 
 
 def find_homes(scene: Scene, runs: Sequence[PlannedRun], *, progress: Progress = silent) -> Mapping[str, Array]:
@@ -42,12 +42,12 @@ def find_homes(scene: Scene, runs: Sequence[PlannedRun], *, progress: Progress =
     Args:
         scene: The scene of the cell, every start posture filled in.
         runs: The runs as they were planned.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         HomeNotFoundError: A robot has no such place.
     """
-    order = sorted({name for run in runs for name in homeless(scene.cell, run.plan)})
+    order = sorted({name for run in runs for name in homeless(scene.cell, run.phase)})
     tried: set[str] = set()
     while True:
         homes: dict[str, Array] = {}
@@ -88,7 +88,7 @@ def with_homes(cell: Cell, found: Mapping[str, Array], *, given: Cell) -> Cell:
 def depends_on_homes(cell: Cell, runs: Sequence[PlannedRun]) -> bool:
     """Whether the motion of a run is another one when idle robots stand elsewhere: a goal keeps away from them."""
     keeps_away = any(goal.kind is GoalKind.OBSTACLES for goal in cell.solver.goals)
-    return keeps_away and any(homeless(cell, run.plan) for run in runs)
+    return keeps_away and any(homeless(cell, run.phase) for run in runs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,14 +118,14 @@ class _Search:
             robot: The robot.
         """
         self._cell, self._robot, self._chain = scene.cell, robot, scene.chains[robot.name]
-        self._runs = [_idle_run(scene, run, robot.name) for run in runs if robot.name in run.plan.idle]
+        self._runs = [_idle_run(scene, run, robot.name) for run in runs if robot.name in run.phase.idle]
         picked = [np.unique(np.linspace(0, len(run.q) - 1, INSTANTS).astype(int)) for run in self._runs]
         instants = [Instants(scene=run.scene, q=run.q[few]) for run, few in zip(self._runs, picked, strict=True)]
         self._trials = HomeTrials(robot.name, instants)
         self._failed = Counter[str]()
 
     def home(self) -> Array | None:
-        """The candidate nearest to the start that is certified to be free, with room to spare if any is; or None."""
+        """The candidate nearest to the start certified to be free, with extra clearance if possible; or None."""
         robot = self._robot
         rng = generator(robot.name, self._cell.solver.seed)
         candidates = home_candidates(robot.model, self._chain, self._start(), rng)
@@ -151,9 +151,9 @@ class _Search:
         return q
 
     def why_nothing(self) -> str:
-        """One line on what stood in the way most often."""
+        """One line on what prevented a home most often."""
         name, cell = self._robot.name, self._cell
-        tasks = [f"'{task}'" for run in self._runs for task in run.run.plan.tasks]
+        tasks = [f"'{task}'" for run in self._runs for task in run.run.phase.tasks]
         while_worked = f"{listed(tasks)} {'is' if len(tasks) == 1 else 'are'} worked on"
         often = ""
         if self._trials.refused:
@@ -175,7 +175,7 @@ class _Search:
         return start
 
     def _is_certified(self, home: Array) -> bool:
-        """Whether a configuration passes all checks of clearance; where one fails the trials learn the instant."""
+        """Whether a configuration passes all checks of clearance; where one fails its sample is added to the trials."""
         for place, idle in enumerate(self._runs):
             if not idle.scene.pairs:
                 continue
@@ -191,10 +191,10 @@ class _Search:
 
 def _idle_run(scene: Scene, run: PlannedRun, robot: str) -> _IdleRun:
     """One run as the robot has to stand it out; those whose homes are not known yet are not there."""
-    of_run = scene_of_run(scene, run.plan.tasks)
-    away = {row for name in homeless(scene.cell, run.plan) - {robot} for row in rows_moved_by(of_run, name)}
+    of_run = scene_of_run(scene, run.phase.tasks)
+    away = {row for name in homeless(scene.cell, run.phase) - {robot} for row in rows_moved_by(of_run, name)}
     rows = [row for row in rows_moved_by(of_run, robot) if row not in away]
-    return _IdleRun(run=run, scene=scene_of_rows(of_run, rows), q=standing(scene.cell, run.plan, run.motion.q))
+    return _IdleRun(run=run, scene=scene_of_rows(of_run, rows), q=standing(scene.cell, run.phase, run.motion.q))
 
 
 def _first_failed(checks: Sequence[Check]) -> Check | None:
@@ -202,5 +202,5 @@ def _first_failed(checks: Sequence[Check]) -> Check | None:
 
 
 def _at(times: Array, q: Array, at_s: float) -> Array:
-    """Stacked configuration at an instant, every joint moving evenly from row to row, shape (nq,)."""
+    """Stacked configuration at a time, linear in time from row to row, shape (nq,)."""
     return np.array([np.interp(at_s, times, column) for column in q.T])

@@ -80,12 +80,12 @@ def _closure_record(grasp: Grasp) -> dict[str, Any]:
 
 def _matrix_record(cell: Cell, matrix: MatrixShape) -> dict[str, Any]:
     """Blocks, rank and redundancy of one run."""
-    from cellplan.report.record.run import number
+    from cellplan.report.record.common import number
 
     values = matrix.singular_values
     robots = [robot.name for robot in cell.robots]
     return {
-        "run": matrix.plan.name,
+        "run": matrix.phase.task,
         "rows": sum(matrix.rows),
         "columns": sum(matrix.columns),
         "row_blocks": dict(zip(matrix.blocks, matrix.rows, strict=True)),

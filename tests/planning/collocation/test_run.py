@@ -14,7 +14,7 @@ from cellplan.geometry.shapes import Cylinder
 from cellplan.model.cell import Cell, LockedJoint, Mode
 from cellplan.model.task import StraightMove, TimeLaw, TimeLawKind
 from cellplan.planning.collocation.run import SETTLING_STEPS, AccurateRun
-from cellplan.planning.modes import plan_runs
+from cellplan.planning.modes import plan_phases
 
 ACCURACY = 1e-7  # [m], [rad] asked for by default
 SAME = 1e-12  # [m], [rad] two kinematics of arms of some metres
@@ -114,7 +114,7 @@ def test_a_joint_that_fails_stands_still_to_the_last_bit(since: float) -> None:
 @pytest.mark.parametrize("mode", [Mode.SIMULTANEOUS, Mode.PART_AT_REST, Mode.PAIRWISE])
 def test_each_mode_moves_its_robots_and_no_others(mode: Mode) -> None:
     cell = slowly_clocked(shipped("four_robots"), 0.02, mode=mode)
-    for plan in plan_runs(cell):
+    for plan in plan_phases(cell).program:
         case = case_of(replace(cell, tasks=tuple(cell.task(name) for name in plan.tasks)), moving=plan.moving)
         assert_on_tasks(case)
         q = case.path().at(case.timed.times)
@@ -194,7 +194,7 @@ def test_stretches_are_cut_where_joints_fail() -> None:
 
 def test_a_motion_goes_on_from_anywhere() -> None:
     case = triangles(CELLS["mixed"])
-    run = AccurateRun(case.cell, case.timed, start=case.start, moving=case.moving)
+    run = AccurateRun(case.task)
     whole = run.path(case.start, begin=0.0, end=1.0)
     first = run.path(case.start, begin=0.0, end=0.37)
     rest = run.path(first.last, begin=0.37, end=1.0)
@@ -204,9 +204,7 @@ def test_a_motion_goes_on_from_anywhere() -> None:
 
 def test_progress_is_told_from_zero_to_one() -> None:
     case, told = triangles(CELLS["single"]), []
-    run = AccurateRun(
-        case.cell, case.timed, start=case.start, moving=case.moving, progress=lambda _stage, share: told.append(share)
-    )
+    run = AccurateRun(case.task, progress=lambda _stage, share: told.append(share))
     run.path(case.start, begin=0.0, end=1.0)
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1.0)
