@@ -30,7 +30,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.solver import NULL_SPACE_METHODS, Integrator, MethodName
 from cellplan.planning.euler.integrate import follow
-from cellplan.planning.modes import plan_runs
+from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.search import find_start
 from cellplan.planning.timing.schedule import schedule_tasks
@@ -129,7 +129,7 @@ def problem_of(case: Case) -> Problem:
         cell = replace(cell, motion=motion, solver=solver)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
     start = find_start(Scene.from_cell(cell), toolpaths)
-    plan = plan_runs(cell)[0]
+    plan = plan_phases(cell).program[0]
     schedule = schedule_tasks(cell, [toolpaths[name] for name in plan.tasks])
     return Problem(cell=cell, schedule=schedule, start=start, moving=plan.moving)
 

@@ -1,6 +1,6 @@
 """Verification: everything that is said about a run is computed here, from the joint tables that were read back."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,22 +35,36 @@ def verify(
     *,
     moving: Sequence[str],
     progress: Progress = silent,
-    preview: Callable[[Report], None] | None = None,
 ) -> Report:
-    """Check tool errors, closed grasps, joint limits and clearance of a run.
+    """Check tool errors, closed grasps, joint limits and clearance of a run: both steps below, one after the other.
 
     The kinematics is that of successive screw displacements; nothing of the planner is used.
 
     Args:
         scene: The cell made computable.
-        schedule: Where every tool must be at each instant.
+        schedule: Desired tool poses at every sample.
         tables: One joint table per robot, parsed from its text.
         moving: Names of the robots that may move; the others must stand still.
-        progress: Who wants to know how far it is.
-        preview: Who wants the report as soon as all of it is known but the clearance.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: A table is missing, or does not fit the cell or the clock.
+    """
+    report = verify_motion(scene, schedule, tables, moving=moving, progress=progress)
+    return with_clearance(report, scene, schedule, progress=progress)
+
+
+def verify_motion(
+    scene: Scene,
+    schedule: Schedule,
+    tables: Sequence[JointTable],
+    *,
+    moving: Sequence[str],
+    progress: Progress = silent,
+) -> Report:
+    """Check everything but the clearance of a run; arguments and errors are those of ``verify``.
+
+    The report does not say yet whether the run passed: ``with_clearance`` completes it.
     """
     cell = scene.cell
     q = _positions(cell, schedule, tables)
@@ -66,7 +80,7 @@ def verify(
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
     checks += [*check_idle(cell, schedule, q), *check_payload(loads)]
-    report = Report(
+    return Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
         tasks=tuple(scheduled.task.name for scheduled in schedule.tasks),
@@ -86,12 +100,21 @@ def verify(
         accelerations=accelerations,
         loads=loads,
     )
-    if preview is not None:
-        preview(report)
-    stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
-    clearance, clearance_checks = check_clearance(scene, schedule, stacked, progress=progress)
-    mounting = check_mounting(scene, stacked, schedule.times)
-    return replace(report, checks=(*checks, *mounting, *clearance_checks), clearance=clearance)
+
+
+def with_clearance(report: Report, scene: Scene, schedule: Schedule, *, progress: Progress = silent) -> Report:
+    """The report of ``verify_motion``, completed by the clearance of all bodies and the depth of mounted ones.
+
+    Args:
+        report: The report on the motion.
+        scene: The scene that it was made with.
+        schedule: Likewise.
+        progress: Called with the stage and the fraction done.
+    """
+    q = np.concatenate([report.q[robot.name] for robot in scene.cell.robots], axis=1)
+    clearance, checks = check_clearance(scene, schedule, q, progress=progress)
+    mounting = check_mounting(scene, q, schedule.times)
+    return replace(report, checks=(*report.checks, *mounting, *checks), clearance=clearance)
 
 
 def _errors(

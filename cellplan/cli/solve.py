@@ -57,14 +57,14 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     """
     from cellplan.guard import BackgroundProcess
 
-    with json_failure(SCHEMA, desired=as_json), BackgroundProcess() as aside:
+    with json_failure(SCHEMA, desired=as_json), BackgroundProcess() as background:
         from cellplan.pipeline.background_plots import BackgroundPlots
 
-        drawing = BackgroundPlots(aside)  # the child imports what it paints with while this process imports the rest
+        plots = BackgroundPlots(background)  # the child imports matplotlib while this process imports the rest
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
-        from cellplan.pipeline.solve import solve as solve_cell
+        from cellplan.pipeline.solve import solve_with_plots
         from cellplan.pipeline.write_run import write_run
         from cellplan.report.text.run import read_record, summary_lines
 
@@ -76,8 +76,8 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         folder = output or Path("outputs") / asked.name
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:
-            solution = solve_cell(asked, task=task, progress=progress, drawing=drawing)
-            write_run(solution, folder, keep_rejected=keep_rejected, drawing=drawing)
+            solution = solve_with_plots(asked, plots, task=task, progress=progress)
+            write_run(solution, folder, keep_rejected=keep_rejected, plots=plots)
         record = read_record(folder)
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
     if as_json:

@@ -75,7 +75,7 @@ def _floats(column: Array) -> list[float]:
 
 
 def _names(robot: Robot) -> str:
-    return ",".join([CLOCK, *(f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in robot.model.joints)])
+    return ",".join([CLOCK, *(f"{joint.name}_{joint.display_unit.name}" for joint in robot.model.joints)])
 
 
 def _read(robot: Robot, text: str, file: str) -> JointTable:

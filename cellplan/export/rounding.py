@@ -7,21 +7,19 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.robot import Joint
+from cellplan.model.units import MM
 
-MM_PER_M: Final = 1e3  # [mm/m]
 LARGEST: Final = 1e6  # [deg], [mm] or [s]: beyond it nine decimals are more than a number holds
 
 
 def to_file_unit(joint: Joint, q: Array) -> Array:
     """Positions of a joint in degrees or millimetres, shape (N,)."""
-    scaled: Array = np.rad2deg(q) if joint.is_revolute else q * MM_PER_M
-    return scaled
+    return q * joint.display_unit.scale
 
 
 def from_file_unit(joint: Joint, written: Array) -> Array:
     """Positions in [rad] or [m] that a reader makes of degrees or millimetres, shape (N,)."""
-    read: Array = np.deg2rad(written) if joint.is_revolute else written / MM_PER_M
-    return read
+    return np.deg2rad(written) if joint.is_revolute else written / MM
 
 
 def rounded_inside(joint: Joint, q: Array, decimals: int) -> Array:
@@ -58,5 +56,4 @@ def rounded_quanta(values: Array, decimals: int, *, what: str) -> Array:
         raise InputError(
             f"{what}: expected numbers below {LARGEST:g}, got one that cannot be written with its decimals"
         )
-    quanta: Array = np.rint(values * 10.0**decimals)
-    return quanta
+    return np.rint(values * 10.0**decimals)

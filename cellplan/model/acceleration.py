@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
+from cellplan.model.units import DisplayUnit, joint_unit
+
 USUAL_FULL_SPEED_IN: Final = (0.25, 0.25, 0.25, 0.15)  # [s] axes 1 to 3, then all others: arms of 5 to 20 kg do it
 USUAL_CYCLE: Final = 0.004  # [s] of a controller that interpolates joints
 
@@ -75,6 +77,11 @@ class JointAcceleration:
     def ratio(self) -> float | None:
         """Largest acceleration as a share of its limit; None where there is no limit."""
         return None if self.limit is None else self.peak / self.limit
+
+    @property
+    def display_unit(self) -> DisplayUnit:
+        """Unit in which its positions are printed."""
+        return joint_unit(is_revolute=self.is_revolute)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

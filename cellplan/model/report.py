@@ -11,6 +11,7 @@ from cellplan.model.acceleration import UNKNOWN_ACCELERATIONS, MotionAcceleratio
 from cellplan.model.between_rows import BetweenRows
 from cellplan.model.left_out import LeftOut
 from cellplan.model.payload import LoadUse
+from cellplan.model.units import DisplayUnit, joint_unit
 
 CAUTION = (
     "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
@@ -141,6 +142,11 @@ class JointUse:
     velocity_limit: float
     peak_velocity_at_s: float
     travel: float
+
+    @property
+    def display_unit(self) -> DisplayUnit:
+        """Unit in which its positions are printed."""
+        return joint_unit(is_revolute=self.is_revolute)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -288,6 +294,11 @@ class JointDrift:
     drift: Array
     worst: float
     at_cycle: int
+
+    @property
+    def display_unit(self) -> DisplayUnit:
+        """Unit in which its positions are printed."""
+        return joint_unit(is_revolute=self.is_revolute)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -14,7 +14,7 @@ from cellplan.model.report import Check
 from cellplan.pipeline.plan.path_depths import depths_on_paths
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.solve import with_start
-from cellplan.planning.modes import plan_runs, standing
+from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.start.present_pairs import present_pairs
@@ -92,9 +92,9 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
 
 def _touching_at_start(scene: Scene, start: Array) -> tuple[str, str] | None:
     """The first two bodies that touch at the start of a run; idle robots stand at their homes, as far as known."""
-    for plan in plan_runs(scene.cell):
-        of_run = scene_of_run(scene, plan.tasks)
-        pair = of_run.touching(standing(scene.cell, plan, start), among=present_pairs(of_run, plan))
+    for phase in plan_phases(scene.cell).program:
+        of_run = scene_of_run(scene, phase.tasks)
+        pair = of_run.touching(standing(scene.cell, phase, start), among=present_pairs(of_run, phase))
         if pair is not None:
             return pair
     return None

@@ -11,26 +11,23 @@ from cellplan.kinematics.derivations.davies import network
 from cellplan.kinematics.derivations.graph import Circuit, CouplingGraph, circuits, spanning_tree
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Cell, Relation
+from cellplan.model.phase import Phase
 from cellplan.model.task import Frame, PlaneName
-from cellplan.planning.modes import RunPlan, plan_runs
-from cellplan.planning.tracking.cooperation_jacobian import (
-    column_signs,
-    constraint_rows,
-    cooperation_jacobian,
-    reference_frames,
-)
+from cellplan.planning.modes import plan_phases
+from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
 from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 
 RANK_TOL = 1e-10  # [-] singular values below this share of the largest one are zero: rounding of the matrix
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MatrixShape:
-    """The cooperation Jacobian of one run, at the start postures of the cell.
+    """The cooperation Jacobian of one phase, at the start postures of the cell.
 
     Attributes:
-        plan: Which tasks are worked on and who moves.
-        blocks: Names of the block rows: the tasks of the plan, then the grasps of further holders that move.
+        phase: Which tasks are worked on and who moves.
+        blocks: Names of the block rows: the tasks of the phase, then the grasps of further holders that move.
         rows: Constrained components of each block row.
         columns: Joints of each robot, in the order of the cell, that move and carry a tool or the part.
         signs: Sign of each block for each robot, shape (blocks, robots): -1 the robot that carries the part, +1 the one
@@ -39,7 +36,7 @@ class MatrixShape:
         singular_values: Largest first, one for each row or column, whichever are fewer; None where a start is missing.
     """
 
-    plan: RunPlan
+    phase: Phase
     blocks: tuple[str, ...]
     rows: tuple[int, ...]
     columns: tuple[int, ...]
@@ -69,7 +66,7 @@ class Structure:
         plane: Plane of the part in which everything moves, with PPR chains; None for space, with PPPS chains.
         graph: Links and joints, virtual chains included.
         circuits: The independent ways round, one per chord.
-        matrices: One per run that the mode asks for.
+        matrices: One per phase of the program.
     """
 
     cell: Cell
@@ -89,7 +86,7 @@ def explain(cell: Cell) -> Structure:
         plane=plane,
         graph=graph,
         circuits=circuits(graph, spanning_tree(graph)),
-        matrices=tuple(_matrix(cell, model, plan) for plan in plan_runs(cell)),
+        matrices=tuple(_matrix(cell, model, phase) for phase in plan_phases(cell).program),
     )
 
 
@@ -105,10 +102,11 @@ def _plane(cell: Cell) -> PlaneName | None:
     return None
 
 
-def _matrix(cell: Cell, model: CombinedModel, plan: RunPlan) -> MatrixShape:
-    """Blocks of one run, and its singular values where all configurations that matter are known."""
-    tasks: list[Relation] = [*(cell.task(name) for name in plan.tasks), *closures(cell, plan.moving)]
-    signs = column_signs(cell, model, tasks, plan.moving)
+def _matrix(cell: Cell, model: CombinedModel, phase: Phase) -> MatrixShape:
+    """Blocks of one phase, and its singular values where all configurations that matter are known."""
+    tasks: list[Relation] = [*(cell.task(name) for name in phase.tasks), *closures(cell, phase.moving)]
+    constraints = TaskConstraints.of(cell, tasks, phase.moving)
+    signs = constraints.column_signs(model.carries_flange)
     moves = np.any(signs != 0.0, axis=0)
     carriers = cell.positioners[:1] if any(task.relative_to is Frame.PART for task in tasks) else ()
     at_work = {*carriers, *(task.robot for task in tasks)}
@@ -116,26 +114,26 @@ def _matrix(cell: Cell, model: CombinedModel, plan: RunPlan) -> MatrixShape:
     places = [cell.columns(robot.name) for robot in cell.robots]
     blocks = [np.sign(signs[:, place].sum(axis=1)) for place in places]  # one robot's signs in one task are all alike
     return MatrixShape(
-        plan=plan,
+        phase=phase,
         blocks=tuple(task.name for task in tasks),
-        rows=tuple(len(constraint_rows(task, np.eye(4)[None])[0]) for task in tasks),
+        rows=tuple(int(count) for count in constraints.kept.sum(axis=1)),
         columns=tuple(int(moves[place].sum()) for place in places),
         signs=np.stack(blocks, axis=1),
         missing=missing,
-        singular_values=None if missing else _singular_values(cell, model, tasks, signs),
+        singular_values=None if missing else _singular_values(cell, model, constraints),
     )
 
 
-def _singular_values(cell: Cell, model: CombinedModel, tasks: list[Relation], signs: Array) -> Array:
+def _singular_values(cell: Cell, model: CombinedModel, constraints: TaskConstraints) -> Array:
     """Singular values of the constrained rows over the moving joints at the start; bystanders do not matter."""
     q = np.concatenate([np.zeros(len(r.model.joints)) if r.start is None else r.start for r in cell.robots])
     state = model.state(q)
-    names = [robot.name for robot in cell.robots]
-    X_WT = state.X_WT[[names.index(task.robot) for task in tasks]]
-    X_WR = reference_frames(state, tasks)
+    X_WT, X_WR = state.X_WT[constraints.operators], constraints.reference_frames(state.X_WP)
+    signs = constraints.column_signs(model.carries_flange)
     X_PT = inverse(X_WR) @ X_WT
     J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
-    picked = [constraint_rows(task, X[None])[0] @ block for task, X, block in zip(tasks, X_PT, J, strict=True)]
+    blocks = zip(constraints.tasks, X_PT, J, strict=True)
+    picked = [constraint_rows(task, X[None])[0] @ block for task, X, block in blocks]
     rows = np.concatenate(picked)
     values: Array = np.linalg.svd(rows[:, np.any(signs != 0.0, axis=0)], compute_uv=False)
     return values

@@ -4,7 +4,7 @@ from functools import reduce
 
 from cellplan.model.cell import Cell
 from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
-from cellplan.planning.modes import plan_runs
+from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import examine_times, time_tasks
 
@@ -30,11 +30,11 @@ def screen(cell: Cell, candidates: Candidates, *, task: str | None = None, accur
     runs = [
         screen_layouts(
             cell,
-            time_tasks(cell, [toolpaths[name] for name in plan.tasks]),
+            time_tasks(cell, [toolpaths[name] for name in phase.tasks]),
             candidates,
-            moving=plan.moving,
+            moving=phase.moving,
             accuracy=accuracy,
         )
-        for plan in plan_runs(cell, only=task)
+        for phase in plan_phases(cell, only=task).program
     ]
     return reduce(Screening.worst, runs)

@@ -9,7 +9,7 @@ from cellplan.io.run.joint_tables import parse_table
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
-from cellplan.planning.modes import plan_runs
+from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.scene.scene import Scene
@@ -22,14 +22,14 @@ def verify(cell: Cell, tables: Mapping[str, str], *, task: str | None = None, pr
         cell: The cell the tables were made for.
         tables: Text of one joint table per robot, by robot name.
         task: Name of the only task that was worked on; needed when the cell's mode has one run per task.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: A table is missing, unreadable, or does not fit the cell; there is no such task.
     """
-    plans = plan_runs(cell, only=task)
+    plans = plan_phases(cell, only=task).program
     if len(plans) > 1:
-        names = ", ".join(str(plan.name) for plan in plans)
+        names = ", ".join(str(plan.task) for plan in plans)
         raise InputError(f"task: this cell has one run per task: name one of {names}")
     plan = plans[0]
     toolpaths = [build_toolpath(cell.task(name), cell.part, cell.origin) for name in plan.tasks]

@@ -16,6 +16,7 @@ from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.report.page.render import overview_html, report_html
 from cellplan.report.record.run import Provenance
+from cellplan.report.record.series import series_json
 from cellplan.report.record.write import report_json, summary_json
 
 ENGINES: Final = (
@@ -34,11 +35,11 @@ def write_run(
     *,
     keep_rejected: bool = False,
     progress: Progress = silent,
-    drawing: BackgroundPlots | None = None,
+    plots: BackgroundPlots | None = None,
 ) -> None:
     """Write a run folder; it appears whole or not at all.
 
-    Every run has ``report.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only when the whole
+    Every run has ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only if the
     solution passed. A cell with one run per task gets a subfolder for each and an overview above them. Last comes
     ``manifest.json``, which names every file.
 
@@ -46,17 +47,17 @@ def write_run(
         solution: What was solved.
         folder: The run folder; an older run there is replaced.
         keep_rejected: Write the tables of a failed solution too, under ``rejected/``, marked in every header.
-        progress: Who wants to know how far it is.
-        drawing: Who paints the plots, and may have begun.
+        progress: Called with the stage and the fraction done.
+        plots: Draws the plots; those that it has begun are not drawn again.
 
     Raises:
         InputError: The folder cannot be written, or holds something else than a run.
     """
-    painter = drawing or BackgroundPlots()
+    background = plots or BackgroundPlots()
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            _write_one(target, solution.cell, run, painter)
+            _write_one(target, solution.cell, run, background)
             if solution.passed:
                 _write_tables(target, run, "tables")
             elif keep_rejected:
@@ -82,17 +83,18 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _write_one(target: RunFolder, cell: Cell, run: Run, drawing: BackgroundPlots) -> None:
+def _write_one(target: RunFolder, cell: Cell, run: Run, plots: BackgroundPlots) -> None:
     """Report, plots and resolved cell of one run."""
     place = _place(run)
     provenance = Provenance(versions=versions(), digests={"program": program_digest(run.program.tables)})
-    painting = drawing.pictures(run.report, cell=cell)
+    begun = plots.pictures(run.report, cell=cell)
     record = report_json(run.report, cell=cell, provenance=provenance, motion=run.motion)
     target.write_text(f"{place}report.json", record)
-    plots = painting()
-    for name, picture in plots.items():
+    target.write_text(f"{place}series.json", series_json(run.report, run.motion))
+    pictures = begun()
+    for name, picture in pictures.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    page = report_html(run.report, cell=cell, provenance=provenance, plots=plots, motion=run.motion)
+    page = report_html(run.report, cell=cell, provenance=provenance, plots=pictures, motion=run.motion)
     target.write_text(f"{place}report.html", page)
     target.write_text(f"{place}cell.yaml", render_cell(cell))
 

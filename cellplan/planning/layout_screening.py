@@ -161,10 +161,7 @@ class _Screen:
         self._windows = windows_between(jumps, whole=float(breaks[-1]), knots=breaks, highest=FIRST_DEGREE)
         at_rest = cell.positioners[:1] if all(path.task.relative_to is Frame.PART for path in timed.paths) else ()
         self._settling = np.concatenate([np.full(len(r.model.joints), r.name not in at_rest) for r in cell.robots])
-        joints = [joint for robot in cell.robots for joint in robot.model.joints]
-        self._lower = np.array([joint.lower for joint in joints])
-        self._upper = np.array([joint.upper for joint in joints])
-        self._fastest = np.array([joint.velocity for joint in joints])
+        self._limits = cell.joint_limits
 
     def of(self, X_WB: Array, X_FT: Array, start: Array) -> Screening:
         """Figures of one group of candidates; see `Candidates`."""
@@ -178,9 +175,10 @@ class _Screen:
         def record(window: Window, cells: Indices, nodes: Array, errors: Array) -> None:
             everywhere = np.concatenate([nodes, nodes @ window.between.T], axis=2)
             speeds = np.abs(nodes @ window.rates.T).max(axis=2).T
-            room = np.minimum(everywhere.min(axis=2).T - self._lower, self._upper - everywhere.max(axis=2).T)
+            lowest, highest = everywhere.min(axis=2).T, everywhere.max(axis=2).T
+            room = np.minimum(lowest - self._limits.lower, self._limits.upper - highest)
             found.margins[cells] = np.minimum(found.margins[cells], room)
-            found.speed_ratios[cells] = np.maximum(found.speed_ratios[cells], speeds / self._fastest)
+            found.speed_ratios[cells] = np.maximum(found.speed_ratios[cells], speeds / self._limits.velocity)
             found.error[cells] = np.maximum(found.error[cells], errors)
             found.lost_at[cells] = window.panels[-1].end
 

@@ -1,34 +1,22 @@
 """Modes: which tasks are worked on together, and which robots move meanwhile (MODO 1, 2, 3 of [Ribeiro2010]_ ch. 5)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import pairwise
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Mode
 from cellplan.model.idle import idle_robots
+from cellplan.model.phase import ALL_TASKS, Carry, Hold, Phase, Role, Transfer, Work
+from cellplan.model.plan import Plan
 from cellplan.model.task import Task
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunPlan:
-    """One motion of the cell.
+def plan_phases(cell: Cell, *, only: str | None = None) -> Plan:
+    """The phases of the cell's program, in the order of the tasks and not yet on a clock: all that its mode decides.
 
-    Attributes:
-        name: Name of the only task in a run of its own; None when all tasks are worked on together.
-        tasks: Names of the tasks worked on.
-        moving: Names of the robots that may move; all others stand still.
-        idle: Names of the robots that have nothing to do and stand at their homes.
-    """
-
-    name: str | None
-    tasks: tuple[str, ...]
-    moving: tuple[str, ...]
-    idle: tuple[str, ...] = ()
-
-
-def plan_runs(cell: Cell, *, only: str | None = None) -> tuple[RunPlan, ...]:
-    """The runs that the cell's mode asks for, in the order of the tasks.
+    Simultaneous: one phase. Part at rest: one phase in which the holders stand still. Pairwise: a phase for each task;
+    what leads from one to the next is not part of the program.
 
     Args:
         cell: The cell.
@@ -41,45 +29,52 @@ def plan_runs(cell: Cell, *, only: str | None = None) -> tuple[RunPlan, ...]:
     if not chosen:
         raise InputError(f"task: expected one of {', '.join(task.name for task in cell.tasks)}, got '{only}'")
     _refuse_carrying_at_rest(cell, chosen)
-    operators = tuple(task.robot for task in chosen)
-    tasks = tuple(task.name for task in chosen)
-    idle = idle_robots(cell, tasks)
     match cell.motion.mode:
         case Mode.SIMULTANEOUS:
-            return (RunPlan(name=None, tasks=tasks, moving=_each_once(cell.positioners + operators), idle=idle),)
+            return Plan(phases=(_phase(cell, ALL_TASKS, chosen),))
         case Mode.PART_AT_REST:
-            return (RunPlan(name=None, tasks=tasks, moving=operators, idle=idle),)
+            return Plan(phases=(_phase(cell, ALL_TASKS, chosen, is_carried=False),))
         case Mode.PAIRWISE:
-            return tuple(
-                RunPlan(
-                    name=task.name,
-                    tasks=(task.name,),
-                    moving=_each_once((*cell.positioners, task.robot)),
-                    idle=idle_robots(cell, (task.name,)),
-                )
-                for task in chosen
-            )
+            return Plan(phases=_with_transfers([_phase(cell, task.name, [task]) for task in chosen]))
 
 
-def standing(cell: Cell, plan: RunPlan, q: Array) -> Array:
-    """Stacked configurations of a run with its idle robots at their homes, as far as these are known.
+def standing(cell: Cell, phase: Phase, q: Array) -> Array:
+    """Stacked configurations of a phase with its idle robots at those of their homes that are known.
 
     Args:
         cell: The cell.
-        plan: The run.
+        phase: The phase.
         q: Stacked joint positions in [rad] or [m], shape (..., nq).
     """
     placed = q.copy()
-    for name in plan.idle:
+    for name in phase.idle:
         home = cell.robot(name).home
         if home is not None:
             placed[..., cell.columns(name)] = home
     return placed
 
 
-def homeless(cell: Cell, plan: RunPlan) -> frozenset[str]:
-    """Names of the idle robots of a run whose homes are still to be found."""
-    return frozenset(name for name in plan.idle if cell.robot(name).home is None)
+def homeless(cell: Cell, phase: Phase) -> frozenset[str]:
+    """Names of the idle robots of a phase whose homes are still to be found."""
+    return frozenset(name for name in phase.idle if cell.robot(name).home is None)
+
+
+def _phase(cell: Cell, name: str, tasks: Sequence[Task], *, is_carried: bool = True) -> Phase:
+    """A phase in which some tasks are worked on and the holders carry the part, or hold it still."""
+    roles: dict[str, Role] = {task.robot: Work(task.name) for task in tasks}
+    for holder in cell.positioners:
+        roles.setdefault(holder, Carry() if is_carried else Hold())
+    idle = idle_robots(cell, [task.name for task in tasks])
+    return Phase(name=name, roles=roles | dict.fromkeys(idle, Hold(at_home=True)))
+
+
+def _with_transfers(phases: Sequence[Phase]) -> tuple[Phase, ...]:
+    """Phases with what leads from each to the next one: motion that no program has yet."""
+    found = list(phases[:1])
+    for one, other in pairwise(phases):
+        roles: dict[str, Role] = {robot: Transfer(other.name) for robot in one.roles}
+        found += [Phase(name=f"{one.name} to {other.name}", roles=roles, in_program=False), other]
+    return tuple(found)
 
 
 def _refuse_carrying_at_rest(cell: Cell, tasks: Sequence[Task]) -> None:
@@ -90,8 +85,3 @@ def _refuse_carrying_at_rest(cell: Cell, tasks: Sequence[Task]) -> None:
                 f"{cell.origin.at(f'tasks.{task.name}.robot')}: expected a robot that does not hold the part in the "
                 f"mode part_at_rest, got the positioner '{task.robot}'; choose another mode or leave the task out"
             )
-
-
-def _each_once(names: Sequence[str]) -> tuple[str, ...]:
-    """Names in their order; a holder that carries the part along a path of its own is named once."""
-    return tuple(dict.fromkeys(names))

@@ -14,6 +14,7 @@ from cellplan.errors import InputError
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.cell import Cell, Grasp
+from cellplan.model.units import MM
 from cellplan.scene.bodies import SceneBody, part_body
 from cellplan.scene.pairs import Rule
 
@@ -65,8 +66,8 @@ def grip_watch(cell: Cell, body: SceneBody, grasp: Grasp) -> GripWatch:
     if not is_in_zone:
         return GripWatch(rule=Rule.CONTACT, reason=RIGID, is_whole=True, outside=None)
     reason = (
-        f"grips the part: may touch within {1e3 * zone:g} mm of the tool tip and with the face at the tip, at most "
-        f"{1e3 * grasp.depth:g} mm deep; checked for contact behind it"
+        f"grips the part: may touch within {MM * zone:g} mm of the tool tip and with the face at the tip, at most "
+        f"{MM * grasp.depth:g} mm deep; checked for contact behind it"
     )
     return GripWatch(rule=Rule.GRIP, reason=reason, is_whole=False, outside=outside)
 
@@ -83,7 +84,7 @@ def _require_free(cell: Cell, body: SceneBody, grasp: Grasp, outside: CollisionB
     engine, poses = _gripped(cell, body, grasp, outside)
     if engine.touch(0, 1, poses, sample=0) or is_inside(engine, (0, 1), poses, sample=0):
         number = cell.positioners.index(grasp.robot)
-        zone = 1e3 * cell.checks.contact_zone
+        zone = MM * cell.checks.contact_zone
         raise InputError(
             f"{cell.origin.at(f'part.held_by[{number}].at')}: expected '{grasp.robot}' to touch the part near its tool "
             f"tip (checks.contact_zone_mm = {zone:g}) or with the face at the tip, got {body.name} that touches it "

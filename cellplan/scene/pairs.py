@@ -11,6 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOutKind
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import BASE
+from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody
 from cellplan.scene.link_tree import NO_BODY, LinkTree
 from cellplan.scene.mounting import Mount, grasp_of, left_out_kind, mounted_pair
@@ -144,10 +145,10 @@ def _mounting(a: SceneBody, b: SceneBody, *, cell: Cell, trees: Mapping[str, Lin
     """Why two bodies are joined by their mounting, or None."""
     mounted = mounted_pair(a, b, (0, 0), cell)
     if mounted is not None and mounted.mount is Mount.STANDING:
-        return f"both stand still: may touch, at most {1e3 * mounted.limit:g} mm deep"
+        return f"both stand still: may touch, at most {MM * mounted.limit:g} mm deep"
     if mounted is not None:
         is_first = grasp_of(a, b, cell) is cell.part.held_by[0]
-        return f"holds the part: may touch, at most {1e3 * mounted.limit:g} mm deep" if is_first else None
+        return f"holds the part: may touch, at most {MM * mounted.limit:g} mm deep" if is_first else None
     if a.robot is None or a.robot != b.robot:
         return None
     return _joined(a, b, trees[a.robot])

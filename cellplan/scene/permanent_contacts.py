@@ -17,6 +17,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOutKind
 from cellplan.model.robot import RobotModel
 from cellplan.model.seeds import generator
+from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, part_body
 from cellplan.scene.link_tree import LinkTree
 from cellplan.scene.mounting import (
@@ -185,7 +186,7 @@ def _random_configurations(model: RobotModel, rng: np.random.Generator) -> Array
 def _stands(design: Design, cell: Cell, pair: ScenePair) -> bool:
     """Let a robot whose foot has no body stand with its first link in the surroundings."""
     limit = cell.checks.standing_depth
-    reason = f"stands on it, as the foot has no body: may touch, at most {1e3 * limit:g} mm deep"
+    reason = f"stands on it, as the foot has no body: may touch, at most {MM * limit:g} mm deep"
     design.excluded.append(Excluded(pair.first, pair.second, reason, LeftOutKind.STANDING))
     design.mounted.append(
         MountedPair(first=pair.first, second=pair.second, mount=Mount.STANDING, limit=limit, moves=True)
@@ -222,7 +223,7 @@ def _mount_behind(design: Design, sampled: _Sampled, pair: ScenePair, holder: st
     is_grip = Kind.PART in (ends[0].kind, ends[1].kind)
     limit = grasps[0].depth if is_grip else MOUNT_DEPTH
     kind, mount = (LeftOutKind.GRIP, Mount.GRIP) if is_grip else (LeftOutKind.MOUNTED, Mount.MOUNT)
-    reason = f"mounted on it, as the flange has no body: may touch, at most {1e3 * limit:g} mm deep"
+    reason = f"mounted on it, as the flange has no body: may touch, at most {MM * limit:g} mm deep"
     design.excluded.append(Excluded(pair.first, pair.second, reason, kind))
     design.mounted.append(MountedPair(first=pair.first, second=pair.second, mount=mount, limit=limit, moves=True))
 

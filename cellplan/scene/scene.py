@@ -18,6 +18,7 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.left_out import LeftOut, LeftOutKind
 from cellplan.model.task import Frame
+from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, scene_bodies
 from cellplan.scene.grips import GripWatch, grip_watch
 from cellplan.scene.left_out import left_out
@@ -201,7 +202,7 @@ def _watch_tool(
         watch.pairs.append(pair)
         watch.watched.append((tool, part))
         return
-    reason = f"at work: may touch within {1e3 * zone:g} mm of the tool tip; checked for contact outside it"
+    reason = f"at work: may touch within {MM * zone:g} mm of the tool tip; checked for contact outside it"
     watch.pairs.append(replace(pair, rule=Rule.PROCESS, reason=reason))
     watch.watched.append(None if outside is None else (next_index, part))
     if outside is not None:

@@ -42,9 +42,7 @@ def more_header_lines(rng, copy):
 def misshapen_series(rng, copy):
     """Label, or too few figures, in the place of a series that only the planner knows."""
     forged = pick(rng, ("safe at full speed", [1.0], ["safe"] * 40, {"safe": True}, [True] * 40, False))
-    edit_json(
-        copy.run / "report.json", lambda record: record["series"].update({pick(rng, ("iterations", "slack")): forged})
-    )
+    edit_json(copy.run / "series.json", lambda record: record.update({pick(rng, ("iterations", "slack")): forged}))
     seal(copy)
 
 

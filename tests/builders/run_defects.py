@@ -301,7 +301,7 @@ def pretty_report(rng, copy):
     """A report that tells of other figures than there are, or of fewer."""
 
     def change(record: dict[str, Any]) -> None:
-        which = int(rng.integers(7))
+        which = int(rng.integers(6))
         if which == 0:
             record["tasks"]["path"]["max_position_error_mm"] += 1e-5  # what is there is less than that
         elif which == 1:
@@ -312,12 +312,33 @@ def pretty_report(rng, copy):
             record["joints"]["left"]["A"]["margin"] += 1e-3
         elif which == 4:
             record["checks"].pop(int(rng.integers(len(record["checks"]))))
-        elif which == 5:
-            record["exclusions"].append({"pair": ["left/A", "right/A"], "reason": "none"})
         else:
-            record["series"]["joints"]["left"]["A"]["position_deg"][3] += 0.01
+            record["exclusions"].append({"pair": ["left/A", "right/A"], "reason": "none"})
 
     edit_json(copy.run / "report.json", change)
+    seal(copy)
+
+
+def other_series(rng, copy):
+    """Series that differ from the tables in one value, have one value less, or are missing."""
+
+    def change(record: dict[str, Any]) -> None:
+        which = int(rng.integers(4))
+        if which == 0:
+            record["joints"]["left"]["A"]["position_deg"][int(rng.integers(40))] += 0.01
+        elif which == 1:
+            record["times_s"].pop()
+        elif which == 2:
+            del record["conditioning"]["manipulability"]
+        else:
+            record["tasks"]["path"]["position_error_mm"][int(rng.integers(40))] += 0.001
+
+    edit_json(copy.run / "series.json", change)
+    seal(copy)
+
+
+def series_missing(rng, copy):
+    (copy.run / "series.json").unlink()
     seal(copy)
 
 
@@ -371,5 +392,7 @@ DEFECTS: dict[str, Defect] = {
     "words in a picture, sealed": words_in_a_picture,
     "more header lines, sealed": more_header_lines,
     "a misshapen series, sealed": misshapen_series,
+    "other series, sealed": other_series,
+    "no series, sealed": series_missing,
     "counts beside the truth, sealed": counts_beside_the_truth,
 }

@@ -1,4 +1,4 @@
-"""Plots painted aside are those painted here, byte for byte, whatever becomes of the child."""
+"""Plots drawn in the background are those drawn here, byte for byte, whatever becomes of the child."""
 
 import threading
 from dataclasses import replace
@@ -7,14 +7,18 @@ from pathlib import Path
 import pytest
 from builders import crashing_jobs
 
+from cellplan.checks.clearance.check import UNKNOWN
+from cellplan.checks.verify import verify_motion, with_clearance
 from cellplan.guard import BackgroundProcess
 from cellplan.io.cell.load import load_cell
+from cellplan.io.run.joint_tables import parse_table
 from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.solution import Solution
-from cellplan.pipeline.solve import solve
+from cellplan.pipeline.solve import solve, solve_with_plots
 from cellplan.pipeline.write_run import write_run
 from cellplan.report.plots.run import draw_plots
+from cellplan.scene.scene import Scene
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -34,45 +38,59 @@ def solution(cell_file: Path) -> Solution:
 @pytest.mark.parametrize("mode", ["simultaneous", "pairwise"])
 def test_a_run_folder_is_the_same_with_and_without_a_child(cell_file: Path, tmp_path: Path, mode: str) -> None:
     cell = with_overrides(load_cell(cell_file), mode=mode)
-    write_run(solve(cell), tmp_path / "alone")
-    with BackgroundProcess() as aside:
-        drawing = BackgroundPlots(aside)
-        write_run(solve(cell, drawing=drawing), tmp_path / "aside", drawing=drawing)
+    write_run(solve(cell), tmp_path / "foreground")
+    with BackgroundProcess() as background:
+        plots = BackgroundPlots(background)
+        write_run(solve_with_plots(cell, plots), tmp_path / "background", plots=plots)
 
-    assert files(tmp_path / "aside") == files(tmp_path / "alone")
-    assert any(name.endswith("clearance.png") for name in files(tmp_path / "alone"))
+    assert files(tmp_path / "background") == files(tmp_path / "foreground")
+    assert any(name.endswith("clearance.png") for name in files(tmp_path / "foreground"))
 
 
-def test_plots_are_painted_here_when_the_child_has_crashed(solution: Solution) -> None:
+def test_plots_are_drawn_here_when_the_child_has_crashed(solution: Solution) -> None:
     report, cell = solution.runs[0].report, solution.cell
-    with BackgroundProcess() as aside:
-        drawing = BackgroundPlots(aside)
-        aside.begin(crashing_jobs.leave)
-        drawing.begin(report, cell=cell)
-        painted = drawing.pictures(report, cell=cell)()
+    with BackgroundProcess() as background:
+        plots = BackgroundPlots(background)
+        background.begin(crashing_jobs.leave)
+        plots.begin(report, cell=cell)
+        drawn = plots.pictures(report, cell=cell)()
 
-    assert painted == draw_plots(report, cell=cell)
+    assert drawn == draw_plots(report, cell=cell)
 
 
 def test_plots_begun_with_other_figures_are_not_taken_for_these(solution: Solution) -> None:
     report, cell = solution.runs[0].report, solution.cell
     other = replace(report, q={robot: 0.5 * values for robot, values in report.q.items()})
-    with BackgroundProcess() as aside:
-        drawing = BackgroundPlots(aside)
-        drawing.begin(other, cell=cell)
-        drawing.begin(report, cell=cell)
-        painted = drawing.pictures(report, cell=cell)
+    with BackgroundProcess() as background:
+        plots = BackgroundPlots(background)
+        plots.begin(other, cell=cell)
+        plots.begin(report, cell=cell)
+        drawn = plots.pictures(report, cell=cell)
 
-        assert painted() == draw_plots(report, cell=cell)
-        assert drawing.pictures(other, cell=cell)() == draw_plots(other, cell=cell) != painted()
+        assert drawn() == draw_plots(report, cell=cell)
+        assert plots.pictures(other, cell=cell)() == draw_plots(other, cell=cell) != drawn()
 
 
-def test_drawing_without_a_child_starts_nothing(solution: Solution) -> None:
+def test_plots_without_a_child_starts_nothing(solution: Solution) -> None:
     before = threading.active_count()
-    drawing = BackgroundPlots()
-    drawing.begin(solution.runs[0].report, cell=solution.cell)
+    plots = BackgroundPlots()
+    plots.begin(solution.runs[0].report, cell=solution.cell)
 
     assert threading.active_count() == before
-    assert drawing.pictures(solution.runs[0].report, cell=solution.cell)() == draw_plots(
+    assert plots.pictures(solution.runs[0].report, cell=solution.cell)() == draw_plots(
         solution.runs[0].report, cell=solution.cell
     )
+
+
+def test_the_clearance_completes_a_report_that_had_none(solution: Solution) -> None:
+    run = solution.runs[0]
+    scene = Scene.from_cell(solution.cell)
+    tables = [parse_table(text, robot) for robot, text in run.program.tables.items()]
+
+    motion = verify_motion(scene, run.schedule, tables, moving=run.moving)
+    assert motion.clearance is UNKNOWN
+    assert not {"clearance", "collision"} & {check.name for check in motion.checks}
+
+    whole = with_clearance(motion, scene, run.schedule)
+    assert whole.checks == run.report.checks
+    assert whole.clearance.minima == run.report.clearance.minima

@@ -8,10 +8,10 @@ import numpy as np
 from cellplan.certify.survey import Survey
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import Check, ClearanceClass, Contact
+from cellplan.model.units import MM
 from cellplan.scene.pairs import Rule
 
 SAME_CONTACT: Final = 0.010  # [s] touches with shorter breaks between them are one contact
-MM: Final = 1e3
 OUTSIDE_ZONE: Final = {
     Rule.PROCESS: "outside the contact zone of the tool at work",
     Rule.GRIP: "outside the contact zone of the grip",

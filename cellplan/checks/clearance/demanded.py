@@ -5,10 +5,11 @@ from typing import Final
 import numpy as np
 
 from cellplan.certify.survey import Survey, proved_distance
-from cellplan.checks.clearance.contacts import MM, seconds
+from cellplan.checks.clearance.contacts import seconds
 from cellplan.collision.distance import TIGHT
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import Check, ClearanceClass, ClearanceMinimum
+from cellplan.model.units import MM
 
 EXACT: Final = 1e-4 - 2.0 * TIGHT  # [m] a bound this near to what was measured is a smallest distance, to 0.1 mm
 

@@ -28,11 +28,11 @@ def check_idle(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> list[C
 
 def _stands(robot: Robot, times: Array, q: Array) -> Check:
     """Whether one robot stands at its home."""
-    units = np.array([np.degrees(1.0) if joint.is_revolute else 1e3 for joint in robot.model.joints])
-    away = np.abs(q - (q[0] if robot.home is None else robot.home)) * units
+    scales = np.array([joint.display_unit.scale for joint in robot.model.joints])
+    away = np.abs(q - (q[0] if robot.home is None else robot.home)) * scales
     row, column = np.unravel_index(int(np.argmax(away)), away.shape)
     joint, value = robot.model.joints[column], float(away[row, column])
-    unit, passed = "deg" if joint.is_revolute else "mm", value <= ROOM
+    unit, passed = joint.display_unit.name, value <= ROOM
     found = f"stands at its home, {value:.2g} {unit} from it at most" if passed else ""
     far = f"joint {joint.name} is {value:.6g} {unit} from its home at {times[row]:.3f} s, and has nothing to do"
     return Check(

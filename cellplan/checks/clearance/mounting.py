@@ -8,11 +8,11 @@ from typing import Final
 from cellplan.certify.depths import FoundDepth, mounted_depths
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import Check
+from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, is_ground
 from cellplan.scene.mounting import Mount
 from cellplan.scene.scene import Scene
 
-MM: Final = 1e3
 ROUNDING: Final = 1e-6  # [m] poses are worked out to less than that: bodies that just touch are not deep
 CURES: Final = {
     Mount.GRIP: "is the grasp the right way round? If the grip is that deep, say so with depth_mm of the grasp",

@@ -15,8 +15,8 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.report import Check, ToolDepth
 from cellplan.model.task import Frame, SampledPath, Task, TimedPath
+from cellplan.model.units import MM
 
-MM: Final = 1000.0  # [mm/m]
 AXIS: Final = "axis"
 AXIS_COMPONENTS: Final = (0, 1, 2, 3, 4)  # of a task: they leave no more than the turn about one axis open
 ROOM: Final = 1e-6  # [m] tracking errors of a micrometre do not decide about a cut that is as deep as it may be

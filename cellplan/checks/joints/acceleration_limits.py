@@ -170,7 +170,7 @@ def _not_judged(cell: Cell) -> Iterator[NotJudged]:
 
 def _check_acceleration(cell: Cell, use: JointAcceleration, limit: float) -> Check:
     """One joint's largest acceleration; the name says when its limit is assumed."""
-    scale, unit = joint_unit(use.is_revolute)
+    unit, scale = use.display_unit
     is_assumed = use.source is LimitSource.ASSUMED
     passed = use.peak <= limit
     verdict = "accelerates at most at" if passed else "is accelerated too much:"
@@ -196,7 +196,7 @@ def _check_acceleration(cell: Cell, use: JointAcceleration, limit: float) -> Che
 
 def _check_jerk(use: JointAcceleration, limit: float) -> Check:
     """One joint's largest jerk."""
-    scale, unit = joint_unit(use.is_revolute)
+    unit, scale = use.display_unit
     return Check(
         name="joint_jerk",
         subject=f"{use.robot}/{use.joint}",
@@ -227,8 +227,3 @@ def _check_part(corner: PointAcceleration, limit: float) -> Check:
             f"at {corner.peak_at_s:.3f} s, allowed {limit:g} m/s2"
         ),
     )
-
-
-def joint_unit(is_revolute: bool) -> tuple[float, str]:
-    """Factor and unit that people read."""
-    return (float(np.degrees(1.0)), "deg") if is_revolute else (1e3, "mm")

@@ -11,9 +11,8 @@ from cellplan.model.motion import Schedule
 from cellplan.model.report import Check, JointDrift, Repeatability
 from cellplan.model.task import INSTANT_ROOM
 
-TURN_LIMIT: Final = float(np.deg2rad(0.001))  # [rad] below the repeatability of any arm's joints
-SLIDE_LIMIT: Final = 1e-6  # [m] likewise
-UNITS: Final = {True: ("deg", float(np.rad2deg(1.0))), False: ("mm", 1e3)}  # of joints that turn, of joints that slide
+REVOLUTE_DRIFT_TOL: Final = float(np.deg2rad(0.001))  # [rad] below the repeatability of any arm's joints
+PRISMATIC_DRIFT_TOL: Final = 1e-6  # [m] likewise
 
 
 def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Repeatability | None:
@@ -92,12 +91,12 @@ def _instants(schedule: Schedule) -> Array:
 
 def _limit(drift: JointDrift) -> float:
     """Largest drift of a joint that comes back, in [rad] or [m]."""
-    return TURN_LIMIT if drift.is_revolute else SLIDE_LIMIT
+    return REVOLUTE_DRIFT_TOL if drift.is_revolute else PRISMATIC_DRIFT_TOL
 
 
 def _check(found: Repeatability, drift: JointDrift) -> Check:
     """One joint against its limit."""
-    unit, scale = UNITS[drift.is_revolute]
+    unit, scale = drift.display_unit
     value, limit = scale * drift.worst, scale * _limit(drift)
     return Check(
         name="joint_drift",

@@ -53,7 +53,7 @@ def _use(robot: Robot, index: int, times: Array, q: Array, *, speeds: Array) -> 
 
 def _check_position(use: JointUse, times: Array, q: Array) -> Check:
     """One joint's worst position; the message names the first instant of a violation too."""
-    scale, unit = _unit(use.is_revolute)
+    unit, scale = use.display_unit
     worst = int(np.searchsorted(times, use.margin_at_s))
     value = scale * float(q[worst])
     limit = scale * (use.lower if q[worst] - use.lower < use.upper - q[worst] else use.upper)
@@ -83,7 +83,7 @@ def _check_position(use: JointUse, times: Array, q: Array) -> Check:
 
 def _check_velocity(use: JointUse) -> Check:
     """One joint's largest speed."""
-    scale, unit = _unit(use.is_revolute)
+    unit, scale = use.display_unit
     passed = use.peak_velocity <= use.velocity_limit
     verdict = "moves at most at" if passed else "is too fast:"
     percent = 100 * use.peak_velocity / use.velocity_limit
@@ -100,8 +100,3 @@ def _check_velocity(use: JointUse) -> Check:
             f"at {use.peak_velocity_at_s:.3f} s ({percent:.4g} % of its limit {scale * use.velocity_limit:g} {unit}/s)"
         ),
     )
-
-
-def _unit(is_revolute: bool) -> tuple[float, str]:
-    """Factor and unit that people read."""
-    return (float(np.degrees(1.0)), "deg") if is_revolute else (1e3, "mm")

@@ -52,8 +52,7 @@ def told_with_failures(
 def _check(cell: Cell, lock: LockedJoint, times: Array, q: Array) -> Check:
     """One joint: the farthest it goes from where it was when it failed."""
     index = cell.robot(lock.robot).model.joint_names.index(lock.joint)
-    is_revolute = cell.robot(lock.robot).model.joints[index].is_revolute
-    scale, unit = (float(np.degrees(1.0)), "deg") if is_revolute else (1e3, "mm")
+    unit, scale = cell.robot(lock.robot).model.joints[index].display_unit
     after = np.flatnonzero(times >= lock.since)
     name = f"joint {lock.robot}/{lock.joint}"
     if not len(after):

@@ -14,11 +14,11 @@ from cellplan.model.cell import Cell, Grasp, Robot
 from cellplan.model.payload import AxisLimit, AxisUse, LoadUse, Payload
 from cellplan.model.report import Check
 from cellplan.model.robot import BASE, FollowerJoint, Joint
+from cellplan.model.units import MM
 
 GRAVITY: Final = 9.80665  # [m/s^2] standard gravity, downwards along the world's z
 UP: Final = np.array([0.0, 0.0, 1.0])
 WRIST: Final = 3  # [-] turning axes before the flange that are looked at
-MM: Final = 1e3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -9,8 +9,9 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.rehearsal import RunRehearsal
 from cellplan.model.report import Check, TaskAccuracy
+from cellplan.model.units import DEGREES, MILLIMETRES
 
-KINDS: Final = (("position", "mm", 1e3), ("orientation", "deg", float(np.rad2deg(1.0))))
+KINDS: Final = (("position", MILLIMETRES), ("orientation", DEGREES))
 
 
 def largest(errors: Array, first: int) -> float:
@@ -40,7 +41,7 @@ def check_true_errors(cell: Cell, run: RunRehearsal) -> tuple[Check, ...]:
 
 def _check(cell: Cell, run: RunRehearsal, place: int, kind: int) -> Check:
     """One error of one task."""
-    name, unit, scale = KINDS[kind]
+    name, (unit, scale) = KINDS[kind]
     found = [trial.final[place] for trial in run.trials]
     task = cell.task(found[0].task)
     first = run.judged_from[task.name]

@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
-
 from cellplan.checks.tools.between_rows import BetweenLook
 from cellplan.geometry.transforms import Array
 from cellplan.model.between_rows import BetweenError
@@ -13,10 +11,10 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.report import Check, ClosureAccuracy, TaskAccuracy
 from cellplan.model.task import Tolerance
+from cellplan.model.units import DEGREES, MILLIMETRES
 from cellplan.scene.scene import Scene
 
 BETWEEN: Final = "_between_rows"  # what the name of a check ends with
-MM, DEG = 1e3, float(np.degrees(1.0))
 
 
 def look_between(
@@ -80,7 +78,7 @@ def with_between(at_rows: Sequence[Check], between: Sequence[Check]) -> tuple[Ch
 
 def _check(name: str, error: BetweenError, subject: str, *, allowed: float, of: str) -> Check:
     """The largest error of one kind against its limit, with the step that would keep it."""
-    scale, unit = (MM, "mm") if "position" in name else (DEG, "deg")
+    unit, scale = MILLIMETRES if "position" in name else DEGREES
     what = name.removesuffix(BETWEEN).replace("_", " ")
     message = (
         f"{what} {of} between the rows of its table: {scale * error.largest:.3g} {unit} at {error.at_s:.4f} s, "

@@ -11,6 +11,7 @@ from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check, ClosureAccuracy
+from cellplan.model.units import DEG, MM
 
 CURE: Final = (
     "a shorter motion.step_s or a slower motion keeps the grasps better, and so does a way round singularities"
@@ -52,17 +53,17 @@ def check_closure(cell: Cell, times: Array, closures: Sequence[ClosureAccuracy])
             worst_error(
                 "closure_position_error",
                 times,
-                1e3 * np.linalg.norm(closure.position_error, axis=1),
+                MM * np.linalg.norm(closure.position_error, axis=1),
                 subject=closure.robot,
-                limit=1e3 * cell.checks.closure_position,
+                limit=MM * cell.checks.closure_position,
                 words=("mm", of),
             ),
             worst_error(
                 "closure_orientation_error",
                 times,
-                np.degrees(np.linalg.norm(closure.orientation_error, axis=1)),
+                DEG * np.linalg.norm(closure.orientation_error, axis=1),
                 subject=closure.robot,
-                limit=float(np.degrees(cell.checks.closure_orientation)),
+                limit=DEG * cell.checks.closure_orientation,
                 words=("deg", of),
             ),
         ]

@@ -11,6 +11,7 @@ from cellplan.model.cell import Cell, Relation
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.report import Check, TaskAccuracy
 from cellplan.model.task import Frame, Task
+from cellplan.model.units import DEG, MM
 
 
 def part_poses(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> Array:
@@ -83,17 +84,17 @@ def check_accuracy(schedule: Schedule, accuracy: TaskAccuracy, task: Task) -> tu
         worst_error(
             "position_error",
             schedule.times[first:],
-            1e3 * position[first:],
+            MM * position[first:],
             subject=task.name,
-            limit=1e3 * allowed.position,
+            limit=MM * allowed.position,
             words=("mm", f"of task '{task.name}'"),
         ),
         worst_error(
             "orientation_error",
             schedule.times[first:],
-            np.degrees(orientation[first:]),
+            DEG * orientation[first:],
             subject=task.name,
-            limit=float(np.degrees(allowed.orientation)),
+            limit=DEG * allowed.orientation,
             words=("deg", f"of task '{task.name}'"),
         ),
     )

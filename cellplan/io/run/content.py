@@ -18,7 +18,7 @@ MANIFEST: Final = "manifest.json"
 LEFT_ALONE: Final = ".DS_Store"  # put into every folder by the file manager of one system
 OWN_FOLDERS: Final = frozenset({PROGRAMS, "plots", "tables", "rejected"})  # what is in them is looked at file by file
 USUAL: Final = re.compile(  # what a run, a rehearsal or a draft of them may hold that lists no files
-    r"cell\.yaml|manifest\.json|view\.html|(report|rehearsal|export)\.(json|html)"
+    r"cell\.yaml|(manifest|series)\.json|view\.html|(report|rehearsal|export)\.(json|html)"
     r"|plots/[^/]+\.(svg|png)|(tables|rejected)/([^/]+/)?[^/]+\.csv"
 )
 

@@ -18,6 +18,7 @@ from cellplan.model.motion import JointTable
 
 REPORT_SCHEMA: Final = "cellplan.report/1"
 OF_EVERY_RUN: Final = ("cell.yaml", "report.html", "report.json")
+SERIES: Final = "series.json"
 CELL: Final = "cell.yaml"
 TABLE_LIMIT: Final = 500_000_000  # [bytes] of a table that is read only to say where it is spoilt
 SERIES_ROOM: Final = 1e-6  # [-] series have seven digits
@@ -56,6 +57,14 @@ class StoredRun:
             InputError: It is missing, or was changed meanwhile.
         """
         return _content(self.folder, _at(place, name), self.manifest)
+
+    def series(self, place: str) -> Record:
+        """The ``series.json`` of one run.
+
+        Raises:
+            InputError: It is missing, was changed meanwhile, or is not JSON.
+        """
+        return parse_json(self.content(place, SERIES), self.file(place, SERIES))
 
     def drawings(self, place: str) -> dict[str, bytes]:
         """The SVG pictures of one run by file name, in the order of the manifest."""
@@ -141,6 +150,8 @@ def _incomplete(folder: Path, manifest: Manifest, places: list[str]) -> Iterator
             if _at(place, name) not in manifest.files:
                 yield InputError(f"{folder / place / name}: missing; every run has it")
     for place in places:
+        if _at(place, SERIES) not in manifest.files:
+            yield InputError(f"{folder / place / SERIES}: missing; every run has it")
         if place and manifest.files.get(_at(place, CELL)) != manifest.files.get(CELL):
             yield InputError(f"{folder / place / CELL}: differs from the cell of the other runs")
     unfitting = "rejected" if manifest.status == "passed" else "tables"
@@ -205,9 +216,9 @@ def _spoilt_tables(folder: Path, changed: Iterable[str]) -> Iterator[InputError]
 
 
 def _first_other_row(table: JointTable, text: str, path: Path) -> Iterator[InputError]:
-    """The first number that is not the one in the series of the report beside the table, as far as that can tell."""
-    report = path.parent.parent / "report.json"
-    curves = parse_json(read_regular_file(report, file=str(report), limit=TABLE_LIMIT), str(report)).get("series", {})
+    """The first number that differs from the series of the run, as far as these can tell."""
+    series = path.parent.parent / SERIES
+    curves = parse_json(read_regular_file(series, file=str(series), limit=TABLE_LIMIT), str(series))
     own = curves.get("joints", {}).get(table.robot, {})
     if curves.get("every") != 1 or list(own) != list(table.joints):
         return
@@ -223,7 +234,7 @@ def _first_other_row(table: JointTable, text: str, path: Path) -> Iterator[Input
     if found:
         row, joint, said_there, got = min(found)
         line = text.count("\n", 0, len(text) - len(table_body(text))) + 2 + row
-        yield InputError(f"{path}:{line}: {joint}: expected {said_there:.7g} as in report.json, got {got:.10g}")
+        yield InputError(f"{path}:{line}: {joint}: expected {said_there:.7g} as in {SERIES}, got {got:.10g}")
 
 
 def _at(place: str, name: str) -> str:

@@ -7,12 +7,13 @@ from cellplan.io.input.findings import listed, shown
 from cellplan.io.run.stored import StoredRun
 from cellplan.model.cell import Cell
 from cellplan.model.verified_run import VerifiedMotion
-from cellplan.pipeline.gate.compare_report import KNOWN_TO_THE_PLANNER
+from cellplan.pipeline.gate.compare_report import PLANNER_KEYS
 from cellplan.pipeline.gate.equal_text import first_difference
 from cellplan.pipeline.gate.picture_text import foreign_piece
 from cellplan.report.page.render import overview_page, report_page
+from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import clearance_sheets, motion_sheets
-from cellplan.report.plots.sheet import Sheet, pictures
+from cellplan.report.plots.sheet import Sheet
 from cellplan.report.record.run import Provenance, Record
 from cellplan.report.record.write import run_record, summary_record
 
@@ -116,6 +117,5 @@ def _provenance(stored: StoredRun, place: str) -> Provenance:
 def _of_the_run(stored: StoredRun, place: str, found: Record) -> Record:
     """A record with the inputs of the run, and with what only its planner knew as its report has it."""
     said: Any = stored.records.get(place, stored.record).get("solver", {})
-    known = [key for section, key in KNOWN_TO_THE_PLANNER if section == "solver"]
-    solver = {key: said.get(key) if key in known else value for key, value in found["solver"].items()}
+    solver = {key: said.get(key) if key in PLANNER_KEYS else value for key, value in found["solver"].items()}
     return found | {"inputs": dict(stored.manifest.inputs), "solver": solver}

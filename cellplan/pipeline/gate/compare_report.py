@@ -19,44 +19,38 @@ NOISE_BY_ENDING: Final[Mapping[str, float]] = {  # in printed units: differences
     "jerk_m_s3": 1e-2,
 }
 COMPARED_ELSEWHERE: Final = frozenset({"inputs", "versions", "digests"})
-KNOWN_TO_THE_PLANNER: Final = frozenset(  # what the planner's steps and nodes took cannot be seen in the tables
-    {
-        ("solver", "iterations"),
-        ("solver", "slack"),
-        ("solver", "resolution"),
-        ("series", "iterations"),
-        ("series", "slack"),
-    }
+PLANNER_KEYS: Final = ("iterations", "slack", "resolution")  # of ``solver``: cannot be derived from the tables
+PLANNER_SERIES: Final = ("iterations", "slack")  # of the series, likewise
+KNOWN_TO_THE_PLANNER: Final = frozenset(
+    {*(("solver", key) for key in PLANNER_KEYS), *((key,) for key in PLANNER_SERIES)}
 )
 
 
 def differences(said: Record, found: Record, *, same_program: bool) -> Iterator[tuple[str, Any, Any]]:
-    """Key paths at which a report differs from what was found, with both values.
+    """Key paths at which a report, or the series of a run, differs from the recomputed one, with both values.
 
-    Figures are the same when they agree to seven digits, words when they do so with the figures in them.
+    Numbers are equal when they agree to seven digits, texts when the numbers in them do.
 
     Args:
-        said: The report on disk.
-        found: What was computed from the tables.
+        said: The record on disk.
+        found: The record computed from the tables.
         same_program: Whether both were made by the same version of cellplan, so that they must have the same keys and
-            the same words; between versions only the figures of common keys are compared.
+            the same texts; between versions only the numbers of common keys are compared.
     """
     yield from _compare(said, found, (), same_program=same_program)
-    if same_program and "series" in found:
-        yield from _misshapen_series(said.get("series"), len(found["series"]["times_s"]) - 1)
 
 
-def _misshapen_series(said: Any, steps: int) -> Iterator[tuple[str, Any, Any]]:
-    """Series that only the planner knows and that are neither null nor one figure for each step."""
-    for section, key in sorted(KNOWN_TO_THE_PLANNER):
-        if section != "series" or not isinstance(said, Mapping) or said.get(key) is None:
+def misshapen_series(said: Record, steps: int) -> Iterator[tuple[str, Any, Any]]:
+    """Series that only the planner knows and that are neither null nor one number for each step."""
+    for key in PLANNER_SERIES:
+        series = said.get(key)
+        if series is None:
             continue
-        series = said[key]
         is_whole = isinstance(series, list) and len(series) == steps
         if not is_whole or any(
             isinstance(value, bool) or not isinstance(value, int | float | None) for value in series
         ):
-            yield f"{section}.{key}", series, f"a list of {steps} numbers or null"
+            yield key, series, f"a list of {steps} numbers or null"
 
 
 def _compare(said: Any, found: Any, path: tuple[str, ...], *, same_program: bool) -> Iterator[tuple[str, Any, Any]]:

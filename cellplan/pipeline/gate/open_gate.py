@@ -19,18 +19,19 @@ from cellplan.io.run.joint_tables import (
     program_digest,
     table_body,
 )
-from cellplan.io.run.stored import CELL, StoredRun, read_stored_run
+from cellplan.io.run.stored import CELL, SERIES, StoredRun, read_stored_run
 from cellplan.model.cell import Cell
 from cellplan.model.idle import not_in_program
 from cellplan.model.motion import JointTable, Schedule
+from cellplan.model.phase import Phase
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.model.verified_run import SEAL, VerifiedMotion, VerifiedRun
 from cellplan.pipeline.gate.compare_page import drawn_again, other_pictures, page_findings
-from cellplan.pipeline.gate.compare_report import differences
+from cellplan.pipeline.gate.compare_report import differences, misshapen_series
 from cellplan.pipeline.gate.stored_cell import load_stored_cell
 from cellplan.pipeline.write_run import versions
-from cellplan.planning.modes import RunPlan, homeless, plan_runs
+from cellplan.planning.modes import homeless, plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.report.record.accelerations import table_line
@@ -91,7 +92,7 @@ def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], prog
             *source.remarks,
             *_other_versions(stored),
             *of_pages,
-            *missing_moves(source.cell, {plan.name: plan.tasks for plan in plans}),
+            *missing_moves(source.cell, {plan.task: plan.tasks for plan in plans}),
         ),
         seal=SEAL,
     )
@@ -107,39 +108,39 @@ def _refuse_failed(stored: StoredRun) -> None:
         raise NotVerifiedError([f"{stored.folder}: the run failed{first}; it has no tables to verify"])
 
 
-def _plans(cell: Cell, stored: StoredRun) -> tuple[RunPlan, ...]:
+def _plans(cell: Cell, stored: StoredRun) -> tuple[Phase, ...]:
     """The runs that the stored ones must be: all tasks of the cell, or the one that was chosen."""
     tasks = list(stored.record["runs"] if "runs" in stored.record else stored.record["tasks"])
     every = [task.name for task in cell.tasks]
     file = stored.file("", "report.json")
     if tasks != every and (len(tasks) != 1 or tasks[0] not in every):
         raise InputError(f"{file}: tasks: expected {listed(every)} or one of them, got {listed(map(str, tasks))}")
-    plans = plan_runs(cell, only=None if tasks == every else tasks[0])
+    plans = plan_phases(cell, only=None if tasks == every else tasks[0]).program
     unknown = sorted({name for plan in plans for name in homeless(cell, plan)})
     if unknown:
         raise InputError(
             f"{stored.file('', CELL)}: robots: expected the home of every idle robot written out, got auto for "
             f"{listed(unknown)}"
         )
-    places = [plan.name or "" for plan in plans]
+    places = [plan.task or "" for plan in plans]
     if places != list(stored.records):
         raise InputError(f"{file}: expected the runs of the mode {cell.motion.mode}, got {listed(stored.records)}")
     return plans
 
 
-def _verified(scene: Scene, stored: StoredRun, plan: RunPlan, *, progress: Progress) -> VerifiedMotion:
+def _verified(scene: Scene, stored: StoredRun, plan: Phase, *, progress: Progress) -> VerifiedMotion:
     """Read the tables of one run back and make all checks again."""
-    cell, place = scene.cell, plan.name or ""
+    cell, place = scene.cell, plan.task or ""
     schedule = schedule_tasks(cell, [build_toolpath(cell.task(name), cell.part, cell.origin) for name in plan.tasks])
     tables = _tables(cell, stored, plan)
     _refuse_other_clock(stored, place, schedule, tables=tables)
     report = verify(scene, schedule, list(tables.values()), moving=plan.moving, progress=progress)
-    return VerifiedMotion(name=plan.name, moving=plan.moving, schedule=schedule, tables=tables, report=report)
+    return VerifiedMotion(name=plan.task, moving=plan.moving, schedule=schedule, tables=tables, report=report)
 
 
-def _tables(cell: Cell, stored: StoredRun, plan: RunPlan) -> dict[str, JointTable]:
+def _tables(cell: Cell, stored: StoredRun, plan: Phase) -> dict[str, JointTable]:
     """The joint tables of one run, each under the header it must have."""
-    place = plan.name or ""
+    place = plan.task or ""
     texts = stored.tables[place]
     names = [robot.name for robot in cell.robots]
     if sorted(texts) != sorted(names):
@@ -214,9 +215,9 @@ def _refuse_other_clock(stored: StoredRun, place: str, schedule: Schedule, *, ta
             raise InputError(f"{file}:{line}: time_s: expected {desired!r} as the cell's clock has, got {got!r}")
 
 
-def _refuse_other_start(stored: StoredRun, plan: RunPlan, cell: Cell, *, tables: Mapping[str, JointTable]) -> None:
+def _refuse_other_start(stored: StoredRun, plan: Phase, cell: Cell, *, tables: Mapping[str, JointTable]) -> None:
     """Refuse a table that does not begin at the start posture of the cell; those of idle robots were checked."""
-    place = plan.name or ""
+    place = plan.task or ""
     for robot in cell.robots:
         off = np.abs(tables[robot.name].q[0] - robot.start)
         if robot.name not in plan.idle and not np.all(off <= START_ROOM):
@@ -256,11 +257,7 @@ def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[Verifi
     """Refuse reports that say something else than was found."""
     provenance = Provenance(versions=stored.manifest.versions, digests={})
     found: dict[str, Record] = {
-        motion.name or "": {
-            **run_record(motion.report, cell=cell, provenance=provenance),
-            "series": series(motion.report),
-        }
-        for motion in motions
+        motion.name or "": run_record(motion.report, cell=cell, provenance=provenance) for motion in motions
     }
     said: dict[str, Record] = dict(stored.records)
     if "runs" in stored.record:
@@ -274,7 +271,19 @@ def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[Verifi
             f"{stored.file(place, 'report.json')}: {key}: {shown(old)} stands there, {shown(new)} was found"
             for key, old, new in differences(record, found[place], same_program=is_same)
         ]
+    for motion in motions:
+        findings += _series_findings(stored, motion, is_same=is_same)
     _refuse_because(stored, findings)
+
+
+def _series_findings(stored: StoredRun, motion: VerifiedMotion, *, is_same: bool) -> Iterator[str]:
+    """Differences between the series of one run and those of its tables."""
+    place = motion.name or ""
+    said, found = stored.series(place), series(motion.report)
+    different = list(differences(said, found, same_program=is_same))
+    different += misshapen_series(said, len(found["times_s"]) - 1) if is_same else []
+    for key, old, new in different:
+        yield f"{stored.file(place, SERIES)}: {key}: {shown(old)} stands there, {shown(new)} was found"
 
 
 def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> tuple[str, ...]:

@@ -47,7 +47,7 @@ def find_homes(scene: Scene, runs: Sequence[PlannedRun], *, progress: Progress =
     Raises:
         HomeNotFoundError: A robot has no such place.
     """
-    order = sorted({name for run in runs for name in homeless(scene.cell, run.plan)})
+    order = sorted({name for run in runs for name in homeless(scene.cell, run.phase)})
     tried: set[str] = set()
     while True:
         homes: dict[str, Array] = {}
@@ -88,7 +88,7 @@ def with_homes(cell: Cell, found: Mapping[str, Array], *, given: Cell) -> Cell:
 def depends_on_homes(cell: Cell, runs: Sequence[PlannedRun]) -> bool:
     """Whether the motion of a run is another one when idle robots stand elsewhere: a goal keeps away from them."""
     keeps_away = any(goal.kind is GoalKind.OBSTACLES for goal in cell.solver.goals)
-    return keeps_away and any(homeless(cell, run.plan) for run in runs)
+    return keeps_away and any(homeless(cell, run.phase) for run in runs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,7 +118,7 @@ class _Search:
             robot: The robot.
         """
         self._cell, self._robot, self._chain = scene.cell, robot, scene.chains[robot.name]
-        self._runs = [_idle_run(scene, run, robot.name) for run in runs if robot.name in run.plan.idle]
+        self._runs = [_idle_run(scene, run, robot.name) for run in runs if robot.name in run.phase.idle]
         picked = [np.unique(np.linspace(0, len(run.q) - 1, INSTANTS).astype(int)) for run in self._runs]
         instants = [Instants(scene=run.scene, q=run.q[few]) for run, few in zip(self._runs, picked, strict=True)]
         self._trials = HomeTrials(robot.name, instants)
@@ -153,7 +153,7 @@ class _Search:
     def why_nothing(self) -> str:
         """One line on what stood in the way most often."""
         name, cell = self._robot.name, self._cell
-        tasks = [f"'{task}'" for run in self._runs for task in run.run.plan.tasks]
+        tasks = [f"'{task}'" for run in self._runs for task in run.run.phase.tasks]
         while_worked = f"{listed(tasks)} {'is' if len(tasks) == 1 else 'are'} worked on"
         often = ""
         if self._trials.refused:
@@ -191,10 +191,10 @@ class _Search:
 
 def _idle_run(scene: Scene, run: PlannedRun, robot: str) -> _IdleRun:
     """One run as the robot has to stand it out; those whose homes are not known yet are not there."""
-    of_run = scene_of_run(scene, run.plan.tasks)
-    away = {row for name in homeless(scene.cell, run.plan) - {robot} for row in rows_moved_by(of_run, name)}
+    of_run = scene_of_run(scene, run.phase.tasks)
+    away = {row for name in homeless(scene.cell, run.phase) - {robot} for row in rows_moved_by(of_run, name)}
     rows = [row for row in rows_moved_by(of_run, robot) if row not in away]
-    return _IdleRun(run=run, scene=scene_of_rows(of_run, rows), q=standing(scene.cell, run.plan, run.motion.q))
+    return _IdleRun(run=run, scene=scene_of_rows(of_run, rows), q=standing(scene.cell, run.phase, run.motion.q))
 
 
 def _first_failed(checks: Sequence[Check]) -> Check | None:

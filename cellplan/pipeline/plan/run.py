@@ -1,4 +1,4 @@
-"""Plan one run: from its tasks to the motion of all joints, nothing of it verified yet."""
+"""Plan one phase: from its tasks to the motion of all joints, nothing of it verified yet."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,45 +7,44 @@ import numpy as np
 
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
+from cellplan.model.phase import Phase
 from cellplan.model.progress import Progress, silent
 from cellplan.model.toolpath import Toolpath
-from cellplan.planning.modes import RunPlan, standing
+from cellplan.planning.modes import standing
 from cellplan.planning.refine_motion import plan_within_accuracy
 from cellplan.planning.timing.schedule import sample, time_tasks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlannedRun:
-    """One motion of the cell.
+    """The motion of one phase.
 
     Attributes:
-        plan: What is worked on, who moves, who is idle.
+        phase: What is worked on, who moves, who is idle.
         schedule: Where every tool must be.
         motion: What all joints do.
     """
 
-    plan: RunPlan
+    phase: Phase
     schedule: Schedule
     motion: Motion
 
 
-def plan_run(
-    cell: Cell, toolpaths: Mapping[str, Toolpath], plan: RunPlan, *, progress: Progress = silent
-) -> PlannedRun:
-    """Follow the tasks of one run; idle robots stand at their homes, or at their starts while these are unknown.
+def plan_run(cell: Cell, toolpaths: Mapping[str, Toolpath], phase: Phase, *, progress: Progress = silent) -> PlannedRun:
+    """Follow the tasks of one phase; idle robots stand at their homes, or at their starts while these are unknown.
 
     Args:
         cell: The cell, every start posture filled in.
         toolpaths: Toolpath of every task, by task name.
-        plan: The run.
+        phase: The phase.
         progress: Who wants to know how far it is.
 
     Raises:
         NoSolutionError: A tool lost its path.
     """
-    timed = time_tasks(cell, [toolpaths[name] for name in plan.tasks])
+    timed = time_tasks(cell, [toolpaths[name] for name in phase.tasks])
     schedule = sample(timed)
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
-    at = standing(cell, plan, start)
-    motion = plan_within_accuracy(cell, timed, schedule, start=at, moving=plan.moving, progress=progress)
-    return PlannedRun(plan=plan, schedule=schedule, motion=motion)
+    at = standing(cell, phase, start)
+    motion = plan_within_accuracy(cell, timed, schedule, start=at, moving=phase.moving, progress=progress)
+    return PlannedRun(phase=phase, schedule=schedule, motion=motion)

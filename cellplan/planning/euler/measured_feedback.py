@@ -17,7 +17,7 @@ from cellplan.model.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.task import Task
 from cellplan.planning.euler.integrate import follow, refuse_leap
 from cellplan.planning.methods import method_named
-from cellplan.planning.tracking.cooperation_jacobian import pose_errors, reference_frames
+from cellplan.planning.tracking.cooperation_jacobian import pose_errors
 from cellplan.planning.tracking.problem import TrackingProblem
 from cellplan.planning.tracking.singularity import singular_words
 
@@ -121,7 +121,7 @@ def integrate_measured(
     q[0] = start
     for k in range(len(q) - 1):
         state = problem.state(q[k])
-        nominal = inverse(reference_frames(state, problem.tasks)) @ state.X_WT[problem.operators]
+        nominal = inverse(problem.constraints.reference_frames(state.X_WP)) @ state.X_WT[problem.operators]
         for place, (scheduled, X_seen) in enumerate(zip(desired.tasks, measure(q[k : k + 1]), strict=True)):
             seen, told = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
             problem.desired[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=told)

@@ -194,7 +194,7 @@ def _promising_configurations(search: StartSearch, holder: Robot) -> Array:
     lower, upper = finite_limits(holder.model)
     middle = 0.5 * (lower + upper)
     q = middle + HOLDER_RANGE * (search.random_configurations(holder, HOLDER_DRAWS) - middle)
-    X_WP = search.chains[holder.name].tool_poses(q) @ inverse(cell.part.held_by[0].X_PT)
+    X_WP = search.chains[holder.name].tool_poses(q) @ cell.part.X_CP
     awkwardness = np.zeros(len(q))
     for relation in cell.relations:
         operator = cell.robot(relation.robot)

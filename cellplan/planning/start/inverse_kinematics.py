@@ -8,7 +8,8 @@ from cellplan.geometry.transforms import Array, inverse, skew
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Relation
 from cellplan.model.robot import RobotModel
-from cellplan.planning.tracking.cooperation_jacobian import constraint_rows, pose_errors
+from cellplan.planning.tracking.cooperation_jacobian import pose_errors
+from cellplan.planning.tracking.task_constraints import constraint_rows
 
 CLOSED: Final = 1e-12  # [m, rad] a configuration counts as found when the tool is this near its goal: rounding is 1e-15
 SAME_POSTURE: Final = 1e-3  # [rad, m] solutions nearer to each other are one branch

@@ -9,7 +9,8 @@ from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Relation, Robot
 from cellplan.planning.start.inverse_kinematics import finite_limits, tip_jacobian
-from cellplan.planning.tracking.cooperation_jacobian import constraint_rows, pose_errors
+from cellplan.planning.tracking.cooperation_jacobian import pose_errors
+from cellplan.planning.tracking.task_constraints import constraint_rows
 
 Flags = NDArray[np.bool_]
 

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from cellplan.certify.depths import mounted_depths
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Mode
+from cellplan.model.cell import Cell
 from cellplan.model.name_order import NameOrder
+from cellplan.model.phase import Phase
 from cellplan.model.task import Task
 from cellplan.model.toolpath import Toolpath
 from cellplan.planning.euler.integrate import follow
 from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
-from cellplan.planning.modes import RunPlan, plan_runs, standing
+from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.start.near_ties import ALIKE
 from cellplan.planning.start.present_pairs import present_pairs
@@ -100,12 +101,12 @@ class StartTrials:
         solver = replace(once.solver, gain=GAIN / self._step, method=TRIED_WITH)
         self._cell = replace(self._once, motion=motion, solver=solver)
         self._alone: dict[str, Cell] = {}
-        self._plans = plan_runs(self._cell)
+        self._phases = plan_phases(self._cell).program
         open_grips = tuple(pair for pair in scene.mounted if pair.moves and pair.mount is Mount.GRIP)
         self._open_grips = replace(scene, mounted=open_grips)
         self.bodies, self.pairs = scene.bodies, scene.pairs
         self.pair_names = [scene.names(pair) for pair in scene.pairs]
-        is_present = np.any([present_pairs(scene, plan) for plan in self._plans], axis=0)
+        is_present = np.any([present_pairs(scene, phase) for phase in self._phases], axis=0)
         self.open_pairs = _open_pairs(scene) & is_present
 
     def touching(self, q: Array) -> tuple[str, str] | None:
@@ -124,7 +125,7 @@ class StartTrials:
     def judge(self, start: Array) -> Trial:
         """What follows from a start configuration of the whole cell in the order of names, shape (nq,)."""
         try:
-            motions = self._motions(self._cell, start, self._plans)
+            motions = self._motions(self._cell, start, self._phases)
         except NoSolutionError:
             lost = np.full(len(start), LOST)
             return Trial(start=start, ranges=lost, speeds=lost, is_followed=False)
@@ -134,7 +135,7 @@ class StartTrials:
             start=start + turns,
             ranges=np.min([ranges for ranges, _ in found], axis=0),
             speeds=np.min([speeds for _, speeds in found], axis=0),
-            touches=any(self._touches_on_the_way(plan, q) for plan, q in zip(self._plans, motions, strict=True)),
+            touches=any(self._touches_on_the_way(phase, q) for phase, q in zip(self._phases, motions, strict=True)),
         )
 
     def looked_at_closely(self, trials: Sequence[Trial]) -> list[Trial]:
@@ -146,7 +147,7 @@ class StartTrials:
         cell = self._once
         if len(trials) < 2 or not cell.solver.is_accurate:
             return list(trials)
-        timed = [time_tasks(cell, self._paths(cell, run.tasks)) for run in self._plans]
+        timed = [time_tasks(cell, self._paths(cell, run.tasks)) for run in self._phases]
         if max(len(each.breaks) for each in timed) > MOST_BREAKS:
             return list(trials)
         candidates = Candidates.of([cell] * len(trials), np.array([trial.start for trial in trials]))
@@ -158,7 +159,7 @@ class StartTrials:
                 moving=run.moving,
                 accuracy=CLOSE_ENOUGH,
             )
-            for run, clocked in zip(self._plans, timed, strict=True)
+            for run, clocked in zip(self._phases, timed, strict=True)
         ]
         found = reduce(Screening.worst, runs)
         ranges = _range_shares(cell, found.margins)
@@ -177,30 +178,25 @@ class StartTrials:
         start[cell.columns(task.robot)] = configuration
         for name in cell.positioners[:1]:
             start[cell.columns(name)] = holder_configuration
-        movers = () if cell.motion.mode is Mode.PART_AT_REST else cell.positioners
-        is_together = cell.motion.mode is Mode.SIMULTANEOUS
-        tasks = tuple(
-            each.name for each in cell.tasks if each.name == task.name or (is_together and each.robot in movers)
-        )
-        chosen = np.concatenate(
-            [np.full(len(robot.model.joints), robot.name in {*movers, task.robot}) for robot in cell.robots]
-        )
+        of_task = next(phase for phase in self._phases if task.name in phase.tasks)
+        phase = of_task.among({*cell.positioners, task.robot})
+        chosen = np.concatenate([np.full(len(robot.model.joints), robot.name in phase.moving) for robot in cell.robots])
         try:
-            motions = self._motions(cell, start, [RunPlan(name=None, tasks=tasks, moving=(*movers, task.robot))])
+            motions = self._motions(cell, start, [phase])
         except NoSolutionError:
             return np.full(2 * int(chosen.sum()), LOST)
         turns = _whole_turns(cell, motions[0])
         ranges, speeds = _shares_left_free(cell, motions[0] + turns, self._step)
         return np.sort(np.concatenate([ranges[chosen], speeds[chosen]]))
 
-    def _touches_on_the_way(self, plan: RunPlan, q: Array) -> bool:
+    def _touches_on_the_way(self, phase: Phase, q: Array) -> bool:
         """Whether something collides in the motion of a run, shape (N, nq), judged at a few samples.
 
         A grip that leaves components free and is too deep in the part at the start counts as well.
         """
         instants = np.linspace(0, len(q) - 1, TOUCH_INSTANTS).astype(int)
-        placed = self._order.as_listed(standing(self._cell, plan, q[instants]))
-        among = self.open_pairs & present_pairs(self._scene, plan)
+        placed = self._order.as_listed(standing(self._cell, phase, q[instants]))
+        among = self.open_pairs & present_pairs(self._scene, phase)
         if any(grip.depth > grip.pair.limit for grip in mounted_depths(self._open_grips, placed[:1])):
             return True
         return any(self._scene.touching(each, among=among) is not None for each in placed)
@@ -222,12 +218,12 @@ class StartTrials:
             )
         return self._alone[robot]
 
-    def _motions(self, cell: Cell, start: Array, plans: Sequence[RunPlan]) -> list[Array]:
+    def _motions(self, cell: Cell, start: Array, phases: Sequence[Phase]) -> list[Array]:
         """Joint positions of each run on the coarse clock, shape (N, nq) each."""
         motions = []
-        for run in plans:
-            schedule = schedule_tasks(cell, self._paths(cell, run.tasks))
-            motions.append(follow(cell, schedule, start=start, moving=run.moving).q)
+        for phase in phases:
+            schedule = schedule_tasks(cell, self._paths(cell, phase.tasks))
+            motions.append(follow(cell, schedule, start=start, moving=phase.moving).q)
         return motions
 
 
@@ -265,17 +261,14 @@ def _whole_turns(cell: Cell, q: Array) -> Array:
 
 def _shares_left_free(cell: Cell, q: Array, step: float) -> tuple[Array, Array]:
     """Shares of half its range and of its speed limit that each joint leaves free in a motion, shape (nq,) each."""
-    lower, upper, velocity = (
-        np.concatenate([getattr(robot.model, name) for robot in cell.robots]) for name in ("lower", "upper", "velocity")
-    )
-    ranges = _range_shares(cell, np.minimum(q.min(axis=0) - lower, upper - q.max(axis=0)))
-    speeds: Array = 1.0 - np.abs(np.diff(q, axis=0)).max(axis=0, initial=0.0) / step / velocity
-    return ranges, speeds
+    limits = cell.joint_limits
+    ranges = _range_shares(cell, np.minimum(q.min(axis=0) - limits.lower, limits.upper - q.max(axis=0)))
+    return ranges, 1.0 - np.abs(np.diff(q, axis=0)).max(axis=0, initial=0.0) / step / limits.velocity
 
 
 def _range_shares(cell: Cell, margins: Array) -> Array:
     """Distances of joints from their limits as shares of half their ranges, 1 without limits, shape (..., nq)."""
-    half = np.concatenate([0.5 * (robot.model.upper - robot.model.lower) for robot in cell.robots])
+    half = 0.5 * (cell.joint_limits.upper - cell.joint_limits.lower)
     half = np.where(np.isfinite(half), half, np.pi)
     shares: Array = np.minimum(margins / np.where(half > 0.0, half, 1.0), 1.0)
     return shares

@@ -20,12 +20,10 @@ class JointWeights:
 
     def __init__(self, cell: Cell, model: CombinedModel) -> None:
         """Take the constant weights, the limits and the masses of all robots."""
-        joints = [joint for robot in cell.robots for joint in robot.model.joints]
         self._constant = np.concatenate([robot.weights for robot in cell.robots])
         self._near_limits, self._load = cell.solver.weighting.near_limits, cell.solver.weighting.load
-        self._lower = np.array([joint.lower for joint in joints])
-        self._upper = np.array([joint.upper for joint in joints])
-        self._turning = TURNING * np.array([joint.velocity for joint in joints])
+        self._lower, self._upper = cell.joint_limits.lower, cell.joint_limits.upper
+        self._turning = TURNING * cell.joint_limits.velocity
         self._carries = model.carries_flange.astype(float)
         self._tools = np.array([robot.tool.mass or 0.0 for robot in cell.robots])
         self._shares = np.array([_part_share(cell, robot.name) for robot in cell.robots])

@@ -5,25 +5,20 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.errors import DivergedError
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.pinocchio_model import CellState, CombinedModel
 from cellplan.model.cell import Cell, Grasp, Relation
 from cellplan.model.motion import Schedule
-from cellplan.model.task import Frame
 from cellplan.planning.timing.common_cycles import common_cycles
-from cellplan.planning.tracking.cooperation_jacobian import (
-    column_signs,
-    constraint_rows,
-    cooperation_jacobian,
-    pose_errors,
-    reference_frames,
-)
+from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
 from cellplan.planning.tracking.joint_weights import JointWeights
 from cellplan.planning.tracking.locked_joints import locked_since
 from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, share_within
 from cellplan.planning.tracking.targets import targets
+from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 
 Drift = Callable[[int, Array], Array]
 
@@ -89,7 +84,7 @@ class TrackingProblem:
         cell: The cell.
         times: Instants in [s], shape (N,).
         tasks: The tasks, then the grasps of further holders, one block row each.
-        operators: Index of each one's robot in the cell.
+        constraints: What they constrain, in which frames and by which joints.
         desired: Reference tool poses X_PT, shape (N, tasks, 4, 4).
         twists: Reference tool twists in P, linear first, shape (N, tasks, 6).
         signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
@@ -110,26 +105,26 @@ class TrackingProblem:
         """
         asked = targets(cell, schedule, moving)
         tasks = tuple(target.relation for target in asked)
-        names = [robot.name for robot in cell.robots]
         self._model = CombinedModel(cell)
         self._rows = [constraint_rows(target.relation, target.X_PT) for target in asked]
-        self._is_whole = all(len(task.axes) == 6 and not task.is_spin_free for task in tasks)
-        self._is_spin_free = [task.is_spin_free for task in tasks]
-        self._is_on_part = all(task.relative_to is Frame.PART for task in tasks)
-        self._is_linear = np.array([[float(axis in task.axes) for axis in range(3)] for task in tasks])
+        self.constraints = TaskConstraints.of(cell, tasks, moving)
+        self._is_on_part = bool(self.constraints.is_on_part.all())
         self._lost = np.array([max(LOST_DISTANCE, 2.0 * target.tolerance) for target in asked])
         self._settled = np.array([target.settled for target in asked])
         self._weights = JointWeights(cell, self._model)
         self.cell, self.times, self.tasks = cell, schedule.times, tasks
-        self.operators = [names.index(task.robot) for task in tasks]
         self.desired = np.stack([target.X_PT for target in asked], axis=1)
         self.twists = np.stack([target.V_PT_P for target in asked], axis=1)
-        self.signs = column_signs(cell, self._model, tasks, moving)
+        self.signs = self.constraints.column_signs(self._model.carries_flange)
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
         self.drift: Drift | None = None
         self._goals = self._secondary_goals(start, _rests(cell, schedule)) if cell.solver.goals else None
         self._locked_since = locked_since(cell)
-        self._may_move = np.isin(_owners(cell), moving)
+
+    @property
+    def operators(self) -> NDArray[np.intp]:
+        """Index of the robot of each task and grasp in the cell, shape (tasks,)."""
+        return self.constraints.operators
 
     def step(self, k: int) -> float:
         """Time from instant k to the next in [s]."""
@@ -141,13 +136,12 @@ class TrackingProblem:
 
     def mobile(self, k: int) -> Array:
         """1 for joints that may move at instant k, 0 for those that stand still or are locked, shape (nq,)."""
-        mobile: Array = (self._may_move & (self.times[k] < self._locked_since)).astype(float)
-        return mobile
+        return self.constraints.may_move * (self.times[k] < self._locked_since)
 
     def rows(self, k: int, q: Array) -> list[Array]:
         """Rows of the cooperation Jacobian for each task at sample k and configuration q, shape (m, nq) each."""
         state = self.state(q)
-        X_WT, X_WR = state.X_WT[self.operators], reference_frames(state, self.tasks)
+        X_WT, X_WR = state.X_WT[self.operators], self.constraints.reference_frames(state.X_WP)
         J = cooperation_jacobian(state, X_WT[:, :3, 3], self.signs * self.mobile(k), X_WR=X_WR)
         return [rows[k] @ block for rows, block in zip(self._rows, J, strict=True)]
 
@@ -160,10 +154,10 @@ class TrackingProblem:
         state = self.state(q)
         signs = self.signs * self.mobile(k)
         X_WT = state.X_WT[self.operators]
-        X_WR = None if self._is_on_part else reference_frames(state, self.tasks)
+        X_WR = None if self._is_on_part else self.constraints.reference_frames(state.X_WP)
         J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
         X_RT = inverse(state.X_WP if X_WR is None else X_WR) @ X_WT
-        error = pose_errors(self.desired[k], X_RT, self._is_spin_free)
+        error = pose_errors(self.desired[k], X_RT, self.constraints.is_spin_free)
         self._refuse_lost_path(k, error)
         rows, twist, errors = self._constrained(k, J, error)
         drift = self._drift(k, q)
@@ -172,7 +166,7 @@ class TrackingProblem:
 
     def _constrained(self, k: int, J: Array, error: Array) -> tuple[Array, Array, Array]:
         """Rows, desired twists and errors of the components that the tasks and grasps constrain."""
-        if self._is_whole:
+        if self.constraints.is_whole:
             return J.reshape(-1, J.shape[2]), self.twists[k].reshape(-1), error.reshape(-1)
         picks = [rows[k] for rows in self._rows]
         return (
@@ -217,7 +211,7 @@ class TrackingProblem:
         A tool that is still on its way to the path is not lost. With a joint that fails the report is to say how far
         the others get.
         """
-        distances = np.linalg.norm(error[:, :3] * self._is_linear, axis=1)
+        distances = np.linalg.norm(error[:, :3] * self.constraints.kept[:, :3], axis=1)
         is_lost = (distances >= self._lost) & (self.times[k] >= self._settled) & (not self.cell.motion.locked)
         if not is_lost.any() and np.isfinite(error.sum()):
             return
@@ -232,11 +226,6 @@ class TrackingProblem:
 def _place(task: Relation) -> str:
     """Where a tool should be, in words."""
     return "its grasp on the part" if isinstance(task, Grasp) else f"task '{task.name}'"
-
-
-def _owners(cell: Cell) -> list[str]:
-    """Name of the robot of each joint."""
-    return [robot.name for robot in cell.robots for _ in robot.model.joints]
 
 
 def _rests(cell: Cell, schedule: Schedule) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 
+LARGEST_DAMPING: Final = 0.02  # [-] damping factor at a singularity where the cell states none
 ROUNDING: Final = 1e-12  # eigenvalues of J W^-1 J^T below this share of the largest are rounding: rank is lost
 
 

@@ -1,7 +1,7 @@
-"""Canvas: sheets painted as SVG and PNG, in one look; the bytes depend on nothing but the sheets.
+"""Rendering of sheets as SVG and PNG in one style; the bytes depend on the sheets alone.
 
-The marks are painted as they are: the general-purpose axes of the plotting library would take three times as long to
-show the same picture.
+The drawing primitives are rendered directly: the axes of the plotting library would take three times as long for the
+same picture.
 """
 
 import io
@@ -11,14 +11,14 @@ from typing import Any
 
 from cellplan.report.plots.no_backend import no_backend
 from cellplan.report.plots.palette import INK
-from cellplan.report.plots.sheet import WIDTH, Area, Line, Mark, Sheet
+from cellplan.report.plots.sheet import WIDTH, Line, Mark, Rectangle, Sheet
 
 with no_backend():
     import matplotlib as mpl
+    from matplotlib import patches
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Rectangle
     from matplotlib.text import Text
 
 DPI = 110  # [1/inch] of the PNG files
@@ -45,7 +45,7 @@ _OPTIONS: dict[str, dict[str, Any]] = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """The look of cellplan's plots for as long as the ``with`` statement lasts, whatever the user's own settings."""
+    """The style of cellplan's plots within a ``with`` statement, whatever the user's own settings."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
@@ -53,7 +53,7 @@ def style() -> Iterator[None]:
 
 
 def paint(sheets: Mapping[str, Sheet]) -> dict[str, bytes]:
-    """Every sheet as SVG and PNG, by file name; no date and no program name in them."""
+    """Every sheet as SVG and PNG, by file name, without date and program name."""
     files: dict[str, bytes] = {}
     with style():
         for name, sheet in sheets.items():
@@ -66,7 +66,7 @@ def paint(sheets: Mapping[str, Sheet]) -> dict[str, bytes]:
 
 
 def _figure(sheet: Sheet) -> Figure:
-    """The marks of a sheet as artists, in their order."""
+    """A sheet as a figure of the plotting library."""
     figure = Figure(figsize=(WIDTH, sheet.height))
     for mark in sheet.marks:
         artist = _artist(mark)
@@ -76,9 +76,9 @@ def _figure(sheet: Sheet) -> Figure:
 
 
 def _artist(mark: Mark) -> Artist:
-    """What the plotting library makes of a mark."""
+    """A drawing primitive as an artist of the plotting library."""
     if isinstance(mark, Line):
-        return Line2D(mark.x, mark.y, **mark.look)
-    if isinstance(mark, Area):
-        return Rectangle(mark.corner, mark.width, mark.height, **mark.look)
-    return Text(mark.x, mark.y, mark.text, **mark.look)
+        return Line2D(mark.x, mark.y, **mark.style)
+    if isinstance(mark, Rectangle):
+        return patches.Rectangle(mark.corner, mark.width, mark.height, **mark.style)
+    return Text(mark.x, mark.y, mark.text, **mark.style)

@@ -1,4 +1,4 @@
-"""The plotting library, imported without a window: whatever display the environment names, nothing is ever shown."""
+"""Import of the plotting library independent of the display backend that the environment names."""
 
 import os
 import sys
@@ -6,15 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Final
 
-VARIABLE: Final = "MPLBACKEND"  # of the display; in a shell started by a notebook it names a module that is not there
+VARIABLE: Final = "MPLBACKEND"  # a shell started by a notebook may name a backend that is not installed
 
 
 @contextmanager
 def no_backend() -> Iterator[None]:
-    """Let the library be imported although the environment names a display that it does not know.
+    """Allow the library to be imported although the environment names an unknown backend.
 
-    Afterwards the environment is as it was, and so is the choice of a display that it does know: a program that uses
-    this one may want to draw windows of its own.
+    The environment and the choice of a known backend are restored afterwards, for a calling program that opens windows.
     """
     desired = None if "matplotlib" in sys.modules else os.environ.pop(VARIABLE, None)
     try:

@@ -10,8 +10,9 @@ from cellplan.model.cell import Cell
 from cellplan.model.rehearsal import Rehearsal, RunRehearsal
 from cellplan.model.report import TaskAccuracy
 from cellplan.report.plots.palette import CLASSES, INK, LIMIT, ROBOTS
+from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import ORIENTATION, POSITION, ErrorKind, draw_error, readable_unit
-from cellplan.report.plots.sheet import Sheet, pictures
+from cellplan.report.plots.sheet import Sheet
 from cellplan.report.record.rehearsal import EXECUTIONS, Pick
 
 TITLES = {"before": "as solved", "after": "corrected from pass to pass", "in_pass": "corrected within the pass"}

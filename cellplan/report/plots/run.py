@@ -12,7 +12,8 @@ from cellplan.model.report import ClearanceClass, ClosureAccuracy, JointUse, Rep
 from cellplan.model.task import Frame
 from cellplan.report.plots import palette
 from cellplan.report.plots.palette import INK, LIMIT
-from cellplan.report.plots.sheet import Sheet, pictures
+from cellplan.report.plots.rendering import pictures
+from cellplan.report.plots.sheet import Sheet
 from cellplan.report.record.run import rounded_down
 
 JOINT_COLUMNS = 3

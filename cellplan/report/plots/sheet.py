@@ -1,7 +1,7 @@
-"""Sheets of small panels over time, laid out as plain marks at places in inches; nothing is painted here.
+"""Figure layout: grids of small panels as drawing primitives in inches; rendering is done by ``canvas``.
 
-A sheet knows nothing of the library that paints it: it is small, can be sent to another process, and is the same for
-the same data.
+A sheet does not depend on the plotting library: it is small, can be sent to another process, and is equal for equal
+data.
 """
 
 import math
@@ -17,48 +17,48 @@ from cellplan.report.plots.palette import FORBIDDEN, GREY, INK, LIMIT
 GRID: Final = "#e3e7ec"
 FRAME: Final = "#aeb7c2"
 
-CURVE_POINTS: Final = 600  # [-] about one point per printed dot: more would only make the files larger
+CURVE_POINTS: Final = 600  # [-] about one point per pixel: more would only enlarge the files
 
 WIDTH: Final = 10.0  # [inch] of a sheet; the lengths below are in inches as well
 ROW: Final = 1.75
 HEAD, FOOT = 0.42, 0.3
 LEFT, RIGHT, GAP = 0.58, 0.15, 0.6
-SHOULDER: Final = 0.32  # above each panel, for its title
-ROOM: Final = 0.06  # [-] share of the range left free above and below
+PANEL_TITLE: Final = 0.32  # above each panel
+PADDING_FRACTION: Final = 0.06  # [-] of the range, left free above and below
 
 
 class Line(NamedTuple):
-    """Points joined by straight strokes, parted where they are not numbers: places in inches, shape (K,) each."""
+    """A polyline in inches, shape (K,) each; NaN interrupts it."""
 
     x: Array
     y: Array
-    look: Mapping[str, Any]
+    style: Mapping[str, Any]
 
 
-class Area(NamedTuple):
+class Rectangle(NamedTuple):
     """A filled rectangle: its lower left corner, width and height in inches."""
 
     corner: tuple[float, float]
     width: float
     height: float
-    look: Mapping[str, Any]
+    style: Mapping[str, Any]
 
 
 class Label(NamedTuple):
-    """A line of text at a place in inches."""
+    """A line of text at a position in inches."""
 
     x: float
     y: float
     text: str
-    look: Mapping[str, Any]
+    style: Mapping[str, Any]
 
 
-Mark = Line | Area | Label
+Mark = Line | Rectangle | Label
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
-    """A window on a sheet: its box in inches; it shows ``first`` to ``last`` in [s] and ``low`` to ``high``."""
+    """One pair of axes: its box in inches; times ``first`` to ``last`` in [s], values ``low`` to ``high``."""
 
     left: float
     bottom: float
@@ -70,11 +70,11 @@ class Panel:
     high: float
 
     def x(self, times: Array) -> Array:
-        """Position of instants on the sheet."""
+        """Horizontal position of times on the sheet in inches."""
         return self.left + self.width * (times - self.first) / (self.last - self.first)
 
     def y(self, values: Array) -> Array:
-        """Position of values on the sheet."""
+        """Vertical position of values on the sheet in inches."""
         return self.bottom + self.height * (values - self.low) / (self.high - self.low)
 
 
@@ -83,12 +83,12 @@ class Sheet:
 
     Attributes:
         height: Of the sheet in inches; all are equally wide.
-        marks: What is to be painted, in this order.
-        times: The instants in [s] that the panels show.
+        marks: Drawing primitives, in drawing order.
+        times: Times in [s] that the panels show.
     """
 
     def __init__(self, title: str, *, rows: int, columns: int, times: Array, across: str = "time in s") -> None:
-        """Open a sheet for a grid of panels over ``times``, which are instants in [s] or what ``across`` says."""
+        """Create a grid of panels over ``times`` in [s], or over the quantity that ``across`` names."""
         self.rows, self.columns, self.times, self.across = rows, columns, times, across
         self.height = HEAD + rows * ROW + FOOT
         self.marks: list[Mark] = []
@@ -102,23 +102,23 @@ class Sheet:
         Args:
             index: Place in the grid, counted by rows.
             title: What is shown, with its unit.
-            note: Small text at the right shoulder.
+            note: Small text at the upper right.
             span: Smallest and largest value to show.
-            is_floored: Whether the lower edge is the smallest value itself, with no room below.
+            is_floored: Whether the lower edge is the smallest value itself, without padding.
         """
         row, column = divmod(index, self.columns)
         width = (WIDTH - LEFT - RIGHT - (self.columns - 1) * GAP) / self.columns
         low, high = span
-        room = ROOM * (high - low) or 1.0
+        padding = PADDING_FRACTION * (high - low) or 1.0
         panel = Panel(
             left=LEFT + column * (width + GAP),
             bottom=FOOT + (self.rows - 1 - row) * ROW + 0.12,
             width=width,
-            height=ROW - SHOULDER - 0.12,
+            height=ROW - PANEL_TITLE - 0.12,
             first=float(self.times[0]),
             last=float(self.times[-1]),
-            low=low if is_floored else low - room,
-            high=high + room,
+            low=low if is_floored else low - padding,
+            high=high + padding,
         )
         is_lowest = row == self.rows - 1
         self._draw_frame(panel, nice_ticks(low, high, 4), with_times=is_lowest)
@@ -130,7 +130,7 @@ class Sheet:
         return panel
 
     def curve(self, panel: Panel, times: Array, values: Array, *, colour: str, width: float = 1.3) -> None:
-        """Draw a curve with few points, so chosen that every peak survives."""
+        """Draw a curve, thinned so that every peak is kept."""
         kept = peaks_kept(values)
         self._line(panel.x(times[kept]), panel.y(values[kept]), color=colour, linewidth=width)
 
@@ -140,62 +140,48 @@ class Sheet:
         self._line(x, y, color=colour, marker="o", markersize=3.8, linestyle="none")
 
     def limit(self, panel: Panel, value: float, *, label: str = "", is_upper: bool = True) -> None:
-        """Draw a limit across the panel and tint the forbidden ground beyond it."""
+        """Draw a limit across the panel and shade the forbidden range beyond it."""
         y = float(panel.y(np.array([value]))[0])
         edge = panel.bottom + panel.height if is_upper else panel.bottom
-        look = {"color": FORBIDDEN, "linewidth": 0, "zorder": 0.5}
-        self.marks.append(Area((panel.left, min(y, edge)), panel.width, abs(edge - y), look))
+        style = {"color": FORBIDDEN, "linewidth": 0, "zorder": 0.5}
+        self.marks.append(Rectangle((panel.left, min(y, edge)), panel.width, abs(edge - y), style))
         right = panel.left + panel.width
         self._line(np.array([panel.left, right]), np.array([y, y]), color=LIMIT, linewidth=1.0)
         side = "top" if is_upper else "bottom"
         self.write(right - 0.04, y - 0.03 if is_upper else y + 0.03, label, size=7, color=LIMIT, ha="right", va=side)
 
-    def write(self, x: float, y: float, text: str, **look: Any) -> None:
-        """Write a line of text at a place on the sheet."""
+    def write(self, x: float, y: float, text: str, **style: Any) -> None:
+        """Write a line of text at a position on the sheet."""
         if text:
-            self.marks.append(Label(x, y, text.replace("-", "−") if _is_number(text) else text, look))
+            self.marks.append(Label(x, y, text.replace("-", "−") if _is_number(text) else text, style))
 
     def _draw_frame(self, panel: Panel, ticks: Sequence[float], *, with_times: bool) -> None:
         """Grid lines at round numbers, the two axis lines, and the numbers."""
         left, right = panel.left, panel.left + panel.width
         bottom, top = panel.bottom, panel.bottom + panel.height
-        instants = nice_ticks(panel.first, panel.last, 5)
-        xs, ys = panel.x(np.array(instants)), panel.y(np.array(ticks))
+        times = nice_ticks(panel.first, panel.last, 5)
+        xs, ys = panel.x(np.array(times)), panel.y(np.array(ticks))
         self._lines([((x, bottom), (x, top)) for x in xs] + [((left, y), (right, y)) for y in ys], GRID, order=1.0)
         self._lines([((left, top), (left, bottom)), ((left, bottom), (right, bottom))], FRAME, order=3.0)
         for y, value in zip(ys, ticks, strict=True):
             self.write(left - 0.05, float(y), f"{value:g}", color=GREY, ha="right", va="center_baseline")
-        for x, value in zip(xs, instants, strict=True):
+        for x, value in zip(xs, times, strict=True):
             if with_times:
                 self.write(float(x), bottom - 0.06, f"{value:g}", color=GREY, ha="center", va="top")
 
     def _lines(
         self, segments: list[tuple[tuple[float, float], tuple[float, float]]], colour: str, *, order: float
     ) -> None:
-        """Straight strokes in one go, parted by gaps."""
+        """Straight segments as one polyline with gaps."""
         points = np.array([[*segment, (np.nan, np.nan)] for segment in segments]).reshape(-1, 2)
         self._line(points[:, 0], points[:, 1], color=colour, linewidth=0.8, zorder=order)
 
-    def _line(self, x: Array, y: Array, **look: Any) -> None:
-        self.marks.append(Line(x, y, look))
-
-
-def pictures(sheets: Mapping[str, Sheet]) -> dict[str, bytes]:
-    """Every sheet as SVG and PNG, by file name; the plotting library is imported when it is needed."""
-    from cellplan.report.plots.canvas import paint
-
-    return paint(sheets)
-
-
-def get_ready() -> None:
-    """Import the plotting library and let it find its letters, before there is anything to paint."""
-    sheet = Sheet("", rows=1, columns=1, times=np.array([0.0, 1.0]))
-    sheet.panel(0, "0", span=(0.0, 1.0))
-    pictures({"": sheet})
+    def _line(self, x: Array, y: Array, **style: Any) -> None:
+        self.marks.append(Line(x, y, style))
 
 
 def peaks_kept(values: Array, points: int = CURVE_POINTS) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Indices of about ``points`` samples, among them the first, the last, and the extremes of every stretch."""
+    """Indices of about ``points`` samples, among them the first, the last, and the extremes of every interval."""
     n = len(values)
     if n <= points:
         return np.arange(n)

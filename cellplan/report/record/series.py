@@ -1,4 +1,4 @@
-"""Series: errors, singular values, joint positions and speeds along the motion, for those who recompute a figure."""
+"""``series.json``: errors, singular values, joint positions and velocities along the motion, sample by sample."""
 
 import json
 import math
@@ -12,27 +12,28 @@ from cellplan.model.motion import Motion
 from cellplan.model.report import JointUse, Report
 from cellplan.report.record.run import SIGNIFICANT
 
-MOST_STEPS: Final = 50_000  # a longer motion is thinned: its report would be too large to open
+SCHEMA: Final = "cellplan.series/1"
+MAX_STEPS: Final = 50_000  # a longer motion is thinned
 DIGITS: Final = 7  # [-] significant: 1e-5 deg of a joint, 1e-7 of an error; the joint tables have all digits
 INDENT: Final = "  "
 
-Tree = dict[str, Any]  # texts to trees, arrays of shape (K,), whole numbers, or None
+Tree = dict[str, Any]  # by name: trees, arrays of shape (K,), whole numbers, texts or None
 
 
 def series(report: Report, motion: Motion | None = None) -> Tree:
-    """What the report says in one figure, along the whole motion, in printed units.
+    """Quantities along the motion in printed units.
 
-    Every n-th instant is kept, and the last one. What belongs to a step, speeds among them, has one value less than
-    there are instants: its k-th value is that of the step of the clock that begins at the k-th kept instant.
+    Every n-th sample is kept, and the last one. Quantities of a step, velocities among them, have one value less than
+    there are samples: the k-th value belongs to the step of the clock that begins at the k-th kept sample.
 
     Args:
         report: The run.
-        motion: The motion as it was planned; it alone knows what its steps took. None when it is not at hand.
+        motion: The planned motion, for iterations and slack of its steps; None if it is not available.
     """
     last = len(report.times) - 1
-    every = max(1, math.ceil(last / MOST_STEPS))
+    every = max(1, math.ceil(last / MAX_STEPS))
     steps = np.arange(0, last, every)
-    instants = np.append(steps, last)
+    samples = np.append(steps, last)
     conditioning = report.conditioning
     of_stack = {
         "smallest_singular_value": conditioning.stack,
@@ -41,19 +42,20 @@ def series(report: Report, motion: Motion | None = None) -> Tree:
         "manipulability": conditioning.manipulability,
     }
     return {
+        "schema": SCHEMA,
         "every": every,
-        "times_s": report.times[instants],
+        "times_s": report.times[samples],
         "tasks": {
             accuracy.task: {
-                "position_error_mm": 1e3 * np.linalg.norm(accuracy.position_error[instants], axis=1),
-                "orientation_error_deg": np.rad2deg(np.linalg.norm(accuracy.orientation_error[instants], axis=1)),
+                "position_error_mm": 1e3 * np.linalg.norm(accuracy.position_error[samples], axis=1),
+                "orientation_error_deg": np.rad2deg(np.linalg.norm(accuracy.orientation_error[samples], axis=1)),
             }
             for accuracy in report.accuracy
         },
-        "conditioning": {name: values[instants] for name, values in of_stack.items()},
+        "conditioning": {name: values[samples] for name, values in of_stack.items()},
         "joints": {
             robot: _joint_series(
-                [use for use in report.joints if use.robot == robot], q=q[instants], qd=report.qd[robot][steps]
+                [use for use in report.joints if use.robot == robot], q=q[samples], qd=report.qd[robot][steps]
             )
             for robot, q in report.q.items()
         },
@@ -63,20 +65,25 @@ def series(report: Report, motion: Motion | None = None) -> Tree:
 
 
 def _joint_series(uses: Iterable[JointUse], *, q: Array, qd: Array) -> Tree:
-    """Position and speed of each joint of one robot, in the order of its columns."""
+    """Position and velocity of each joint of one robot, in the order of its columns."""
     tree: Tree = {}
     for use, position, speed in zip(uses, q.T, qd.T, strict=True):
-        unit, scale = ("deg", math.degrees(1.0)) if use.is_revolute else ("mm", 1e3)
+        unit, scale = use.display_unit
         tree[use.joint] = {f"position_{unit}": scale * position, f"speed_{unit}_s": scale * speed}
     return tree
+
+
+def series_json(report: Report, motion: Motion | None = None) -> str:
+    """The text of ``series.json``; see ``series``."""
+    return series_text(series(report, motion)) + "\n"
 
 
 def series_text(tree: Mapping[str, Any], depth: int = 0) -> str:
     """The series as JSON, one line for each array; values that are not finite are null.
 
     Args:
-        tree: What ``series`` gives.
-        depth: How many levels the text will be indented by; its first line is not.
+        tree: Result of ``series``.
+        depth: Levels of indentation, which the first line does not have.
     """
     inside = INDENT * (depth + 1)
     lines = [

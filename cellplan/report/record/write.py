@@ -31,12 +31,11 @@ from cellplan.report.record.run import (
     report_record,
     status,
 )
-from cellplan.report.record.series import INDENT, series, series_text
 from cellplan.report.record.task import tasks_record
 
 
 def report_json(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> str:
-    """The record of one run as text, its series last; values without a finite number are null.
+    """The record of one run as text; values without a finite number are null.
 
     Args:
         report: The run.
@@ -44,9 +43,7 @@ def report_json(report: Report, *, cell: Cell, provenance: Provenance, motion: M
         provenance: Where the result comes from.
         motion: The motion as it was planned, for what its steps took; None when it is not at hand.
     """
-    record = run_record(report, cell=cell, provenance=provenance, motion=motion)
-    last = f',\n{INDENT}"series": {series_text(series(report, motion), 1)}\n}}\n'
-    return _as_text(record).removesuffix("\n}\n") + last
+    return _as_text(run_record(report, cell=cell, provenance=provenance, motion=motion))
 
 
 def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> Record:

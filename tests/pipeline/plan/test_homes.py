@@ -19,7 +19,7 @@ from cellplan.model.cell import Cell, Mode, Robot
 from cellplan.model.motion import Motion
 from cellplan.pipeline.plan.homes import find_homes
 from cellplan.pipeline.plan.run import PlannedRun
-from cellplan.planning.modes import plan_runs
+from cellplan.planning.modes import plan_phases
 from cellplan.scene.scene import Scene
 
 BLOCK = Box((0.1, 0.1, 0.1))
@@ -42,12 +42,12 @@ def in_turns(*robots: Robot, things=()) -> Cell:
 def homes(cell: Cell, worker: str, ways: Mapping[str, Array], *, only: bool = True) -> Mapping[str, Array]:
     """Homes of the robots that are idle while one moves along rows of positions of its own."""
     runs = []
-    for plan in plan_runs(cell, only=f"work_of_{worker}" if only else None):
-        (name,) = plan.moving
+    for phase in plan_phases(cell, only=f"work_of_{worker}" if only else None).program:
+        (name,) = phase.moving
         q = np.zeros((len(ways[name]), cell.joint_count))
         q[:, cell.columns(name)] = ways[name][:, None]
-        clock = schedule(len(q), cell.task(plan.tasks[0]))
-        runs.append(PlannedRun(plan=plan, schedule=clock, motion=Motion(times=clock.times, q=q)))
+        clock = schedule(len(q), cell.task(phase.tasks[0]))
+        runs.append(PlannedRun(phase=phase, schedule=clock, motion=Motion(times=clock.times, q=q)))
     return find_homes(Scene.from_cell(cell), runs)
 
 

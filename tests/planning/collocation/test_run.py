@@ -14,7 +14,7 @@ from cellplan.geometry.shapes import Cylinder
 from cellplan.model.cell import Cell, LockedJoint, Mode
 from cellplan.model.task import StraightMove, TimeLaw, TimeLawKind
 from cellplan.planning.collocation.run import SETTLING_STEPS, AccurateRun
-from cellplan.planning.modes import plan_runs
+from cellplan.planning.modes import plan_phases
 
 ACCURACY = 1e-7  # [m], [rad] asked for by default
 SAME = 1e-12  # [m], [rad] two kinematics of arms of some metres
@@ -114,7 +114,7 @@ def test_a_joint_that_fails_stands_still_to_the_last_bit(since: float) -> None:
 @pytest.mark.parametrize("mode", [Mode.SIMULTANEOUS, Mode.PART_AT_REST, Mode.PAIRWISE])
 def test_each_mode_moves_its_robots_and_no_others(mode: Mode) -> None:
     cell = slowly_clocked(shipped("four_robots"), 0.02, mode=mode)
-    for plan in plan_runs(cell):
+    for plan in plan_phases(cell).program:
         case = case_of(replace(cell, tasks=tuple(cell.task(name) for name in plan.tasks)), moving=plan.moving)
         assert_on_tasks(case)
         q = case.path().at(case.timed.times)

@@ -12,7 +12,7 @@ from cellplan.model.cell import Grasp, Mode
 from cellplan.model.motion import Schedule
 from cellplan.model.task import Frame
 from cellplan.pipeline.overrides import with_overrides
-from cellplan.planning.modes import plan_runs
+from cellplan.planning.modes import plan_phases
 from cellplan.planning.tracking.problem import TrackingProblem
 from cellplan.planning.tracking.targets import targets
 
@@ -93,19 +93,19 @@ def test_only_the_kept_components_of_a_closure_become_rows():
 @pytest.mark.parametrize(
     ("mode", "moving"),
     [
-        (Mode.SIMULTANEOUS, [("holder", "op1", "op2", "op0")]),
-        (Mode.PAIRWISE, [("holder", "op1", "op2", "op0"), ("holder", "op1", "op2")]),
+        (Mode.SIMULTANEOUS, [{"holder", "op1", "op2", "op0"}]),
+        (Mode.PAIRWISE, [{"holder", "op1", "op2", "op0"}, {"holder", "op1", "op2"}]),
     ],
 )
 def test_all_holders_move_in_every_run(mode, moving):
     cell = with_overrides(carried(sharing(random_cell(44, operators=3), 2)), mode=str(mode))
-    assert [run.moving for run in plan_runs(cell)] == moving
-    assert all(len(targets(cell, STILL, run.moving)) == 2 for run in plan_runs(cell))
+    assert [set(run.moving) for run in plan_phases(cell).program] == moving
+    assert all(len(targets(cell, STILL, run.moving)) == 2 for run in plan_phases(cell).program)
 
 
 def test_no_holder_moves_with_the_part_at_rest():
     cell = with_overrides(sharing(random_cell(45, operators=3), 2), mode="part_at_rest")
-    (run,) = plan_runs(cell)
+    (run,) = plan_phases(cell).program
     assert run.moving == ("op0",)
     assert targets(cell, STILL, run.moving) == ()
 
@@ -113,9 +113,9 @@ def test_no_holder_moves_with_the_part_at_rest():
 def test_the_part_cannot_be_carried_while_it_is_to_rest():
     cell = with_overrides(carried(random_cell(46, operators=1)), mode="part_at_rest")
     with pytest.raises(InputError) as caught:
-        plan_runs(cell)
+        plan_phases(cell)
     assert str(caught.value) == (
         "<cell>: tasks.task_holder.robot: expected a robot that does not hold the part in the mode part_at_rest, got "
         "the positioner 'holder'; choose another mode or leave the task out"
     )
-    assert plan_runs(cell, only="task_op0")[0].moving == ("op0",)
+    assert plan_phases(cell, only="task_op0").program[0].moving == ("op0",)

@@ -9,8 +9,8 @@ import pytest
 PROGRAM = """
 import os, sys
 before = os.environ.get("MPLBACKEND")
-from cellplan.report.plots.sheet import get_ready
-get_ready()
+from cellplan.report.plots.rendering import warm_up
+warm_up()
 import matplotlib
 assert os.environ.get("MPLBACKEND") == before
 print(matplotlib.rcParams._get("backend"))

@@ -1,4 +1,4 @@
-"""Series of ``report.json``: the figures of the report can be found again in them; short, whole and always the same."""
+"""``series.json``: agrees with the figures of the report, is complete and reproducible."""
 
 import json
 import math
@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from cellplan.model.motion import Motion
 from cellplan.report.record import series as module
-from cellplan.report.record.series import series, series_text
+from cellplan.report.record.series import series, series_json, series_text
 from cellplan.report.record.write import report_json
 
 RELATIVE = 1e-6  # seven digits are written, which may be wrong by 5e-7
@@ -29,7 +29,9 @@ def motion_of(run: Any) -> Motion:
 
 
 def written(run: Any, motion: Motion | None = None) -> Any:
-    return json.loads(report_json(run.report, cell=run.cell, provenance=run.provenance, motion=motion))
+    """The report with its series under a key of their own."""
+    record = json.loads(report_json(run.report, cell=run.cell, provenance=run.provenance, motion=motion))
+    return record | {"series": json.loads(series_json(run.report, motion))}
 
 
 def test_largest_errors_and_their_instants_are_found_again(passed_run: Any) -> None:
@@ -114,7 +116,7 @@ def lengths(tree: Any) -> set[tuple[str, int]]:
 def test_long_motions_are_thinned_and_keep_both_ends(
     passed_run: Any, monkeypatch: pytest.MonkeyPatch, most: int, every: int, kept: int
 ) -> None:
-    monkeypatch.setattr(module, "MOST_STEPS", most)
+    monkeypatch.setattr(module, "MAX_STEPS", most)
 
     tree = series(passed_run.report, motion_of(passed_run))
 
@@ -127,17 +129,20 @@ def test_long_motions_are_thinned_and_keep_both_ends(
     np.testing.assert_array_equal(tree["iterations"], 1.0 + np.arange(0, len(times) - 1, every) % 3)
 
 
-def test_each_array_is_one_line_and_the_report_begins_with_its_readable_part(passed_run: Any) -> None:
-    text = report_json(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance)
+def test_each_array_is_one_line(passed_run: Any) -> None:
+    text = series_json(passed_run.report)
     lines = text.splitlines()
-    assert lines[1] == '  "schema": "cellplan.report/1",'
-    start = lines.index('  "series": {')
-    assert lines[start + 1] == '    "every": 1,'
-    arrays_at = [line for line in lines[start:] if "[" in line]
+    assert lines[1:3] == ['  "schema": "cellplan.series/1",', '  "every": 1,']
+    arrays_at = [line for line in lines if "[" in line]
     assert all(line.rstrip(",").endswith("]") for line in arrays_at)
     assert len(arrays_at) == 1 + 3 * 2 + 4 + 24 * 2
-    assert list(json.loads(text))[-1] == "series"
-    assert text.endswith("  }\n}\n")
+    assert text.endswith("\n}\n")
+
+
+def test_the_report_is_small_and_has_no_series(passed_run: Any) -> None:
+    text = report_json(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance)
+    assert "series" not in json.loads(text)
+    assert len(text) < 100_000  # four robots, 4001 samples: the series have 4.5 MB
 
 
 def test_the_same_run_gives_the_same_bytes(passed_run: Any, make_run: Any) -> None:
