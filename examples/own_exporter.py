@@ -1,6 +1,6 @@
 """A program format of your own: one JSON file per robot, read back and verified before it is written.
 
-A format is an entry of ``EXPORTERS``: a function that renders a verified run, an independent reader of what was rendered,
+A format is an entry of ``EXPORTERS``: a function that renders a verified run, an independent reader of the text,
 and the number of decimals. ``export_program`` makes every check again on what the reader returns.
 """
 
