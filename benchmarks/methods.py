@@ -29,11 +29,12 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.solver import NULL_SPACE_METHODS, Integrator, MethodName
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.start.search import find_start
-from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.planning.start.search import choose_start
+from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.scene import Scene
 
 mpl.use("agg")
@@ -128,7 +129,7 @@ def problem_of(case: Case) -> Problem:
         motion, solver = replace(cell.motion, step=case.step_s), replace(cell.solver, gain=gain)
         cell = replace(cell, motion=motion, solver=solver)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
-    start = find_start(Scene.from_cell(cell), toolpaths)
+    start = choose_start(Scene.from_cell(cell), clock_paths(cell, toolpaths.values())).start
     plan = plan_phases(cell).program[0]
     schedule = schedule_tasks(cell, [toolpaths[name] for name in plan.tasks])
     return Problem(cell=cell, schedule=schedule, start=start, moving=plan.moving)
@@ -169,7 +170,7 @@ def followed(problem: Problem, method: MethodName) -> Motion | str:
     """The motion, or why there is none."""
     cell = replace(problem.cell, solver=replace(problem.cell.solver, method=method))
     try:
-        return follow(cell, problem.schedule, start=problem.start, moving=problem.moving)
+        return integrate_schedule(MotionTask(cell, problem.schedule, problem.moving, problem.start))
     except CellplanError as error:
         return f"{type(error).__name__}: {error}"
 

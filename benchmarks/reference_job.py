@@ -16,9 +16,10 @@ from cellplan.checks.tools.tracking import errors_on_part, part_poses
 from cellplan.geometry.transforms import inverse
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.motion import Schedule
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.planning.tracking.motion_task import MotionTask
 
 CELL: Final = Path(__file__).resolve().parent.parent / "cells/four_robots.yaml"
 BETWEEN: Final = 4  # [-] points between two samples that are evaluated
@@ -152,5 +153,7 @@ def _end(cell: Cell, steps: int, *, start: Array) -> Array:
     """Where the joints end by so many Euler steps per sample, with the feedback as strong in each, shape (nq,)."""
     motion = replace(cell.motion, step=cell.motion.step / steps)
     finer = replace(cell, motion=motion, solver=replace(cell.solver, gain=cell.solver.gain * steps))
-    end: Array = follow(finer, _schedule(finer), start=start, moving=[robot.name for robot in cell.robots]).q[-1]
+    end: Array = integrate_schedule(
+        MotionTask(finer, _schedule(finer), [robot.name for robot in cell.robots], start)
+    ).q[-1]
     return end

@@ -26,7 +26,7 @@ from cellplan import Cell, load_cell
 from cellplan.geometry.transforms import rotation_about
 from cellplan.planning.layout_screening import AT_ONCE, Candidates, Screening, screen_layouts
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.schedule import time_tasks
+from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.planning.timing.timed_path import TimedTasks
 
 COUNT: Final = 256  # [-] candidates
@@ -84,7 +84,7 @@ def measure(rounds: int) -> Figures:
 def job() -> tuple[Cell, TimedTasks]:
     """The cell and its tasks on the clock, prepared once in each process."""
     cell = load_cell(CELL)
-    return cell, time_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    return cell, schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks]).desired
 
 
 def candidates_near(cell: Cell, count: int) -> Candidates:

@@ -32,13 +32,13 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     "bodies, hulls and pairs": {"cellplan.scene.scene": ("Scene.from_cell",)},
     "paths and times of the tools": {
         "cellplan.planning.path.build": ("build_toolpath",),
-        "cellplan.planning.timing.schedule": ("time_tasks", "sample", "examine_times"),
+        "cellplan.planning.timing.schedule": ("time_tasks", "sample", "clock_paths"),
     },
     "start postures": {
         "cellplan.planning.start.given": ("examine_given_starts",),
-        "cellplan.planning.start.search": ("find_start",),
+        "cellplan.planning.start.search": ("choose_start",),
     },
-    "joint motion": {"cellplan.planning.plan_motion": ("resolve",)},
+    "joint motion": {"cellplan.planning.plan_motion": ("plan_motion",)},
     "writing and reading back the tables": {
         "cellplan.io.run.joint_tables": ("render_table", "parse_table", "replace_header")
     },
@@ -46,15 +46,15 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     "certifying the clearance": {"cellplan.checks.clearance.check": ("check_clearance",)},
     "laying out the plots": {"cellplan.report.plots.run": ("motion_sheets", "clearance_sheets")},
     "waiting for the painted plots": {"concurrent.futures": ("Future.result",)},
-    "report.json": {"cellplan.report.record.write": ("report_json",)},
-    "report.html": {"cellplan.report.page.render": ("report_html",)},
+    "report.json": {"cellplan.report.record.run": ("run_record",), "cellplan.report.record.series": ("series_json",)},
+    "report.html": {"cellplan.report.page.render": ("report_page",)},
     "writing the run folder": {
         "cellplan.io.run.folder": ("RunFolder.__enter__", "RunFolder.write_bytes", "RunFolder.__exit__"),
         "cellplan.io.cell.write": ("render_cell",),
         "cellplan.io.run.manifest": ("render_manifest",),
         "cellplan.pipeline.write_run": ("versions",),
     },
-    "telling the result": {"cellplan.report.text.run": ("read_record", "summary_lines")},
+    "telling the result": {"cellplan.report.text.run": ("summary_lines",)},
 }
 
 

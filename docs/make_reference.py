@@ -1,22 +1,16 @@
-"""Write the reference pages: files from their formats, Python names from their docstrings.
+"""Write the reference of the files from their formats: ``python docs/make_reference.py`` makes the pages anew."""
 
-``python docs/make_reference.py`` writes all pages anew.
-"""
-
-import ast
-import inspect
 import json
 import re
-import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cellplan
 from cellplan.io.schema import errors_schema, json_schema, robot_table_schema
+from cellplan.report.record.schema import report_schema
 
 FOLDER = Path(__file__).resolve().parent / "reference"
-PAGE, ERRORS_PAGE, API_PAGE = FOLDER / "cell-file.md", FOLDER / "errors-file.md", FOLDER / "api.md"
+PAGE, ERRORS_PAGE, REPORT_PAGE = FOLDER / "cell-file.md", FOLDER / "errors-file.md", FOLDER / "report-json.md"
 INTRODUCTION = """\
 # The cell file
 
@@ -69,16 +63,77 @@ robots and joints must be those of the cell.
   is no direction, and the entry is refused. Before the first joint stands the origin of the base frame. What lies
   behind the last joint is an error of the tool.
 """
-API_INTRODUCTION = """\
-# The Python API
+REPORT_INTRODUCTION = """\
+# report.json and series.json
 
-This page is made from the docstrings by `docs/make_reference.py`; do not edit it by hand. The guide
-[From Python](../guides/from-python.md) shows how the names are used together, and `examples/` has scripts that run.
+This page is made from the types of the records by `docs/make_reference.py`; do not edit it by hand. `cellplan schema
+--report` prints the same as a JSON Schema (draft 2020-12).
 
-These names are the public interface, as in `cellplan.__all__`; anything else may change without notice. All values are
-frozen data in metres, radians and seconds. `Array` is a NumPy array of 64-bit floating-point numbers.
+`report.json` is the result of a run for scripts; `report.html` shows the same as a page. Equal input gives equal
+bytes.
+
+- **The promise of `cellplan.report/1`**: keys are only added, and no key changes its meaning or its unit. The format
+  is frozen at the first release; until then it may change, and the changelog says so. Scripts must ignore keys that
+  they do not know.
+- **Units are in the keys** (`_mm`, `_deg`, `_s`, `_mm_s`, `_deg_s`) or in a `unit` beside the value. Every key that
+  ends with `at_s` is a time on the common clock.
+- **`null`** stands for a value that does not exist: the limit of an endless joint, a distance without a pair.
+- Numbers have twelve significant digits and are taken over **all** samples. The arrays of `series.json` have seven.
+- Names of robots, joints, tasks and bodies are those of the cell file.
+- **`iterations`, `slack` and `resolution`** of the solver are known to the planner alone, as the joint tables hold
+  samples: `cellplan verify` derives everything else from the tables again and leaves these as they are.
 """
-CODE_LINE = 120  # characters in a line of a signature
+SERIES = """
+In the mode `pairwise` every task has a folder with a report of its own. The `report.json` above them is the
+[summary](#summary): the worst values of all of them; its `solver` holds no effort of steps.
+
+## Series
+
+`series.json` (`cellplan.series/1`) of every run holds the curves behind the numbers, one line for each array.
+
+| key | length | meaning |
+|---|---|---|
+| `schema` | | `cellplan.series/1` |
+| `every` | | n: every n-th sample is kept, and the last one |
+| `times_s` | K | times of the kept samples |
+| `tasks.TASK.position_error_mm` | K | distance from the desired position on the part |
+| `tasks.TASK.orientation_error_deg` | K | angle from the desired orientation |
+| `conditioning.smallest_singular_value` | K | of J, see [singularity](#singularity) |
+| `conditioning.condition`, `conditioning.squared_condition` | K | likewise |
+| `conditioning.manipulability` | K | likewise |
+| `joints.ROBOT.JOINT.position_deg` or `position_mm` | K | joint position |
+| `joints.ROBOT.JOINT.speed_deg_s` or `speed_mm_s` | K - 1 | joint velocity |
+| `iterations` | K - 1 | evaluations of the tasks per step; `null` in the accurate mode |
+| `slack` | K - 1 | norm of the twist residual; `null` if the method has none |
+
+**Steps and samples.** A velocity belongs to the step between two samples: the difference of both positions divided by
+`step_s`. The k-th value of an array of length K - 1 belongs to the step that *begins* at the k-th sample. Add half of
+`step_s` to plot it at the middle of its step.
+
+**Long motions.** Up to 50,001 samples all of them are kept and `every` is 1. Beyond that every n-th is kept, and a
+step is the one step of the clock after a kept sample. The numbers in `report.json` are always those of all samples,
+so a peak between two kept samples is in `joints` and `tasks` and not in the series.
+
+Seven digits are 0.00001 deg of a joint angle. The [joint tables](../concepts/conventions.md#joint-tables) have all of
+them.
+
+```python
+import json
+from pathlib import Path
+
+from cellplan import load_cell, solve, write_run
+
+folder = Path("outputs/series")
+write_run(solve(load_cell(Path("cells/planar_pair.yaml"))), folder)
+
+series = json.loads((folder / "series.json").read_text(encoding="utf-8"))
+times = series["times_s"]
+for name, curves in series["tasks"].items():
+    errors = curves["position_error_mm"]
+    worst = errors.index(max(errors))
+    print(f"{name}: {errors[worst]:.4g} mm at {times[worst]:g} s")
+```
+"""
 
 
 def main() -> None:
@@ -86,12 +141,55 @@ def main() -> None:
     FOLDER.mkdir(exist_ok=True)
     PAGE.write_text(reference(), encoding="utf-8")
     ERRORS_PAGE.write_text(errors_reference(), encoding="utf-8")
-    API_PAGE.write_text(api_reference(), encoding="utf-8")
+    REPORT_PAGE.write_text(report_reference(), encoding="utf-8")
 
 
 def errors_reference() -> str:
     """Text of the page about errors files."""
     return "".join([ERRORS_INTRODUCTION, *sections(errors_schema(), "Errors", set())])
+
+
+def report_reference() -> str:
+    """Text of the page about ``report.json`` and ``series.json``."""
+    schema = report_schema()
+    names = [name for name in schema["$defs"] if name != "SummaryRecord"]
+    run = schema["$defs"]["RunRecord"]["properties"]
+    summary = schema["$defs"]["SummaryRecord"]
+    own = {key: field for key, field in summary["properties"].items() if run.get(key) != field}
+    parts = [record_section(name, schema["$defs"][name]) for name in names]
+    return "".join(
+        [REPORT_INTRODUCTION, *parts, record_section("SummaryRecord", {**summary, "properties": own}), SERIES]
+    )
+
+
+def record_section(name: str, record: dict[str, Any]) -> str:
+    """Heading, one sentence and the keys of a record."""
+    lines = [f"\n## {record_title(name)}\n", record["description"], "", "| key | value | meaning |", "|---|---|---|"]
+    for key, field in record["properties"].items():
+        optional = "" if key in record["required"] else " (optional)"
+        lines.append(f"| `{key}` | {record_value(field)} | {field['description']}{optional} |")
+    return "\n".join(lines) + "\n"
+
+
+def record_title(name: str) -> str:
+    """Heading of a record: ``ClosestPair`` becomes ``Closest pair``."""
+    return re.sub(r"(?<!^)([A-Z])", lambda match: " " + match[1].lower(), name.removesuffix("Record"))
+
+
+def record_value(field: dict[str, Any]) -> str:
+    """Type of the value of a key."""
+    if "$ref" in field:
+        title = record_title(field["$ref"].rpartition("/")[2])
+        return f"[{title.lower()}](#{title.lower().replace(' ', '-')})"
+    if "anyOf" in field:
+        return " or ".join(record_value(arm) for arm in field["anyOf"])
+    if field["type"] == "array":
+        return f"list: {record_value(field['items'])}"
+    if field["type"] == "object":
+        return f"by name: {record_value(field['additionalProperties'])}"
+    return {"string": "text", "integer": "whole number", "boolean": "`true`, `false`", "null": "null"}.get(
+        field["type"], field["type"]
+    )
 
 
 def reference() -> str:
@@ -184,90 +282,6 @@ def bounds(field: dict[str, Any]) -> str:
         return f" from {low:.10g} to {upper}" if upper else f" from {low:.10g}"
     start = "" if above is None else f" above {above:g}"
     return f"{start}, up to {upper}" if upper else start
-
-
-def api_reference() -> str:
-    """Text of the page about the Python API: functions first, then classes, each in alphabetical order."""
-    public = {name: getattr(cellplan, name) for name in cellplan.__all__ if not name.startswith("__")}
-    functions = [name for name, value in public.items() if inspect.isfunction(value)]
-    classes = [name for name, value in public.items() if inspect.isclass(value)]
-    parts = [API_INTRODUCTION, "\n## Functions\n", *(function_entry(name, public[name]) for name in functions)]
-    return "".join([*parts, "\n## Classes\n", *(class_entry(name, public[name]) for name in classes)])
-
-
-def function_entry(name: str, function: Any) -> str:
-    """Heading, signature and docstring of a function."""
-    return (
-        f"\n### `{name}`\n\n```text\n{signature(definition(function))}\n```\n\n{prose(inspect.getdoc(function) or '')}"
-    )
-
-
-def class_entry(name: str, cls: type) -> str:
-    """Heading and docstring of a class, then its public methods and properties with their first sentence."""
-    members = [
-        f"- `{signature(node, is_method=True)}`: {first_line(node)}\n"
-        for node in definition(cls).body
-        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")
-    ]
-    listed = ["\n**Methods and properties**\n\n", *members] if members else []
-    return "".join([f"\n### `{name}`\n\n{prose(inspect.getdoc(cls) or '')}", *listed])
-
-
-def definition(value: Any) -> Any:
-    """Syntax tree of a function or class; the text of its annotations is the same in all versions of its libraries."""
-    return ast.parse(textwrap.dedent(inspect.getsource(value))).body[0]
-
-
-def signature(node: ast.FunctionDef, *, is_method: bool = False) -> str:
-    """A function as it is called: name, parameters and result; a property by its name and type."""
-    returns = ast.unparse(node.returns).strip("'") if node.returns else "None"
-    decorators = {ast.unparse(decorator) for decorator in node.decorator_list}
-    if decorators & {"property", "cached_property"}:
-        return f"{node.name}: {returns}"
-    arguments = node.args
-    plain = arguments.args[1:] if is_method else arguments.args  # without self or cls
-    defaults = [None] * (len(plain) - len(arguments.defaults)) + arguments.defaults
-    given = [with_default(*pair) for pair in zip(plain, defaults, strict=True)]
-    given += ["*"] if arguments.kwonlyargs else []
-    given += [with_default(*pair) for pair in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True)]
-    line = f"{node.name}({', '.join(given)}) -> {returns}"
-    if is_method or len(line) <= CODE_LINE:
-        return line
-    return "\n".join([f"{node.name}(", *(f"    {text}," for text in given), f") -> {returns}"])
-
-
-def with_default(argument: ast.arg, default: ast.expr | None) -> str:
-    """A parameter with its default."""
-    return ast.unparse(argument) + (f" = {ast.unparse(default)}" if default is not None else "")
-
-
-def first_line(node: ast.FunctionDef) -> str:
-    """First sentence of a docstring."""
-    return markup((ast.get_docstring(node) or "").partition("\n")[0])
-
-
-def prose(docstring: str) -> str:
-    """A docstring in Google style as Markdown: sections become lists."""
-    return "".join(f"{line}\n" for line in _lines(docstring))
-
-
-def _lines(docstring: str) -> Iterator[str]:
-    is_list = False
-    for line in docstring.splitlines():
-        if line in ("Args:", "Attributes:", "Raises:", "Returns:"):
-            is_list = line != "Returns:"
-            yield from (f"**{line.removesuffix(':')}**", "")
-        elif is_list and (entry := re.match(r"    (\w+): (.*)", line)):
-            yield f"- `{entry[1]}`: {markup(entry[2])}"
-        elif is_list and line:
-            yield f"  {markup(line.strip())}"
-        else:
-            yield markup(line.strip())
-
-
-def markup(text: str) -> str:
-    """Literals and citations of a docstring in Markdown."""
-    return re.sub(r"\[(\w+)\]_", r"[\1]", text.replace("``", "`"))
 
 
 PLAIN: dict[str, Callable[[dict[str, Any]], str]] = {

@@ -61,8 +61,7 @@ class _Group:
     @property
     def screws(self) -> Array:
         """Columns of the axes as last computed, shape (6, axes); of a single one pinocchio gives a vector."""
-        screws: Array = self.data.J.copy().reshape(6, self.model.nv)
-        return screws
+        return self.data.J.copy().reshape(6, self.model.nv)
 
     def poses(self) -> list[Array]:
         """Poses of the joint frames as last computed, shape (4, 4) each."""
@@ -126,13 +125,11 @@ class CombinedModel:
 
     def along_joints(self, per_axis: Array) -> Array:
         """Sum what belongs to the axes over those that each driven joint turns, shape (..., links) to (..., nq)."""
-        summed: Array = per_axis @ self._spread
-        return summed
+        return per_axis @ self._spread
 
     def to_flange(self, per_joint: Array) -> Array:
         """Share of each axis on the way to a flange in what belongs to the joints, shape (..., nq) to (..., links)."""
-        shares: Array = per_joint @ self._spread_to_flange.T
-        return shares
+        return per_joint @ self._spread_to_flange.T
 
     def _compute(self, full: Array) -> None:
         """Let the engine place all axes at their positions, shape (links,)."""

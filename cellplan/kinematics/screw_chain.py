@@ -45,20 +45,17 @@ class ScrewChain:
 
     def flange_poses(self, q: Array) -> Array:
         """Flange in the world, shape (N, 4, 4)."""
-        poses: Array = self.link_displacements(q)[:, self._flange_link + 1] @ self._X_BF
-        return poses
+        return self.link_displacements(q)[:, self._flange_link + 1] @ self._X_BF
 
     def tool_poses(self, q: Array) -> Array:
         """Tool tip in the world, shape (N, 4, 4)."""
-        poses: Array = self.link_displacements(q)[:, self._flange_link + 1] @ self._X_BT
-        return poses
+        return self.link_displacements(q)[:, self._flange_link + 1] @ self._X_BT
 
     def axis_points(self, q: Array) -> Array:
         """The point that stands for each driven joint's axis, carried along, in the world, shape (N, n, 3)."""
         D = self.link_displacements(q)[:, 1 : self._n + 1]
         points = np.array([axis.point_B for axis in self._axes[: self._n]])
-        moved: Array = (D[..., :3, :3] @ points[..., None])[..., 0] + D[..., :3, 3]
-        return moved
+        return (D[..., :3, :3] @ points[..., None])[..., 0] + D[..., :3, 3]
 
     def flange_screws(self, q: Array) -> Array:
         r"""Twist that unit speed of each driven joint gives the flange, taken at the world origin.

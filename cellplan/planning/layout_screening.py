@@ -13,7 +13,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.task import Frame
 from cellplan.planning.collocation.batch_targets import BatchTargets
 from cellplan.planning.collocation.batch_tasks import BatchTasks
-from cellplan.planning.collocation.solver import Collocation, Indices
+from cellplan.planning.collocation.solver import Collocation, Indices, Precision
 from cellplan.planning.collocation.windows import Window, windows_between
 from cellplan.planning.timing.timed_path import TimedTasks
 from cellplan.planning.tracking.targets import closures
@@ -109,15 +109,13 @@ class Screening:
     @property
     def is_followed(self) -> NDArray[np.bool_]:
         """Which candidates did the whole job, shape (K,)."""
-        followed: NDArray[np.bool_] = self.lost_at == ALL_WAY
-        return followed
+        return self.lost_at == ALL_WAY
 
     @property
     def is_feasible(self) -> NDArray[np.bool_]:
         """Which did it within all joint limits and speeds, shape (K,); nothing is known of collisions yet."""
         within = np.all(self.margins >= 0.0, axis=1) & np.all(self.speed_ratios <= 1.0, axis=1)
-        feasible: NDArray[np.bool_] = self.is_followed & within
-        return feasible
+        return self.is_followed & within
 
 
 def screen_layouts(
@@ -155,7 +153,8 @@ class _Screen:
         """Prepare the tasks, the windows that all go through, and the limits."""
         grasps = closures(cell, moving)
         self._tasks = BatchTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
-        self._targets, self._accuracy, self._shortest = BatchTargets(timed, grasps), accuracy, cell.motion.step
+        self._targets, self._accuracy = BatchTargets(timed, grasps), accuracy
+        self._precision = Precision(accuracy=accuracy, shortest=cell.motion.step)
         breaks, jumps = timed.breaks, timed.jumps
         self._at_start = self._targets.at(breaks[:1], breaks[:1], breaks[1:2])
         self._windows = windows_between(jumps, whole=float(breaks[-1]), knots=breaks, highest=FIRST_DEGREE)
@@ -169,8 +168,7 @@ class _Screen:
         q, arrived = self._settled(start.T.copy(), placement)
         found = Screening.unknown(q.T.copy())
         found.lost_at[arrived] = 0.0
-        collocation = Collocation(self._tasks, self._targets, placement, accuracy=self._accuracy)
-        collocation.shortest = self._shortest
+        collocation = Collocation(self._tasks, self._targets, placement, self._precision)
 
         def record(window: Window, cells: Indices, nodes: Array, errors: Array) -> None:
             everywhere = np.concatenate([nodes, nodes @ window.between.T], axis=2)

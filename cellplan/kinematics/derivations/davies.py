@@ -216,8 +216,7 @@ def _unit_screws(cell: Cell, q: Array, graph: CouplingGraph) -> Array:
             chain[:3, :3] = chain[3:, 3:] = X_PW[:3, :3]  # along the axes of W
         chain[:3, 3:] = skew(r) @ chain[3:, 3:]
         virtual.append(chain[:, [axis for axis in range(6) if virtual_joint(task, axis) in names]])
-    screws: Array = np.concatenate([*real, *virtual], axis=1)
-    return screws
+    return np.concatenate([*real, *virtual], axis=1)
 
 
 def _robot_screws(robot: Robot, q: Array) -> tuple[Array, Array]:

@@ -83,8 +83,7 @@ class DHChain:
 
     def flange_pose(self, q: Array) -> Array:
         """Flange in B, shape (4, 4)."""
-        pose: Array = self.frames(q)[-1] @ self.X_DF
-        return pose
+        return self.frames(q)[-1] @ self.X_DF
 
 
 def dh_chain(model: RobotModel) -> DHChain:

@@ -206,8 +206,7 @@ def _turns(points: Array) -> Array:
     sides = np.diff(points, axis=0)
     t = sides / np.linalg.norm(sides, axis=1, keepdims=True)
     sine = np.linalg.norm(np.cross(t[:-1], t[1:]), axis=1)
-    angles: Array = np.arctan2(sine, np.sum(t[:-1] * t[1:], axis=1))
-    return angles
+    return np.arctan2(sine, np.sum(t[:-1] * t[1:], axis=1))
 
 
 def _corners_at(task: Task, origin: Origin) -> str:

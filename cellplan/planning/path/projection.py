@@ -97,8 +97,7 @@ def _last_before_edge(held: Array, hits: list[Array]) -> Array:
     """Last point of a path before it leaves the patch that holds its beginning for longest."""
     counts = np.argmin(held, axis=1)
     patch = int(np.argmax(counts))
-    last: Array = hits[patch][max(int(counts[patch]) - 1, 0)]
-    return last
+    return hits[patch][max(int(counts[patch]) - 1, 0)]
 
 
 def _project_onto_mesh(drawing: PathCurve, direction: Array, part: Part, *, where: str, mesh: Mesh) -> ProjectedPath:
@@ -143,8 +142,7 @@ def _mesh_normals(mesh: Mesh, points: Array, faces: NDArray[np.int64]) -> Array:
     weight_c = np.sum(np.cross(b - a, points - a) * across, axis=1) / square
     weights = np.stack([1.0 - weight_b - weight_c, weight_b, weight_c], axis=1)
     blended = np.einsum("ni,nij->nj", weights, corner_normals(mesh)[faces])
-    normals: Array = blended / np.linalg.norm(blended, axis=1, keepdims=True)
-    return normals
+    return blended / np.linalg.norm(blended, axis=1, keepdims=True)
 
 
 def _refuse_flat_view(p: Array, normals: Array, direction: Array, *, where: str) -> None:

@@ -105,8 +105,7 @@ def _refuse_wide(angles: Array, widest: float, path: SampledPath | TimedPath, *,
 
 def _unit(axes: Array) -> Array:
     """Vectors of length one along others, shape (N, 3)."""
-    unit: Array = axes / np.linalg.norm(axes, axis=1, keepdims=True)
-    return unit
+    return axes / np.linalg.norm(axes, axis=1, keepdims=True)
 
 
 def _room(z: Array, direction: Array) -> Array:
@@ -117,8 +116,7 @@ def _room(z: Array, direction: Array) -> Array:
     d = direction / np.linalg.norm(direction)
     lean = np.arcsin(np.clip(np.linalg.norm(np.cross(z, d), axis=1), 0.0, 1.0))
     moved = np.append(np.linalg.norm(np.diff(z, axis=0), axis=1), 0.0)
-    room: Array = np.minimum(lean, np.append(lean[1:], lean[-1:])) - 0.5 * moved
-    return room
+    return np.minimum(lean, np.append(lean[1:], lean[-1:])) - 0.5 * moved
 
 
 def _refuse_parallel(z: Array, p: Array, task: Task, origin: Origin) -> None:

@@ -79,5 +79,4 @@ def _move(J: Array, error: Array, squared_damping: Array, *, at: tuple[Flags, Fl
     damping = np.maximum(squared_damping, 1e-12)[:, None, None] * np.eye(J.shape[1])
     move = (J_T @ np.linalg.solve(J @ J_T + damping, error[:, :, None]))[:, :, 0]
     longest = np.abs(move).max(axis=1, keepdims=True)
-    shortened: Array = move * np.minimum(1.0, LONGEST_MOVE / np.maximum(longest, LONGEST_MOVE))
-    return shortened
+    return move * np.minimum(1.0, LONGEST_MOVE / np.maximum(longest, LONGEST_MOVE))

@@ -139,8 +139,7 @@ class ClosestPairs:
     def _centres(self, poses: BodyPoses) -> Array:
         """Centres of the bounding spheres of all solids in the world, shape (B, 3)."""
         own = self._scene.engine.centres[: len(poses.p), :, None]
-        centres: Array = (poses.R[:, 0] @ own)[..., 0] + poses.p[:, 0]
-        return centres
+        return (poses.R[:, 0] @ own)[..., 0] + poses.p[:, 0]
 
     def _gradients(self, pairs: list[ScenePair], near: list[NearestPoints], links: LinkState) -> Array:
         """Change of each distance per joint, shape (pairs, nq)."""
@@ -157,5 +156,4 @@ class ClosestPairs:
         at_rest = np.zeros((1, links.D.shape[0]), dtype=bool)
         carries = np.concatenate([self._model.carries_link, at_rest])
         carrier = [self._carrier[body] if body < len(self._carrier) else -1 for body in bodies]
-        rates: Array = (wrench @ links.screws_W) * carries[carrier]
-        return rates
+        return (wrench @ links.screws_W) * carries[carrier]

@@ -1,6 +1,7 @@
-"""Tracking problem: what a resolution method is asked at every instant, and what it may ask back."""
+"""Tracking problem: reference poses and twists of all tasks, linearised at any sample and configuration."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -16,6 +17,7 @@ from cellplan.planning.timing.common_cycles import common_cycles
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
 from cellplan.planning.tracking.joint_weights import JointWeights
 from cellplan.planning.tracking.locked_joints import locked_since
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, share_within
 from cellplan.planning.tracking.targets import targets
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
@@ -81,8 +83,9 @@ class TrackingProblem:
     """All tasks of one run on the common clock, and the joints that may move for them.
 
     Attributes:
+        motion: The tasks and the robots that move for them.
         cell: The cell.
-        times: Instants in [s], shape (N,).
+        times: Samples of the clock in [s], shape (N,).
         tasks: The tasks, then the grasps of further holders, one block row each.
         constraints: What they constrain, in which frames and by which joints.
         desired: Reference tool poses X_PT, shape (N, tasks, 4, 4).
@@ -94,20 +97,19 @@ class TrackingProblem:
             closes a cycle.
     """
 
-    def __init__(self, cell: Cell, schedule: Schedule, moving: Sequence[str], *, start: Array | None = None) -> None:
+    def __init__(self, motion: MotionTask, drift: Drift | None = None) -> None:
         """Gather what stays the same from step to step.
 
         Args:
-            cell: The cell.
-            schedule: Reference tool poses and twists on the common clock.
-            moving: Names of the robots that may move.
-            start: Stacked start posture, shape (nq,), which goals may lead back to; needed with goals only.
+            motion: The tasks and the robots that move for them; goals may lead back to its start.
+            drift: Joint velocities in the null space of the tasks that close a cycle; None for none.
         """
-        asked = targets(cell, schedule, moving)
+        cell, schedule = motion.cell, motion.schedule
+        asked = targets(motion)
         tasks = tuple(target.relation for target in asked)
         self._model = CombinedModel(cell)
         self._rows = [constraint_rows(target.relation, target.X_PT) for target in asked]
-        self.constraints = TaskConstraints.of(cell, tasks, moving)
+        self.constraints = TaskConstraints.of(cell, tasks, motion.moving)
         self._is_on_part = bool(self.constraints.is_on_part.all())
         self._lost = np.array([max(LOST_DISTANCE, 2.0 * target.tolerance) for target in asked])
         self._settled = np.array([target.settled for target in asked])
@@ -117,8 +119,8 @@ class TrackingProblem:
         self.twists = np.stack([target.V_PT_P for target in asked], axis=1)
         self.signs = self.constraints.column_signs(self._model.carries_flange)
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
-        self.drift: Drift | None = None
-        self._goals = self._secondary_goals(start, _rests(cell, schedule)) if cell.solver.goals else None
+        self.motion, self.drift = motion, drift
+        self._goals = self._secondary_goals() if cell.solver.goals else None
         self._locked_since = locked_since(cell)
 
     @property
@@ -175,18 +177,29 @@ class TrackingProblem:
             np.concatenate([pick @ part for pick, part in zip(picks, error, strict=True)]),
         )
 
-    def _secondary_goals(self, start: Array | None, rests: Array) -> SecondaryGoals:
+    def with_drift(self, drift: Drift | None) -> "TrackingProblem":
+        """The same problem with another drift."""
+        other = copy(self)
+        other.drift = drift
+        return other
+
+    def _secondary_goals(self) -> SecondaryGoals:
         """The goals of the cell, which may lead back to the start posture."""
-        if start is None:
-            raise ValueError("secondary goals need the start posture of the motion")
-        return SecondaryGoals(self.cell, self._model, tasks=self.tasks, times=self.times, start=start, rests=rests)
+        motion = self.motion
+        return SecondaryGoals(
+            self.cell,
+            self._model,
+            tasks=self.tasks,
+            times=self.times,
+            start=motion.start,
+            rests=_rests(motion.cell, motion.schedule),
+        )
 
     def _drift(self, k: int, q: Array) -> Array | None:
         """Joint speeds that are asked for to close a cycle, of those joints that may move."""
         if self.drift is None:
             return None
-        speeds: Array = self.drift(k, q) * self.mobile(k)
-        return speeds
+        return self.drift(k, q) * self.mobile(k)
 
     def _with_goals(self, k: int, q: Array, state: CellState, first: FirstOrder, *, signs: Array) -> FirstOrder:
         """The tasks, with what the secondary goals ask for besides."""

@@ -107,8 +107,7 @@ class SecondaryGoals:
             slope = pull(stance)
             speeds = gain / (1.0 + gain * self._step * slope.curvature) * slope.gradient * stance.mobility
             asked += speeds / max(1.0, float(np.max(np.abs(speeds) / self._limits, initial=0.0)))
-        desired: Array = self._fade[k] * asked
-        return desired
+        return self._fade[k] * asked
 
     def bounds(self, q: Array) -> tuple[Array, Array]:
         """Lowest and highest joint speeds that a goal may lead to at a configuration, shape (nq,) each."""
@@ -139,8 +138,7 @@ def _fade(times: Array, rests: Array) -> Array:
     length = float(np.diff(rests).max())
     away = np.min(np.abs(times[:, None] - rests), axis=1)
     x = np.clip(away / max(min(FADE, FADE_SHARE * length), np.finfo(float).tiny), 0.0, 1.0)
-    share: Array = x * x * (3.0 - 2.0 * x)
-    return share
+    return x * x * (3.0 - 2.0 * x)
 
 
 def _pull(goal: SecondaryGoal, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], start: Array) -> Pull:

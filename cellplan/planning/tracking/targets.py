@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Grasp, Relation
-from cellplan.model.motion import Schedule
+from cellplan.planning.tracking.motion_task import MotionTask
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,17 +29,13 @@ class Target:
     settled: float = -np.inf
 
 
-def targets(cell: Cell, schedule: Schedule, moving: Sequence[str]) -> tuple[Target, ...]:
+def targets(motion: MotionTask) -> tuple[Target, ...]:
     """The scheduled tasks, then the grasp of every further holder that moves ([Ribeiro2010]_ 4.5).
 
     A grasp is a task that never changes: its pose is where the holder took hold of the part, its twist is zero. Where
     the part stands still, so do all its holders; they ask for nothing then.
-
-    Args:
-        cell: The cell.
-        schedule: The tasks that are worked on.
-        moving: Names of the robots that may move.
     """
+    cell, schedule = motion.cell, motion.schedule
     asked = [
         Target(
             relation=each.task,
@@ -51,7 +47,7 @@ def targets(cell: Cell, schedule: Schedule, moving: Sequence[str]) -> tuple[Targ
         for each in schedule.tasks
     ]
     count = len(schedule.times)
-    for grasp in closures(cell, moving):
+    for grasp in motion.grasps:
         X_PT: Array = np.broadcast_to(grasp.X_PT, (count, 4, 4))
         still, allowed = np.zeros((count, 6)), cell.checks.closure_position
         asked.append(Target(relation=grasp, X_PT=X_PT, V_PT_P=still, tolerance=allowed))

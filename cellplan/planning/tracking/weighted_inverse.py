@@ -47,8 +47,7 @@ class WeightedInverse:
         Returns:
             Speeds in [rad/s] or [m/s], shape (nq,).
         """
-        speeds: Array = self._JW.T @ (self._U @ ((self._U.T @ xdot) / (self._s_squared + lambda_squared)))
-        return speeds
+        return self._JW.T @ (self._U @ ((self._U.T @ xdot) / (self._s_squared + lambda_squared)))
 
     def null_space_projection(self, speeds: Array) -> Array:
         r"""What of given joint speeds moves no task ([Ribeiro2010]_ Eq. D.43), projected in the metric of W.
@@ -62,5 +61,4 @@ class WeightedInverse:
         """
         kept = self._s_squared > ROUNDING * self._s_squared[-1]
         U = self._U[:, kept]
-        rest: Array = speeds - self._JW.T @ (U @ ((U.T @ (self._J @ speeds)) / self._s_squared[kept]))
-        return rest
+        return speeds - self._JW.T @ (U @ ((U.T @ (self._J @ speeds)) / self._s_squared[kept]))

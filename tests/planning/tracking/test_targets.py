@@ -13,6 +13,7 @@ from cellplan.model.motion import Schedule
 from cellplan.model.task import Frame
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.planning.modes import plan_phases
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import TrackingProblem
 from cellplan.planning.tracking.targets import targets
 
@@ -79,7 +80,9 @@ def test_a_closure_wants_the_grasp_at_all_times_and_no_twist():
 def test_only_the_kept_components_of_a_closure_become_rows():
     cell = sharing(random_cell(43, operators=2), 2, axes=(0, 1, 5))
     q = np.random.default_rng(4).uniform(-1.5, 1.5, cell.joint_count)
-    problem = TrackingProblem(cell, STILL, tuple(robot.name for robot in cell.robots))
+    problem = TrackingProblem(
+        MotionTask(cell, STILL, tuple(robot.name for robot in cell.robots), np.zeros(cell.joint_count))
+    )
 
     with pytest.raises(DivergedError, match="from its grasp on the part"):
         problem.first_order(0, q)

@@ -104,8 +104,7 @@ class ConfigurationSearch:
     def _nudge(self, k: int) -> Array:
         """A disturbance that no two joints share, of those that may move."""
         mobile = self._problem.mobile(k) * np.any(self._problem.signs != 0.0, axis=0)
-        nudge: Array = NUDGE * np.cos(1.0 + 2.4 * np.arange(len(mobile))) * mobile
-        return nudge
+        return NUDGE * np.cos(1.0 + 2.4 * np.arange(len(mobile))) * mobile
 
 
 def cheaper(one: Look, other: Look) -> Look:
@@ -121,8 +120,7 @@ def _scaled(look: Look, way: Array) -> Array:
     shift = look.a @ way
     square = float(shift @ shift)
     share = float(look.e @ shift) / square if square > 0.0 else 0.0
-    scaled: Array = min(max(share, 0.0), 1.0) * way
-    return scaled
+    return min(max(share, 0.0), 1.0) * way
 
 
 def _carried_on(look: Look, ways: Array) -> Array:
@@ -130,8 +128,7 @@ def _carried_on(look: Look, ways: Array) -> Array:
     shares = np.linalg.lstsq(look.a @ ways, look.e, rcond=DEPENDENT)[0]
     move = ways @ shares
     longest, most = float(np.max(np.abs(move))), FARTHEST * float(np.max(np.abs(ways)))
-    carried: Array = move if longest <= most else move * (most / longest)
-    return carried
+    return move if longest <= most else move * (most / longest)
 
 
 def position_bounds(problem: TrackingProblem, q: Array) -> Bounds:

@@ -98,11 +98,9 @@ def braking_speed(room: Array, acceleration: Array, dt: float) -> Array:
     brakes = np.isfinite(room) & np.isfinite(acceleration)
     a, d = np.where(brakes, acceleration, 1.0), np.where(brakes, room, 0.0)
     n = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * d / (a * dt**2)) - 1.0))
-    speeds: Array = np.where(brakes, d / ((n + 1.0) * dt) + 0.5 * n * a * dt, room / dt)
-    return speeds
+    return np.where(brakes, d / ((n + 1.0) * dt) + 0.5 * n * a * dt, room / dt)
 
 
 def _less(limits: Array, room: float) -> Array:
     """Limits with room for rounding, half of them at least."""
-    less: Array = np.maximum(limits - room, 0.5 * limits)
-    return less
+    return np.maximum(limits - room, 0.5 * limits)
