@@ -1,4 +1,4 @@
-"""Write the reference of the Python API from its docstrings: ``python docs/make_api_reference.py`` makes the page anew."""
+"""Write the reference of the Python API from the docstrings: ``python docs/make_api_reference.py``."""
 
 import ast
 import inspect
