@@ -109,7 +109,8 @@ class Survey:
         self._rank(row)
 
     def bound(self) -> Bound:
-        """All that was found and proved."""
+        """All that was found and proved; the survey ends with it."""
+        self.low.flags.writeable = False
         spans, lowest = self.at_surface, self.low.min(axis=1, initial=np.inf).tolist()
         pairs = (
             PairBound.of(row, pair, self.states[row], low=self.low[row], lowest=lowest[row], span=spans.get(row))
