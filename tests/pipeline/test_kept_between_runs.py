@@ -1,22 +1,21 @@
 """The cache saves time and changes nothing: same bytes cold, warm, damaged and off."""
 
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
-from cellplan.io.cell.load import load_cell
+import pytest
+
+from cellplan import load_cell, solve, write_run
+from cellplan.cache.store import forget
 
 
 def solved(cell: Path, folder: Path, *, cache: str) -> dict[str, bytes]:
-    subprocess.run(
-        [sys.executable, "-m", "cellplan", "solve", str(cell), "-q", "-o", str(folder)],
-        env={**os.environ, "CELLPLAN_CACHE": cache},
-        capture_output=True,
-        check=True,
-        cwd=Path(__file__).resolve().parents[2],
-    )
+    """Files of a run that begins with nothing in memory, as a process of its own would."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CELLPLAN_CACHE", cache)
+        forget()
+        write_run(solve(load_cell(cell)), folder)
+        forget()
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
