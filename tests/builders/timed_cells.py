@@ -1,7 +1,7 @@
 """Timed tasks of shipped cells and of random ones, and what is independent of the planner to judge their motion by."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,41 +24,66 @@ from cellplan.planning.timing.schedule import sample, time_tasks
 from cellplan.planning.timing.timed_path import TimedTasks, distinct
 from cellplan.planning.tracking.targets import closures
 
+SIDE = 0.06  # [m]
 SHIPPED = Path(__file__).parents[2] / "cells"
 
 
 @dataclass(frozen=True)
 class Case:
-    """A cell, its tasks on the clock, who moves, and where it starts."""
+    """A cell, its tasks on the clock, who moves, and where it starts; every motion of it is planned once."""
 
     cell: Cell
     timed: TimedTasks
     moving: tuple[str, ...]
     start: Array
+    _planned: dict[Any, Any] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     @property
     def schedule(self) -> Schedule:
         return sample(self.timed)
 
     def resolved(self, **changes: Any) -> Motion:
-        """The motion, with changed solver settings."""
-        cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
-        return resolve(cell, self.timed, self.schedule, start=self.start, moving=self.moving)
+        """The motion, with changed solver settings; not to be changed."""
+        key = ("motion", *sorted(changes.items()))
+        if key not in self._planned:
+            cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
+            self._planned[key] = resolve(cell, self.timed, self.schedule, start=self.start, moving=self.moving)
+        return self._planned[key]
 
     def path(self, **changes: Any) -> JointPath:
-        """The whole motion as polynomials."""
-        cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
-        run = AccurateRun(cell, self.timed, start=self.start, moving=self.moving)
-        return run.path(self.start, begin=0.0, end=run.end)
+        """The whole motion as polynomials; not to be changed."""
+        key = ("path", *sorted(changes.items()))
+        if key not in self._planned:
+            cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
+            run = AccurateRun(cell, self.timed, start=self.start, moving=self.moving)
+            self._planned[key] = run.path(self.start, begin=0.0, end=run.end)
+        return self._planned[key]
 
 
 def case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | None = None) -> Case:
     """All tasks of a cell at once."""
+    if moving is None and start is None:
+        return _shared("whole", cell, _case_of)
+    return _case_of(cell, moving=moving, start=start)
+
+
+def _case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | None = None) -> Case:
     cell = replace(cell, solver=replace(cell.solver, integrator=Integrator.ACCURATE))
     timed = time_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
     if start is None:
         start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     return Case(cell, timed, tuple(everyone(cell) if moving is None else moving), start)
+
+
+_SHARED: dict[tuple[str, int], tuple[Cell, Case]] = {}
+
+
+def _shared(kind: str, cell: Cell, make: Callable[[Cell], Case]) -> Case:
+    """One case for each cell, so that tests share the motions that are planned of it."""
+    key = (kind, id(cell))  # the cell is kept, so that no other takes its place in memory
+    if key not in _SHARED:
+        _SHARED[key] = (cell, make(cell))
+    return _SHARED[key][1]
 
 
 @cache
@@ -103,8 +128,14 @@ def between_samples(case: Case, path: JointPath, *, count: int = 10) -> Array:
     return (ends[:-1, None] + np.diff(ends)[:, None] * shares).ravel()
 
 
-def triangles(cell: Cell, *, side: float = 0.06, start: Array | None = None, **words: Any) -> Case:
+def triangles(cell: Cell, *, side: float = SIDE, start: Array | None = None, **words: Any) -> Case:
     """A random cell whose tools go along triangles in space that begin where they are at a start posture."""
+    if side == SIDE and start is None and not words:
+        return _shared("triangles", cell, _triangles)
+    return _triangles(cell, side=side, start=start, **words)
+
+
+def _triangles(cell: Cell, *, side: float = SIDE, start: Array | None = None, **words: Any) -> Case:
     q = np.random.default_rng(2).uniform(-1.0, 1.0, cell.joint_count) if start is None else start
     seen = seen_poses(cell, q[None])[0]
     tasks = []
@@ -117,4 +148,4 @@ def triangles(cell: Cell, *, side: float = 0.06, start: Array | None = None, **w
     held_by = cell.part.held_by[:1] + tuple(replace(grasp, X_PT=X) for grasp, X in grasps)
     robots = tuple(replace(robot, start=q[cell.columns(robot.name)]) for robot in cell.robots)
     part = replace(cell.part, held_by=held_by)
-    return case_of(replace(cell, tasks=tuple(tasks), robots=robots, part=part))
+    return _case_of(replace(cell, tasks=tuple(tasks), robots=robots, part=part))
