@@ -1,21 +1,36 @@
 """The cache saves time and changes nothing: same bytes cold, warm, damaged and off."""
 
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
-import pytest
+from cellplan.io.cell.load import load_cell
 
+
+SOLVE = """
+import sys
+from pathlib import Path
 from cellplan import load_cell, solve, write_run
-from cellplan.cache.store import forget
+
+class Blank:
+    def pictures(self, report, *, cell):
+        return dict
+
+write_run(solve(load_cell(sys.argv[1])), Path(sys.argv[2]), drawing=Blank())
+"""
 
 
 def solved(cell: Path, folder: Path, *, cache: str) -> dict[str, bytes]:
-    """Files of a run that begins with nothing in memory, as a process of its own would."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("CELLPLAN_CACHE", cache)
-        forget()
-        write_run(solve(load_cell(cell)), folder)
-        forget()
+    """Files of a run that a process of its own solves; pictures show nothing that is not in the report."""
+    subprocess.run(
+        [sys.executable, "-c", SOLVE, str(cell), str(folder)],
+        env={**os.environ, "CELLPLAN_CACHE": cache},
+        capture_output=True,
+        check=True,
+        cwd=Path(__file__).resolve().parents[2],
+    )
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
