@@ -8,7 +8,6 @@ from pathlib import Path
 
 from cellplan.io.cell.load import load_cell
 
-
 SOLVE = """
 import sys
 from pathlib import Path
