@@ -46,15 +46,15 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     "certifying the clearance": {"cellplan.checks.clearance.check": ("check_clearance",)},
     "laying out the plots": {"cellplan.report.plots.run": ("motion_sheets", "clearance_sheets")},
     "waiting for the painted plots": {"concurrent.futures": ("Future.result",)},
-    "report.json": {"cellplan.report.record.write": ("report_json",)},
-    "report.html": {"cellplan.report.page.render": ("report_html",)},
+    "report.json": {"cellplan.report.record.run": ("run_record",), "cellplan.report.record.series": ("series_json",)},
+    "report.html": {"cellplan.report.page.render": ("report_page",)},
     "writing the run folder": {
         "cellplan.io.run.folder": ("RunFolder.__enter__", "RunFolder.write_bytes", "RunFolder.__exit__"),
         "cellplan.io.cell.write": ("render_cell",),
         "cellplan.io.run.manifest": ("render_manifest",),
         "cellplan.pipeline.write_run": ("versions",),
     },
-    "telling the result": {"cellplan.report.text.run": ("read_record", "summary_lines")},
+    "telling the result": {"cellplan.report.text.run": ("summary_lines",)},
 }
 
 

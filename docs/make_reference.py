@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from cellplan.io.schema import errors_schema, json_schema, robot_table_schema
+from cellplan.report.record.schema import report_schema
 
 FOLDER = Path(__file__).resolve().parent / "reference"
-PAGE, ERRORS_PAGE = FOLDER / "cell-file.md", FOLDER / "errors-file.md"
+PAGE, ERRORS_PAGE, REPORT_PAGE = FOLDER / "cell-file.md", FOLDER / "errors-file.md", FOLDER / "report-json.md"
 INTRODUCTION = """\
 # The cell file
 
@@ -62,6 +63,77 @@ robots and joints must be those of the cell.
   is no direction, and the entry is refused. Before the first joint stands the origin of the base frame. What lies
   behind the last joint is an error of the tool.
 """
+REPORT_INTRODUCTION = """\
+# report.json and series.json
+
+This page is made from the types of the records by `docs/make_reference.py`; do not edit it by hand. `cellplan schema
+--report` prints the same as a JSON Schema (draft 2020-12).
+
+`report.json` is the result of a run for scripts; `report.html` shows the same as a page. Equal input gives equal
+bytes.
+
+- **The promise of `cellplan.report/1`**: keys are only added, and no key changes its meaning or its unit. The format
+  is frozen at the first release; until then it may change, and the changelog says so. Scripts must ignore keys that
+  they do not know.
+- **Units are in the keys** (`_mm`, `_deg`, `_s`, `_mm_s`, `_deg_s`) or in a `unit` beside the value. Every key that
+  ends with `at_s` is a time on the common clock.
+- **`null`** stands for a value that does not exist: the limit of an endless joint, a distance without a pair.
+- Numbers have twelve significant digits and are taken over **all** samples. The arrays of `series.json` have seven.
+- Names of robots, joints, tasks and bodies are those of the cell file.
+- **`iterations`, `slack` and `resolution`** of the solver are known to the planner alone, as the joint tables hold
+  samples: `cellplan verify` derives everything else from the tables again and leaves these as they are.
+"""
+SERIES = """
+In the mode `pairwise` every task has a folder with a report of its own. The `report.json` above them is the
+[summary](#summary): the worst values of all of them; its `solver` holds no effort of steps.
+
+## Series
+
+`series.json` (`cellplan.series/1`) of every run holds the curves behind the numbers, one line for each array.
+
+| key | length | meaning |
+|---|---|---|
+| `schema` | | `cellplan.series/1` |
+| `every` | | n: every n-th sample is kept, and the last one |
+| `times_s` | K | times of the kept samples |
+| `tasks.TASK.position_error_mm` | K | distance from the desired position on the part |
+| `tasks.TASK.orientation_error_deg` | K | angle from the desired orientation |
+| `conditioning.smallest_singular_value` | K | of J, see [singularity](#singularity) |
+| `conditioning.condition`, `conditioning.squared_condition` | K | likewise |
+| `conditioning.manipulability` | K | likewise |
+| `joints.ROBOT.JOINT.position_deg` or `position_mm` | K | joint position |
+| `joints.ROBOT.JOINT.speed_deg_s` or `speed_mm_s` | K - 1 | joint velocity |
+| `iterations` | K - 1 | evaluations of the tasks per step; `null` in the accurate mode |
+| `slack` | K - 1 | norm of the twist residual; `null` if the method has none |
+
+**Steps and samples.** A velocity belongs to the step between two samples: the difference of both positions divided by
+`step_s`. The k-th value of an array of length K - 1 belongs to the step that *begins* at the k-th sample. Add half of
+`step_s` to plot it at the middle of its step.
+
+**Long motions.** Up to 50,001 samples all of them are kept and `every` is 1. Beyond that every n-th is kept, and a
+step is the one step of the clock after a kept sample. The numbers in `report.json` are always those of all samples,
+so a peak between two kept samples is in `joints` and `tasks` and not in the series.
+
+Seven digits are 0.00001 deg of a joint angle. The [joint tables](../concepts/conventions.md#joint-tables) have all of
+them.
+
+```python
+import json
+from pathlib import Path
+
+from cellplan import load_cell, solve, write_run
+
+folder = Path("outputs/series")
+write_run(solve(load_cell(Path("cells/planar_pair.yaml"))), folder)
+
+series = json.loads((folder / "series.json").read_text(encoding="utf-8"))
+times = series["times_s"]
+for name, curves in series["tasks"].items():
+    errors = curves["position_error_mm"]
+    worst = errors.index(max(errors))
+    print(f"{name}: {errors[worst]:.4g} mm at {times[worst]:g} s")
+```
+"""
 
 
 def main() -> None:
@@ -69,11 +141,55 @@ def main() -> None:
     FOLDER.mkdir(exist_ok=True)
     PAGE.write_text(reference(), encoding="utf-8")
     ERRORS_PAGE.write_text(errors_reference(), encoding="utf-8")
+    REPORT_PAGE.write_text(report_reference(), encoding="utf-8")
 
 
 def errors_reference() -> str:
     """Text of the page about errors files."""
     return "".join([ERRORS_INTRODUCTION, *sections(errors_schema(), "Errors", set())])
+
+
+def report_reference() -> str:
+    """Text of the page about ``report.json`` and ``series.json``."""
+    schema = report_schema()
+    names = [name for name in schema["$defs"] if name != "SummaryRecord"]
+    run = schema["$defs"]["RunRecord"]["properties"]
+    summary = schema["$defs"]["SummaryRecord"]
+    own = {key: field for key, field in summary["properties"].items() if run.get(key) != field}
+    parts = [record_section(name, schema["$defs"][name]) for name in names]
+    return "".join(
+        [REPORT_INTRODUCTION, *parts, record_section("SummaryRecord", {**summary, "properties": own}), SERIES]
+    )
+
+
+def record_section(name: str, record: dict[str, Any]) -> str:
+    """Heading, one sentence and the keys of a record."""
+    lines = [f"\n## {record_title(name)}\n", record["description"], "", "| key | value | meaning |", "|---|---|---|"]
+    for key, field in record["properties"].items():
+        optional = "" if key in record["required"] else " (optional)"
+        lines.append(f"| `{key}` | {record_value(field)} | {field['description']}{optional} |")
+    return "\n".join(lines) + "\n"
+
+
+def record_title(name: str) -> str:
+    """Heading of a record: ``ClosestPair`` becomes ``Closest pair``."""
+    return re.sub(r"(?<!^)([A-Z])", lambda match: " " + match[1].lower(), name.removesuffix("Record"))
+
+
+def record_value(field: dict[str, Any]) -> str:
+    """Type of the value of a key."""
+    if "$ref" in field:
+        title = record_title(field["$ref"].rpartition("/")[2])
+        return f"[{title.lower()}](#{title.lower().replace(' ', '-')})"
+    if "anyOf" in field:
+        return " or ".join(record_value(arm) for arm in field["anyOf"])
+    if field["type"] == "array":
+        return f"list: {record_value(field['items'])}"
+    if field["type"] == "object":
+        return f"by name: {record_value(field['additionalProperties'])}"
+    return {"string": "text", "integer": "whole number", "boolean": "`true`, `false`", "null": "null"}.get(
+        field["type"], field["type"]
+    )
 
 
 def reference() -> str:

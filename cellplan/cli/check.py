@@ -41,10 +41,11 @@ def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_d
 
 def _record(result: CellCheck) -> dict[str, Any]:
     """What was found, in printed units."""
-    from cellplan.report.record.left_out import left_out_record
-    from cellplan.report.record.open_surfaces import open_surface_lines, open_surfaces_record
-    from cellplan.report.record.run import check_record, number
-    from cellplan.report.record.task import direction_record
+    from cellplan.report.record.clearance import left_out_record
+    from cellplan.report.record.common import check_record, number
+    from cellplan.report.record.open_surfaces import open_surfaces_record
+    from cellplan.report.record.tasks import direction_record
+    from cellplan.report.text.notes import open_surface_notes
 
     open_surfaces = open_surfaces_record(result.cell)
     return {
@@ -57,14 +58,14 @@ def _record(result: CellCheck) -> dict[str, Any]:
         "direction": {task.name: direction_record(task) for task in result.cell.tasks},
         "checks": [check_record(each) for each in result.checks],
         "open_surfaces": open_surfaces,
-        "remarks": [f"{result.cell.origin.at(key)}: {line}" for key, line in open_surface_lines(open_surfaces)],
+        "remarks": [f"{result.cell.origin.at(key)}: {line}" for key, line in open_surface_notes(open_surfaces)],
         "left_out": left_out_record(result.left_out),
     }
 
 
 def _start(robot: Robot) -> dict[str, float | None]:
     """Start posture by joint with its unit, as the column names of the tables have it."""
-    from cellplan.report.record.run import number
+    from cellplan.report.record.common import number
 
     if robot.start is None:
         return {}
@@ -78,7 +79,7 @@ def _start(robot: Robot) -> dict[str, float | None]:
 
 def _lines(record: dict[str, Any]) -> list[str]:
     """What was found, for people."""
-    from cellplan.report.record.task import direction_words
+    from cellplan.report.record.tasks import direction_text
     from cellplan.report.text.run import left_out_lines
 
     lines = [f"{record['cell']}: {'sound' if record['status'] == 'passed' else 'not sound'}"]
@@ -87,7 +88,7 @@ def _lines(record: dict[str, Any]) -> list[str]:
         lines.append(f"  start of {robot} ({'found' if robot in record['start_found'] else 'given'}): {configuration}")
     lines += [f"  {record['start_choice']}"] if record["start_choice"] else []
     for name, length in record["path_length_mm"].items():
-        lines.append(f"  task {name}: path of {length:.4g} mm, {direction_words(record['direction'][name])}")
+        lines.append(f"  task {name}: path of {length:.4g} mm, {direction_text(record['direction'][name])}")
     lines += [f"  note: {remark}" for remark in record["remarks"]]
     lines += [f"  {'' if each['passed'] else 'FAILED '}{each['message']}" for each in record["checks"]]
     return lines + left_out_lines(record)

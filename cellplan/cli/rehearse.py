@@ -56,7 +56,7 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.overrides import with_draws
         from cellplan.pipeline.rehearsal.rehearse import rehearse as rehearse_cell
         from cellplan.pipeline.rehearsal.write import write_rehearsal
-        from cellplan.report.text.rehearsal import read_record, summary_lines
+        from cellplan.report.text.rehearsal import summary_lines
 
         asked = load_cell(cell, allow_dirs=allow_dir or ())
         stated = with_draws(load_errors(errors, asked), trials=trials, seed=seed)
@@ -64,8 +64,7 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:
             made = rehearse_cell(asked, stated, feedback=feedback, in_pass=in_pass, rounds=rounds, progress=progress)
-            write_rehearsal(made, folder, progress=progress)
-        record = read_record(folder)
+            record = write_rehearsal(made, folder, progress=progress)
     status = ExitStatus.PASSED if made.passed else ExitStatus.CHECK_FAILED
     if as_json:
         place = {"folder": str(folder), "report_path": str(folder / "rehearsal.html")}

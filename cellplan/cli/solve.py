@@ -66,7 +66,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.overrides import require_task, with_overrides
         from cellplan.pipeline.solve import solve_with_plots
         from cellplan.pipeline.write_run import write_run
-        from cellplan.report.text.run import read_record, summary_lines
+        from cellplan.report.text.run import summary_lines
 
         given = load_cell(cell, allow_dirs=allow_dir or ())
         asked = with_overrides(
@@ -77,8 +77,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:
             solution = solve_with_plots(asked, plots, task=task, progress=progress)
-            write_run(solution, folder, keep_rejected=keep_rejected, plots=plots)
-        record = read_record(folder)
+            record = write_run(solution, folder, keep_rejected=keep_rejected, plots=plots)
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
     if as_json:
         place = {"folder": str(folder), "report_path": str(folder / "report.html")}

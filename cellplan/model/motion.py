@@ -1,29 +1,34 @@
-"""Schedule, motion and program: where each tool must be, what all joints do, and what is written for each robot."""
+"""Schedule, motion and program: desired tool poses, joint positions of all robots, and the tables as text."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.phase import Phase
+from cellplan.model.plan import Plan, rows_of
 from cellplan.model.solver import Integrator
 from cellplan.model.task import Task
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TaskSchedule:
-    """One task on the common clock of N instants.
+    """One task on the common clock of N samples.
 
     Attributes:
         task: The task.
-        X_PT: Reference tool tip in P at each instant, shape (N, 4, 4); held still before the start and after the end.
+        X_PT: Reference tool tip in P at each sample, shape (N, 4, 4); held still before the start and after the end.
         V_PT_P: Reference twist of the tool relative to the part in P, linear first, shape (N, 6).
         travelled: Length of path behind the tool in [m], shape (N,); it grows from cycle to cycle.
         length: Length of the path on the surface in [m], of one cycle.
-        end: Instant in [s] at which the path is done.
-        cycle_ends: Instants in [s] at which the tool has come back to the pose of its start, all constrained
+        end: Time in [s] at which the path is done.
+        cycle_ends: Times in [s] at which the tool has come back to the pose of its start, all constrained
             components together, one per cycle; none when it does not come back.
+        stops: Times in [s] at which a stretch of the path with its own start and stop of the time law begins or ends.
     """
 
     task: Task
@@ -33,21 +38,22 @@ class TaskSchedule:
     length: float
     end: float
     cycle_ends: tuple[float, ...] = ()
+    stops: tuple[float, ...] = ()
 
 
 class DesiredMotion(Protocol):
-    """Where every tool must be at any instant, not at those of the clock only."""
+    """Desired tool poses at any time, not at the samples only."""
 
     @property
     def times(self) -> Array:
-        """Instants of the clock in [s], shape (N,)."""
+        """Times of the samples in [s], shape (N,)."""
 
     @property
     def jumps(self) -> Array:
-        """Instants in [s], increasing, at which the speed of a tool may jump, or its rate."""
+        """Times in [s], increasing, at which the speed of a tool may jump, or its rate."""
 
     def poses(self, times: Array) -> tuple[Array, ...]:
-        """Reference tool tips in P of all tasks at instants in [s], shape (M,), shape (M, 4, 4) each."""
+        """Reference tool tips in P of all tasks at times in [s], shape (M,), shape (M, 4, 4) each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,10 +61,10 @@ class Schedule:
     """All tasks on one clock.
 
     Attributes:
-        times: Instants in [s], evenly spaced from 0, shape (N,).
+        times: Times of the samples in [s], evenly spaced from 0, shape (N,).
         tasks: The tasks that are worked on.
-        desired: Where their tools must be between these instants; None where nobody knows, and errors are looked at
-            at the instants of the clock only.
+        desired: Desired tool poses between these times; None where they are unknown, and errors are computed at the
+            samples only.
     """
 
     times: Array
@@ -67,7 +73,7 @@ class Schedule:
 
     @property
     def step(self) -> float:
-        """Time between two instants in [s]."""
+        """Time between two samples in [s]."""
         return float(self.times[-1] / (len(self.times) - 1))
 
 
@@ -101,15 +107,15 @@ class Resolution:
     """How finely a motion was resolved, and what that took.
 
     Attributes:
-        integrator: What carried the joints from the start on; ``euler_from`` tells where the accurate one gave up.
-        panels: Stretches of time on each of which all joints are one polynomial.
-        nodes: Instants at which the joints were solved for.
+        integrator: What integrated the joints from the start on; ``euler_from`` is where the accurate one failed.
+        panels: Intervals of time on each of which all joints are one polynomial.
+        nodes: Times at which the joints were solved for.
         sweeps: Passes over all nodes of a panel, added up.
         solves: Systems of equations that were solved.
-        error_between: Bound of the tool error at the nodes and between them, in [m] or [rad]; None when nobody looked,
+        error_between: Bound of the tool error at the nodes and between them, in [m] or [rad]; None when it is unknown,
             as with Euler's steps.
-        euler_from: Instant in [s] from which on Euler's steps had to be taken; None when they never had to.
-        lost: The robot that is nearest to a singular configuration at that instant; None when none is.
+        euler_from: Time in [s] from which on Euler's steps had to be taken; None when they never had to.
+        lost: The robot that is nearest to a singular configuration at that time; None when none is.
     """
 
     integrator: Integrator
@@ -122,7 +128,7 @@ class Resolution:
     lost: NearestSingular | None = None
 
     def __post_init__(self) -> None:
-        """Check at the door that every figure is one."""
+        """Check that every figure is one."""
         counts = (self.panels, self.nodes, self.sweeps, self.solves)
         if min(counts) < 0:
             raise ValueError(f"resolution: expected counts of at least 0, got {counts}")
@@ -133,50 +139,96 @@ class Resolution:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Motion:
-    """Joint positions of all robots on the common clock.
+    """Joint positions of all robots in the rows of a program, or of one phase of it.
 
     Attributes:
-        times: Instants in [s], shape (N,).
+        times: Times of the rows in [s], shape (N,).
         q: Stacked joint positions in [rad] or [m], shape (N, nq), in the order of ``Cell.robots``.
-        iterations: How often the method looked at the tasks for each step, shape (N - 1,); None when nobody counted.
-        slack: By how much each step leaves the tasks on purpose, as the norm of the twist that it gives up (metres
-            and radians per second as they come), shape (N - 1,); None when nobody measured it.
-        resolution: How finely it was resolved; None when nobody kept account.
+        sigma: Nominal time of each row in [s], shape (N,); the time itself where it is not given.
+        plan: The phases of the program on its nominal time; without phases for the motion of a single one.
+        iterations: Iterations of the method in each step, shape (N - 1,); None when they were not counted.
+        slack: Norm of the twist residual that each step accepts (mixed units: m/s and rad/s), shape (N - 1,); None when
+            it was not measured.
+        resolution: How finely it was resolved; None when that was not recorded.
     """
 
     times: Array
     q: Array
+    sigma: Array = field(default_factory=lambda: np.empty(0))
+    plan: Plan = field(default_factory=Plan)
     iterations: Array | None = None
     slack: Array | None = None
     resolution: Resolution | None = None
 
     def __post_init__(self) -> None:
-        """Check at the door that nothing is missing or not finite."""
+        """Check that nothing is missing or not finite."""
         if self.q.shape[:1] != self.times.shape:
-            raise ValueError(f"motion: {len(self.q)} rows for {len(self.times)} instants")
+            raise ValueError(f"motion: {len(self.q)} rows for {len(self.times)} times")
         if not np.all(np.isfinite(self.q)):
             raise ValueError("motion: a joint position is not finite")
+        if not len(self.sigma):
+            object.__setattr__(self, "sigma", self.times)
+        if self.sigma.shape != self.times.shape:
+            raise ValueError(f"motion: {len(self.sigma)} nominal times for {len(self.times)} times")
+
+    @property
+    def gaps(self) -> dict[int, str]:
+        """Name of what is not part of the program, by the first row after it."""
+        return self.plan.gaps(self.sigma)
+
+    def rows(self, phase: Phase) -> slice:
+        """The rows of a phase, both ends included."""
+        return rows_of(phase, self.sigma)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointTable:
-    """What one robot is told to do: the content of its written table, read back.
+    """The joint positions of one robot: the content of its written table, read back.
 
     Attributes:
         robot: Name of the robot.
         joints: Joint names in the order of the columns.
-        times: Instants in [s], shape (N,).
+        times: Times of the rows in [s], shape (N,).
         q: Joint positions in [rad] or [m], shape (N, n).
+        gaps: Name of what is not part of the program, by the first row after it.
     """
 
     robot: str
     joints: tuple[str, ...]
     times: Array
     q: Array
+    gaps: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ClockTable:
+    """What happens at each row of a program: the content of its written clock.
+
+    Attributes:
+        times: Times of the rows in [s], shape (N,).
+        sigma: Nominal time of each row in [s], shape (N,).
+        phases: Name of the phase of each row.
+        lengths: Length of path in [m] behind the tool of each task, shape (N,), by task.
+        process: Whether the tool of each task is on its path, shape (N,), by task.
+        gaps: Name of what is not part of the program, by the first row after it.
+    """
+
+    times: Array
+    sigma: Array
+    phases: tuple[str, ...]
+    lengths: Mapping[str, Array]
+    process: Mapping[str, NDArray[np.bool_]]
+    gaps: Mapping[int, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Program:
-    """One rendered joint table per robot: file text by robot name."""
+    """A program as text.
+
+    Attributes:
+        tables: The joint table of every robot, by robot name.
+        clock: What happens at each row of these; empty where it is not written.
+    """
 
     tables: dict[str, str]
+    clock: str = ""

@@ -22,7 +22,7 @@ class Plan:
         process: Stretches of nominal time in [s] in which the tool of a task is on its path, by task.
     """
 
-    phases: tuple[Phase, ...]
+    phases: tuple[Phase, ...] = ()
     stops: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     dwells: tuple[Interval, ...] = ()
     process: Mapping[str, tuple[Interval, ...]] = field(default_factory=dict)

@@ -11,6 +11,7 @@ from cellplan.model.acceleration import UNKNOWN_ACCELERATIONS, MotionAcceleratio
 from cellplan.model.between_rows import BetweenRows
 from cellplan.model.left_out import LeftOut
 from cellplan.model.payload import LoadUse
+from cellplan.model.phase import Phase
 from cellplan.model.units import DisplayUnit, joint_unit
 
 CAUTION = (
@@ -350,6 +351,8 @@ class Report:
         depths: How deep tools stand in the part, one entry per task on it.
         accelerations: Accelerations, jerk and process speeds.
         loads: What each robot carries.
+        phases: All phases of the program on its nominal time, those that are not part of it among them; the times of
+            this report count from the begin of the phase that it is for.
     """
 
     cell: str
@@ -370,6 +373,7 @@ class Report:
     depths: tuple[ToolDepth, ...] = ()
     accelerations: MotionAccelerations = UNKNOWN_ACCELERATIONS
     loads: tuple[LoadUse, ...] = ()
+    phases: tuple[Phase, ...] = ()
 
     @property
     def passed(self) -> bool:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.model.cell import Cell
-from cellplan.model.motion import JointTable, Schedule
+from cellplan.model.motion import JointTable, Motion, Schedule
 from cellplan.model.report import Report
 
 SEAL: Final = object()  # held by the gate alone: whoever shows it has verified the run
@@ -14,13 +14,13 @@ SEAL: Final = object()  # held by the gate alone: whoever shows it has verified 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class VerifiedMotion:
-    """One motion of a verified run.
+    """One phase of a verified run, on its own time, which starts at 0.
 
     Attributes:
-        name: Name of the only task in a run of its own; None when all tasks are worked on together.
+        name: Name of the only task of a phase of its own; None when all tasks are worked on together.
         moving: Names of the robots that may move.
-        schedule: Where every tool must be.
-        tables: What each robot is told to do, read back from its table, by robot name.
+        schedule: Desired tool poses.
+        tables: Joint positions of each robot, read back from its table, by robot name.
         report: What the checks found when the run was verified.
     """
 
@@ -41,15 +41,17 @@ class VerifiedRun:
         folder: The run folder.
         digest: SHA-256 of its manifest, which stands for the whole run.
         cell: The cell that was solved.
-        motions: One, or one per task in the pairwise mode.
+        motion: All rows of the program, as they stand in its tables, and its plan, as the cell demands it.
+        motions: One for each phase: one, or one per task in the pairwise mode.
         file_count: Files that were compared with the manifest.
         inputs_compared: Names of the files the run rests on that were found unchanged.
-        remarks: What somebody who relies on the run should know.
+        remarks: What to know before relying on the run.
     """
 
     folder: Path
     digest: str
     cell: Cell
+    motion: Motion
     motions: tuple[VerifiedMotion, ...]
     file_count: int
     inputs_compared: tuple[str, ...]
@@ -57,7 +59,7 @@ class VerifiedRun:
     seal: InitVar[object]
 
     def __post_init__(self, seal: object) -> None:
-        """Refuse to be made by anybody but the gate, or of a run with a failed check."""
+        """Refuse to be made outside the gate, or of a run with a failed check."""
         if seal is not SEAL:
             raise TypeError("a verified run is made by cellplan.open_gate only")
         if not self.motions or not all(motion.report.passed for motion in self.motions):

@@ -1,31 +1,41 @@
-"""Solution: what solving a cell gives: one verified run, or one per task."""
+"""Solution: what solving a cell gives: a program of one or several phases, each of them verified."""
 
 from dataclasses import dataclass
 
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Program, Schedule
+from cellplan.model.phase import Phase
+from cellplan.model.plan import Plan
 from cellplan.model.report import Report
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Run:
-    """One motion of the cell and its proof.
+    """One phase of the program and its proof, on the phase's own time, which starts at 0.
 
     Attributes:
-        name: Name of the only task in a run of its own; None when all tasks are worked on together.
-        moving: Names of the robots that may move.
-        schedule: Where every tool must be.
-        motion: What all joints do.
-        program: The joint tables as text; the report speaks of these.
-        report: What the checks found.
+        phase: The phase on the clock of the program.
+        schedule: Desired tool poses.
+        motion: Joint positions of all robots, as they were planned.
+        program: The program as text, in which this phase has its rows.
+        report: Result of the checks on these rows.
     """
 
-    name: str | None
-    moving: tuple[str, ...]
+    phase: Phase
     schedule: Schedule
     motion: Motion
     program: Program
     report: Report
+
+    @property
+    def name(self) -> str | None:
+        """Name of the only task of a phase of its own; None when all tasks are worked on together."""
+        return self.phase.task
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Names of the robots that may move."""
+        return self.phase.moving
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,15 +44,27 @@ class Solution:
 
     Attributes:
         cell: The cell that was solved, with every start posture filled in.
-        runs: One run, or one per task in the pairwise mode.
+        motion: Joint positions in all rows of the program, and its plan.
+        runs: One run for each phase of the program: one, or one per task in the pairwise mode.
         remark: What to know of the start that was chosen when no trial of one was without fault.
     """
 
     cell: Cell
+    motion: Motion
     runs: tuple[Run, ...]
     remark: str | None = None
 
     @property
+    def plan(self) -> Plan:
+        """The phases of the program on its nominal time."""
+        return self.motion.plan
+
+    @property
+    def program(self) -> Program:
+        """The program as text: one joint table per robot, and their clock."""
+        return self.runs[0].program
+
+    @property
     def passed(self) -> bool:
-        """Whether every check of every run passed."""
+        """Whether every check of every phase passed."""
         return all(run.report.passed for run in self.runs)

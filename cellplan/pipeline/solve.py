@@ -1,18 +1,23 @@
 """Solve a cell: from what the user wrote to verified joint tables."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import PurePath
 
 from cellplan.checks.verify import verify_motion, with_clearance
 from cellplan.geometry.transforms import Array
+from cellplan.io.run.clock_table import render_clock
 from cellplan.io.run.joint_tables import TableHeader, parse_table, program_digest, render_table, replace_header
 from cellplan.model.cell import Cell
-from cellplan.model.idle import not_in_program
 from cellplan.model.motion import Motion, Program
+from cellplan.model.phase import Phase
+from cellplan.model.plan import Plan
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.pipeline.background_plots import BackgroundPlots
+from cellplan.pipeline.plan.headers import table_headers
 from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_homes
+from cellplan.pipeline.plan.program import ProgramClock, refuse_clock_name
 from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.run import PlannedRun, plan_run
 from cellplan.pipeline.plan.start import chosen_start
@@ -21,14 +26,13 @@ from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.timing.schedule import clock_paths
-from cellplan.report.record.accelerations import table_line
 from cellplan.scene.scene import Scene
 
 
 def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -> Solution:
     """Plan the motion of all robots, render their joint tables, read these back and verify them.
 
-    A run that breaks a limit or collides is returned like any other: its report says by how much, where and when.
+    A program that breaks a limit or collides is returned like any other: its reports say by how much, where and when.
 
     Args:
         cell: The cell, as ``load_cell`` gives it.
@@ -61,72 +65,95 @@ def solve_with_plots(
 
 
 def _solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[Scene, Solution]:
-    """All runs, verified but for their clearance, and the scene of the solved cell."""
+    """All phases, verified but for their clearance, and the scene of the solved cell."""
+    refuse_clock_name(cell)
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
     paths = clock_paths(cell, toolpaths.values())
     examine_given_starts(cell, toolpaths)
     choice = chosen_start(scene, paths, progress=progress)
     started = with_start(cell, choice.start)
-    plans = plan_phases(cell, only=task).program
-    planned = [plan_run(started, paths, plan, progress=progress) for plan in plans]
+    plan = plan_phases(cell, only=task)
+    planned = [plan_run(started, paths, phase, progress=progress) for phase in plan.program]
     solved = with_homes(started, find_homes(replace(scene, cell=started), planned, progress=progress), given=cell)
     if depends_on_homes(started, planned):
-        planned = [plan_run(solved, paths, plan, progress=progress) for plan in plans]
+        planned = [plan_run(solved, paths, phase, progress=progress) for phase in plan.program]
     scene = replace(scene, cell=solved)
-    runs = tuple(_run(scene, each, progress=progress) for each in planned)
-    return scene, Solution(cell=solved, runs=runs, remark=choice.warning)
+    motion, runs = _runs(scene, plan, planned, progress=progress)
+    return scene, Solution(cell=solved, motion=motion, runs=runs, remark=choice.warning)
 
 
 def _with_clearance(solution: Solution, scene: Scene, *, progress: Progress) -> Solution:
-    """The solution with the clearance of every run checked and the verdict in the headers of its tables."""
-    runs = []
-    for run in solution.runs:
-        report = with_clearance(run.report, scene, run.schedule, progress=progress)
-        runs.append(replace(run, report=report, program=with_verdict(solution.cell, run.program, report)))
-    return replace(solution, runs=tuple(runs))
+    """The solution with the clearance of every phase checked and the verdict in the headers of its tables."""
+    reports = [with_clearance(run.report, scene, run.schedule, progress=progress) for run in solution.runs]
+    program = with_verdict(solution.cell, solution.program, solution.plan.program, reports)
+    runs = zip(solution.runs, reports, strict=True)
+    return replace(solution, runs=tuple(replace(run, report=report, program=program) for run, report in runs))
 
 
-def _run(scene: Scene, planned: PlannedRun, *, progress: Progress) -> Run:
-    """Verify what would be written of one run, but for its clearance."""
-    cell, plan = scene.cell, planned.phase
-    motion = replace(planned.motion, q=standing(cell, plan, planned.motion.q))
+def _runs(
+    scene: Scene, plan: Plan, planned: Sequence[PlannedRun], *, progress: Progress
+) -> tuple[Motion, tuple[Run, ...]]:
+    """The motion of the program, and its phases verified on the rows that would be written, but for their clearance."""
+    cell = scene.cell
+    motions = [replace(run.motion, q=standing(cell, run.phase, run.motion.q)) for run in planned]
+    clock = ProgramClock.of(cell, plan, [run.schedule for run in planned])
+    motion = clock.motion([each.q for each in motions])
     program = render_program(cell, motion)
+    tasks = [task.name for task in cell.tasks if task.name in clock.plan.process]
+    text = render_clock(clock.table(tasks), cell=cell.name, program=program_digest(program.tables))
+    program = replace(program, clock=text)
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
-    report = verify_motion(scene, planned.schedule, tables, moving=plan.moving, progress=progress)
-    return Run(
-        name=plan.task,
-        moving=plan.moving,
-        schedule=planned.schedule,
-        motion=motion,
-        program=program,
-        report=report,
-    )
+    runs = []
+    for place, (run, own) in enumerate(zip(planned, motions, strict=True)):
+        rows = clock.cut(tables, place)
+        report = verify_motion(scene, run.schedule, rows, moving=run.phase.moving, progress=progress)
+        runs.append(
+            Run(
+                phase=clock.plan.program[place],
+                schedule=run.schedule,
+                motion=own,
+                program=program,
+                report=replace(report, phases=clock.plan.phases),
+            )
+        )
+    return motion, tuple(runs)
 
 
 def render_program(cell: Cell, motion: Motion) -> Program:
     """Joint tables of all robots as text, not yet verified."""
     header = TableHeader(cell=cell.name, mode=str(cell.motion.mode), digests={})
+    times, gaps = motion.times, motion.gaps
     return Program(
         tables={
-            robot.name: render_table(robot, motion.times, motion.q[:, cell.columns(robot.name)], header=header)
+            robot.name: render_table(robot, times, motion.q[:, cell.columns(robot.name)], header=header, gaps=gaps)
             for robot in cell.robots
         }
     )
 
 
-def with_verdict(cell: Cell, program: Program, report: Report, *, remark: str = "") -> Program:
-    """The same rows under headers that carry the verdict, the digests, a remark, and what is left out."""
-    failed = [check for check in report.checks if not check.passed]
-    header = TableHeader(
-        cell=cell.name,
-        mode=str(cell.motion.mode),
-        verdict=f"REJECTED: {failed[0].message}" if failed else "passed",
-        digests=_digests(cell, program),
-        remark="; ".join(filter(None, [remark, not_in_program(cell, report.tasks)])),
-    )
-    headers = {name: replace(header, accelerations=table_line(report.accelerations, name)) for name in program.tables}
-    return Program(tables={name: replace_header(text, header=headers[name]) for name, text in program.tables.items()})
+def with_verdict(
+    cell: Cell, program: Program, phases: Sequence[Phase], reports: Sequence[Report], *, remark: str = ""
+) -> Program:
+    """The same rows under headers that carry the verdict, the digests, a remark, and what is left out.
+
+    Args:
+        cell: The cell.
+        program: The tables as text.
+        phases: The phases of the program.
+        reports: The report of each of them.
+        remark: What else has to be known of the rows.
+    """
+    names = [f"{phase.name}: " if len(phases) > 1 else "" for phase in phases]
+    checks = [(name, check) for name, report in zip(names, reports, strict=True) for check in report.checks]
+    failed = [f"{name}{check.message}" for name, check in checks if not check.passed]
+    digests = _digests(cell, program)
+    headers = table_headers(cell, phases, reports, digests=digests, remark=remark)
+    if failed:
+        verdict = f"REJECTED: {failed[0]}"
+        headers = {name: replace(header, verdict=verdict) for name, header in headers.items()}
+    tables = {name: replace_header(text, header=headers[name]) for name, text in program.tables.items()}
+    return replace(program, tables=tables)
 
 
 def _digests(cell: Cell, program: Program) -> dict[str, str]:

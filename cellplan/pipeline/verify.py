@@ -1,17 +1,22 @@
 """Verify joint tables against their cell, without planning anything."""
 
 from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
 
 from cellplan.cache import nothing_kept
 from cellplan.checks.verify import verify as verify_tables
 from cellplan.errors import InputError
+from cellplan.io.input.findings import listed
 from cellplan.io.run.joint_tables import parse_table
 from cellplan.model.cell import Cell
+from cellplan.model.motion import JointTable
+from cellplan.model.plan import Plan
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
+from cellplan.pipeline.plan.program import ProgramClock, moved_while_holding
 from cellplan.planning.modes import plan_phases
-from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.scene.scene import Scene
 
 
@@ -21,19 +26,46 @@ def verify(cell: Cell, tables: Mapping[str, str], *, task: str | None = None, pr
     Args:
         cell: The cell the tables were made for.
         tables: Text of one joint table per robot, by robot name.
-        task: Name of the only task that was worked on; needed when the cell's mode has one run per task.
+        task: Name of the only task that was worked on, or of the phase to verify where the program has one per task;
+            the report counts time from the start of that phase.
         progress: Called with the stage and the fraction done.
 
     Raises:
-        InputError: A table is missing, unreadable, or does not fit the cell; there is no such task.
+        InputError: A table is missing, unreadable, or does not fit the cell; there is no such task; a robot moves that
+            holds still in this phase.
     """
-    plans = plan_phases(cell, only=task).program
-    if len(plans) > 1:
-        names = ", ".join(str(plan.task) for plan in plans)
-        raise InputError(f"task: this cell has one run per task: name one of {names}")
-    plan = plans[0]
-    toolpaths = [build_toolpath(cell.task(name), cell.part, cell.origin) for name in plan.tasks]
     parsed = [parse_table(text, f"tables/{name}.csv") for name, text in tables.items()]
-    schedule = schedule_tasks(cell, toolpaths)
+    plan = plan_phases(cell) if any(table.gaps for table in parsed) else plan_phases(cell, only=task)
+    place = _place(plan, task)
+    clock = ProgramClock.from_cell(cell, plan)
+    _refuse_other_rows(clock, parsed)
+    phase, schedule = clock.plan.program[place], clock.schedules[place]
+    own = clock.cut(parsed, place)
+    for table in own:
+        if table.robot in phase.roles and moved_while_holding(phase, table.robot, table.q) is not None:
+            raise InputError(
+                f"table of '{table.robot}': expected no motion in the phase '{phase.name}': it holds still"
+            )
     with nothing_kept():  # a proof rests on the cell itself
-        return verify_tables(Scene.from_cell(cell), schedule, parsed, moving=plan.moving, progress=progress)
+        report = verify_tables(Scene.from_cell(cell), schedule, own, moving=phase.moving, progress=progress)
+    return replace(report, phases=clock.plan.phases)
+
+
+def _place(plan: Plan, task: str | None) -> int:
+    """Number of the phase to verify among those of the program."""
+    if len(plan.program) == 1:
+        return 0
+    names = [phase.name for phase in plan.program]
+    if task not in names:
+        got = "none" if task is None else f"'{task}'"
+        raise InputError(f"task: this cell has one phase per task: expected one of {listed(names)}, got {got}")
+    return names.index(task)
+
+
+def _refuse_other_rows(clock: ProgramClock, tables: list[JointTable]) -> None:
+    """Refuse tables whose times or gaps are not those of the program."""
+    for table in tables:
+        if not np.array_equal(table.times, clock.times):
+            raise InputError(f"table of '{table.robot}': its times are not those of the program")
+        if table.gaps != clock.gaps:
+            raise InputError(f"table of '{table.robot}': its gaps are not those of the program")

@@ -1,6 +1,5 @@
 """Write a solution: report, plots, the resolved cell and, when every check passed, the joint tables."""
 
-from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
@@ -8,16 +7,19 @@ from typing import Final
 import cellplan
 from cellplan.io.cell.write import render_cell
 from cellplan.io.run.folder import MANIFEST, RunFolder
-from cellplan.io.run.joint_tables import parse_header, program_digest, replace_header
+from cellplan.io.run.joint_tables import program_digest
 from cellplan.io.run.manifest import render_manifest
+from cellplan.io.run.stored import CLOCK
 from cellplan.model.cell import Cell
+from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.report.page.render import overview_html, report_html
-from cellplan.report.record.run import Provenance
+from cellplan.report.page.render import overview_page, report_page
+from cellplan.report.record.common import Provenance, Record, as_json
+from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series_json
-from cellplan.report.record.write import report_json, summary_json
+from cellplan.report.record.summary import summary_record
 
 ENGINES: Final = (
     "numpy",
@@ -36,12 +38,12 @@ def write_run(
     keep_rejected: bool = False,
     progress: Progress = silent,
     plots: BackgroundPlots | None = None,
-) -> None:
+) -> Record:
     """Write a run folder; it appears whole or not at all.
 
-    Every run has ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only if the
-    solution passed. A cell with one run per task gets a subfolder for each and an overview above them. Last comes
-    ``manifest.json``, which names every file.
+    The folder holds ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only
+    if every check passed. The phases of a program with one for each task have reports and plots of their own in
+    subfolders, and an overview above them. Last comes ``manifest.json``, which names every file.
 
     Args:
         solution: What was solved.
@@ -50,26 +52,30 @@ def write_run(
         progress: Called with the stage and the fraction done.
         plots: Draws the plots; those that it has begun are not drawn again.
 
+    Returns:
+        The record in the ``report.json`` of the folder.
+
     Raises:
         InputError: The folder cannot be written, or holds something else than a run.
     """
     background = plots or BackgroundPlots()
+    cell, program = solution.cell, solution.program
+    provenance = Provenance(versions=versions(), digests={"program": program_digest(program.tables)})
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            _write_one(target, solution.cell, run, background)
-            if solution.passed:
-                _write_tables(target, run, "tables")
-            elif keep_rejected:
-                _write_tables(target, run, "rejected")
+            record = _write_report(target, cell, run, provenance, background)
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
-            provenance = Provenance(versions=versions(), digests={})
-            target.write_text("report.json", summary_json(reports, cell=solution.cell, provenance=provenance))
-            target.write_text("report.html", overview_html(reports, cell=solution.cell, provenance=provenance))
-            target.write_text("cell.yaml", render_cell(solution.cell))
-        manifest = render_manifest(solution.cell, passed=solution.passed, versions=versions(), files=target.written)
+            record = summary_record(reports, cell=cell, provenance=provenance)
+            target.write_text("report.json", as_json(record))
+            target.write_text("report.html", overview_page(record, cell=cell))
+        target.write_text("cell.yaml", render_cell(cell))
+        if solution.passed or keep_rejected:
+            _write_tables(target, program, "tables" if solution.passed else "rejected")
+        manifest = render_manifest(cell, passed=solution.passed, versions=versions(), files=target.written)
         target.write_text(MANIFEST, manifest)
+    return record
 
 
 def versions() -> dict[str, str]:
@@ -83,31 +89,22 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _write_one(target: RunFolder, cell: Cell, run: Run, plots: BackgroundPlots) -> None:
-    """Report, plots and resolved cell of one run."""
-    place = _place(run)
-    provenance = Provenance(versions=versions(), digests={"program": program_digest(run.program.tables)})
+def _write_report(target: RunFolder, cell: Cell, run: Run, provenance: Provenance, plots: BackgroundPlots) -> Record:
+    """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
+    place = "" if run.name is None else f"{run.name}/"
     begun = plots.pictures(run.report, cell=cell)
-    record = report_json(run.report, cell=cell, provenance=provenance, motion=run.motion)
-    target.write_text(f"{place}report.json", record)
+    record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion)
+    target.write_text(f"{place}report.json", as_json(record))
     target.write_text(f"{place}series.json", series_json(run.report, run.motion))
     pictures = begun()
     for name, picture in pictures.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    page = report_html(run.report, cell=cell, provenance=provenance, plots=pictures, motion=run.motion)
-    target.write_text(f"{place}report.html", page)
-    target.write_text(f"{place}cell.yaml", render_cell(cell))
+    target.write_text(f"{place}report.html", report_page(record, run.report.checks, cell=cell, plots=pictures))
+    return record
 
 
-def _write_tables(target: RunFolder, run: Run, folder: str) -> None:
-    """Joint tables of one run; none of a failed solution says that it passed."""
-    for robot, text in run.program.tables.items():
-        if folder == "rejected" and run.report.passed:
-            header = replace(parse_header(text, robot), verdict="REJECTED: another run of the same job failed")
-            text = replace_header(text, header=header)  # noqa: PLW2901
-        target.write_text(f"{_place(run)}{folder}/{robot}.csv", text)
-
-
-def _place(run: Run) -> str:
-    """Where in the run folder a run is written: a run with a name has a subfolder."""
-    return "" if run.name is None else f"{run.name}/"
+def _write_tables(target: RunFolder, program: Program, folder: str) -> None:
+    """The tables of the whole program: one of each robot, and the clock."""
+    for robot, text in program.tables.items():
+        target.write_text(f"{folder}/{robot}.csv", text)
+    target.write_text(f"{folder}/{CLOCK}.csv", program.clock)

@@ -94,5 +94,8 @@ def sign(copy: Copy) -> None:
         own = re.sub("# cell digest: sha256 .*", f"# cell digest: sha256 {now['cell']}", text)
         own = re.sub("# program digest: sha256 .*", f"# program digest: sha256 {now['program']}", own)
         copy.table(name).write_text(own, encoding="utf-8")
+    clock = copy.table("clock")
+    text = re.sub("# program digest: sha256 .*", f"# program digest: sha256 {now['program']}", clock.read_text())
+    clock.write_text(text, encoding="utf-8")
     edit_json(copy.run / "report.json", lambda record: record["digests"].update(program=now["program"]))
     seal(copy)

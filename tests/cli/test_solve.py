@@ -32,6 +32,7 @@ def test_a_sound_cell_is_told_and_written(
     assert lines[-2:] == [f"report: {folder / 'report.html'}", f"tables: {folder / 'tables'}"]
     assert sorted(path.name for path in (folder / "tables").iterdir()) == [
         "abb.csv",
+        "clock.csv",
         "kuka.csv",
         "reis.csv",
         "staubli.csv",
@@ -129,7 +130,7 @@ def test_the_integrator_is_chosen_on_the_command_line_and_reported(
     capsys.readouterr()
     record = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     assert (status, record["solver"]["integrator"], record["solver"]["accuracy_mm"]) == (0, "euler", 1e-4)
-    assert "Euler steps of 5 ms; errors are fed back" in (folder / "report.html").read_text(encoding="utf-8")
+    assert "Euler steps of 5 ms; pose errors are fed back" in (folder / "report.html").read_text(encoding="utf-8")
     assert "integrator: euler" in (folder / "cell.yaml").read_text(encoding="utf-8")
 
 

@@ -12,8 +12,9 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.pipeline.explain import explain
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.solve import render_program
-from cellplan.report.page.render import report_html
-from cellplan.report.record.run import Provenance
+from cellplan.report.page.render import report_page
+from cellplan.report.record.common import Provenance
+from cellplan.report.record.run import run_record
 from cellplan.report.record.structure import structure_record
 from cellplan.report.text.run import summary_lines
 from cellplan.report.text.structure import structure_lines
@@ -72,9 +73,8 @@ def test_the_record_the_page_and_the_screen_tell_the_closure(planar, tmp_path):
     write_run(planar, tmp_path / "run")
     record = json.loads((tmp_path / "run" / "report.json").read_text(encoding="utf-8"))
     closure = record["closure"]["right"]
-    page = report_html(
-        planar.runs[0].report, cell=planar.cell, provenance=Provenance(versions={}, digests={}), plots={}
-    )
+    report, none = planar.runs[0].report, Provenance(versions={}, digests={})
+    page = report_page(run_record(report, cell=planar.cell, provenance=none), report.checks, cell=planar.cell, plots={})
 
     assert {"max_position_error_mm", "max_orientation_error_deg", "at_s"} <= set(closure)
     assert 0.0 < closure["max_position_error_mm"] <= ALLOWED_MM

@@ -166,9 +166,10 @@ def test_run_folder_holds_what_it_promises(four_robots, tmp_path):
         "plots",
         "report.html",
         "report.json",
+        "series.json",
         "tables",
     }
-    assert {path.stem for path in (folder / "tables").iterdir()} == {"reis", "kuka", "abb", "staubli"}
+    assert {path.stem for path in (folder / "tables").iterdir()} == {"reis", "kuka", "abb", "staubli", "clock"}
     assert record["status"] == "passed"
     assert record["cycle_time_s"] == 4.0
     assert record["tasks"]["circle"]["max_position_error_mm"] <= 0.003
@@ -202,12 +203,13 @@ def test_failed_run_leaves_no_tables_unless_asked(cells, tmp_path):
         assert "# verdict: REJECTED: joint kuka/B2 goes" in table.read_text()
 
 
-def test_pairwise_writes_a_subfolder_for_each_task(cells, tmp_path):
+def test_pairwise_writes_one_program_and_a_report_for_each_task(cells, tmp_path):
     cell = with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise")
     write_run(solve(cell, task="circle"), tmp_path / "run")
     record = json.loads((tmp_path / "run" / "report.json").read_text())
     assert list(record["runs"]) == ["circle"]
-    assert (tmp_path / "run" / "circle" / "tables" / "kuka.csv").is_file()
+    assert (tmp_path / "run" / "tables" / "kuka.csv").is_file()
+    assert not (tmp_path / "run" / "circle" / "tables").exists()
     assert json.loads((tmp_path / "run" / "circle" / "report.json").read_text())["status"] == "passed"
 
 
@@ -240,5 +242,5 @@ def test_one_failed_run_withholds_the_tables_of_all(cells, tmp_path):
 
     assert not list((tmp_path / "plain").rglob("*.csv"))
     assert not list((tmp_path / "kept").rglob("tables"))
-    header = (tmp_path / "kept" / "rhombus" / "rejected" / "abb.csv").read_text()
-    assert "# verdict: REJECTED: another run of the same job failed" in header
+    header = (tmp_path / "kept" / "rejected" / "abb.csv").read_text()
+    assert "# verdict: REJECTED: circle: position error of task 'circle'" in header

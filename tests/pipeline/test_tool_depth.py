@@ -8,7 +8,7 @@ from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell
 from cellplan.pipeline.check import check
 from cellplan.pipeline.solve import solve
-from cellplan.report.record.task import direction_record, direction_words, tasks_record
+from cellplan.report.record.tasks import direction_record, direction_text, tasks_record
 
 CELL = """
 cellplan: 1
@@ -63,4 +63,4 @@ def test_what_is_deeper_than_allowed_fails(tmp_path: Path, path: str, more: str,
 def test_the_report_says_which_way_round_a_path_runs(tmp_path: Path, path: str, words: str) -> None:
     (task,) = cell_with(tmp_path, path).tasks
 
-    assert direction_words(direction_record(task)).startswith(words)
+    assert direction_text(direction_record(task)).startswith(words)

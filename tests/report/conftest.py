@@ -37,7 +37,7 @@ from cellplan.model.report import (
 from cellplan.model.robot import Joint, JointKind, RobotModel
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
-from cellplan.report.record.run import Provenance
+from cellplan.report.record.common import Provenance
 
 N = 4001
 TIMES = 0.001 * np.arange(N)

@@ -1,8 +1,9 @@
-"""Joint tables: the text file that tells one robot where its joints are at each instant of the common clock.
+"""Joint tables: the text file with the joint positions of one robot at every time of the program.
 
 A table is ASCII-plain text: header lines that start with ``#``, one line of column names with their units, one row per
-sample. The written number is the truth: angles and lengths are rounded to twelve decimals of a degree or a millimetre,
-and every number is written so that it reads back to itself; what is verified is what was read back.
+sample, and between two phases a line that says what is not part of the program. The written number is the truth: angles
+and lengths are rounded to twelve decimals of a degree or a millimetre, and every number is written so that it reads
+back to itself; what is verified is what was read back.
 """
 
 import hashlib
@@ -15,6 +16,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
+from cellplan.io.run.gap_lines import line_of_row, with_gap_lines, without_gap_lines
 from cellplan.model.cell import Robot
 from cellplan.model.motion import JointTable
 from cellplan.model.report import CAUTION
@@ -27,6 +29,8 @@ MM_PER_M = 1e3  # [mm/m]
 CLOCK_TOL = 1e-6  # [s] room for steps that are not whole decimals, such as 1/3000 s
 MAX_NUMBER = 1e9  # [deg], [mm] or [s]: beyond it twelve decimals would be pretence
 
+NO_GAPS: Mapping[int, str] = {}
+
 Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
 _NUMBER = r"-?[0-9]{1,20}(?:\.[0-9]{1,400})?"
@@ -37,7 +41,7 @@ _SHA256 = "sha256 "
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableHeader:
-    """What the header lines of a table say besides its title and the caution.
+    """The entries of the header of a table besides its title and the caution.
 
     Attributes:
         cell: Name of the cell.
@@ -56,19 +60,22 @@ class TableHeader:
     accelerations: str = ""
 
 
-def render_table(robot: Robot, times: Array, q: Array, *, header: TableHeader) -> str:
+def render_table(
+    robot: Robot, times: Array, q: Array, *, header: TableHeader, gaps: Mapping[int, str] = NO_GAPS
+) -> str:
     """Write the joint table of one robot.
 
     Args:
         robot: Whose table it is.
-        times: Instants in [s], shape (N,).
+        times: Times of the rows in [s], shape (N,).
         q: Its joint positions in [rad] or [m], shape (N, n).
         header: What stands above the rows.
+        gaps: Name of what is not part of the program, by the first row after it.
 
     Raises:
         InputError: When a joint's name cannot stand in a table.
     """
-    return _render_header(robot.name, header) + _render_rows(robot, times, q)
+    return _render_header(robot.name, header) + _render_rows(robot, times, q, gaps)
 
 
 def replace_header(text: str, *, header: TableHeader) -> str:
@@ -118,7 +125,7 @@ def parse_table(text: str, source: str) -> JointTable:
         source: File name for messages.
 
     Returns:
-        Instants in [s] and joint positions in [rad] or [m].
+        Times in [s] and joint positions in [rad] or [m].
 
     Raises:
         InputError: With file, line and column, when the text is not a whole joint table.
@@ -130,10 +137,19 @@ def parse_table(text: str, source: str) -> JointTable:
         raise InputError(f"{source}: expected the last row to end with a line break; the file is cut off")
     columns, _, rows = body.partition("\n")
     joints, is_angle = _parse_columns(columns, f"{source}:{first_line}")
-    numbers = _parse_rows(rows, columns.split(","), source=source, first_line=first_line + 1)
+    lines, gaps = without_gap_lines(rows.split("\n")[:-1], source=source, first_line=first_line + 1)
+    places = _Places(source=source, first_line=first_line + 1, gaps=gaps)
+    numbers = _parse_rows(lines, columns.split(","), places)
     times = numbers[:, 0].copy()
-    _check_clock(times, source=source, first_line=first_line + 1)
-    return JointTable(robot=robot, joints=joints, times=times, q=_to_si(numbers[:, 1:], is_angle))
+    _check_clock(times, places)
+    return JointTable(robot=robot, joints=joints, times=times, q=_to_si(numbers[:, 1:], is_angle), gaps=gaps)
+
+
+def row_place(text: str, source: str, row: int) -> str:
+    """File and line of a row of numbers, counted from 0, in the text of a table."""
+    gaps = parse_table(text, source).gaps
+    first_line = text.count("\n", 0, len(text) - len(table_body(text))) + 2
+    return f"{source}:{line_of_row(row, gaps, first_line=first_line)}"
 
 
 def parse_header(text: str, source: str) -> TableHeader:
@@ -173,7 +189,7 @@ def _one_line(value: str) -> str:
     return " ".join("".join(char if char.isprintable() else " " for char in value).split())
 
 
-def _render_rows(robot: Robot, times: Array, q: Array) -> str:
+def _render_rows(robot: Robot, times: Array, q: Array, gaps: Mapping[int, str]) -> str:
     joints = robot.model.joints
     if q.shape != (len(times), len(joints)):
         raise ValueError(f"table of '{robot.name}': expected shape {(len(times), len(joints))}, got {q.shape}")
@@ -185,11 +201,12 @@ def _render_rows(robot: Robot, times: Array, q: Array) -> str:
             )
     names = ",".join(["time_s", *(f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in joints)])
     scaled = (np.rad2deg(q[:, i]) if joint.is_revolute else q[:, i] * MM_PER_M for i, joint in enumerate(joints))
-    written = (_plain_decimals(column) for column in (times, *(np.round(column, DECIMALS) for column in scaled)))
-    return "\n".join([names, *map(",".join, zip(*written, strict=True))]) + "\n"
+    written = (plain_decimals(column) for column in (times, *(np.round(column, DECIMALS) for column in scaled)))
+    rows = map(",".join, zip(*written, strict=True))
+    return "\n".join([names, *with_gap_lines(rows, gaps)]) + "\n"
 
 
-def _plain_decimals(column: Array) -> list[str]:
+def plain_decimals(column: Array) -> list[str]:
     """The shortest text of each number that reads back to it, without exponents and without -0."""
     if not np.all(np.abs(column) < MAX_NUMBER):
         raise ValueError("joint table: a number is not finite or absurdly large")
@@ -240,39 +257,49 @@ def _to_si(numbers: Array, is_angle: Flags) -> Array:
     return np.where(is_angle, np.deg2rad(numbers), numbers / MM_PER_M)
 
 
-def _parse_rows(rows: str, columns: list[str], *, source: str, first_line: int) -> Array:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Places:
+    """Where the rows of a table are, for messages."""
+
+    source: str
+    first_line: int
+    gaps: Mapping[int, str]
+
+    def of(self, row: int) -> str:
+        """File and line of a row."""
+        return f"{self.source}:{line_of_row(row, self.gaps, first_line=self.first_line)}"
+
+
+def _parse_rows(lines: list[str], columns: list[str], places: _Places) -> Array:
     """All numbers, shape (N, columns)."""
-    lines = rows.split("\n")[:-1]
     if len(lines) < 2:
-        raise InputError(f"{source}: expected at least two rows of numbers, got {len(lines)}")
+        raise InputError(f"{places.source}: expected at least two rows of numbers, got {len(lines)}")
     row = re.compile(_NUMBER + rf"(?:,{_NUMBER}){{{len(columns) - 1}}}")
     if not all(map(row.fullmatch, lines)):
-        raise _first_bad_row(lines, row, columns=columns, source=source, first_line=first_line)
+        raise _first_bad_row(lines, row, columns, places)
     numbers = np.array(list(map(float, ",".join(lines).split(","))))
     return numbers.reshape(len(lines), len(columns))
 
 
-def _first_bad_row(
-    lines: Iterable[str], row: re.Pattern[str], *, columns: list[str], source: str, first_line: int
-) -> InputError:
+def _first_bad_row(lines: Iterable[str], row: re.Pattern[str], columns: list[str], places: _Places) -> InputError:
     """The finding about the first row that is not a row of plain decimals."""
-    number, line = next((n, line) for n, line in enumerate(lines, start=first_line) if not row.fullmatch(line))
+    index, line = next((index, line) for index, line in enumerate(lines) if not row.fullmatch(line))
     fields = line.split(",")
     if len(fields) != len(columns):
-        return InputError(f"{source}:{number}: expected {len(columns)} numbers, got {len(fields)}")
+        return InputError(f"{places.of(index)}: expected {len(columns)} numbers, got {len(fields)}")
     name, field = next(pair for pair in zip(columns, fields, strict=True) if not _FIELD.fullmatch(pair[1]))
-    return InputError(f"{source}:{number}: {name}: expected a plain decimal number such as -12.5, got {field[:40]!r}")
+    return InputError(f"{places.of(index)}: {name}: expected a plain decimal number such as -12.5, got {field[:40]!r}")
 
 
-def _check_clock(times: Array, *, source: str, first_line: int) -> None:
+def _check_clock(times: Array, places: _Places) -> None:
     """Refuse a clock that does not start at zero or does not tick evenly."""
     if times[0] != 0.0:
-        raise InputError(f"{source}:{first_line}: time_s: expected the first row at 0, got {times[0]:g}")
+        raise InputError(f"{places.of(0)}: time_s: expected the first row at 0, got {times[0]:g}")
     even = np.median(np.diff(times)) * np.arange(len(times))
     late = np.flatnonzero((np.abs(times - even) > CLOCK_TOL) | (np.diff(times, prepend=-1.0) <= 0.0))
     if len(late):
         row = int(late[0])
         raise InputError(
-            f"{source}:{first_line + row}: time_s: expected evenly spaced, growing instants "
+            f"{places.of(row)}: time_s: expected evenly spaced, growing times "
             f"({even[row]:.6g} here), got {times[row]:.6g}"
         )

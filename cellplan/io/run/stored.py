@@ -1,4 +1,4 @@
-"""A run as it stands on disk: its folder read whole, each file as it was written, before anybody relies on it."""
+"""A run as it stands on disk: its folder read whole, each file as it was written, and compared with its manifest."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -11,16 +11,18 @@ from cellplan.errors import InputError, InvalidFileError
 from cellplan.io.input.files import digest, read_regular_file
 from cellplan.io.input.findings import shown
 from cellplan.io.input.json_reader import parse_json, required
+from cellplan.io.run.clock_table import parse_clock
 from cellplan.io.run.folder import MANIFEST
-from cellplan.io.run.joint_tables import MM_PER_M, parse_header, parse_table, table_body
+from cellplan.io.run.joint_tables import MM_PER_M, parse_header, parse_table, row_place
 from cellplan.io.run.manifest import SIZE_LIMIT, Manifest, file_findings, parse_manifest
 from cellplan.model.motion import JointTable
 
 REPORT_SCHEMA: Final = "cellplan.report/1"
-OF_EVERY_RUN: Final = ("cell.yaml", "report.html", "report.json")
+OF_EVERY_RUN: Final = ("report.html", "report.json")
 SERIES: Final = "series.json"
 CELL: Final = "cell.yaml"
-TABLE_LIMIT: Final = 500_000_000  # [bytes] of a table that is read only to say where it is spoilt
+CLOCK: Final = "clock"  # name of the table beside those of the robots: none of them may have it
+TABLE_LIMIT: Final = 500_000_000  # [bytes] of a table that is read only to find where it was changed
 SERIES_ROOM: Final = 1e-6  # [-] series have seven digits
 
 Record = dict[str, Any]
@@ -35,8 +37,9 @@ class StoredRun:
         digest: SHA-256 of the manifest, which stands for the whole run.
         manifest: What the run holds and rests on.
         record: Its ``report.json``.
-        records: The ``report.json`` of each run, by its place in the folder: empty for a single one, else the task.
-        tables: Text of the joint tables by place of the run and by robot.
+        records: The ``report.json`` of each phase, by its place in the folder: empty for a single one, else the task.
+        tables: Text of the joint tables, by robot.
+        clock: Text of the clock of the program; empty for a failed run.
     """
 
     folder: Path
@@ -44,7 +47,8 @@ class StoredRun:
     manifest: Manifest
     record: Record
     records: Mapping[str, Record]
-    tables: Mapping[str, Mapping[str, str]]
+    tables: Mapping[str, str]
+    clock: str
 
     def file(self, place: str, name: str) -> str:
         """Path of a file of one run as messages show it."""
@@ -84,15 +88,18 @@ def read_stored_run(folder: Path) -> StoredRun:
     manifest, whole = _manifest(folder)
     changed = file_findings(folder, manifest)
     if changed:
-        raise InvalidFileError([*changed.values(), *_spoilt_tables(folder, changed)])
+        raise InvalidFileError([*changed.values(), *_spoilt_tables(folder, changed, manifest)])
     record = _record(folder, "report.json", manifest)
     records = _records(folder, record, manifest)
     findings = list(_incomplete(folder, manifest, [*records]))
     findings += _contradictions(folder, manifest, record=record, records=records)
     if findings:
         raise InvalidFileError(findings)
-    tables = {place: dict(_tables(folder, manifest, place)) for place in records}
-    return StoredRun(folder=folder, digest=whole, manifest=manifest, record=record, records=records, tables=tables)
+    tables = dict(_tables(folder, manifest))
+    clock = tables.pop(CLOCK, "")
+    return StoredRun(
+        folder=folder, digest=whole, manifest=manifest, record=record, records=records, tables=tables, clock=clock
+    )
 
 
 def _manifest(folder: Path) -> tuple[Manifest, str]:
@@ -112,7 +119,7 @@ def _manifest(folder: Path) -> tuple[Manifest, str]:
 
 
 def _content(folder: Path, name: str, manifest: Manifest) -> bytes:
-    """Content of a file that must be the one the manifest speaks of, even if somebody writes meanwhile."""
+    """Content of a file that must be the one of the manifest, even if it is written to meanwhile."""
     file, stored = str(folder / name), manifest.files.get(name)
     if stored is None:
         raise InputError(f"{file}: missing; the run was written without it")
@@ -145,19 +152,18 @@ def _records(folder: Path, record: Record, manifest: Manifest) -> dict[str, Reco
 
 def _incomplete(folder: Path, manifest: Manifest, places: list[str]) -> Iterator[InputError]:
     """What a run must have and this one has not, and tables that do not go with the verdict."""
-    for place in {"", *places}:
-        for name in OF_EVERY_RUN:
-            if _at(place, name) not in manifest.files:
-                yield InputError(f"{folder / place / name}: missing; every run has it")
-    for place in places:
-        if _at(place, SERIES) not in manifest.files:
-            yield InputError(f"{folder / place / SERIES}: missing; every run has it")
-        if place and manifest.files.get(_at(place, CELL)) != manifest.files.get(CELL):
-            yield InputError(f"{folder / place / CELL}: differs from the cell of the other runs")
+    demanded = [CELL, *(_at(place, name) for place in dict.fromkeys(["", *places]) for name in OF_EVERY_RUN)]
+    demanded += [_at(place, SERIES) for place in places]
+    demanded += [f"tables/{CLOCK}.csv"] if manifest.status == "passed" else []
+    for name in demanded:
+        if name not in manifest.files:
+            yield InputError(f"{folder / name}: missing; every run has it")
     unfitting = "rejected" if manifest.status == "passed" else "tables"
     for name in manifest.files:
-        if _is_table(name, places, unfitting):
+        if _is_table(name, unfitting):
             yield InputError(f"{folder / name}: does not go with a run that has {manifest.status}")
+        elif PurePosixPath(name).suffix == ".csv" and not _is_table(name) and not _is_table(name, "rejected"):
+            yield InputError(f"{folder / name}: is not a table of the run; all of them lie in 'tables'")
 
 
 def _contradictions(
@@ -178,11 +184,11 @@ def _contradictions(
                 yield InputError(f"{folder / name}: {key}: contradicts {MANIFEST}; solve the cell again")
 
 
-def _tables(folder: Path, manifest: Manifest, place: str) -> Iterator[tuple[str, str]]:
-    """Robot name and text of each joint table of one run."""
+def _tables(folder: Path, manifest: Manifest) -> Iterator[tuple[str, str]]:
+    """Name and text of each table of the program."""
     for name in manifest.files:
         path = PurePosixPath(name)
-        if _is_table(name, [place]):
+        if _is_table(name):
             data = _content(folder, name, manifest)
             try:
                 yield path.stem, data.decode("utf-8")
@@ -192,14 +198,14 @@ def _tables(folder: Path, manifest: Manifest, place: str) -> Iterator[tuple[str,
                 raise InputError(f"{folder / name}:{line}: {text}") from None
 
 
-def _is_table(name: str, places: list[str], kind: str = "tables") -> bool:
-    """Whether a file of the manifest is a joint table of one of the runs."""
+def _is_table(name: str, folder: str = "tables") -> bool:
+    """Whether a file of the manifest is a table of the program."""
     path = PurePosixPath(name)
-    return path.suffix == ".csv" and str(path.parent) in {_at(place, kind) for place in places}
+    return path.suffix == ".csv" and str(path.parent) == folder
 
 
-def _spoilt_tables(folder: Path, changed: Iterable[str]) -> Iterator[InputError]:
-    """Where exactly a table that was changed can no longer be read."""
+def _spoilt_tables(folder: Path, changed: Iterable[str], manifest: Manifest) -> Iterator[InputError]:
+    """Where exactly a table that was changed can no longer be read, or is another one."""
     for name in changed:
         path = folder / name
         if path.suffix != ".csv" or path.is_symlink() or not path.is_file():
@@ -207,25 +213,39 @@ def _spoilt_tables(folder: Path, changed: Iterable[str]) -> Iterator[InputError]
         try:
             data = read_regular_file(path, file=str(path), limit=TABLE_LIMIT)
             text = data.decode("utf-8", "replace")
-            parse_header(text, str(path))
-            yield from _first_other_row(parse_table(text, str(path)), text, path)
+            if path.stem == CLOCK:
+                parse_clock(text, str(path))
+            else:
+                parse_header(text, str(path))
+                yield from _first_other_row(parse_table(text, str(path)), text, path, _series_of(folder, manifest))
         except InputError as error:
             yield error
-        except (AttributeError, KeyError, TypeError, ValueError):  # the report is spoilt too: nothing to compare with
+        except (AttributeError, KeyError, TypeError, ValueError):  # the report was changed too: nothing to compare with
             continue
 
 
-def _first_other_row(table: JointTable, text: str, path: Path) -> Iterator[InputError]:
-    """The first number that differs from the series of the run, as far as these can tell."""
-    series = path.parent.parent / SERIES
-    curves = parse_json(read_regular_file(series, file=str(series), limit=TABLE_LIMIT), str(series))
-    own = curves.get("joints", {}).get(table.robot, {})
-    if curves.get("every") != 1 or list(own) != list(table.joints):
+def _series_of(folder: Path, manifest: Manifest) -> list[Record]:
+    """The series of all phases in their order, as they are on disk now."""
+    report = parse_json(_as_it_is(folder / "report.json"), str(folder / "report.json"))
+    names = [_at(place, SERIES) for place in report.get("runs", {"": None})]
+    return [parse_json(_as_it_is(folder / name), str(folder / name)) for name in names if name in manifest.files]
+
+
+def _as_it_is(path: Path) -> bytes:
+    """Content of a file that may have been changed."""
+    return read_regular_file(path, file=str(path), limit=TABLE_LIMIT)
+
+
+def _first_other_row(table: JointTable, text: str, path: Path, series: list[Record]) -> Iterator[InputError]:
+    """The first number that differs from the series of the phases, where these have all rows."""
+    own = [curves.get("joints", {}).get(table.robot, {}) for curves in series]
+    if any(curves.get("every") != 1 for curves in series) or any(list(one) != list(table.joints) for one in own):
         return
     found = []
     for joint, q in zip(table.joints, table.q.T, strict=True):
-        is_turn = "position_deg" in own[joint]
-        said = np.array(own[joint]["position_deg" if is_turn else "position_mm"], dtype=np.float64)
+        is_turn = "position_deg" in own[0][joint]
+        key = "position_deg" if is_turn else "position_mm"
+        said = np.concatenate([np.array(one[joint][key], dtype=np.float64) for one in own])
         written = np.rad2deg(q) if is_turn else MM_PER_M * q
         if said.shape != written.shape:
             return
@@ -233,8 +253,8 @@ def _first_other_row(table: JointTable, text: str, path: Path) -> Iterator[Input
         found += [(int(other[0]), joint, float(said[other[0]]), float(written[other[0]]))] if len(other) else []
     if found:
         row, joint, said_there, got = min(found)
-        line = text.count("\n", 0, len(text) - len(table_body(text))) + 2 + row
-        yield InputError(f"{path}:{line}: {joint}: expected {said_there:.7g} as in {SERIES}, got {got:.10g}")
+        place = row_place(text, str(path), row)
+        yield InputError(f"{place}: {joint}: expected {said_there:.7g} as in {SERIES}, got {got:.10g}")
 
 
 def _at(place: str, name: str) -> str:

@@ -14,8 +14,9 @@ from cellplan.report.page.render import overview_page, report_page
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import clearance_sheets, motion_sheets
 from cellplan.report.plots.sheet import Sheet
-from cellplan.report.record.run import Provenance, Record
-from cellplan.report.record.write import run_record, summary_record
+from cellplan.report.record.common import Provenance, Record
+from cellplan.report.record.run import run_record
+from cellplan.report.record.summary import summary_record
 
 Drawings = Mapping[str, Mapping[str, bytes]]
 
@@ -60,7 +61,7 @@ def other_pictures(stored: StoredRun, drawn: Drawings) -> Iterator[str]:
 
 
 def _foreign_pieces(stored: StoredRun, place: str, drawn: Mapping[str, bytes]) -> Iterator[str]:
-    """Pictures of one run that hold something that cellplan does not draw; those missing ones are told elsewhere."""
+    """Pictures of one run that hold something that cellplan does not draw; missing ones are reported elsewhere."""
     for name, picture in stored.drawings(place).items():
         if name in drawn:
             foreign = foreign_piece(picture.decode("utf-8", "replace"), drawn[name].decode())
@@ -118,4 +119,4 @@ def _of_the_run(stored: StoredRun, place: str, found: Record) -> Record:
     """A record with the inputs of the run, and with what only its planner knew as its report has it."""
     said: Any = stored.records.get(place, stored.record).get("solver", {})
     solver = {key: said.get(key) if key in PLANNER_KEYS else value for key, value in found["solver"].items()}
-    return found | {"inputs": dict(stored.manifest.inputs), "solver": solver}
+    return {**found, "inputs": dict(stored.manifest.inputs), "solver": solver}

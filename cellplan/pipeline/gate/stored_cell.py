@@ -18,7 +18,7 @@ ANY: Final = "*"
 FOUND: Final = frozenset({"start", "start_deg", "home", "home_deg"})  # written ``auto`` where they were to be found
 METHOD: Final = ("solver", "method")
 INTEGRATOR: Final = ("solver", "integrator")
-ASKED: Final = (  # what the command line may have chosen instead of the cell file
+CHOSEN: Final = (  # what the command line may have set instead of the cell file
     ("motion", "mode"),
     ("motion", "duration_s"),
     METHOD,
@@ -52,7 +52,7 @@ def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequen
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
 
     Raises:
-        InputError: An input has changed or cannot be looked for; the resolved copy is not made from the cell file.
+        InputError: An input has changed or cannot be found; the resolved copy is not made from the cell file.
     """
     if cell is None:
         return _without_file(stored)
@@ -147,13 +147,13 @@ def _may_differ(path: KeyPath, old: object) -> bool:
     if len(path) == 3 and path[0] == "robots" and path[2] in FOUND:
         return old == "auto" or old is None
     return any(
-        len(path) == len(asked) and all(word in (ANY, part) for word, part in zip(asked, path, strict=True))
-        for asked in ASKED
+        len(path) == len(chosen) and all(key in (ANY, part) for key, part in zip(chosen, path, strict=True))
+        for chosen in CHOSEN
     )
 
 
 def _follows(path: KeyPath, original: Cell, chosen: Sequence[tuple[KeyPath, object, object]]) -> bool:
-    """Whether nobody chose a value: an integrator that the cell file leaves open goes with the method."""
+    """Whether a value follows from another one: an integrator that the cell file leaves open goes with the method."""
     is_open = path == INTEGRATOR and key_text(path) not in original.origin.lines
     return is_open and any(other == METHOD for other, _, _ in chosen)
 

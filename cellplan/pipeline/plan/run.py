@@ -38,7 +38,7 @@ def plan_run(cell: Cell, paths: Mapping[str, ClockedPath], phase: Phase, *, prog
         cell: The cell, every start posture filled in.
         paths: Path of every task on the common clock, by task name.
         phase: The phase.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         NoSolutionError: A tool lost its path.

@@ -1,6 +1,6 @@
 """Rehearse a cell with errors: solve it, execute the program on real cells, and correct it from measurements."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -11,12 +11,12 @@ from cellplan.checks.real_cell.iso9283 import path_figures, pose_figures
 from cellplan.checks.real_cell.true_errors import check_true_errors
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError
-from cellplan.geometry.transforms import Array
 from cellplan.io.run.joint_tables import parse_table
 from cellplan.kinematics.perturbed_cell import draw_errors, perturbed_cell
 from cellplan.model.cell import Cell
 from cellplan.model.cell_errors import CellErrors
 from cellplan.model.motion import Motion, Schedule
+from cellplan.model.phase import Phase
 from cellplan.model.progress import Progress, silent
 from cellplan.model.rehearsal import CorrectedProgram, IsoFigures, Rehearsal, RunRehearsal, Trial
 from cellplan.model.report import Check, Report, TaskAccuracy
@@ -63,9 +63,9 @@ def rehearse(
         cell: The cell, as ``load_cell`` gives it.
         errors: How real cells differ from it, as ``load_errors`` gives them.
         feedback: Correct from pass to pass.
-        in_pass: Also execute with the error measured at each instant fed back at the next.
+        in_pass: Also execute with the error measured at each sample fed back at the next.
         rounds: Most corrections from pass to pass.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The cell cannot be worked with, several robots hold the part, or there are more trials than can be
@@ -82,9 +82,10 @@ def rehearse(
     solution = solve(cell, progress=progress)
     trials = errors.trials if errors.is_random else 1
     _refuse_too_many(solution.runs, trials, errors)
-    wish = _Options(feedback=feedback, in_pass=in_pass, rounds=rounds)
+    options = _Options(feedback=feedback, in_pass=in_pass, rounds=rounds)
     runs = tuple(
-        _rehearse_run(solution.cell, run, errors, trials=trials, wish=wish, progress=progress) for run in solution.runs
+        _rehearse_run(solution.cell, run, errors, trials=trials, options=options, progress=progress)
+        for run in solution.runs
     )
     return Rehearsal(
         cell=solution.cell,
@@ -121,7 +122,7 @@ def _refuse_too_many(runs: Sequence[Run], trials: int, errors: CellErrors) -> No
 
 
 def _rehearse_run(
-    cell: Cell, run: Run, errors: CellErrors, *, trials: int, wish: _Options, progress: Progress
+    cell: Cell, run: Run, errors: CellErrors, *, trials: int, options: _Options, progress: Progress
 ) -> RunRehearsal:
     """Execute one run on every real cell."""
     job = Pass(
@@ -129,20 +130,20 @@ def _rehearse_run(
         schedule=run.schedule,
         moving=run.moving,
         judged_from=_judged_from(run.schedule),
-        q=_written(cell, run.program.tables),
+        q=np.concatenate([run.report.q[robot.name] for robot in cell.robots], axis=1),
     )
     made = []
     for number in range(trials):
         progress("rehearsing", number / trials)
-        made.append(_try(job, errors, number, wish=wish, progress=_within(progress, number, trials)))
-    corrected = _corrected(job, made[0], progress) if trials == 1 and wish.feedback else None
+        made.append(_try(job, errors, number, options=options, progress=_within(progress, number, trials)))
+    corrected = _corrected(job, made[0], run.phase, progress) if trials == 1 and options.feedback else None
     return RunRehearsal(
         name=run.name,
         times=run.schedule.times,
         judged_from=job.judged_from,
         trials=tuple(made),
         before=_iso_figures(job, [trial.before for trial in made]),
-        after=_iso_figures(job, [trial.final for trial in made]) if wish.feedback else None,
+        after=_iso_figures(job, [trial.final for trial in made]) if options.feedback else None,
         corrected=corrected,
     )
 
@@ -152,30 +153,30 @@ def _within(progress: Progress, number: int, trials: int) -> Progress:
     return lambda stage, share: progress(stage, (number + share) / trials)
 
 
-def _try(job: Pass, errors: CellErrors, number: int, *, wish: _Options, progress: Progress) -> Trial:
+def _try(job: Pass, errors: CellErrors, number: int, *, options: _Options, progress: Progress) -> Trial:
     """One real cell."""
     draw = draw_errors(job.cell, errors, number)
     real = RealCell(perturbed_cell(job.cell, draw))
     system = Measurement(position_noise=errors.position_noise, orientation_noise=errors.orientation_noise)
     before = real.accuracy(job.schedule, job.q)
     correction, in_pass = None, None
-    if wish.feedback:
+    if options.feedback:
         correction = correct_from_pass_to_pass(
             job,
             real,
             system,
             rng=np.random.default_rng([errors.seed, number, MEASUREMENT_STREAM]),
-            rounds=wish.rounds,
-            tell=lambda made: progress(f"correcting, round {made}", made / (wish.rounds + 1)),
+            rounds=options.rounds,
+            on_round=lambda made: progress(f"correcting, round {made}", made / (options.rounds + 1)),
         )
-    if wish.in_pass:
+    if options.in_pass:
         progress("correcting within the pass", 1.0)
         rng = np.random.default_rng([errors.seed, number, IN_PASS_STREAM])
         in_pass = correct_within_the_pass(job, real, system, rng=rng)
     return Trial(draw=draw, before=before, correction=correction, in_pass=in_pass)
 
 
-def _corrected(job: Pass, trial: Trial, progress: Progress) -> CorrectedProgram | None:
+def _corrected(job: Pass, trial: Trial, phase: Phase, progress: Progress) -> CorrectedProgram | None:
     """The corrected joint tables, verified on the written cell against the corrected references."""
     if trial.correction is None:
         return None
@@ -187,14 +188,8 @@ def _corrected(job: Pass, trial: Trial, progress: Progress) -> CorrectedProgram 
     )
     kept = trial.correction.best
     remark = f"corrected for measured errors, round {kept}: right for the measured cell, not for the written one"
-    return CorrectedProgram(program=with_verdict(cell, program, report, remark=remark), report=report)
-
-
-def _written(cell: Cell, tables: Mapping[str, str]) -> Array:
-    """Stacked joint positions as they stand in the tables, shape (N, nq)."""
-    return np.concatenate(
-        [parse_table(tables[robot.name], f"tables/{robot.name}.csv").q for robot in cell.robots], axis=1
-    )
+    alone = replace(phase, begin=0.0, end=float(references.times[-1]))  # a program of its own
+    return CorrectedProgram(program=with_verdict(cell, program, [alone], [report], remark=remark), report=report)
 
 
 def _judged_from(schedule: Schedule) -> dict[str, int]:

@@ -8,13 +8,13 @@ from cellplan.io.run.joint_tables import program_digest
 from cellplan.model.progress import Progress, silent
 from cellplan.model.rehearsal import Rehearsal
 from cellplan.pipeline.write_run import versions
-from cellplan.report.page.render import rehearsal_html
+from cellplan.report.page.render import rehearsal_page
 from cellplan.report.plots.rehearsal import draw_rehearsal
-from cellplan.report.record.rehearsal import rehearsal_json
-from cellplan.report.record.run import Provenance
+from cellplan.report.record.common import Provenance, Record, as_json
+from cellplan.report.record.rehearsal import rehearsal_record
 
 
-def write_rehearsal(rehearsal: Rehearsal, folder: Path, *, progress: Progress = silent) -> None:
+def write_rehearsal(rehearsal: Rehearsal, folder: Path, *, progress: Progress = silent) -> Record:
     """Write the folder of a rehearsal; it appears whole or not at all.
 
     It has ``rehearsal.json``, ``rehearsal.html``, ``plots/`` and ``cell.yaml``. Corrected tables stand under
@@ -23,7 +23,10 @@ def write_rehearsal(rehearsal: Rehearsal, folder: Path, *, progress: Progress = 
     Args:
         rehearsal: What was rehearsed.
         folder: The folder; an older rehearsal there is replaced.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
+
+    Returns:
+        The record in the ``rehearsal.json`` of the folder.
 
     Raises:
         InputError: The folder cannot be written, or holds something that cellplan did not write.
@@ -31,16 +34,18 @@ def write_rehearsal(rehearsal: Rehearsal, folder: Path, *, progress: Progress = 
     progress("writing the rehearsal", 1.0)
     provenance = Provenance(versions=versions(), digests=_digests(rehearsal))
     plots = draw_rehearsal(rehearsal)
+    record = rehearsal_record(rehearsal, provenance=provenance)
     with RunFolder(folder) as target:
         for name, picture in plots.items():
             target.write_bytes(f"plots/{name}", picture)
-        target.write_text("rehearsal.json", rehearsal_json(rehearsal, provenance=provenance))
-        target.write_text("rehearsal.html", rehearsal_html(rehearsal, provenance=provenance, plots=plots))
+        target.write_text("rehearsal.json", as_json(record))
+        target.write_text("rehearsal.html", rehearsal_page(record, cell=rehearsal.cell, plots=plots))
         target.write_text("cell.yaml", render_cell(rehearsal.cell))
         for run in rehearsal.runs if rehearsal.is_released else ():
             place = "tables" if run.name is None else f"tables/{run.name}"
             for robot, text in run.corrected.program.tables.items() if run.corrected else ():
                 target.write_text(f"{place}/{robot}.csv", text)
+    return record
 
 
 def _digests(rehearsal: Rehearsal) -> dict[str, str]:

@@ -73,7 +73,7 @@ def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
     for index, lock in enumerate(cell.motion.locked):
         if lock.since >= end:
             where = cell.origin.at(f"motion.locked_joints[{index}].from_s")
-            raise InputError(f"{where}: expected an instant before the end at {end:g} s, got {lock.since:g}")
+            raise InputError(f"{where}: expected a time before the end at {end:g} s, got {lock.since:g}")
     least = FEWEST_STEPS * cell.motion.step
     for path in paths:
         task, whole = path.task, path.end - path.start
@@ -148,6 +148,7 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
         length=path.toolpath.length,
         end=path.end,
         cycle_ends=_cycle_ends(task, path.toolpath, corners),
+        stops=tuple(corners.tolist()),
     )
 
 

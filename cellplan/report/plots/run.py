@@ -14,7 +14,7 @@ from cellplan.report.plots import palette
 from cellplan.report.plots.palette import INK, LIMIT
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.sheet import Sheet
-from cellplan.report.record.run import rounded_down
+from cellplan.report.record.common import rounded_down
 
 JOINT_COLUMNS = 3
 LEAST_IN_UNIT = 0.5  # [-] of an error in its unit: a larger unit is not chosen below
@@ -140,7 +140,7 @@ def _positions_sheet(robot: str, uses: list[JointUse], report: Report, colour: s
     """Joint positions between their limits; a dot where the margin is smallest."""
     sheet = _joint_sheet(f"{robot}: joint positions", len(uses), report.times)
     for i, use in enumerate(uses):
-        unit, scale = ("deg", math.degrees(1.0)) if use.is_revolute else ("mm", 1e3)
+        unit, scale = use.display_unit
         curve = _JointCurve(
             title=f"{use.joint}, in {unit}",
             note=_margin_note(use, scale),
@@ -166,9 +166,9 @@ def _velocities_sheet(robot: str, uses: list[JointUse], report: Report, colour: 
     """Joint speeds between their limits; a dot where the speed is largest."""
     sheet = _joint_sheet(f"{robot}: joint velocities", len(uses), report.times)
     for i, use in enumerate(uses):
-        unit, scale = ("deg/s", math.degrees(1.0)) if use.is_revolute else ("mm/s", 1e3)
+        unit, scale = use.display_unit
         curve = _JointCurve(
-            title=f"{use.joint}, in {unit}",
+            title=f"{use.joint}, in {unit}/s",
             note=f"peak {scale * use.peak_velocity:.1f} at {use.peak_velocity_at_s:.2f} s",
             times=0.5 * (report.times[1:] + report.times[:-1]),
             values=scale * report.qd[robot][:, i],

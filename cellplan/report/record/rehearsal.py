@@ -1,10 +1,10 @@
 """``rehearsal.json``: true errors on real cells in printed units, round by round and over all trials."""
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import PurePath
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from cellplan.model.cell import Cell
 from cellplan.model.cell_errors import Draw
 from cellplan.model.rehearsal import Correction, IsoFigures, PathFigures, PoseFigures, Rehearsal, RunRehearsal, Trial
 from cellplan.model.report import CAUTION, TaskAccuracy
+from cellplan.report.record.common import AXES, Provenance, Record, check_record, number
 from cellplan.report.record.idle import missing_moves
-from cellplan.report.record.run import AXES, Provenance, Record, check_record, number
 
 SCHEMA = "cellplan.rehearsal/1"
 ABC = ("a", "b", "c")
@@ -37,12 +37,6 @@ def in_pass(trial: Trial) -> tuple[TaskAccuracy, ...] | None:
 
 
 EXECUTIONS: Mapping[str, Pick] = {"before": before, "after": after, "in_pass": in_pass}
-
-
-def rehearsal_json(rehearsal: Rehearsal, *, provenance: Provenance) -> str:
-    """The record as text; values without a finite number are null."""
-    record = rehearsal_record(rehearsal, provenance=provenance)
-    return json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def rehearsal_record(rehearsal: Rehearsal, *, provenance: Provenance) -> Record:
@@ -76,7 +70,7 @@ def rehearsal_record(rehearsal: Rehearsal, *, provenance: Provenance) -> Record:
 
 def _tasks_record(cell: Cell, run: RunRehearsal) -> Record:
     """True errors of each task of a run over all trials, for each way of executing it."""
-    record: Record = {}
+    record: dict[str, Any] = {}
     for place, accuracy in enumerate(run.trials[0].before):
         task = cell.task(accuracy.task)
         record[task.name] = {
@@ -217,7 +211,7 @@ def _correction_record(correction: Correction) -> Record:
 
 def _draw_record(cell: Cell, draw: Draw) -> Record:
     """The errors of one trial as they were drawn: joints by name, poses as rows of a matrix with lengths in mm."""
-    robots: Record = {}
+    robots: dict[str, Any] = {}
     for robot in cell.robots:
         drawn = draw.robots[robot.name]
         scales = [math.degrees(1.0) if joint.is_revolute else 1e3 for joint in robot.model.joints]

@@ -1,18 +1,34 @@
-"""What the figures of a report rest on: how good link bodies are, and what was not stated and so not judged."""
+"""Assumptions behind the numbers of a report: accuracy of link bodies, payloads, values that were not stated."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import Annotated, TypedDict
 
 from cellplan.model.cell import Cell
 from cellplan.model.payload import LoadUse
-from cellplan.model.report import ClearanceClass, ClearanceMinimum
-from cellplan.report.record.payload import loads_record, unjudged_loads
-from cellplan.report.record.run import Record, number
-
-Accuracies = Sequence[float | None]  # of the two bodies of a pair in [mm]; None where it is not stated
+from cellplan.model.units import MM
+from cellplan.report.record.common import Number, number
+from cellplan.report.record.payload import LoadRecord, loads_record, unjudged_loads
 
 
-def rests_on_record(cell: Cell, loads: Sequence[LoadUse]) -> Record:
-    """What the figures rest on, and one line on each thing that was not stated."""
+class BodiesRecord(TypedDict):
+    """Accuracy of the link bodies of a robot."""
+
+    accuracy_mm: Annotated[Number, "largest distance by which the real arm exceeds its link bodies"]
+    source: Annotated[str, "source of that value"]
+    own_accuracy_mm: Annotated[dict[str, Number], "by body: values of bodies that differ"]
+
+
+class RestsOnRecord(TypedDict):
+    """Assumptions behind the numbers."""
+
+    bodies: Annotated[dict[str, BodiesRecord], "by robot: accuracy of its link bodies"]
+    body_accuracy: Annotated[str, "`report`, or `add`: the accuracy of both bodies is added to the required clearance"]
+    payload: Annotated[dict[str, LoadRecord], "by robot: load and rated load"]
+    lines: Annotated[list[str], "one line on each value that was not stated and therefore not judged"]
+
+
+def rests_on_record(cell: Cell, loads: Sequence[LoadUse]) -> RestsOnRecord:
+    """Assumptions, and one line on each value that was not stated."""
     return {
         "bodies": bodies_record(cell),
         "body_accuracy": "add" if cell.checks.adds_accuracy else "report",
@@ -21,16 +37,16 @@ def rests_on_record(cell: Cell, loads: Sequence[LoadUse]) -> Record:
     }
 
 
-def bodies_record(cell: Cell) -> Record:
-    """How good the link bodies of each robot are and who says so; nothing for a robot without bodies."""
-    record: Record = {}
+def bodies_record(cell: Cell) -> dict[str, BodiesRecord]:
+    """Accuracy of the link bodies of each robot and its source; nothing for a robot without bodies."""
+    record: dict[str, BodiesRecord] = {}
     for robot in cell.robots:
         stated, own = robot.model.body_accuracy, [body for body in robot.model.bodies if body.accuracy is not None]
         if robot.model.bodies:
             record[robot.name] = {
-                "accuracy_mm": None if stated is None else number(1e3 * stated.distance),
+                "accuracy_mm": None if stated is None else number(MM * stated.distance),
                 "source": "not stated" if stated is None else stated.source,
-                "own_accuracy_mm": {body.name: number(1e3 * (body.accuracy or 0.0)) for body in own},
+                "own_accuracy_mm": {body.name: number(MM * (body.accuracy or 0.0)) for body in own},
             }
     return record
 
@@ -40,35 +56,3 @@ def unstated_bodies(cell: Cell) -> list[str]:
     models = {robot.name: robot.model for robot in cell.robots}
     unknown = [name for name, model in models.items() if any(model.accuracy_of(body) is None for body in model.bodies)]
     return [f"accuracy of bodies of {', '.join(unknown)} not stated"] if unknown else []
-
-
-def with_accuracies(clearance: Record, minima: Mapping[ClearanceClass, ClearanceMinimum]) -> Record:
-    """The record of the smallest distances, each with how good the two bodies are."""
-    known = {minimum.pair: minimum.accuracies for minimum in minima.values() if minimum.pair is not None}
-    return {kind: {**entry, "accuracies_mm": _accuracies(entry, known)} for kind, entry in clearance.items()}
-
-
-def _accuracies(
-    entry: Record, known: Mapping[tuple[str, str], tuple[float | None, float | None] | None]
-) -> list[float | None] | None:
-    """How good the bodies of a smallest distance are, in [mm]."""
-    found = known.get(tuple(entry["pair"])) if entry["pair"] else None
-    return None if found is None else [None if value is None else number(1e3 * value) for value in found]
-
-
-def good_to(pair: Sequence[str], accuracies: Accuracies | None) -> str:
-    """How good the two bodies of a pair are, in words; empty when nothing is known of them.
-
-    A body that is taken as exact is passed over where the other is not.
-    """
-    if accuracies is None:
-        return ""
-    unknown = [name for name, value in zip(pair, accuracies, strict=True) if value is None]
-    if unknown:
-        return f"accuracy of {' and '.join(unknown)} not stated"
-    stated = [(name, value) for name, value in zip(pair, accuracies, strict=True) if value]
-    if not stated:
-        return "between bodies taken as exact"
-    if len(stated) == len(accuracies) and len(set(accuracies)) == 1:
-        return f"between bodies good to {stated[0][1]:g} mm"
-    return f"between bodies good to {' and '.join(f'{value:g} mm ({name})' for name, value in stated)}"

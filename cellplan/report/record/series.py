@@ -10,7 +10,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.motion import Motion
 from cellplan.model.report import JointUse, Report
-from cellplan.report.record.run import SIGNIFICANT
+from cellplan.report.record.common import SIGNIFICANT
 
 SCHEMA: Final = "cellplan.series/1"
 MAX_STEPS: Final = 50_000  # a longer motion is thinned

@@ -80,7 +80,7 @@ def _closure_record(grasp: Grasp) -> dict[str, Any]:
 
 def _matrix_record(cell: Cell, matrix: MatrixShape) -> dict[str, Any]:
     """Blocks, rank and redundancy of one run."""
-    from cellplan.report.record.run import number
+    from cellplan.report.record.common import number
 
     values = matrix.singular_values
     robots = [robot.name for robot in cell.robots]

@@ -1,9 +1,8 @@
-"""Accelerations on the screen: the joint nearest to its limit, jerk, tool and part, and what was not judged."""
+"""Accelerations as text: the joint closest to its limit, jerk, tool and part, and what was not judged."""
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator
 
-Record = dict[str, Any]
+from cellplan.report.record.common import Record
 
 
 def acceleration_lines(record: Record) -> Iterator[str]:
@@ -17,7 +16,7 @@ def acceleration_lines(record: Record) -> Iterator[str]:
 
 
 def _joint_lines(joints: Record) -> Iterator[str]:
-    """The joint that takes the largest share of its limit, or else the one that accelerates most; the largest jerk."""
+    """The joint with the largest fraction of its limit, or else the largest acceleration; the largest jerk."""
     uses = [(f"{robot} {name}", use) for robot, named in joints.items() for name, use in named.items()]
     known = [each for each in uses if each[1].get("peak_acceleration") is not None]
     limited = [each for each in known if each[1]["acceleration_ratio"] is not None]
@@ -37,19 +36,19 @@ def _joint_lines(joints: Record) -> Iterator[str]:
 
 
 def _world_lines(found: Record) -> Iterator[str]:
-    """Tool and part in the world."""
-    words = []
+    """The tool tip and the part with the largest acceleration."""
+    texts = []
     if found["tools"]:
         robot, tool = max(found["tools"].items(), key=lambda it: it[1]["peak_acceleration_m_s2"])
-        words.append(f"of a tool tip {_figure(tool)} ({robot})")
+        texts.append(f"of a tool tip {_figure(tool)} ({robot})")
     if found["part"] is not None:
-        words.append(f"of the part {_figure(found['part']['corner'])}")
-    if words:
-        yield f"  largest acceleration {', '.join(words)}"
+        texts.append(f"of the part {_figure(found['part']['corner'])}")
+    if texts:
+        yield f"  largest acceleration {', '.join(texts)}"
 
 
-def _not_judged_lines(entries: list[Record]) -> Iterator[str]:
-    """One line for each kind of thing that was left out, with its robots and the reason."""
+def _not_judged_lines(entries: Iterable[Record]) -> Iterator[str]:
+    """One line for each quantity that was not judged, with its robots and the reason."""
     robots: dict[tuple[str, str], list[str]] = {}
     for left in entries:
         robots.setdefault((left["what"], left["reason"]), []).extend([left["robot"]] if left["robot"] else [])

@@ -1,29 +1,22 @@
-"""What a rehearsal shows on the screen: verdict, true errors before and after, convergence, and where the report is."""
+"""A rehearsal as text: verdict, true errors before and after correction, convergence, location of the report."""
 
-import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Final
 
-Record = dict[str, Any]
+from cellplan.report.record.common import Record
 
-TITLES = {"before": "as solved", "after": "corrected", "in_pass": "corrected within the pass"}
-OUTCOMES = {
+TITLES: Final = {"before": "as solved", "after": "corrected", "in_pass": "corrected within the pass"}
+OUTCOMES: Final = {
     "converged": "converged",
-    "stalled": "does not converge: the error falls no more",
+    "stalled": "does not converge: the error stopped decreasing",
     "diverged": "does not converge: the error grew, or the corrected references cannot be followed",
-    "unfinished": "not converged yet: allow more --rounds",
+    "unfinished": "has not converged: allow more --rounds",
 }
 
 
-def read_record(folder: Path) -> Record:
-    """The rehearsal as it stands on disk."""
-    record: Record = json.loads((folder / "rehearsal.json").read_text(encoding="utf-8"))
-    return record
-
-
 def summary_lines(record: Record, folder: Path) -> list[str]:
-    """Lines for people about one rehearsal."""
+    """All lines about one rehearsal."""
     cells = "one real cell" if record["trials"] == 1 else f"{record['trials']} real cells"
     return [
         f"{record['cell']}: {record['status']}",
@@ -61,16 +54,16 @@ def _repeatability_lines(tasks: Record) -> Iterator[str]:
                 yield f"  task {name}, {TITLES[key]}: AT_p {accuracy:.2g} mm, RT_p {spread:.2g} mm"
 
 
-def _round_lines(runs: list[Record]) -> Iterator[str]:
-    """How correcting ended: the convergence table of a single cell, the count of each outcome of several."""
+def _round_lines(runs: Iterable[Record]) -> Iterator[str]:
+    """Outcome of the correction: the convergence table of a single cell, or the count of each outcome."""
     for run in runs:
         where = f"{run['name']}: " if run["name"] else ""
         corrections = [trial["correction"] for trial in run["trials"] if trial["correction"] is not None]
-        for outcome, words in OUTCOMES.items():
+        for outcome, text in OUTCOMES.items():
             count = sum(correction["outcome"] == outcome for correction in corrections)
             if count:
                 share = f" in {count} of {len(corrections)} trials" if len(corrections) > 1 else ""
-                yield f"  {where}feedback {words}{share}"
+                yield f"  {where}feedback {text}{share}"
         if len(corrections) == 1:
             for made in corrections[0]["rounds"]:
                 yield f"    round {made['round']}: largest true error {made['share_of_tolerance']:.3g} of its tolerance"

@@ -1,41 +1,42 @@
-"""What a run shows on the screen: verdict, cycle time, worst figures, failed checks, and where the report is."""
+"""A run as text: verdict, cycle time, worst values, failed checks, and location of the report."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
-from cellplan.report.record.clock import clock_words
-from cellplan.report.record.left_out import grips_told, told_left_out
-from cellplan.report.record.method import USUAL_METHOD
-from cellplan.report.record.open_surfaces import open_surface_lines
-from cellplan.report.record.rests_on import good_to
+from cellplan.report.record.common import Record
 from cellplan.report.text.accelerations import acceleration_lines
-
-Record = dict[str, Any]
+from cellplan.report.text.method import DEFAULT_METHOD
+from cellplan.report.text.notes import (
+    accuracy_note,
+    clock_note,
+    grip_notes,
+    left_out_notes,
+    open_surface_notes,
+)
 
 
 def read_record(folder: Path) -> Record:
-    """The report of a run as it stands on disk, without its series, which are for files and not for screens."""
+    """The report of a run on disk."""
     record: Record = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-    return {name: value for name, value in record.items() if name != "series"}
+    return record
 
 
 def summary_lines(record: Record, folder: Path) -> list[str]:
-    """Lines for people about one run folder."""
+    """All lines about one run folder."""
     return [
         f"{record['cell']}: {record['status']}",
         *figure_lines(record),
         *_failure_lines(record["checks"]),
         *(f"  {line}" for line in record.get("not_in_program", [])),
-        *_place_lines(record, folder),
+        *_place_lines(folder),
     ]
 
 
 def figure_lines(record: Record) -> list[str]:
-    """The worst figures of a run."""
+    """The worst values of a run."""
     return [
-        f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_clock_word(record)}{_method_word(record['solver'])}",
+        f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_clock_text(record)}{_method_text(record['solver'])}",
         *_task_lines(record["tasks"]),
         *_closure_lines(record.get("closure", {})),
         *_margin_lines(record["joints"]),
@@ -45,8 +46,8 @@ def figure_lines(record: Record) -> list[str]:
         *_clearance_lines(record["clearance"]["whole"]),
         *_slack_lines(record["solver"]["slack"]),
         *_fallback_lines(record["solver"]),
-        *(f"  note: {line}" for _, line in open_surface_lines(record.get("open_surfaces", []))),
-        *(f"  grip: {line}" for line in grips_told(record)),
+        *(f"  note: {line}" for _, line in open_surface_notes(record.get("open_surfaces", []))),
+        *(f"  grip: {line}" for line in grip_notes(record)),
         *(f"  {line}" for line in record.get("rests_on", {}).get("lines", [])),
         *left_out_lines(record),
     ]
@@ -54,18 +55,18 @@ def figure_lines(record: Record) -> list[str]:
 
 def left_out_lines(record: Record) -> list[str]:
     """One line for each kind of pairs that were not judged in full."""
-    return [f"  {line}" for line in told_left_out(record)]
+    return [f"  {line}" for line in left_out_notes(record)]
 
 
-def _clock_word(record: Record) -> str:
-    """What decides the length of the clock, unless the cell file states it."""
-    words = clock_words(record.get("clock_from", ""))
-    return f" ({words})" if words else ""
+def _clock_text(record: Record) -> str:
+    """What determines the duration, unless the cell file states it."""
+    note = clock_note(record)
+    return f" ({note})" if note else ""
 
 
-def _method_word(solver: Record) -> str:
-    """The method, unless it is the usual one."""
-    return "" if solver["method"] == USUAL_METHOD else f", method {solver['method']}"
+def _method_text(solver: Record) -> str:
+    """The method, unless it is the default one."""
+    return "" if solver["method"] == DEFAULT_METHOD else f", method {solver['method']}"
 
 
 def _task_lines(tasks: Record) -> Iterator[str]:
@@ -81,14 +82,14 @@ def _closure_lines(closures: Record) -> Iterator[str]:
 
 
 def _largest(errors: Record, name: str, unit: str) -> float | None:
-    """The larger one of an error at the rows and between them."""
+    """The larger of an error at the rows and between them."""
     at_rows: float | None = errors[f"max_{name}_{unit}"]
     between: float | None = errors.get(f"max_{name}_between_rows_{unit}")
     return at_rows if at_rows is None or between is None else max(at_rows, between)
 
 
 def _margin_lines(joints: Record) -> Iterator[str]:
-    """The tightest joint of each kind: degrees and millimetres do not compare."""
+    """The joint with the smallest margin, in degrees and in millimetres."""
     for unit in ("deg", "mm"):
         bounded = [
             (use["margin"], f"{robot} {joint}", use["margin_at_s"])
@@ -98,7 +99,7 @@ def _margin_lines(joints: Record) -> Iterator[str]:
         ]
         if bounded:
             margin, joint, at_s = min(bounded)
-            yield f"  smallest joint margin {margin:.4g} {unit}: {joint}{_instant(at_s)}"
+            yield f"  smallest joint margin {margin:.4g} {unit}: {joint}{_time(at_s)}"
 
 
 def _speed_lines(joints: Record) -> Iterator[str]:
@@ -110,11 +111,11 @@ def _speed_lines(joints: Record) -> Iterator[str]:
     ]
     if driven:
         ratio, joint, at_s = max(driven)
-        yield f"  largest joint speed {100.0 * ratio:.4g} % of its limit: {joint}{_instant(at_s)}"
+        yield f"  largest joint speed {100.0 * ratio:.4g} % of its limit: {joint}{_time(at_s)}"
 
 
 def _drift_lines(repeatability: Record) -> Iterator[str]:
-    """The joint that is farthest from where a cycle began; nothing when all come back."""
+    """The largest drift of a joint over a cycle; nothing if all joints return."""
     for name, found in repeatability.items():
         if found["closes"]:
             continue
@@ -133,45 +134,43 @@ def _clearance_lines(whole: Record) -> Iterator[str]:
         proof = "certified" if whole["certified"] else "not certified"
         least = "" if whole.get("exact", True) else "at least "
         figure = f"{least}{whole['minimum_mm']:.4g} mm, {proof}"
-        rests_on = good_to(whole["pair"], whole.get("accuracies_mm"))
-        where = f"{first} - {second}{_instant(whole['at_s'])}{f', {rests_on}' if rests_on else ''}"
+        rests_on = accuracy_note(whole["pair"], whole.get("accuracies_mm"))
+        where = f"{first} - {second}{_time(whole['at_s'])}{f', {rests_on}' if rests_on else ''}"
         yield f"  smallest clearance {figure}: {where}"
 
 
 def _slack_lines(slack: Record | None) -> Iterator[str]:
-    """By how much a method left the tasks on purpose."""
+    """The largest task slack."""
     if slack and slack["max"]:
-        yield f"  tasks left on purpose by at most {slack['max']:.2g} ({slack['unit']}){_instant(slack['max_at_s'])}"
+        yield f"  task slack up to {slack['max']:.2g} ({slack['unit']}){_time(slack['max_at_s'])}"
 
 
 def _fallback_lines(solver: Record) -> Iterator[str]:
-    """Where the accurate mode found no way on."""
+    """The time at which collocation failed."""
     resolution = solver.get("resolution")
     if resolution and solver["integrator"] == "accurate" and resolution["euler_from_s"] is not None:
         lost = resolution.get("lost")
         reason = f"; {lost['message']}" if lost else ""
-        yield f"  no accurate way on: Euler steps from {resolution['euler_from_s']:.3f} s{reason}"
+        yield f"  collocation failed at {resolution['euler_from_s']:.3f} s; continued with Euler steps{reason}"
 
 
-def _failure_lines(checks: list[Record]) -> Iterator[str]:
+def _failure_lines(checks: Iterable[Record]) -> Iterator[str]:
     for check in checks:
         if not check["passed"]:
             run = f"{check['run']}: " if check.get("run") else ""
             yield f"  FAILED {run}{check['message']}"
 
 
-def _place_lines(record: Record, folder: Path) -> Iterator[str]:
+def _place_lines(folder: Path) -> Iterator[str]:
     yield f"report: {folder / 'report.html'}"
-    runs = list(record.get("runs", {}))
-    for place in [folder / run for run in runs] or [folder]:
-        for tables in (place / "tables", place / "rejected"):
-            if tables.is_dir():
-                yield f"tables: {tables}"
+    for tables in (folder / "tables", folder / "rejected"):
+        if tables.is_dir():
+            yield f"tables: {tables}"
 
 
 def _short(value: float | None) -> str:
     return "unknown" if value is None else f"{value:.2g}"
 
 
-def _instant(at_s: float | None) -> str:
+def _time(at_s: float | None) -> str:
     return "" if at_s is None else f" at {at_s:.3f} s"

@@ -12,7 +12,8 @@ from cellplan.geometry.transforms import pose
 from cellplan.model.cell import Cell, CheckSettings
 from cellplan.model.report import Check, ClearanceClass, ClearanceReport
 from cellplan.model.robot import BodyAccuracy
-from cellplan.report.record.rests_on import good_to, unstated_bodies
+from cellplan.report.record.rests_on import unstated_bodies
+from cellplan.report.text.notes import accuracy_note
 from cellplan.scene.scene import Scene
 
 GOOD = BodyAccuracy(distance=0.030, source="test")
@@ -89,4 +90,4 @@ def test_bodies_of_which_nobody_says_how_good_they_are_are_named_in_one_line() -
     ],
 )
 def test_the_verdict_says_how_good_the_two_bodies_are(accuracies, words: str) -> None:
-    assert good_to(("a/arm", "b/arm"), accuracies) == words
+    assert accuracy_note(("a/arm", "b/arm"), accuracies) == words

@@ -163,7 +163,7 @@ def test_what_is_not_stated_is_one_line() -> None:
     lines = unjudged_loads([use_of(cell), use_of(cell, name="b")])
 
     assert lines == [
-        "payload not judged: mass of the part not stated (a); what the robot may carry not stated (a); "
+        "payload not judged: mass of the part not stated (a); rated load of the robot not stated (a); "
         "mass of the tool not stated (b)"
     ]
 

@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 from cellplan.model.cell import Cell
-from cellplan.report.record.open_surfaces import open_surface_lines, open_surfaces_record
+from cellplan.report.record.open_surfaces import open_surfaces_record
+from cellplan.report.text.notes import open_surface_notes
 
 Load = Callable[..., Cell]
 Refuse = Callable[..., list[str]]
@@ -52,7 +53,7 @@ def test_an_open_mesh_is_refused_unless_it_is_a_surface(
     cell = load((old, new.format(", open: true")))
 
     (found,) = open_surfaces_record(cell)
-    (line,) = open_surface_lines([found])
+    (line,) = open_surface_notes([found])
     assert (found["open_edges"], found["has_inside"]) == (3, False)
     assert line[1].endswith("has 3 open edges: touching it counts, being inside it does not")
 
@@ -70,7 +71,7 @@ def test_open_links_are_told_robot_by_robot() -> None:
         for k in range(5)
     ]
 
-    assert list(open_surface_lines(links)) == [
+    assert list(open_surface_notes(links)) == [
         (
             "robots.arm.model",
             "5 meshes of links are open (arm/link_0, arm/link_1, arm/link_2, …): what they wind round by more than one "

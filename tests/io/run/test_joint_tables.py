@@ -207,7 +207,7 @@ def test_joint_name_that_would_break_the_table_is_refused(name: str) -> None:
         ("-20.25", "", "t.csv:11: a2_deg: expected a plain decimal number such as -12.5, got ''"),
         ("-20.25", " 3.0", "t.csv:11: a2_deg: expected a plain decimal number such as -12.5, got ' 3.0'"),
         ("-20.25", "1.0,2.0", "t.csv:11: expected 3 numbers, got 4"),
-        ("0.002,", "0.001,", "t.csv:12: time_s: expected evenly spaced, growing instants (0.002 here), got 0.001"),
+        ("0.002,", "0.001,", "t.csv:12: time_s: expected evenly spaced, growing times (0.002 here), got 0.001"),
         ("\n0.0,", "\n0.5,", "t.csv:10: time_s: expected the first row at 0, got 0.5"),
         ("6.0,1.0\n", "6.0,1", "t.csv: expected the last row to end with a line break; the file is cut off"),
     ],

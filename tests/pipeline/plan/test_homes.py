@@ -10,6 +10,7 @@ import pytest
 import yaml
 from builders.run_edits import Copy, seal
 from builders.scene_builders import body, fixed_part, make_cell, placed, schedule, slide_model, thing, work
+from builders.two_phases import PAIR
 
 from cellplan import Solution, load_cell, open_gate, solve, write_run
 from cellplan.errors import HomeNotFoundError, HomeOutsideLimitsError, NoSolutionError, NotVerifiedError
@@ -133,30 +134,6 @@ def test_a_home_that_is_given_is_not_searched() -> None:
     assert homes(in_turns(slider("saw", axis=(0.0, 1.0, 0.0)), pen), "saw", {"saw": np.linspace(-1, 1, 9)}) == {}
 
 
-PAIR = """\
-cellplan: 1
-name: in-turns
-robots:
-  left:
-    model: planar_3r
-    tool: {xyz_mm: [0, 0, 60], geometry: {cylinder: {radius_mm: 5, length_mm: 60}}}
-    start_deg: [57.681180960824, -53.90672769931, -51.879785265709]
-  right:
-    model: planar_3r
-    base: {xyz_mm: [1400, 0, 0], rpy_deg: [0, 0, 180]}
-    tool: {xyz_mm: [0, 0, 60], geometry: {cylinder: {radius_mm: 5, length_mm: 60}}}
-    start_deg: [-75.819668859148, 75.876425761142, 67.140200116841]
-part:
-  geometry: {box: {size_mm: [300, 300, 10]}}
-  at: {xyz_mm: [700, 300, -85]}
-tasks:
-  first: {robot: left, path: {circle: {radius_mm: 100, plane: xy}, project: +z}, tool_axis: normal, axes: [x, y]}
-  second: {robot: right, path: {circle: {radius_mm: 100, plane: xy}, project: +z}, tool_axis: normal, axes: [x, y]}
-motion: {mode: pairwise, duration_s: 2, step_s: 0.01}
-checks: {clearance_mm: 5}
-"""
-
-
 @pytest.fixture(scope="module")
 def pair(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Solution]:
     """Two arms that work on one plate in turns, the turn of the first one solved; its run is written beside it."""
@@ -185,7 +162,7 @@ def test_rows_of_idle_robots_are_constant_and_the_resolved_cell_says_where(pair:
     assert [remark for remark in verified.remarks if "idle" in remark] == [
         "first: idle in this run: right stands at its home; moves to and from home are not part of the program",
     ]
-    table = (folder / "first" / "tables" / "right.csv").read_text(encoding="utf-8")
+    table = (folder / "tables" / "right.csv").read_text(encoding="utf-8")
     assert "# remark: idle in this run: right stands at its home; moves to and from home are not" in table
 
 
@@ -213,11 +190,10 @@ def test_the_home_of_the_copy_has_to_be_that_of_the_tables(pair: tuple[Path, Sol
     file, solution = pair
     shutil.copytree(file.parent / "run", tmp_path / "run")
     home = np.degrees(solution.cell.robot("right").home)
-    for place in (".", "first"):
-        copy = tmp_path / "run" / place / "cell.yaml"
-        text = copy.read_text(encoding="utf-8")
-        assert f"{home[2]:.9f}"[:8] in text
-        copy.write_text(text.replace(f"{home[0]:.6f}"[:7], f"{home[0] + 1.0:.6f}"[:7], 1), encoding="utf-8")
+    copy = tmp_path / "run" / "cell.yaml"
+    text = copy.read_text(encoding="utf-8")
+    assert f"{home[2]:.9f}"[:8] in text
+    copy.write_text(text.replace(f"{home[0]:.6f}"[:7], f"{home[0] + 1.0:.6f}"[:7], 1), encoding="utf-8")
     seal(Copy(cell=file, run=tmp_path / "run", other=tmp_path))
 
     with pytest.raises(NotVerifiedError, match=r"idle robot right: joint A is .* from its home at 0.000 s"):

@@ -11,8 +11,10 @@ import pytest
 from cellplan.model.cell import LockedJoint
 from cellplan.model.report import Check, JointDrift, Repeatability
 from cellplan.report.page import render
-from cellplan.report.page.render import overview_html, report_html
+from cellplan.report.page.render import overview_page, report_page
 from cellplan.report.plots.run import draw_plots
+from cellplan.report.record.run import run_record
+from cellplan.report.record.summary import summary_record
 
 HOSTILE = "\"><img src=x onerror='alert(1)'><script>alert(2)</script>{{ 7*7 }}&amp;"
 VOID = {"meta", "br", "img", "link", "hr", "input"}
@@ -63,12 +65,14 @@ class Page(HTMLParser):
 
 def page_of(run: Any, plots: dict[str, bytes] | None = None) -> str:
     drawn = draw_plots(run.report, cell=run.cell) if plots is None else plots
-    return report_html(run.report, cell=run.cell, provenance=run.provenance, plots=drawn)
+    record = run_record(run.report, cell=run.cell, provenance=run.provenance)
+    return report_page(record, run.report.checks, cell=run.cell, plots=drawn)
 
 
 def overview_of(runs: Any) -> str:
     first = runs["circle"]
-    return overview_html({name: run.report for name, run in runs.items()}, cell=first.cell, provenance=first.provenance)
+    reports = {name: run.report for name, run in runs.items()}
+    return overview_page(summary_record(reports, cell=first.cell, provenance=first.provenance), cell=first.cell)
 
 
 @pytest.fixture(scope="module")
@@ -239,7 +243,8 @@ def test_a_failed_joint_is_told_in_plain_words(passed_run: Any) -> None:
     locked = (LockedJoint(robot="kuka", joint="B2", since=2.0),)
     cell = replace(passed_run.cell, motion=replace(passed_run.cell.motion, locked=locked))
 
-    page = report_html(passed_run.report, cell=cell, provenance=passed_run.provenance, plots={})
+    record = run_record(passed_run.report, cell=cell, provenance=passed_run.provenance)
+    page = report_page(record, passed_run.report.checks, cell=cell, plots={})
 
     assert "Joint kuka/B2 fails at 2.000 s and stays at " in page
     assert "the other joints take over, and every task is kept." in page
@@ -248,7 +253,7 @@ def test_a_failed_joint_is_told_in_plain_words(passed_run: Any) -> None:
 def test_with_many_robots_pictures_are_folded_and_each_robot_has_a_line(
     passed_run: Any, failed_run: Any, rail_run: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(render, "MANY", 3)
+    monkeypatch.setattr(render, "MAX_UNFOLDED", 3)
     for run in (passed_run, failed_run, rail_run):
         page = Page(page_of(run))
         assert page.wrong == []
@@ -266,7 +271,7 @@ def test_with_few_robots_nothing_is_folded(passed_run: Any) -> None:
 
 
 def test_the_line_of_a_robot_names_its_worst_joints(failed_run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(render, "MANY", 3)
+    monkeypatch.setattr(render, "MAX_UNFOLDED", 3)
     text = Page(page_of(failed_run, plots={})).text
     overview = text[text.index("The joint of each robot") :]
 

@@ -1,5 +1,6 @@
 """The reference page of ``report.json`` names every key that a report has."""
 
+import importlib.util
 import json
 import re
 from pathlib import Path
@@ -10,7 +11,9 @@ import pytest
 
 from cellplan.model.motion import Motion, Resolution
 from cellplan.model.solver import Integrator
-from cellplan.report.record.write import report_json, summary_json
+from cellplan.report.record.common import as_json
+from cellplan.report.record.run import run_record
+from cellplan.report.record.summary import summary_record
 
 OWN_NAMES = {"inputs", "digests", "versions"}  # the keys below these are names of files and packages
 
@@ -31,9 +34,9 @@ def reports(rail_run: Any, pairwise_runs: Any) -> list[Any]:
     q = np.zeros((steps + 1, 1))
     made = Resolution(integrator=Integrator.ACCURATE, panels=2, nodes=18, sweeps=4, solves=72, error_between=1e-9)
     motion = Motion(times=rail_run.report.times, q=q, iterations=np.ones(steps), slack=np.zeros(steps), resolution=made)
-    one = report_json(rail_run.report, cell=rail_run.cell, provenance=rail_run.provenance, motion=motion)
+    one = as_json(run_record(rail_run.report, cell=rail_run.cell, provenance=rail_run.provenance, motion=motion))
     runs = {name: run.report for name, run in pairwise_runs.items()}
-    several = summary_json(runs, cell=rail_run.cell, provenance=rail_run.provenance)
+    several = as_json(summary_record(runs, cell=rail_run.cell, provenance=rail_run.provenance))
     return [json.loads(one), json.loads(several)]
 
 
@@ -46,3 +49,15 @@ def test_every_key_stands_on_the_page(repository: Path, reports: list[Any]) -> N
     unnamed = {key for report in reports for key in keys(report, cell_names)} - named
 
     assert sorted(unnamed) == []
+
+
+def test_the_page_is_the_one_made_from_the_types(repository: Path) -> None:
+    spec = importlib.util.spec_from_file_location("make_reference", repository / "docs" / "make_reference.py")
+    assert spec is not None
+    assert spec.loader is not None
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+
+    page = (repository / "docs" / "reference" / "report-json.md").read_text(encoding="utf-8")
+
+    assert page == script.report_reference(), "run: python docs/make_reference.py"

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -13,7 +14,11 @@ from cellplan.model.acceleration import (
     PointAcceleration,
     ProcessSpeed,
 )
-from cellplan.report.record.accelerations import acceleration_parts, merge_accelerations, table_line
+from cellplan.model.report import JointUse
+from cellplan.report.record.accelerations import accelerations_record, table_line
+from cellplan.report.record.joints import joints_record
+from cellplan.report.record.merging import merge_accelerations
+from cellplan.report.record.tasks import tasks_record
 
 TURNING = JointAcceleration(
     robot="kuka",
@@ -41,13 +46,29 @@ FOUND = MotionAccelerations(
 )
 
 
-def test_joints_speak_degrees_and_millimetres_and_tasks_tell_their_speed() -> None:
-    record = {"tasks": {"ring": {"robot": "kuka"}, "hold": {}}, "joints": {"kuka": {"A1": {"min": 0.0}, "rail": {}}}}
+def use_of(joint: JointAcceleration) -> JointUse:
+    return JointUse(
+        robot=joint.robot,
+        joint=joint.joint,
+        is_revolute=joint.is_revolute,
+        min=0.0,
+        max=1.0,
+        lower=-1.0,
+        upper=2.0,
+        margin=1.0,
+        margin_at_s=0.0,
+        peak_velocity=0.5,
+        velocity_limit=1.0,
+        peak_velocity_at_s=0.5,
+        travel=1.0,
+    )
 
-    parts = acceleration_parts(record, FOUND)
 
-    turning, sliding = parts["joints"]["kuka"]["A1"], parts["joints"]["kuka"]["rail"]
-    assert turning["min"] == 0.0
+def test_joints_are_recorded_in_degrees_and_millimetres() -> None:
+    record = joints_record([use_of(TURNING), use_of(SLIDING)], FOUND.joints)
+
+    turning, sliding = record["kuka"]["A1"], record["kuka"]["rail"]
+    assert (turning["min"], turning["unit"], sliding["unit"], sliding["max"]) == (0.0, "deg", "mm", 1000.0)
     assert (turning["peak_acceleration"], turning["acceleration_limit"]) == (300.0, 600.0)
     assert (turning["acceleration_limit_source"], turning["peak_jerk"], turning["jerk_window_ms"]) == (
         "assumed",
@@ -55,8 +76,17 @@ def test_joints_speak_degrees_and_millimetres_and_tasks_tell_their_speed() -> No
         4.0,
     )
     assert (sliding["peak_acceleration"], sliding["acceleration_limit_source"]) == (600.0, "stated")
-    assert parts["tasks"]["hold"]["process_speed"] is None
-    assert parts["tasks"]["ring"]["process_speed"] == {
+    part = accelerations_record(FOUND)["part"]
+    assert part is not None
+    assert part["corner"]["peak_acceleration_m_s2"] == 5.0
+
+
+def test_the_process_speed_of_a_task_is_recorded_in_millimetres_per_second(passed_run: Any) -> None:
+    found = replace(FOUND, process={"circle": SPEED})
+    tasks = tasks_record(replace(passed_run.report, accelerations=found), passed_run.cell)
+
+    assert tasks["rhombus"]["process_speed"] is None
+    assert tasks["circle"]["process_speed"] == {
         "mean_mm_s": 50.0,
         "peak_mm_s": 100.0,
         "peak_at_s": 0.5,
@@ -64,7 +94,6 @@ def test_joints_speak_degrees_and_millimetres_and_tasks_tell_their_speed() -> No
         "slower_count": 2,
         "slower_at_s": [[0.0, 0.4], [0.6, 1.0]],
     }
-    assert parts["accelerations"]["part"]["corner"]["peak_acceleration_m_s2"] == 5.0
 
 
 def test_the_worst_of_several_runs_counts() -> None:

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 from builders.random_cells import random_cell
 
-from cellplan.report.record.clock import clock_from, clock_words
+from cellplan.report.record.clock import clock_from
+from cellplan.report.text.notes import clock_note
 
 
 @pytest.mark.parametrize(
@@ -25,6 +26,6 @@ def test_the_record_says_what_the_clock_follows(duration: float | None, step: fl
 
 
 def test_only_a_clock_as_long_as_the_cell_says_needs_no_words() -> None:
-    assert clock_words("tasks").endswith("the clock ends with the last task")
-    assert clock_words("step after motion.duration_s").endswith("the clock ends with the step after it")
-    assert not clock_words("motion.duration_s")
+    assert clock_note({"clock_from": "tasks"}).endswith("the clock ends with the last task")
+    assert clock_note({"clock_from": "step after motion.duration_s"}).endswith("the clock ends with the step after it")
+    assert not clock_note({"clock_from": "motion.duration_s"})

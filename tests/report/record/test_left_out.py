@@ -1,22 +1,23 @@
 """What a report says of pairs that were not judged in full."""
 
 from cellplan.model.left_out import LeftOut, LeftOutKind
-from cellplan.report.record.left_out import grips_told, left_out_record, told_left_out
+from cellplan.report.record.clearance import left_out_record
+from cellplan.report.text.notes import grip_notes, left_out_notes
 
 
 def test_each_pair_stands_in_the_record_with_kind_bodies_and_reason() -> None:
     found = left_out_record([LeftOut(LeftOutKind.GRIP, ("a/hand", "part"), "holds the part")])
 
     assert found == [{"kind": "grip", "bodies": ["a/hand", "part"], "reason": "holds the part"}]
-    assert told_left_out({"left_out": found}) == ["left out, grip: a/hand - part (holds the part)"]
+    assert left_out_notes({"left_out": found}) == ["left out, grip: a/hand - part (holds the part)"]
 
 
 def test_a_record_without_any_says_so_and_one_that_is_silent_says_nothing() -> None:
-    assert told_left_out({"left_out": []}) == ["nothing was left out"]
-    assert told_left_out({}) == []
+    assert left_out_notes({"left_out": []}) == ["nothing was left out"]
+    assert left_out_notes({}) == []
 
 
 def test_grips_of_several_runs_are_told_once() -> None:
     grip = {"name": "grip_depth", "message": "a/hand is 0 mm deep in part, at most 2 mm"}
 
-    assert grips_told({"checks": [grip, {"name": "clearance", "message": "fine"}, grip]}) == [grip["message"]]
+    assert grip_notes({"checks": [grip, {"name": "clearance", "message": "fine"}, grip]}) == [grip["message"]]

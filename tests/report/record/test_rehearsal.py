@@ -22,10 +22,10 @@ from cellplan.model.rehearsal import (
     Trial,
 )
 from cellplan.model.report import TaskAccuracy
-from cellplan.report.page.render import rehearsal_html
+from cellplan.report.page.render import rehearsal_page
 from cellplan.report.plots.rehearsal import draw_rehearsal
-from cellplan.report.record.rehearsal import rehearsal_json, rehearsal_record
-from cellplan.report.record.run import Provenance
+from cellplan.report.record.common import Provenance, as_json
+from cellplan.report.record.rehearsal import rehearsal_record
 
 N = 5
 TIMES = 0.1 * np.arange(N)
@@ -134,7 +134,7 @@ def test_draws_are_written_out_with_their_units(rehearsal):
 
 
 def test_no_path_of_this_machine_stands_in_the_record(rehearsal):
-    text = rehearsal_json(rehearsal, provenance=PROVENANCE)
+    text = as_json(rehearsal_record(rehearsal, provenance=PROVENANCE))
 
     assert json.loads(text)["inputs"]["e.yaml"] == "ab12"
     assert "/somewhere" not in text
@@ -143,7 +143,7 @@ def test_no_path_of_this_machine_stands_in_the_record(rehearsal):
 def test_the_page_shows_figures_rounds_and_plots_and_needs_no_network(rehearsal):
     plots = draw_rehearsal(rehearsal)
 
-    page = rehearsal_html(rehearsal, provenance=PROVENANCE, plots=plots)
+    page = rehearsal_page(rehearsal_record(rehearsal, provenance=PROVENANCE), cell=rehearsal.cell, plots=plots)
 
     assert set(plots) == {
         f"{name}_circle.{kind}"
@@ -159,4 +159,6 @@ def test_the_page_shows_figures_rounds_and_plots_and_needs_no_network(rehearsal)
 def test_a_hostile_name_stays_text(rehearsal):
     hostile = replace(rehearsal, cell=replace(rehearsal.cell, name="<script>alert(1)</script>"))
 
-    assert "<script>" not in rehearsal_html(hostile, provenance=PROVENANCE, plots={})
+    assert "<script>" not in rehearsal_page(
+        rehearsal_record(hostile, provenance=PROVENANCE), cell=hostile.cell, plots={}
+    )

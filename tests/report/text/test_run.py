@@ -56,7 +56,7 @@ def test_a_method_of_ones_own_choice_and_what_it_gave_up_are_told(record: dict[s
     lines = summary_lines(record, tmp_path)
 
     assert lines[1] == "  mode simultaneous, 4 s, method quadratic_program"
-    assert "  tasks left on purpose by at most 0.012 (m/s) at 1.500 s" in lines
+    assert "  task slack up to 0.012 (m/s) at 1.500 s" in lines
 
 
 def test_where_the_accurate_mode_gave_up_is_told(record: dict[str, Any], tmp_path: Path) -> None:
@@ -65,12 +65,12 @@ def test_where_the_accurate_mode_gave_up_is_told(record: dict[str, Any], tmp_pat
     record["solver"]["resolution"]["euler_from_s"] = None
 
     assert [line for line in told if line not in summary_lines(record, tmp_path)] == [
-        "  no accurate way on: Euler steps from 1.250 s"
+        "  collocation failed at 1.250 s; continued with Euler steps"
     ]
 
-    record["solver"]["resolution"] |= {"euler_from_s": 1.25, "lost": {"message": "nearest to a singular one is 'arm'"}}
+    record["solver"]["resolution"] |= {"euler_from_s": 1.25, "lost": {"message": "'arm' is singular"}}
 
-    assert "  no accurate way on: Euler steps from 1.250 s; nearest to a singular one is 'arm'" in summary_lines(
+    assert "  collocation failed at 1.250 s; continued with Euler steps; 'arm' is singular" in summary_lines(
         record, tmp_path
     )
 
@@ -101,14 +101,13 @@ def test_sliding_and_turning_joints_are_not_compared(record: dict[str, Any], tmp
     assert "  smallest joint margin 500 mm: rail X at 1.500 s" in lines
 
 
-def test_runs_of_their_own_have_tables_of_their_own(record: dict[str, Any], tmp_path: Path) -> None:
-    for task in ("ring", "line"):
-        (tmp_path / task / "tables").mkdir(parents=True)
+def test_the_tables_of_all_phases_lie_in_one_folder(record: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "rejected").mkdir()
     record["runs"] = {"ring": {}, "line": {}}
 
     lines = summary_lines(record, tmp_path)
 
-    assert lines[-2:] == [f"tables: {tmp_path / 'ring' / 'tables'}", f"tables: {tmp_path / 'line' / 'tables'}"]
+    assert lines[-2:] == [f"report: {tmp_path / 'report.html'}", f"tables: {tmp_path / 'rejected'}"]
 
 
 def test_what_is_not_known_is_left_out(record: dict[str, Any], tmp_path: Path) -> None:

@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 from cellplan.io.run.folder import RunFolder
 from cellplan.model.cell import LockedJoint
 from cellplan.model.report import ClearanceClass, ClosureAccuracy, JointDrift, Repeatability
-from cellplan.report.record.run import number
-from cellplan.report.record.write import merge_joint_uses, report_json, summary_json
+from cellplan.report.record.common import as_json, number
+from cellplan.report.record.merging import merge_joint_uses
+from cellplan.report.record.run import run_record
+from cellplan.report.record.summary import summary_record
 
 
 def refuse(constant: str) -> Any:
@@ -27,13 +29,13 @@ def read(text: str) -> Any:
 
 
 def record_of(run: Any) -> Any:
-    return read(report_json(run.report, cell=run.cell, provenance=run.provenance))
+    return read(as_json(run_record(run.report, cell=run.cell, provenance=run.provenance)))
 
 
 def summary_of(runs: Any) -> Any:
     first = runs["circle"]
     reports = {name: run.report for name, run in runs.items()}
-    return read(summary_json(reports, cell=first.cell, provenance=first.provenance))
+    return read(as_json(summary_record(reports, cell=first.cell, provenance=first.provenance)))
 
 
 def test_names_that_scripts_rely_on_are_there(passed_run: Any) -> None:
@@ -199,15 +201,15 @@ def test_merging_one_run_changes_nothing(passed_run: Any) -> None:
 
 
 def test_same_run_gives_the_same_bytes(failed_run: Any) -> None:
-    first = report_json(failed_run.report, cell=failed_run.cell, provenance=failed_run.provenance)
-    assert report_json(failed_run.report, cell=failed_run.cell, provenance=failed_run.provenance) == first
+    first = as_json(run_record(failed_run.report, cell=failed_run.cell, provenance=failed_run.provenance))
+    assert as_json(run_record(failed_run.report, cell=failed_run.cell, provenance=failed_run.provenance)) == first
     assert first.endswith("}\n")
 
 
 def test_run_folder_knows_the_report_as_its_own(tmp_path: Path, passed_run: Any, pairwise_runs: Any) -> None:
-    one = report_json(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance)
+    one = as_json(run_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance))
     reports = {name: run.report for name, run in pairwise_runs.items()}
-    several = summary_json(reports, cell=passed_run.cell, provenance=passed_run.provenance)
+    several = as_json(summary_record(reports, cell=passed_run.cell, provenance=passed_run.provenance))
     for text in (one, several, one):  # each replaces the one before, which must be recognised
         with RunFolder(tmp_path / "run") as folder:
             folder.write_text("report.json", text)
@@ -231,7 +233,7 @@ def test_failed_joints_are_told_with_instant_and_place(passed_run: Any, failed_r
         locked = (LockedJoint(robot="kuka", joint="B2", since=2.0),)
         cell = replace(run.cell, motion=replace(run.cell.motion, locked=locked))
 
-        (record,) = read(report_json(run.report, cell=cell, provenance=run.provenance))["locked_joints"]
+        (record,) = read(as_json(run_record(run.report, cell=cell, provenance=run.provenance)))["locked_joints"]
 
         index = list(run.report.times).index(2.0)
         assert (record["robot"], record["joint"], record["from_s"], record["unit"]) == ("kuka", "B2", 2.0, "deg")
@@ -263,7 +265,7 @@ def closure(size: float, turn: float, times: Any) -> ClosureAccuracy:
 def test_closures_are_told_by_robot_with_what_is_allowed(passed_run: Any) -> None:
     report = replace(passed_run.report, closures=(closure(2e-6, 1e-5, passed_run.report.times),))
 
-    record = read(report_json(report, cell=passed_run.cell, provenance=passed_run.provenance))["closure"]
+    record = read(as_json(run_record(report, cell=passed_run.cell, provenance=passed_run.provenance)))["closure"]
 
     assert list(record) == ["abb"]
     assert record["abb"]["max_position_error_mm"] == pytest.approx(2e-3)
@@ -282,7 +284,7 @@ def test_the_summary_tells_the_worst_closure_of_all_runs(pairwise_runs: Any) -> 
         for name, size in sizes.items()
     }
 
-    record = read(summary_json(reports, cell=first.cell, provenance=first.provenance))["closure"]["abb"]
+    record = read(as_json(summary_record(reports, cell=first.cell, provenance=first.provenance)))["closure"]["abb"]
 
     assert record["max_position_error_mm"] == pytest.approx(2e-3)
     assert record["max_orientation_error_deg"] == pytest.approx(math.degrees(3e-5))

@@ -10,8 +10,10 @@ from cellplan.io.cell.build_solver import build_solver
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.model.motion import Motion, Resolution
 from cellplan.model.solver import Integrator, MethodName, SolverSettings, WeightingSettings
-from cellplan.report.page.render import report_html
-from cellplan.report.record.method import method_lines, solver_record
+from cellplan.report.page.render import report_page
+from cellplan.report.record.run import run_record
+from cellplan.report.record.solver import solver_record
+from cellplan.report.text.method import method_lines
 
 METHODS: tuple[MethodName, ...] = get_args(MethodName)
 OWN_SECTION = {
@@ -64,7 +66,7 @@ def test_every_method_has_a_name_for_people(method: MethodName) -> None:
 
 def test_an_easy_motion_by_the_usual_method_is_told_in_one_sentence() -> None:
     assert said(settings(gain_per_s=650, integrator="euler"), motion([1, 1], [0, 0])) == [
-        "Method: weighted pseudo-inverse, Euler steps of 1 ms; errors are fed back with a gain of 650 per second."
+        "Method: weighted pseudo-inverse, Euler steps of 1 ms; pose errors are fed back with a gain of 650 per second."
     ]
 
 
@@ -81,23 +83,23 @@ def test_an_easy_motion_by_the_usual_method_is_told_in_one_sentence() -> None:
 def test_an_error_between_nodes_is_never_told_smaller_than_it_is(error_between: float, words: str) -> None:
     assert said(settings(), resolved(error_between=error_between)) == [
         "Method: weighted pseudo-inverse.",
-        f"Resolved accurately: 96 nodes in 9 panels, error between nodes {words}.",
+        f"Accurate mode: 96 nodes in 9 panels, error between nodes {words}.",
     ]
 
 
 def test_a_fall_back_to_steps_is_told_with_its_instant_and_gain() -> None:
     solver = settings(gain_per_s=650)
-    back = "Euler steps of 1 ms had to be taken instead; errors are fed back with a gain of 650 per second."
+    back = "continued with Euler steps of 1 ms; pose errors are fed back with a gain of 650 per second."
 
     part = said(solver, resolved(panels=1, nodes=12, error_between=None, euler_from=1.25))
     whole = said(solver, resolved(panels=0, nodes=0, euler_from=0.0))
 
-    assert part[1:] == ["Resolved accurately: 12 nodes in 1 panel.", f"From 1.250 s on {back}"]
-    assert whole[1:] == [f"From 0.000 s on {back}"]
+    assert part[1:] == ["Accurate mode: 12 nodes in 1 panel.", f"Collocation failed at 1.250 s; {back}"]
+    assert whole[1:] == [f"Collocation failed at 0.000 s; {back}"]
 
 
 def test_without_the_motion_the_accuracy_asked_for_is_told() -> None:
-    assert said(settings(accuracy_mm=2e-5))[1:] == ["Resolved accurately: error between nodes not above 0.00002 mm."]
+    assert said(settings(accuracy_mm=2e-5))[1:] == ["Accurate mode: error between nodes at most 0.00002 mm."]
 
 
 def test_the_record_says_what_the_accurate_mode_took() -> None:
@@ -132,10 +134,10 @@ def test_goals_weights_iterations_and_slack_are_told_when_there_are_any() -> Non
         weighting={"near_limits": 1.5},
     )
     assert said(solver, motion([1, 4, 2], [0, 0, 0.125]))[1:] == [
-        "Besides the tasks: joint limits (gain 2), obstacles (gain 0.1).",
+        "Secondary goals: joint limits (gain 2), obstacles (gain 0.1).",
         "Joint weights change along the motion: near limits 1.5.",
         "Iterations per step: 2.33 on average, 4 at most, at 0.500 s.",
-        "The tasks were left on purpose: by 0.125 at 1.000 s (norm of the twist given up, m/s and rad/s as they come).",
+        "Task slack: at most 0.125 at 1.000 s (norm of the twist residual, mixed units: m/s and rad/s).",
     ]
     record = solver_record(solver)
     assert record["secondary"] == {"joint_limits": {"gain": 2.0}, "obstacles": {"gain": 0.1, "within_mm": 150.0}}
@@ -160,6 +162,7 @@ def searched(passed_run: Any) -> Any:
 
 
 def test_the_page_says_how_the_motion_was_found(searched: Any) -> None:
-    page = report_html(searched.report, cell=searched.cell, provenance=searched.provenance, plots={})
+    record = run_record(searched.report, cell=searched.cell, provenance=searched.provenance)
+    page = report_page(record, searched.report.checks, cell=searched.cell, plots={})
     assert "<p>Method: recursive search, joint by joint.</p>" in page
     assert "manipulability at least 2.24 · 10^−7" in page  # 3e-7 + 1e-7 sin 4

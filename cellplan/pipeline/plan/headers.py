@@ -1,0 +1,57 @@
+"""Headers of the tables of a program: what solving writes above the rows, and what the gate demands there."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from cellplan.io.input.findings import listed
+from cellplan.io.run.joint_tables import TableHeader
+from cellplan.model.acceleration import MotionAccelerations
+from cellplan.model.cell import Cell
+from cellplan.model.idle import not_in_program
+from cellplan.model.phase import NOT_IN_PROGRAM, Phase
+from cellplan.model.report import Report
+from cellplan.report.record.accelerations import table_line
+from cellplan.report.record.idle import missing_moves
+from cellplan.report.record.merging import merge_accelerations
+
+
+def table_headers(
+    cell: Cell, phases: Sequence[Phase], reports: Sequence[Report], *, digests: Mapping[str, str], remark: str = ""
+) -> dict[str, TableHeader]:
+    """Header of every table of a program whose checks passed, by robot.
+
+    Args:
+        cell: The cell.
+        phases: The phases of the program, on its clock.
+        reports: The report of each of them.
+        digests: SHA-256 by what it is the digest of.
+        remark: What else has to be known of the rows.
+    """
+    header = TableHeader(
+        cell=cell.name,
+        mode=str(cell.motion.mode),
+        verdict="passed",
+        digests=digests,
+        remark="; ".join(filter(None, [remark, left_out_of_program(cell, phases)])),
+    )
+    moved = zip(phases, reports, strict=True)
+    accelerations = merge_accelerations([_on_clock(report.accelerations, phase.begin) for phase, report in moved])
+    return {robot.name: replace(header, accelerations=table_line(accelerations, robot.name)) for robot in cell.robots}
+
+
+def left_out_of_program(cell: Cell, phases: Sequence[Phase]) -> str:
+    """One line on moves that a program leaves out, those of each phase after its name; empty when there are none."""
+    if len(phases) == 1:
+        return not_in_program(cell, phases[0].tasks)
+    names = listed(phase.name for phase in phases)
+    moves = missing_moves(cell, {phase.task: phase.tasks for phase in phases})
+    return "; ".join([f"phases {names}: the motion from each to the next is {NOT_IN_PROGRAM}", *moves])
+
+
+def _on_clock(accelerations: MotionAccelerations, begin: float) -> MotionAccelerations:
+    """Accelerations of the joints in a phase with times on the clock of the program."""
+    joints = (
+        replace(use, peak_at_s=use.peak_at_s + begin, peak_jerk_at_s=use.peak_jerk_at_s + begin)
+        for use in accelerations.joints
+    )
+    return replace(accelerations, joints=tuple(joints))

@@ -1,0 +1,156 @@
+"""Program: the phases of a plan as rows on one clock, and these rows cut into their phases again."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
+from cellplan.io.run.stored import CLOCK
+from cellplan.model.cell import Cell
+from cellplan.model.clock import Clock
+from cellplan.model.motion import ClockTable, JointTable, Motion, Schedule
+from cellplan.model.phase import Hold, Phase
+from cellplan.model.plan import Plan, rows_of
+from cellplan.model.task import INSTANT_ROOM
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import TIME_DECIMALS, schedule_tasks
+
+STILL_TOL: Final = 1e-9  # [rad] or [m] tables have twelve decimals of a degree or a millimetre
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProgramClock:
+    """A plan on the clock of its program, and the desired tool poses of each phase.
+
+    The rows of the phases follow one another, a step of the clock apart. In the step between two phases lies what is
+    not part of the program: no motion is described or certified there.
+
+    Attributes:
+        plan: The plan, its phases on the nominal time of the whole program.
+        times: Times of all rows in [s], shape (N,).
+        schedules: Desired tool poses of each phase of the program, on the phase's own time, which starts at 0.
+    """
+
+    plan: Plan
+    times: Array
+    schedules: tuple[Schedule, ...]
+
+    @classmethod
+    def of(cls, cell: Cell, plan: Plan, schedules: Sequence[Schedule]) -> Self:
+        """Put the phases of a program one after the other.
+
+        Args:
+            cell: The cell; its motion gives the step.
+            plan: The plan, on no clock yet.
+            schedules: Desired tool poses of each phase of the program.
+        """
+        counts = [len(schedule.times) for schedule in schedules]
+        times = np.round(np.arange(sum(counts)) * cell.motion.step, TIME_DECIMALS)
+        first = np.cumsum([0, *counts])
+        ends = [(float(times[a]), float(times[b - 1])) for a, b in pairwise(first)]
+        placed = [replace(phase, begin=b, end=e) for phase, (b, e) in zip(plan.program, ends, strict=True)]
+        return cls(plan=_placed(plan, placed, schedules), times=times, schedules=tuple(schedules))
+
+    @classmethod
+    def from_cell(cls, cell: Cell, plan: Plan) -> Self:
+        """The clock of a program as its cell demands it; nothing of it is taken from a run."""
+        schedules = []
+        for phase in plan.program:
+            toolpaths = [build_toolpath(cell.task(name), cell.part, cell.origin) for name in phase.tasks]
+            schedules.append(schedule_tasks(cell, toolpaths))
+        return cls.of(cell, plan, schedules)
+
+    @property
+    def gaps(self) -> dict[int, str]:
+        """Name of what is not part of the program, by the first row after it."""
+        return self.plan.gaps(self.times)
+
+    def motion(self, q: Sequence[Array]) -> Motion:
+        """The motion of the program from that of its phases, shape (n, nq) each."""
+        clock = Clock.as_written(self.times)
+        return Motion(times=clock.times, sigma=clock.sigma, q=np.concatenate(q), plan=self.plan)
+
+    def table(self, tasks: Sequence[str]) -> ClockTable:
+        """What happens at each row.
+
+        Args:
+            tasks: Names of the tasks in the order of the columns.
+        """
+        names = [""] * len(self.times)
+        lengths = {task: np.zeros(len(self.times)) for task in tasks}
+        for phase, schedule in zip(self.plan.program, self.schedules, strict=True):
+            rows = rows_of(phase, self.times)
+            names[rows] = [phase.name] * (rows.stop - rows.start)
+            for scheduled in schedule.tasks:
+                lengths[scheduled.task.name][rows] = scheduled.travelled
+                lengths[scheduled.task.name][rows.stop :] = scheduled.travelled[-1]
+        process = {task: _within(self.times, self.plan.process[task]) for task in tasks}
+        sigma = self.times
+        return ClockTable(
+            times=self.times, sigma=sigma, phases=tuple(names), lengths=lengths, process=process, gaps=self.gaps
+        )
+
+    def cut(self, tables: Sequence[JointTable], place: int) -> list[JointTable]:
+        """The rows of one phase of the program on the phase's own time.
+
+        Args:
+            tables: One table per robot, with all rows of the program and its times.
+            place: Number of the phase among those of the program.
+        """
+        rows = rows_of(self.plan.program[place], self.times)
+        times = self.schedules[place].times
+        return [replace(table, times=times, q=table.q[rows], gaps={}) for table in tables]
+
+
+def refuse_clock_name(cell: Cell) -> None:
+    """Refuse a robot whose table would have the name of the clock.
+
+    Raises:
+        InputError: There is such a robot.
+    """
+    for robot in cell.robots:
+        if robot.name.lower() == CLOCK:
+            where = cell.origin.at(f"robots.{robot.name}")
+            raise InputError(f"{where}: expected another name: tables/{CLOCK}.csv is the clock of the whole program")
+
+
+def moved_while_holding(phase: Phase, robot: str, q: Array) -> tuple[int, int] | None:
+    """The first row and joint at which a robot moves that holds still in a phase; None where it does hold still.
+
+    Args:
+        phase: The phase.
+        robot: Name of the robot.
+        q: Its joint positions in the rows of the phase in [rad] or [m], shape (n, joints).
+    """
+    if not isinstance(phase.roles[robot], Hold):
+        return None
+    row, joint = np.nonzero(np.abs(q - q[0]) > STILL_TOL)
+    return (int(row[0]), int(joint[0])) if len(row) else None
+
+
+def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) -> Plan:
+    """The plan with the phases of its program on the clock, and all others between them."""
+    left = list(placed)
+    phases: list[Phase] = []
+    for phase in plan.phases:
+        phases.append(left.pop(0) if phase.in_program else replace(phase, begin=phases[-1].end, end=left[0].begin))
+    stops, process = {}, {}
+    for phase, schedule in zip(placed, schedules, strict=True):
+        for scheduled in schedule.tasks:
+            name = scheduled.task.name
+            process[name] = ((phase.begin + scheduled.task.start, phase.begin + scheduled.end),)
+            stops[name] = tuple(phase.begin + stop for stop in scheduled.stops)
+    return replace(plan, phases=tuple(phases), stops=stops, process=process)
+
+
+def _within(times: Array, stretches: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    """Whether times in [s], shape (N,), lie in one of some stretches, ends included, shape (N,)."""
+    inside = np.zeros(len(times), dtype=bool)
+    for begin, end in stretches:
+        inside |= (times >= begin - INSTANT_ROOM) & (times <= end + INSTANT_ROOM)
+    return inside

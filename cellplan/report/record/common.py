@@ -1,0 +1,125 @@
+"""What all records share: printed numbers, provenance, and verified statements."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, TypedDict
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.report import Check, Report
+
+Number = float | None
+Record = Mapping[str, Any]  # a record as consumers read it, from memory or from a file
+Entries = list[dict[str, Any]]  # what pages and screens list
+
+SIGNIFICANT: Final = 12  # digits: hides the noise of unit conversion (-185.00000000000003) and nothing else
+ROUNDING_TOL: Final = 1e-9  # [-] of a tenth: 36.99999999999 is printed as 37.0
+AXES: Final = ("x", "y", "z", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Provenance:
+    """Origin of a result.
+
+    Attributes:
+        versions: Version by package, cellplan's own first.
+        digests: SHA-256 by name (``program``, or a file of the run).
+    """
+
+    versions: Mapping[str, str]
+    digests: Mapping[str, str]
+
+
+class CheckRecord(TypedDict):
+    """A verified statement."""
+
+    name: Annotated[str, "name of the check"]
+    subject: Annotated[str, "robot and joint, task, or pair of bodies"]
+    passed: Annotated[bool, "the verdict"]
+    value: Annotated[Number, "worst value, in `unit`"]
+    limit: Annotated[Number, "admissible value, in `unit`"]
+    unit: Annotated[str, "unit of `value` and `limit`"]
+    at_s: Annotated[Number, "time of the worst value"]
+    message: Annotated[str, "the statement as one line of text"]
+
+
+class RunCheckRecord(CheckRecord):
+    """A verified statement about one of several runs."""
+
+    run: Annotated[str, "name of the run"]
+
+
+class OriginRecord(TypedDict):
+    """Inputs and programs that a result was computed from."""
+
+    inputs: Annotated[dict[str, str], "SHA-256 of every input file, by name"]
+    digests: Annotated[
+        dict[str, str], "SHA-256 of what was written: `program`, the rows of all joint tables; files: see manifest.json"
+    ]
+    versions: Annotated[dict[str, str], "versions of cellplan and of the packages that the numbers depend on"]
+    seed: Annotated[int, "seed of every random search"]
+
+
+class ExtremeRecord(TypedDict):
+    """Smallest value along the motion."""
+
+    minimum: Annotated[Number, "smallest value"]
+    at_s: Annotated[Number, "its time"]
+
+
+def number(value: float | None) -> Number:
+    """The value with ``SIGNIFICANT`` digits and without -0; None if it is not finite."""
+    if value is None or not math.isfinite(value):
+        return None
+    return float(f"{value:.{SIGNIFICANT}g}") + 0.0
+
+
+def rounded_down(value: float) -> float:
+    """The value with one decimal, rounded down, so that no clearance or margin is overstated."""
+    return math.floor(10.0 * value + ROUNDING_TOL) / 10.0
+
+
+def smallest(values: Array, times: Array) -> ExtremeRecord:
+    """Smallest value of a series of shape (N,) and its time."""
+    if not len(values):
+        return {"minimum": None, "at_s": None}
+    index = int(np.argmin(values))
+    return {"minimum": number(values[index]), "at_s": number(times[index])}
+
+
+def status(report: Report) -> str:
+    """``passed`` or ``failed``."""
+    return "passed" if report.passed else "failed"
+
+
+def origin_record(cell: Cell, provenance: Provenance) -> OriginRecord:
+    """Inputs and versions of a result."""
+    return {
+        "inputs": dict(cell.inputs),
+        "digests": dict(provenance.digests),
+        "versions": dict(provenance.versions),
+        "seed": cell.solver.seed,
+    }
+
+
+def check_record(check: Check) -> CheckRecord:
+    """One verified statement."""
+    return {
+        "name": check.name,
+        "subject": check.subject,
+        "passed": check.passed,
+        "value": number(check.value),
+        "limit": number(check.limit),
+        "unit": check.unit,
+        "at_s": number(check.at_s),
+        "message": check.message,
+    }
+
+
+def as_json(record: Mapping[str, object]) -> str:
+    """A record as JSON text; a number that is not finite is refused."""
+    return json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

@@ -1,0 +1,66 @@
+"""JSON Schema (draft 2020-12) of records, generated from their types."""
+
+import types
+from collections.abc import Mapping
+from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints, is_typeddict
+
+from cellplan.report.record.run import RunRecord
+from cellplan.report.record.summary import SummaryRecord
+
+DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
+TYPES: Final[Mapping[object, str]] = {
+    str: "string",
+    bool: "boolean",
+    int: "integer",
+    float: "number",
+    type(None): "null",
+}
+
+
+def report_schema(*, closed: bool = False) -> dict[str, Any]:
+    """The JSON Schema of ``report.json``.
+
+    Args:
+        closed: Refuse keys that the schema does not name; the published schema permits those of later releases.
+    """
+    definitions: dict[str, dict[str, Any]] = {}
+    forms = [_schema(form, definitions, closed=closed) for form in (RunRecord, SummaryRecord)]
+    return {
+        "$schema": DIALECT,
+        "title": "cellplan.report/1",
+        "description": "report.json of a run, or of several runs (with the key `runs`)",
+        "oneOf": forms,
+        "$defs": definitions,
+    }
+
+
+def _schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) -> dict[str, Any]:
+    """The schema of one type; records are added to the definitions."""
+    if is_typeddict(form):
+        name = form.__name__.strip("_")
+        if name not in definitions:
+            definitions[name] = {}  # reserves its place before the records within it
+            definitions[name].update(_record_schema(form, definitions, closed=closed))
+        return {"$ref": f"#/$defs/{name}"}
+    origin, arguments = get_origin(form), get_args(form)
+    if origin is Annotated:
+        return {**_schema(arguments[0], definitions, closed=closed), "description": arguments[1]}
+    if origin in {Union, types.UnionType}:
+        return {"anyOf": [_schema(each, definitions, closed=closed) for each in arguments]}
+    if origin is list:
+        return {"type": "array", "items": _schema(arguments[0], definitions, closed=closed)}
+    if origin is dict:
+        return {"type": "object", "additionalProperties": _schema(arguments[1], definitions, closed=closed)}
+    return {"type": TYPES[form]}
+
+
+def _record_schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) -> dict[str, Any]:
+    """The schema of a record type."""
+    hints = get_type_hints(form, include_extras=True)
+    schema = {
+        "type": "object",
+        "description": form.__doc__ or "",
+        "properties": {key: _schema(hint, definitions, closed=closed) for key, hint in hints.items()},
+        "required": sorted(form.__required_keys__),
+    }
+    return {**schema, "additionalProperties": False} if closed else schema

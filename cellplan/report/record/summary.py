@@ -1,0 +1,113 @@
+"""``report.json`` of a program whose tasks have a report each: the worst values of all of them."""
+
+from collections.abc import Mapping
+from typing import Annotated, TypedDict
+
+from cellplan.model.cell import Cell
+from cellplan.model.report import CAUTION, Report
+from cellplan.model.units import MM
+from cellplan.report.record.accelerations import accelerations_record
+from cellplan.report.record.clearance import clearance_record, left_out_record
+from cellplan.report.record.clock import clock_from
+from cellplan.report.record.common import (
+    Number,
+    Provenance,
+    RunCheckRecord,
+    check_record,
+    number,
+    origin_record,
+    status,
+)
+from cellplan.report.record.idle import missing_moves
+from cellplan.report.record.joints import joints_record, repeatability_record
+from cellplan.report.record.merging import merge_accelerations, merge_joint_uses, merge_minima
+from cellplan.report.record.open_surfaces import open_surfaces_record
+from cellplan.report.record.payload import worst_loads
+from cellplan.report.record.phases import phases_record
+from cellplan.report.record.rests_on import rests_on_record
+from cellplan.report.record.run import SCHEMA, HeadRecord
+from cellplan.report.record.solver import solver_record
+from cellplan.report.record.tasks import tasks_record
+from cellplan.report.record.tool_errors import ClosureRecord, worst_closures_record
+
+
+class _RunEntry(TypedDict):
+    status: Annotated[str, "`passed` or `failed`"]
+    folder: Annotated[str, "folder of its report"]
+    cycle_time_s: Annotated[Number, "its duration"]
+
+
+class RunEntry(_RunEntry, total=False):
+    """A run of several, with the largest errors of its task."""
+
+    robot: Annotated[str, "the operator"]
+    max_position_error_mm: Annotated[Number, "largest distance"]
+    max_position_error_at_s: Annotated[Number, "its time"]
+    max_orientation_error_deg: Annotated[Number, "largest angle"]
+    max_orientation_error_at_s: Annotated[Number, "its time"]
+    max_position_error_between_rows_mm: Annotated[Number, "largest distance between the rows"]
+    max_orientation_error_between_rows_deg: Annotated[Number, "largest angle between the rows"]
+
+
+class SummaryRecord(HeadRecord):
+    """The record of several runs: the worst of tasks, joints, clearance and accelerations."""
+
+    runs: Annotated[dict[str, RunEntry], "by task: the runs"]
+    closure: Annotated[dict[str, ClosureRecord], "by co-holder; empty if one robot holds the part"]
+    checks: Annotated[list[RunCheckRecord], "every verified statement, with its run"]
+
+
+def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> SummaryRecord:
+    """The record of several runs, one after another.
+
+    Tasks, joints, clearance and accelerations are the worst of all runs; everything else is in the report of each run.
+
+    Args:
+        reports: Report by the name of the run, which is its task and its folder.
+        cell: The cell.
+        provenance: Origin of the result.
+    """
+    runs = list(reports.values())
+    accelerations = merge_accelerations(report.accelerations for report in runs)
+    return {
+        "schema": SCHEMA,
+        "cell": cell.name,
+        "status": "passed" if all(report.passed for report in runs) else "failed",
+        "mode": runs[0].mode,
+        "cycle_time_s": number(sum(report.cycle_time for report in runs)),
+        "clock_from": clock_from(cell),
+        "phases": phases_record(runs[0].phases),
+        "runs": {name: _run_entry(name, report, cell) for name, report in reports.items()},
+        "tasks": {name: record for report in runs for name, record in tasks_record(report, cell).items()},
+        "open_surfaces": open_surfaces_record(cell),
+        "closure": worst_closures_record(runs, cell),
+        "joints": joints_record(
+            merge_joint_uses(use for report in runs for use in report.joints), accelerations.joints
+        ),
+        "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
+        "clearance": clearance_record(merge_minima(runs)),
+        "required_clearance_mm": number(MM * cell.checks.clearance),
+        "left_out": left_out_record(dict.fromkeys(each for report in runs for each in report.clearance.left_out)),
+        "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
+        "not_in_program": missing_moves(cell, {name: report.tasks for name, report in reports.items()}),
+        "rests_on": rests_on_record(cell, worst_loads(runs)),
+        **origin_record(cell, provenance),
+        "caution": CAUTION,
+        "solver": solver_record(cell.solver),
+        "accelerations": accelerations_record(accelerations),
+    }
+
+
+def _run_entry(name: str, report: Report, cell: Cell) -> RunEntry:
+    """What the summary holds of one run."""
+    entry: RunEntry = {"status": status(report), "folder": name, "cycle_time_s": number(report.cycle_time)}
+    for task in tasks_record(report, cell).values():
+        entry["robot"] = task["robot"]
+        entry["max_position_error_mm"] = task["max_position_error_mm"]
+        entry["max_position_error_at_s"] = task["max_position_error_at_s"]
+        entry["max_orientation_error_deg"] = task["max_orientation_error_deg"]
+        entry["max_orientation_error_at_s"] = task["max_orientation_error_at_s"]
+        if "max_position_error_between_rows_mm" in task:
+            entry["max_position_error_between_rows_mm"] = task["max_position_error_between_rows_mm"]
+            entry["max_orientation_error_between_rows_deg"] = task["max_orientation_error_between_rows_deg"]
+    return entry

@@ -1,0 +1,96 @@
+"""The method of a run as sentences."""
+
+import math
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from cellplan.model.solver import Integrator, MethodName
+from cellplan.report.record.common import Record
+from cellplan.report.record.solver import SEARCHES
+
+DEFAULT_METHOD: Final[MethodName] = "weighted_pseudo_inverse"  # not mentioned in summaries
+METHOD_NAMES: Final[dict[MethodName, str]] = {
+    "weighted_pseudo_inverse": "weighted pseudo-inverse",
+    "damped_least_squares": "damped least squares",
+    "jacobian_transpose": "Jacobian transpose",
+    "filtered_inverse": "filtered inverse I",
+    "filtered_inverse_ii": "filtered inverse II",
+    "heuristic_search": "heuristic search, the best joint first",
+    "recursive_search": "recursive search, joint by joint",
+    "quadratic_program": "quadratic program",
+}
+EULER_STEPS: Final[frozenset[MethodName]] = frozenset(  # the others iterate towards each sample
+    {"weighted_pseudo_inverse", "damped_least_squares", "quadratic_program"}
+)
+SHOWN_DIGITS: Final = 2  # of an error between nodes
+MIN_SHOWN: Final = 1e-9  # [mm] smaller errors are shown as this one
+
+
+def method_lines(record: Record, step_s: float) -> Iterator[str]:
+    """Sentences about the method, its secondary goals, and its effort.
+
+    Args:
+        record: Result of ``solver_record``.
+        step_s: Time between two samples in [s].
+    """
+    yield from _integration_lines(record, f"{1e3 * step_s:.6g} ms")
+    goals = [f"{name.replace('_', ' ')} (gain {goal['gain']:g})" for name, goal in record["secondary"].items()]
+    if goals:
+        yield f"Secondary goals: {', '.join(goals)}."
+    weights = [f"{name.replace('_', ' ')} {value:g}" for name, value in record["weighting"].items() if value]
+    if weights:
+        yield f"Joint weights change along the motion: {', '.join(weights)}."
+    steps = record["iterations"]
+    if steps and steps["max"] is not None and steps["max"] > 1.0:
+        yield (
+            f"Iterations per step: {steps['mean']:.3g} on average, {steps['max']:g} at most, "
+            f"at {steps['max_at_s']:.3f} s."
+        )
+    slack = record["slack"]
+    if slack and slack["max"] is not None and slack["max"] > 0.0:
+        yield f"Task slack: at most {slack['max']:.3g} at {slack['max_at_s']:.3f} s ({slack['unit']})."
+
+
+def _integration_lines(record: Record, step: str) -> Iterator[str]:
+    """The method and the integration of joint velocities."""
+    name, resolution = METHOD_NAMES[record["method"]], record["resolution"]
+    feedback = f"pose errors are fed back with a gain of {record['gain_per_s']:g} per second"
+    if record["integrator"] != Integrator.ACCURATE:
+        steps = f", Euler steps of {step}" if record["method"] in EULER_STEPS else ""
+        yield f"Method: {name}{steps}." if record["method"] in SEARCHES else f"Method: {name}{steps}; {feedback}."
+        return
+    yield f"Method: {name}."
+    if resolution is None:
+        yield f"Accurate mode: error between nodes at most {_plain(record['accuracy_mm'])} mm."
+        return
+    if resolution["panels"]:
+        error = resolution["error_between_nodes_mm"]
+        within = "" if error is None else f", error between nodes below {_plain(_above(error))} mm"
+        counts = f"{_counted(resolution['nodes'], 'node')} in {_counted(resolution['panels'], 'panel')}"
+        yield f"Accurate mode: {counts}{within}."
+    if resolution["euler_from_s"] is not None:
+        lost = resolution.get("lost")
+        reason = f" ({lost['message']})" if lost else ""
+        yield (
+            f"Collocation failed at {resolution['euler_from_s']:.3f} s; continued with Euler steps of {step}{reason}; "
+            f"{feedback}."
+        )
+
+
+def _counted(count: int, what: str) -> str:
+    """A count with its noun."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def _above(error: float) -> float:
+    """An upper bound of the error with few digits."""
+    shown = max(error, MIN_SHOWN)
+    unit = 10.0 ** (math.floor(math.log10(shown)) + 1 - SHOWN_DIGITS)
+    return (math.floor(shown / unit) + 1.0) * unit
+
+
+def _plain(value: float) -> str:
+    """A positive number without an exponent."""
+    return np.format_float_positional(float(f"{value:.6g}"), trim="-")

@@ -1,0 +1,64 @@
+"""Notes beside the numbers of a report: clock, accuracy of bodies, open surfaces, grips, pairs that were left out."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final
+
+from cellplan.model.left_out import left_out_lines
+from cellplan.report.record.clock import NEXT_STEP, TASKS
+from cellplan.report.record.common import Number, Record
+
+MAX_NAMES: Final = 3  # links of a robot that a line names; further ones are counted
+CLOCK_NOTES: Final = {
+    TASKS: "no motion.duration_s: the clock ends with the last task",
+    NEXT_STEP: "motion.duration_s is no whole number of steps: the clock ends with the step after it",
+}
+
+
+def clock_note(record: Record) -> str:
+    """What determines the duration of the motion; empty if the cell file states it."""
+    return CLOCK_NOTES.get(record.get("clock_from", ""), "")
+
+
+def accuracy_note(pair: Sequence[str], accuracies: Sequence[Number] | None) -> str:
+    """Accuracy of the two bodies of a pair; empty if it is unknown.
+
+    A body that is taken as exact is not mentioned if the other is not.
+    """
+    if accuracies is None:
+        return ""
+    unknown = [name for name, value in zip(pair, accuracies, strict=True) if value is None]
+    if unknown:
+        return f"accuracy of {' and '.join(unknown)} not stated"
+    stated = [(name, value) for name, value in zip(pair, accuracies, strict=True) if value]
+    if not stated:
+        return "between bodies taken as exact"
+    if len(stated) == len(accuracies) and len(set(accuracies)) == 1:
+        return f"between bodies accurate to {stated[0][1]:g} mm"
+    return f"between bodies accurate to {' and '.join(f'{value:g} mm ({name})' for name, value in stated)}"
+
+
+def left_out_notes(record: Record) -> list[str]:
+    """One line for each kind of pairs that were not judged in full; none if the record has no such key."""
+    if "left_out" not in record:
+        return []
+    return left_out_lines((each["kind"], tuple(each["bodies"]), each["reason"]) for each in record["left_out"])
+
+
+def grip_notes(record: Record) -> list[str]:
+    """Depth of each holder in the part: the messages of these checks, each once."""
+    return list(dict.fromkeys(check["message"] for check in record["checks"] if check.get("name") == "grip_depth"))
+
+
+def open_surface_notes(entries: Iterable[Record]) -> Iterator[tuple[str, str]]:
+    """A line for each open surface, one for all links of a robot, with the key of the cell that it is about."""
+    links: dict[str, list[Record]] = {}
+    for each in entries:
+        if each["has_inside"]:
+            links.setdefault(each["key"], []).append(each)
+        else:
+            edges = f"{each['open_edges']} open edge{'s' if each['open_edges'] != 1 else ''}"
+            yield each["key"], f"the mesh of {each['body']} has {edges}: contact is detected, containment is not"
+    for key, meshes in links.items():
+        names = ", ".join(each["body"] for each in meshes[:MAX_NAMES]) + (", …" if len(meshes) > MAX_NAMES else "")
+        count = f"{len(meshes)} meshes of links are" if len(meshes) > 1 else "the mesh of a link is"
+        yield key, f"{count} open ({names}): points with a winding number above one half count as inside"
