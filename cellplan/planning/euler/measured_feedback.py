@@ -118,7 +118,7 @@ def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
     q[0] = motion.start
     for k in range(len(q) - 1):
         state = problem.state(q[k])
-        nominal = inverse(problem.constraints.reference_frames(state.X_WP)) @ state.X_WT[problem.operators]
+        nominal = inverse(problem.constraints.reference_frames(state.X_WP)) @ state.X_WT[problem.constraints.operators]
         for place, (scheduled, X_seen) in enumerate(zip(desired.tasks, measure(q[k : k + 1]), strict=True)):
             seen, told = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
             problem.desired[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=told)

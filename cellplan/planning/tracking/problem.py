@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.errors import DivergedError
 from cellplan.geometry.transforms import Array, inverse
@@ -121,11 +120,6 @@ class TrackingProblem:
         self._goals = self._secondary_goals() if cell.solver.goals else None
         self._locked_since = locked_since(cell)
 
-    @property
-    def operators(self) -> NDArray[np.intp]:
-        """Index of the robot of each task and grasp in the cell, shape (tasks,)."""
-        return self.constraints.operators
-
     def step(self, k: int) -> float:
         """Time from sample k to the next in [s]."""
         return float(self.times[k + 1] - self.times[k])
@@ -141,7 +135,7 @@ class TrackingProblem:
     def rows(self, k: int, q: Array) -> list[Array]:
         """Rows of the cooperation Jacobian for each task at sample k and configuration q, shape (m, nq) each."""
         state = self.state(q)
-        X_WT, X_WR = state.X_WT[self.operators], self.constraints.reference_frames(state.X_WP)
+        X_WT, X_WR = state.X_WT[self.constraints.operators], self.constraints.reference_frames(state.X_WP)
         J = cooperation_jacobian(state, X_WT[:, :3, 3], self.signs * self.mobile(k), X_WR=X_WR)
         return [rows[k] @ block for rows, block in zip(self._rows, J, strict=True)]
 
@@ -153,7 +147,7 @@ class TrackingProblem:
         """
         state = self.state(q)
         signs = self.signs * self.mobile(k)
-        X_WT = state.X_WT[self.operators]
+        X_WT = state.X_WT[self.constraints.operators]
         X_WR = None if self._is_on_part else self.constraints.reference_frames(state.X_WP)
         J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
         X_RT = inverse(state.X_WP if X_WR is None else X_WR) @ X_WT

@@ -108,7 +108,7 @@ class SearchCost:
         R, p = np.swapaxes(X_WR[:, :3, :3], 1, 2), X_WR[:, :3, 3]
         w = R @ state.screws_W[3:]
         v = R @ (state.screws_W[:3] - skew(p) @ state.screws_W[3:])  # of the point at the origin of P
-        poses = R @ state.X_WT[self._problem.operators][:, :3, :]
+        poses = R @ state.X_WT[self._problem.constraints.operators][:, :3, :]
         poses[:, :, 3] -= (R @ p[:, :, None])[:, :, 0]
         x = poses[self._owners, :, self._columns]
         signs = self._signs[self._owners][:, None, :]
@@ -152,7 +152,7 @@ class SearchCost:
         for index, (task, kind) in enumerate(zip(self._problem.tasks, self._kinds, strict=True)):
             if kind == "turn":
                 rotations = [axis - 3 for axis in task.axes if axis >= 3]
-                R = X_WR[index, :3, :3].T @ state.X_WT[self._problem.operators[index], :3, :3]
+                R = X_WR[index, :3, :3].T @ state.X_WT[self._problem.constraints.operators[index], :3, :3]
                 desired[index, :3, :3] = _twist(desired[index, :3, :3] @ R.T, rotations) @ R
         return desired
 
