@@ -20,7 +20,7 @@ from cellplan.planning.path.tool_orientation import orient_tool
 
 STANDSTILL: Final = 1e-4  # [-] of the largest speed by the parameter: a curve slower than this has a cusp there
 SAME_POSE: Final = 1e-9  # [m], [-] entries of poses that differ by less are those of one pose
-PROBES: Final = 257  # poses looked at before a toolpath is handed on
+PROBES: Final = 257  # poses checked before a toolpath is handed on
 
 
 def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:

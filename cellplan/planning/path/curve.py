@@ -59,7 +59,7 @@ def path_curve(task: Task, origin: Origin) -> PathCurve:
     Listed points are passed in their order; shapes that have none run the way round that their task says.
 
     Raises:
-        InputError: The points do not make a path, or a corner cannot be rounded as asked.
+        InputError: The points do not make a path, or a corner cannot be rounded as stated.
     """
     path = task.path
     where = origin.at(f"tasks.{task.name}.path")
@@ -112,7 +112,7 @@ def _polygon_points(path: PolygonPath, task: Task, where: str) -> Array:
 
 
 def _outside(task: Task, normal: Array, where: str) -> Array:
-    """Direction a planar path is seen from: the side it is laid on from, else against the tool axis."""
+    """Direction a planar path is seen from: the side it is projected from, else against the tool axis."""
     if task.project is not None and abs(task.project @ normal) < IN_PLANE:
         raise InputError(
             f"{where}.project: expected a side that faces the path's plane, got {direction_name(task.project)}, which "

@@ -18,7 +18,7 @@ from cellplan.model.task import Task
 from cellplan.planning.path.curve import PathCurve
 from cellplan.planning.path.formatting import AXIS_NAMES, direction_name, in_mm, length
 
-SAMPLES: Final = 4096  # points at which a path is looked at to see whether it stays on the part
+SAMPLES: Final = 4096  # points at which a path is checked to see whether it stays on the part
 FEWEST_SAMPLES: Final = 4  # of them on each smooth span
 FLATTEST: Final = np.sin(np.deg2rad(1.0))  # [-] a surface seen at a flatter angle than 1 deg stretches the path
 RAY_STEP: Final = 2.5e-4  # [m] between rays on a mesh: finer than the fillets a tool axis can follow
