@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
@@ -13,6 +13,7 @@ from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
 from cellplan.model.joint_limits import JointLimits
 from cellplan.model.mounting import Pedestal
+from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Frame, Task
@@ -24,29 +25,6 @@ class Mode(StrEnum):
     SIMULTANEOUS = "simultaneous"
     PAIRWISE = "pairwise"
     PART_AT_REST = "part_at_rest"
-
-
-@dataclass(frozen=True, slots=True)
-class Origin:
-    """Where the words of a cell stand, so that a later finding can still name the line.
-
-    Attributes:
-        file: File name as the user gave it.
-        lines: Line number, from 1, of each key path (``robots.kuka.start_deg``).
-        document: The file as plain values in the file's units, every default filled in: what a written copy is made of.
-    """
-
-    file: str = "<cell>"
-    lines: Mapping[str, int] = field(default_factory=dict)
-    document: Mapping[str, object] = field(default_factory=dict)
-
-    def at(self, key: str) -> str:
-        """``file:line: key`` for a key path; the nearest enclosing key gives the line when the key is a default."""
-        enclosing = key
-        while enclosing not in self.lines and "." in enclosing:
-            enclosing = enclosing.rpartition(".")[0]
-        line = self.lines.get(enclosing)
-        return f"{self.file}:{line}: {key}" if line else f"{self.file}: {key}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

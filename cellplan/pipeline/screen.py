@@ -25,7 +25,7 @@ def screen(cell: Cell, candidates: Candidates, *, task: str | None = None, accur
         InputError: The cell cannot be worked with, or there is no such task.
         ValueError: The candidates are not cells of these robots.
     """
-    paths = clock_paths(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     runs = [
         screen_layouts(
             cell,

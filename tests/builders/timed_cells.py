@@ -76,9 +76,7 @@ def case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | N
 
 def _case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | None = None) -> Case:
     cell = replace(cell, solver=replace(cell.solver, integrator=Integrator.ACCURATE))
-    timed = time_tasks(
-        cell, [clock_path(cell, task, build_toolpath(task, cell.part, cell.origin)) for task in cell.tasks]
-    )
+    timed = time_tasks(cell, [clock_path(cell, task, build_toolpath(task, cell.part)) for task in cell.tasks])
     if start is None:
         start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     return Case(cell, timed, tuple(everyone(cell) if moving is None else moving), start)

@@ -23,9 +23,7 @@ FAR = 20.0  # [m] out of reach of any arm
 @pytest.fixture(scope="module")
 def job() -> SimpleNamespace:
     cell = load_cell(CELL)
-    timed = time_tasks(
-        cell, [clock_path(cell, task, build_toolpath(task, cell.part, cell.origin)) for task in cell.tasks]
-    )
+    timed = time_tasks(cell, [clock_path(cell, task, build_toolpath(task, cell.part)) for task in cell.tasks])
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     return SimpleNamespace(cell=cell, timed=timed, start=start, moving=[robot.name for robot in cell.robots])
 

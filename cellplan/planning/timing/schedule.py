@@ -83,12 +83,12 @@ def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
             own = "path" if isinstance(path.toolpath, Trajectory) else key
             what = "a task" if task.repeat == 1 else "a cycle"
             raise InputError(
-                f"{cell.origin.at(f'tasks.{task.name}.{own}')}: expected {what} of at least {least:g} s "
+                f"{task.where(own)}: expected {what} of at least {least:g} s "
                 f"({FEWEST_STEPS} times motion.step_s), got {duration:g} s; slow the task down or shorten the step"
             )
         if task.settle > whole - least * (1.0 - STEP_ROOM) + INSTANT_ROOM:
             raise InputError(
-                f"{cell.origin.at(f'tasks.{task.name}.settle_s')}: expected a time that leaves at least {least:g} s "
+                f"{task.where('settle_s')}: expected a time that leaves at least {least:g} s "
                 f"({FEWEST_STEPS} times motion.step_s) of the task's {whole:g} s to be judged, got {task.settle:g}"
             )
 
@@ -120,7 +120,7 @@ def _examine_end(cell: Cell, path: ClockedPath) -> None:
     elif isinstance(path.toolpath, Trajectory):
         key, why = "path", " (by the instants of its file)"
     raise InputError(
-        f"{cell.origin.at(f'tasks.{task.name}.{key}')}: expected an end within the clock of {clock:g} s "
+        f"{task.where(key)}: expected an end within the clock of {clock:g} s "
         f"(motion.duration_s), got an end at {path.over:.6g} s{why}; give the clock at least "
         f"{_rounded_up(path.over):g} s, or leave motion.duration_s out and it ends with the last task"
     )

@@ -35,7 +35,6 @@ class ClockedPath:
             start and stop of the time law. The cycles of a trajectory are its stretches.
         behind: Length in [m] behind each stop of one cycle, shape (pieces + 1,).
         quick: Way from lengths to parameters of the path for a few times at a time.
-        where: Place of the path in the cell file, for findings.
     """
 
     task: Task
@@ -43,7 +42,6 @@ class ClockedPath:
     corners: Array
     behind: Array
     quick: QuickParameters
-    where: str
 
     @property
     def start(self) -> float:
@@ -75,8 +73,8 @@ class ClockedPath:
         knots = self._knots()
         if self.task.repeat * len(knots) > MOST_BREAKS:
             raise InputError(
-                f"{self.where}: expected at most {MOST_BREAKS} knots of the path in all cycles, got {len(knots)} in "
-                f"each of {self.task.repeat}; repeat it less often, or write solver.integrator: euler"
+                f"{self.task.where('path')}: expected at most {MOST_BREAKS} knots of the path in all cycles, got "
+                f"{len(knots)} in each of {self.task.repeat}; repeat it less often, or write solver.integrator: euler"
             )
         return distinct(np.concatenate([self.jumps, self._instants(knots)]))
 
@@ -253,7 +251,6 @@ def clock_path(cell: Cell, task: Task, toolpath: Toolpath) -> ClockedPath:
         corners=_corner_times(cell, task, toolpath),
         behind=toolpath.behind,
         quick=quickly(toolpath.arc),
-        where=cell.origin.at(f"tasks.{task.name}.path"),
     )
 
 
@@ -261,24 +258,24 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
     """Times in [s] at which the stretches of a path begin, and the one at which the last ends."""
     if isinstance(toolpath, Trajectory):
         return task.start + toolpath.duration * np.arange(task.repeat + 1.0)
-    behind = _stops(cell, task, toolpath)
+    behind = _stops(task, toolpath)
     if task.feed is not None:
         return task.start + peak_rate(task.time_law) / task.feed * behind
     duration = task.time_for_path(cell.motion.duration)
     if duration is None:
         raise InputError(
-            f"{cell.origin.at(f'tasks.{task.name}')}: missing duration_s: expected duration_s or feed_mm_s, as "
+            f"{task.where()}: missing duration_s: expected duration_s or feed_mm_s, as "
             "motion.duration_s is not given either"
         )
     if not duration > 0.0:
         raise InputError(
-            f"{cell.origin.at(f'tasks.{task.name}.start_s')}: expected a start before the end of the clock at "
+            f"{task.where('start_s')}: expected a start before the end of the clock at "
             f"{cell.motion.duration:g} s, got {task.start:g}; make motion.duration_s longer"
         )
     return task.start + duration * (behind / behind[-1])
 
 
-def _stops(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
+def _stops(task: Task, toolpath: Toolpath) -> Array:
     """Length in [m] behind each stop of all cycles, from zero to the whole way."""
     if task.repeat == 1:
         return toolpath.behind
@@ -287,7 +284,7 @@ def _stops(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
     behind = toolpath.behind
     if task.repeat * len(behind) > MOST_SAMPLES:
         raise InputError(
-            f"{cell.origin.at(f'tasks.{task.name}.repeat')}: expected at most {MOST_SAMPLES // len(behind)} cycles of "
+            f"{task.where('repeat')}: expected at most {MOST_SAMPLES // len(behind)} cycles of "
             f"a path with {len(behind) - 1} stops, got {task.repeat}"
         )
     cycles = np.arange(task.repeat)[:, None] * toolpath.length

@@ -8,8 +8,8 @@ from builders.roller_paths import ROLLER, clocked, task_on
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, rotation_exp, rotation_vector
-from cellplan.model.cell import Origin
 from cellplan.model.motion import TaskSchedule
+from cellplan.model.origin import Origin
 from cellplan.model.task import Task, TimedPath
 from cellplan.model.toolpath import Trajectory
 from cellplan.planning.path.build import build_toolpath
@@ -53,7 +53,7 @@ def ellipse(samples: int = 41, **words: Any) -> TimedPath:
 
 
 def on_clock(task: Task, *, duration: float = 4.0, step: float = 0.01) -> TaskSchedule:
-    (one,) = schedule_tasks(clocked(task, duration=duration, step=step), [build_toolpath(task, ROLLER, ORIGIN)]).tasks
+    (one,) = schedule_tasks(clocked(task, duration=duration, step=step), [build_toolpath(task, ROLLER)]).tasks
     return one
 
 
@@ -84,7 +84,7 @@ def test_twists_are_the_derivatives_of_the_poses(kind: str) -> None:
         "fixed": {},
     }[kind]
     task = task_on(timed(t, points, **words), tool_axis=DOWN if kind == "fixed" else None)
-    path = build_toolpath(task, ROLLER, ORIGIN)
+    path = build_toolpath(task, ROLLER)
     assert isinstance(path, Trajectory)
     h = 1e-6
     u = np.linspace(h, path.duration - h, 300)
@@ -103,7 +103,7 @@ def test_a_trajectory_is_shifted_by_its_start_and_rests_before_and_after() -> No
     task = task_on(timed(t, np.outer(t, [0.3, 0.0, 0.0])), tool_axis=DOWN, start=0.5)
     other = task_on(ellipse(), tool_axis=DOWN, name="other")
     cell = clocked(task, other, step=0.01)
-    one = schedule_tasks(cell, [build_toolpath(task, ROLLER, ORIGIN), build_toolpath(other, ROLLER, ORIGIN)]).tasks[0]
+    one = schedule_tasks(cell, [build_toolpath(task, ROLLER), build_toolpath(other, ROLLER)]).tasks[0]
 
     assert one.end == pytest.approx(1.5, abs=1e-15)
     assert np.allclose(one.X_PT[[0, 50, 100, 150, 152], 0, 3], [0.0, 0.0, 0.15, 0.3, 0.3], atol=1e-14)
@@ -144,7 +144,7 @@ def test_length_is_that_of_the_curve() -> None:
     u = 2.0 * np.pi * np.arange(200) / 200  # the trapezoid rule converges geometrically on a periodic function
     exact = 2.0 * np.pi * float(np.hypot(a * np.sin(u), b * np.cos(u)).mean())
 
-    path = build_toolpath(task_on(ellipse(401), tool_axis=DOWN), ROLLER, ORIGIN)
+    path = build_toolpath(task_on(ellipse(401), tool_axis=DOWN), ROLLER)
 
     assert path.length == pytest.approx(exact, rel=1e-8)
 
@@ -152,7 +152,7 @@ def test_length_is_that_of_the_curve() -> None:
 def test_an_open_trajectory_is_not_repeated() -> None:
     t = np.linspace(0.0, 1.0, 11)
     with pytest.raises(InputError) as caught:
-        build_toolpath(task_on(timed(t, np.outer(t, [1, 0, 0])), tool_axis=DOWN, repeat=2), ROLLER, ORIGIN)
+        build_toolpath(task_on(timed(t, np.outer(t, [1, 0, 0])), tool_axis=DOWN, repeat=2, origin=ORIGIN), ROLLER)
 
     assert str(caught.value) == (
         "cell.yaml:12: tasks.ring.repeat: expected 1 for a path that does not end in the pose of its start, got 2; "
@@ -164,7 +164,7 @@ def test_a_trajectory_needs_ten_steps_and_some_time_to_be_judged() -> None:
     short, settling = task_on(ellipse(), tool_axis=DOWN), task_on(ellipse(), tool_axis=DOWN, settle=PERIOD)
     for task, step, key in ((short, 0.3, "path"), (settling, 0.01, "settle_s")):
         with pytest.raises(InputError, match=f"tasks.ring.{key}: expected a t"):
-            clock_paths(clocked(task, step=step), [build_toolpath(task, ROLLER, ORIGIN)])
+            clock_paths(clocked(task, step=step), [build_toolpath(task, ROLLER)])
 
 
 @pytest.mark.parametrize("times", [[0.1, 0.2], [0.0, 0.0], [0.0, np.nan], [0.0]])
