@@ -11,7 +11,7 @@ from cellplan.geometry.curves.orientation import Orientation
 from cellplan.geometry.transforms import Array, is_rigid, pose_from
 from cellplan.model.cell import Part
 from cellplan.model.task import Task, TimedPath
-from cellplan.model.toolpath import Toolpath, Trajectory
+from cellplan.model.toolpath import Toolpath
 from cellplan.planning.path.curve import path_curve
 from cellplan.planning.path.formatting import in_mm
 from cellplan.planning.path.plausible_size import refuse_unlikely_path
@@ -47,7 +47,7 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
             f"{task.where('repeat')}: expected 1 for a path that does not end in the pose of its "
             f"start, got {task.repeat}; close the path"
         )
-    toolpath = (Trajectory if is_timed else Toolpath)(
+    toolpath = Toolpath(
         name=task.name,
         tip=curve.curve,
         orientation=orientation,
@@ -57,8 +57,9 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
         is_closed=is_closed,
         runs_on=curve.runs_on,
         stand_off=task.approach.distance if task.approach else 0.0,
+        is_timed=is_timed,
     )
-    if not is_rigid(_probe(toolpath)):
+    if not is_rigid(toolpath.spread(PROBES)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")
     return toolpath
 
@@ -71,13 +72,6 @@ def _comes_back(tip: Curve, orientation: Orientation, stops: Array) -> bool:
         R, _ = orientation.frames(u, interval, p=p, dp=dp)
         poses.append(pose_from(R, p)[0])
     return bool(np.abs(poses[1] - poses[0]).max() <= SAME_POSE)
-
-
-def _probe(toolpath: Toolpath) -> Array:
-    """Poses spread over a toolpath, shape (N, 4, 4)."""
-    if isinstance(toolpath, Trajectory):
-        return toolpath.at(np.linspace(0.0, toolpath.duration, PROBES))[0]
-    return toolpath.poses(np.linspace(0.0, toolpath.length, PROBES))
 
 
 def _refuse_standstill(tip: Curve, arc: ArcLength, where: str) -> None:

@@ -10,7 +10,7 @@ from cellplan.geometry.transforms import Array, rotation_vector
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.task import INSTANT_ROOM, Task
-from cellplan.model.toolpath import Toolpath, Trajectory
+from cellplan.model.toolpath import Toolpath
 from cellplan.planning.timing.approach_retract import stand_off
 from cellplan.planning.timing.sample_memory import require_room
 from cellplan.planning.timing.time_law import reached_at
@@ -80,7 +80,7 @@ def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
         duration = whole / task.repeat
         if duration < least * (1.0 - STEP_ROOM) - INSTANT_ROOM:
             key = "duration_s" if task.feed is None else "feed_mm_s"
-            own = "path" if isinstance(path.toolpath, Trajectory) else key
+            own = "path" if path.toolpath.is_timed else key
             what = "a task" if task.repeat == 1 else "a cycle"
             raise InputError(
                 f"{task.where(own)}: expected {what} of at least {least:g} s "
@@ -117,7 +117,7 @@ def _examine_end(cell: Cell, path: ClockedPath) -> None:
     key, why = "duration_s", ""
     if task.feed is not None:
         key, why = "feed_mm_s", f" ({1e3 * length:.4g} mm at up to {1e3 * task.feed:g} mm/s)"
-    elif isinstance(path.toolpath, Trajectory):
+    elif path.toolpath.is_timed:
         key, why = "path", " (by the instants of its file)"
     raise InputError(
         f"{task.where(key)}: expected an end within the clock of {clock:g} s "
@@ -135,7 +135,7 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
     """Reference pose and twist of one tool at each sample; at a corner the later side counts, at the end the rest."""
     task, corners = path.task, path.corners
     X_PT, V_PT_P, travelled = path.targets(times, path.stretches(times + INSTANT_ROOM))
-    corners = corners[[0, -1]] if isinstance(path.toolpath, Trajectory) else corners
+    corners = corners[[0, -1]] if path.toolpath.is_timed else corners
     rests = (times < corners[0] - INSTANT_ROOM) | (times > corners[-1] - INSTANT_ROOM)
     V_PT_P[rests] = 0.0
     _even_out_jumps(times, corners, X_PT, V_PT_P=V_PT_P)
@@ -159,7 +159,7 @@ def _cycle_ends(task: Task, toolpath: Toolpath, corners: Array) -> tuple[float, 
     if not toolpath.is_closed or is_turned:
         return ()
     shares = np.arange(1, task.repeat + 1) / task.repeat
-    if toolpath.runs_on and not isinstance(toolpath, Trajectory):
+    if toolpath.runs_on and not toolpath.is_timed:
         shares = reached_at(task.time_law, shares)
     return tuple((corners[0] + shares * (corners[-1] - corners[0])).tolist())
 

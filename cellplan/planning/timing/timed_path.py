@@ -13,7 +13,7 @@ from cellplan.geometry.curves.curve import Interval
 from cellplan.geometry.transforms import Array, rotation_about
 from cellplan.model.cell import Cell
 from cellplan.model.task import INSTANT_ROOM, Task, TimeLawKind
-from cellplan.model.toolpath import TOOL_Z, Toolpath, Trajectory
+from cellplan.model.toolpath import TOOL_Z, Toolpath
 from cellplan.planning.timing.approach_retract import stand_off
 from cellplan.planning.timing.time_law import advance, peak_rate, reached_at
 
@@ -84,7 +84,7 @@ class ClockedPath:
         found = [self.corners, np.array([self.over])]
         if self.task.approach is not None:
             found.append(np.array([self.start - self.task.approach.duration]))
-        if self.task.time_law.kind is TimeLawKind.TRAPEZOID and not isinstance(self.toolpath, Trajectory):
+        if self.task.time_law.kind is TimeLawKind.TRAPEZOID and not self.toolpath.is_timed:
             ramp = self.task.time_law.ramp * np.diff(self.corners)
             found += [self.corners[:-1] + ramp, self.corners[1:] - ramp]
         return distinct(np.concatenate(found))
@@ -104,7 +104,7 @@ class ClockedPath:
         low, high = within
         inside = np.clip(times, low, high)
         middle = np.broadcast_to(np.asarray(0.5 * (low + high)), inside.shape)
-        if isinstance(self.toolpath, Trajectory):
+        if self.toolpath.is_timed:
             X_PT, V_PT_P = self.toolpath.at(self._own_times(inside, self.toolpath.duration)[1])
         else:
             X_PT, V_PT_P, _ = self._by_time_law(inside, self.stretches(middle), quick=self.quick)
@@ -129,7 +129,7 @@ class ClockedPath:
             shape (N,).
         """
         path = self.toolpath
-        if isinstance(path, Trajectory):
+        if path.is_timed:
             cycle, t = self._own_times(times, path.duration)
             return *path.at(t), cycle * path.length + path.arc.lengths(t)
         return self._by_time_law(times, stretch)
@@ -176,7 +176,7 @@ class ClockedPath:
         """Times in [s] at which the path passes its knots, of all cycles, shape (N,)."""
         path, law = self.toolpath, self.task.time_law
         cycles = np.arange(self.task.repeat)[:, None]
-        if isinstance(path, Trajectory):
+        if path.is_timed:
             return (self.corners[:-1, None] + knots).ravel()
         pieces = len(self.behind) - 1
         s = path.arc.lengths(knots)
@@ -256,7 +256,7 @@ def clock_path(cell: Cell, task: Task, toolpath: Toolpath) -> ClockedPath:
 
 def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
     """Times in [s] at which the stretches of a path begin, and the one at which the last ends."""
-    if isinstance(toolpath, Trajectory):
+    if toolpath.is_timed:
         return task.start + toolpath.duration * np.arange(task.repeat + 1.0)
     behind = _stops(task, toolpath)
     if task.feed is not None:

@@ -11,7 +11,6 @@ from cellplan.geometry.transforms import Array, rotation_exp, rotation_vector
 from cellplan.model.motion import TaskSchedule
 from cellplan.model.origin import Origin
 from cellplan.model.task import Task, TimedPath
-from cellplan.model.toolpath import Trajectory
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
 
@@ -85,7 +84,7 @@ def test_twists_are_the_derivatives_of_the_poses(kind: str) -> None:
     }[kind]
     task = task_on(timed(t, points, **words), tool_axis=DOWN if kind == "fixed" else None)
     path = build_toolpath(task, ROLLER)
-    assert isinstance(path, Trajectory)
+    assert path.is_timed
     h = 1e-6
     u = np.linspace(h, path.duration - h, 300)
 
