@@ -11,9 +11,9 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.batched import Placement
 from cellplan.model.cell import Cell
 from cellplan.model.task import Frame
-from cellplan.planning.collocation.batch_targets import BatchTargets
+from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
-from cellplan.planning.collocation.solver import Collocation, Indices, Precision
+from cellplan.planning.collocation.solver import Collocation, Indices, Precision, repeated
 from cellplan.planning.collocation.windows import Window, windows_between
 from cellplan.planning.timing.timed_path import TimedTasks
 from cellplan.planning.tracking.motion_task import closures
@@ -153,10 +153,10 @@ class _Screen:
         """Prepare the tasks, the windows that all go through, and the limits."""
         grasps = closures(cell, moving)
         self._tasks = BatchTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
-        self._targets, self._accuracy = BatchTargets(timed, grasps), accuracy
+        self._desired_at, self._accuracy = desired_motion(timed, grasps), accuracy
         self._precision = Precision(accuracy=accuracy, shortest=cell.motion.step)
         breaks, jumps = timed.breaks, timed.jumps
-        self._at_start = self._targets.at(breaks[:1], breaks[:1], breaks[1:2])
+        self._at_start = self._desired_at(breaks[:1], breaks[:1], breaks[1:2])
         self._windows = windows_between(jumps, whole=float(breaks[-1]), knots=breaks, highest=FIRST_DEGREE)
         at_rest = cell.positioners[:1] if all(path.task.relative_to is Frame.PART for path in timed.paths) else ()
         self._settling = np.concatenate([np.full(len(r.model.joints), r.name not in at_rest) for r in cell.robots])
@@ -168,7 +168,7 @@ class _Screen:
         q, arrived = self._settled(start.T.copy(), placement)
         found = Screening.unknown(q.T.copy())
         found.lost_at[arrived] = 0.0
-        collocation = Collocation(self._tasks, self._targets, placement, self._precision)
+        collocation = Collocation(self._tasks, self._desired_at, placement, self._precision)
 
         def record(window: Window, cells: Indices, nodes: Array, errors: Array) -> None:
             everywhere = np.concatenate([nodes, nodes @ window.between.T], axis=2)
@@ -186,12 +186,12 @@ class _Screen:
     def _settled(self, q: Array, placement: Placement) -> tuple[Array, NDArray[np.bool_]]:
         """Start postures, shape (nq, cells), with the tools brought to their paths, and which of them came there."""
         cells = q.shape[1]
-        desired, still = self._at_start.repeated(cells), np.zeros_like(q)
+        desired, still = repeated(self._at_start, cells), np.zeros_like(q)
         for _ in range(NEWTON_STEPS):
             step = self._tasks.linearise(q, desired, placement, mobile=self._settling).correction(still)
             longest = np.abs(step).max(axis=0)
             if not np.any(longest > QUIET * self._accuracy):
                 break
             q = q + step * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, LARGEST_STEP))
-        errors = np.abs(self._tasks.errors(q, desired, placement)).max(axis=(0, 1))
+        errors = np.abs(self._tasks.errors(q, desired[0], placement)).max(axis=(0, 1))
         return q, errors <= self._accuracy

@@ -11,7 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import INSTANT_ROOM
-from cellplan.planning.collocation.batch_targets import BatchTargets
+from cellplan.planning.collocation.batch_targets import desired_motion, in_windows, sampled
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath
 from cellplan.planning.collocation.solver import Collocation, Drift, Indices, Precision, largest
@@ -53,7 +53,8 @@ class AccurateRun:
         placement, self.end = tasks.chains.placement(cell), float(timed.times[-1])
         breaks, jumps = timed.breaks, timed.jumps
         until, first = _settled(cell, timed, len(grasps)), breaks[:2]
-        desired = BatchTargets(timed, grasps).at(first[:1], first[:1], first[1:])
+        on_paths = desired_motion(timed, grasps)
+        desired = on_paths(first[:1], first[:1], first[1:])
         offset = start_offset(tasks, desired, placement, start=motion.start, until=until, accuracy=accuracy)
         self._precision = Precision(
             accuracy=accuracy,
@@ -61,7 +62,8 @@ class AccurateRun:
             shortest=min(cell.motion.step, SHORTEST_SHARE * self.end),
         )
         self.sweeps = self.solves = 0
-        self._tasks, self._targets, self._placement = tasks, BatchTargets(timed, grasps, offset), placement
+        self._tasks, self._placement, self._grasps, self._offset = tasks, placement, grasps, offset
+        self._on_paths, self._desired_at = on_paths, desired_motion(timed, grasps, offset)
         self._locked_since, self._progress = locked_since(cell), progress
         inner = np.concatenate([jumps, self._locked_since, *([] if offset is None else [until])])
         self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
@@ -92,7 +94,7 @@ class AccurateRun:
         for breaks in self._stretches(begin, end):
             mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
             collocation = Collocation(
-                self._tasks, self._targets, self._placement, self._precision, mobile=mobile, drift=paced
+                self._tasks, self._desired_at, self._placement, self._precision, mobile=mobile, drift=paced
             )
             windows = windows_between(breaks, whole=self.end, knots=self._knots)
             arrived = collocation.carry(windows, at, ONLY, record)
@@ -104,17 +106,16 @@ class AccurateRun:
     def gaps(self, begin: float, end: float) -> Array:
         """How far each tool is desired at one time from where it is desired at a later one, in pose entries."""
         inside = np.array([begin, end - INSTANT_ROOM])
-        desired = self._targets.on_path(np.array([begin, end]), inside, inside + INSTANT_ROOM)
-        turned = np.abs(np.diff(desired.R))[..., 0].max(axis=(0, 1))
-        return np.maximum(turned, np.abs(np.diff(desired.p))[..., 0].max(axis=0))
+        X, _ = self._on_paths(np.array([begin, end]), inside, inside + INSTANT_ROOM)
+        return np.abs(np.diff(X[:3]))[..., 0].max(axis=(0, 1))
 
     def errors(self, schedule: Schedule, q: Array) -> Array:
         """Largest tool errors in [m] or [rad] at the first N samples, at configurations of shape (N, nq)."""
         worst = np.empty(len(q))
         for first in range(0, len(q), IN_CACHE):
             some = slice(first, min(first + IN_CACHE, len(q)))
-            desired = self._targets.sampled(schedule, some)
-            worst[some] = largest(self._tasks.errors(q[some].T, desired, self._placement))
+            X, _ = sampled(schedule, some, self._grasps, self._offset)
+            worst[some] = largest(self._tasks.errors(q[some].T, X, self._placement))
         return worst
 
     def repeated(self, cycle: CollocatedPath, *, begin: float) -> CollocatedPath | None:
@@ -122,9 +123,9 @@ class AccurateRun:
         again = cycle.shifted(begin - cycle.begin)
         if np.any((self._locked_since > cycle.begin) & (self._locked_since < again.end)):
             return None
-        here, there = (self._targets.in_windows([Window(tuple(path.panels))])[0] for path in (cycle, again))
-        gap = max(float(np.abs(here.R - there.R).max()), float(np.abs(here.p - there.p).max()))
-        return again if gap <= SAME_POSE else None
+        windows = [Window(tuple(path.panels)) for path in (cycle, again)]
+        (here, _), (there, _) = (in_windows(self._desired_at, [window])[0] for window in windows)
+        return again if np.abs(here - there).max() <= SAME_POSE else None
 
     def _stretches(self, begin: float, end: float) -> list[Array]:
         """Breaks between two times, cut where a joint fails; none when there is no time between them."""
