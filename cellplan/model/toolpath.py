@@ -59,6 +59,12 @@ class Toolpath:
         return self.arc.behind_knots(self.stops)
 
     @property
+    def knots(self) -> Array:
+        """Parameters at which the tip curve or the orientation is joined, the ends included, shape (K,)."""
+        knots: Array = np.unique(np.concatenate([self.tip.knots, self.orientation.knots, self.stops]))
+        return knots[(knots >= self.stops[0]) & (knots <= self.stops[-1])]
+
+    @property
     def pieces(self) -> "tuple[Piece, ...]":
         """The stretches between stops, in order; each starts where the one before ends."""
         behind = self.behind

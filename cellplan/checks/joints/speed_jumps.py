@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array, rotation_vector
-from cellplan.model.motion import DesiredMotion
+from cellplan.model.motion import Schedule
 
 BESIDE: Final = 1e-6  # [s] before and after an instant: the speeds on its two sides
 SMALLEST: Final = 1e-4  # [m/s] or [rad/s]: a smaller change of a tool's speed is no jump
@@ -13,15 +13,15 @@ ON_ROW: Final = 1e-6  # [-] of a step: nearer instants are those of the row
 NO_INSTANTS: Final = np.zeros(0)
 
 
-def desired_jumps(desired: DesiredMotion) -> Array:
+def desired_jumps(schedule: Schedule) -> Array:
     """Instants in [s] at which the desired speed of a tool jumps, shape (J,).
 
     So it does where a constant law starts, passes a corner or ends, and where a trajectory starts or ends at speed.
     """
-    instants = desired.jumps
+    instants = schedule.jumps
     beside = np.concatenate([instants - BESIDE, instants, instants + BESIDE])
     is_jump = np.zeros(len(instants), dtype=bool)
-    for X_PT in desired.poses(np.clip(beside, 0.0, float(desired.times[-1]))):
+    for X_PT in schedule.poses(np.clip(beside, 0.0, float(schedule.times[-1]))):
         before, at, after = np.split(X_PT, 3)
         change = (after[:, :3, 3] - 2.0 * at[:, :3, 3] + before[:, :3, 3]) / BESIDE
         turn = (_turns(at, after) - _turns(before, at)) / BESIDE

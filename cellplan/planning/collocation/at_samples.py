@@ -29,7 +29,7 @@ def brought_onto_tasks(motion: MotionTask, q: Array) -> Array:
     cell, schedule, grasps = motion.cell, motion.schedule, motion.grasps
     if cell.motion.locked:
         return q
-    tasks = BatchTasks(cell, [*(each.task for each in schedule.tasks), *grasps], motion.moving)
+    tasks = BatchTasks(cell, motion.relations, motion.moving)
     placement, everything = tasks.chains.placement(cell), np.ones(cell.joint_count)
     brought = q.copy()
     for first in range(0, len(q), IN_CACHE):

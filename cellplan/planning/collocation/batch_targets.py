@@ -7,26 +7,28 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Grasp
+from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.motion import Schedule
 from cellplan.planning.collocation.batch_tasks import Desired
 from cellplan.planning.collocation.start_offset import StartOffset
 from cellplan.planning.collocation.windows import Window
-from cellplan.planning.timing.timed_path import TimedTasks
 
 DesiredAt = Callable[[Array, Array, Array], Desired]  # times in [s] and the breaks before and after, shape (N,) each
 
 
-def desired_motion(timed: TimedTasks, grasps: Sequence[Grasp], offset: StartOffset | None = None) -> DesiredAt:
-    """The desired motion of the tools of timed tasks, then of further holders, whose grasps never change.
+def desired_motion(
+    paths: Sequence[ClockedPath], grasps: Sequence[Grasp], offset: StartOffset | None = None
+) -> DesiredAt:
+    """The desired motion of the tools of the tasks, then of further holders, whose grasps never change.
 
     Args:
-        timed: The tasks on the common clock.
+        paths: The paths of the tasks on the common clock.
         grasps: Grasps of the further holders that move.
         offset: How far the tools stand beside their paths at the start; None when they stand on them.
     """
 
     def at(times: Array, begins: Array, ends: Array) -> Desired:
-        desired = _in_batches([path.at(times, (begins, ends)) for path in timed.paths], grasps)
+        desired = _in_batches([path.at(times, (begins, ends)) for path in paths], grasps)
         return desired if offset is None else offset.applied(times, *desired)
 
     return at

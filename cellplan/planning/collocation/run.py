@@ -8,6 +8,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.batched import IN_CACHE
 from cellplan.model.cell import Cell
+from cellplan.model.clocked_path import distinct
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import INSTANT_ROOM
@@ -18,7 +19,6 @@ from cellplan.planning.collocation.solver import Collocation, Drift, Indices, Pr
 from cellplan.planning.collocation.start_offset import start_offset
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
 from cellplan.planning.euler.cycle_closing import SAME_POSE, drift_pace
-from cellplan.planning.timing.timed_path import TimedTasks, distinct
 from cellplan.planning.tracking.locked_joints import locked_since
 from cellplan.planning.tracking.motion_task import MotionTask
 
@@ -46,14 +46,19 @@ class AccurateRun:
         Args:
             motion: The tasks, the robots that move and their start.
             progress: Called with the stage and the fraction done.
+
+        Raises:
+            TypeError: The desired motion is known at the samples only.
         """
-        cell, timed, grasps = motion.cell, motion.timed, motion.grasps
+        cell, schedule, grasps = motion.cell, motion.schedule, motion.grasps
+        if not schedule.is_continuous:
+            raise TypeError("accurate run: expected a desired motion between samples, got none")
         accuracy = min(cell.solver.accuracy, TO_CLOSE) if cell.motion.cyclic else cell.solver.accuracy
-        tasks = BatchTasks(cell, [*(path.task for path in timed.paths), *grasps], motion.moving)
-        placement, self.end = tasks.chains.placement(cell), float(timed.times[-1])
-        breaks, jumps = timed.breaks, timed.jumps
-        until, first = _settled(cell, timed, len(grasps)), breaks[:2]
-        on_paths = desired_motion(timed, grasps)
+        tasks = BatchTasks(cell, motion.relations, motion.moving)
+        placement, self.end = tasks.chains.placement(cell), float(schedule.times[-1])
+        breaks, jumps = schedule.breaks, schedule.jumps
+        until, first = _settled(cell, schedule, len(grasps)), breaks[:2]
+        on_paths = desired_motion(schedule.paths, grasps)
         desired = on_paths(first[:1], first[:1], first[1:])
         offset = start_offset(tasks, desired, placement, start=motion.start, until=until, accuracy=accuracy)
         self._precision = Precision(
@@ -63,7 +68,7 @@ class AccurateRun:
         )
         self.sweeps = self.solves = 0
         self._tasks, self._placement, self._grasps, self._offset = tasks, placement, grasps, offset
-        self._on_paths, self._desired_at = on_paths, desired_motion(timed, grasps, offset)
+        self._on_paths, self._desired_at = on_paths, desired_motion(schedule.paths, grasps, offset)
         self._locked_since, self._progress = locked_since(cell), progress
         inner = np.concatenate([jumps, self._locked_since, *([] if offset is None else [until])])
         self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
@@ -147,8 +152,8 @@ def _paced(drift: Array, begin: float, end: float) -> Drift:
     return speeds
 
 
-def _settled(cell: Cell, timed: TimedTasks, grasps: int) -> Array:
+def _settled(cell: Cell, schedule: Schedule, grasps: int) -> Array:
     """Times in [s] until which each tool, and that of each further holder, may be on its way to where it belongs."""
-    given = [path.task.start + path.task.settle if path.task.settle else 0.0 for path in timed.paths]
-    soon = min(SETTLING_STEPS * cell.motion.step, 0.5 * float(timed.times[-1]))
+    given = [path.task.start + path.task.settle if path.task.settle else 0.0 for path in schedule.paths]
+    soon = min(SETTLING_STEPS * cell.motion.step, 0.5 * float(schedule.times[-1]))
     return np.maximum(np.array(given + [0.0] * grasps), soon)

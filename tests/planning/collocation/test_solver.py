@@ -33,7 +33,7 @@ def collocation(
     tasks = BatchTasks(case.cell, [*case.cell.tasks, *grasps], case.moving)
     placed = tasks.chains.placement(case.cell) if placement is None else placement
     precision = Precision(accuracy=accuracy, shortest=shortest)
-    return Collocation(tasks, desired_motion(case.timed, grasps), placed, precision, mobile=mobile)
+    return Collocation(tasks, desired_motion(case.schedule.paths, grasps), placed, precision, mobile=mobile)
 
 
 def moved_bases(cell: Cell, count: int) -> list[Cell]:
@@ -62,7 +62,7 @@ def carried_through(found: Collocation, case: Case, q: Array, cells: NDArray[np.
             passed[cell].extend(window.panels)
 
     last = q.copy()
-    windows = windows_between(case.timed.breaks, whole=float(case.timed.times[-1]))
+    windows = windows_between(case.schedule.breaks, whole=float(case.schedule.times[-1]))
     arrived = found.carry(windows, last, cells, record)
     return last, arrived.tolist(), passed
 
@@ -117,7 +117,7 @@ def test_an_attempt_that_does_not_settle_says_so_in_silence() -> None:
     found = collocation(CELL, mobile=np.zeros(CELL.cell.joint_count))
     window = Window((Panel(0.0, 1.0 / 3.0, 12),))
     times, (begins, ends) = window.instants, window.stretches
-    desired = desired_motion(CELL.timed, ())(times, begins, ends)
+    desired = desired_motion(CELL.schedule.paths, ())(times, begins, ends)
 
     attempt = found.attempt(
         window,
@@ -140,16 +140,16 @@ def test_work_is_counted() -> None:
 def test_targets_of_windows_are_those_of_the_tasks(name: str) -> None:
     case = triangles(CELLS[name])
     grasps = closures(case.cell, case.moving)
-    windows = windows_between(case.timed.breaks, whole=1.0)
+    windows = windows_between(case.schedule.breaks, whole=1.0)
 
-    found = in_windows(desired_motion(case.timed, grasps), windows)
+    found = in_windows(desired_motion(case.schedule.paths, grasps), windows)
 
     for window, (desired, twists) in zip(windows, found, strict=True):
-        for index, path in enumerate(case.timed.paths):
+        for index, path in enumerate(case.schedule.paths):
             X, V = path.at(window.instants, window.stretches)
             np.testing.assert_array_equal(np.moveaxis(desired[:, :, index], -1, 0), X)
             np.testing.assert_array_equal(twists[:, index].T, V)
-        for index, grasp in enumerate(grasps, start=len(case.timed.paths)):
+        for index, grasp in enumerate(grasps, start=len(case.schedule.paths)):
             assert np.all(desired[:, :, index] == grasp.X_PT[:, :, None])
             assert not twists[:, index].any()
 

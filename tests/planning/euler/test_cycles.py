@@ -10,9 +10,9 @@ from cellplan.errors import InputError
 from cellplan.model.motion import TaskSchedule
 from cellplan.model.origin import Origin
 from cellplan.model.task import PolygonPath, SpacePolylinePath, Task, TimeLaw, TimeLawKind
+from cellplan.model.time_law import advance, reached_at
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
-from cellplan.planning.timing.time_law import advance, reached_at
 
 ORIGIN = Origin(file="cell.yaml", lines={"tasks.ring.repeat": 12, "tasks.ring.settle_s": 13})
 CONSTANT, QUINTIC = TimeLaw(kind=TimeLawKind.CONSTANT), TimeLaw(kind=TimeLawKind.QUINTIC)

@@ -1,27 +1,22 @@
-"""Timing: when each tool is where on its path, at any time, and at which times its motion is not smooth."""
+"""Clocked path: the desired motion of one tool at any time, and the times at which it is not smooth."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
-from cellplan.geometry.curves.arc_length import QuickParameters, quickly
+from cellplan.geometry.curves.arc_length import QuickParameters
 from cellplan.geometry.curves.curve import Interval
 from cellplan.geometry.transforms import Array, rotation_about
-from cellplan.model.cell import Cell
+from cellplan.model.approach_retract import stand_off
 from cellplan.model.task import INSTANT_ROOM, Task, TimeLawKind
+from cellplan.model.time_law import advance, reached_at
 from cellplan.model.toolpath import TOOL_Z, Toolpath
-from cellplan.planning.timing.approach_retract import stand_off
-from cellplan.planning.timing.time_law import advance, peak_rate, reached_at
 
-MOST_SAMPLES: Final = 2_000_000  # tables longer than this fill disks, not controllers
 SAME_PLACE: Final = 1e-12  # [-] of the whole length: knots nearer to a stop lie on it
-MOST_BREAKS: Final = (
-    2_000_000  # smooth stretches of a motion beyond which integration from one to the next takes too long
-)
+MOST_BREAKS: Final = 2_000_000  # smooth stretches of a motion; integration over more of them takes too long
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,7 +65,7 @@ class ClockedPath:
         Raises:
             InputError: There are more than two million.
         """
-        knots = self._knots()
+        knots = self.toolpath.knots
         if self.task.repeat * len(knots) > MOST_BREAKS:
             raise InputError(
                 f"{self.task.where('path')}: expected at most {MOST_BREAKS} knots of the path in all cycles, got "
@@ -107,22 +102,23 @@ class ClockedPath:
         if self.toolpath.is_timed:
             X_PT, V_PT_P = self.toolpath.at(self._own_times(inside, self.toolpath.duration)[1])
         else:
-            X_PT, V_PT_P, _ = self._by_time_law(inside, self.stretches(middle), quick=self.quick)
+            X_PT, V_PT_P, _ = self._by_time_law(inside, self._stretches(middle), quick=self.quick)
         V_PT_P[(middle < self.corners[0]) | (middle > self.corners[-1])] = 0.0
         stand_off(inside, self.task, X_PT, V_PT_P=V_PT_P, end=self.end)
         return X_PT, V_PT_P
 
-    def stretches(self, times: Array) -> NDArray[np.intp]:
-        """Number of the stretch that times in [s] fall into, shape (N,); the nearest before and after all."""
-        stretch = np.searchsorted(self.corners, times, side="right") - 1
-        return np.clip(stretch, 0, len(self.corners) - 2)
+    def poses(self, times: Array) -> Array:
+        """Reference poses X_PT with approach and retreat at times in [s], shape (M,), shape (M, 4, 4)."""
+        X_PT, V_PT_P, _ = self.targets(times)
+        stand_off(times, self.task, X_PT, V_PT_P=V_PT_P, end=self.end)
+        return X_PT
 
-    def targets(self, times: Array, stretch: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+    def targets(self, times: Array) -> tuple[Array, Array, Array]:
         """Poses, twists and lengths behind the tool while it follows its path, without approach and retreat.
 
         Args:
-            times: Times in [s], shape (N,); beyond its stretch the nearer end is taken.
-            stretch: Stretch that each belongs to, shape (N,): it says which side counts at a corner.
+            times: Times in [s], shape (N,); before and after the path its nearer end is taken, at a corner the later
+                side.
 
         Returns:
             Poses X_PT, shape (N, 4, 4), twists V_PT_P, shape (N, 6), and lengths in [m] that grow from cycle to cycle,
@@ -132,7 +128,12 @@ class ClockedPath:
         if path.is_timed:
             cycle, t = self._own_times(times, path.duration)
             return *path.at(t), cycle * path.length + path.arc.lengths(t)
-        return self._by_time_law(times, stretch)
+        return self._by_time_law(times, self._stretches(times + INSTANT_ROOM))
+
+    def _stretches(self, times: Array) -> NDArray[np.intp]:
+        """Number of the stretch that times in [s] fall into, shape (N,); the nearest before and after all."""
+        stretch = np.searchsorted(self.corners, times, side="right") - 1
+        return np.clip(stretch, 0, len(self.corners) - 2)
 
     def _own_times(self, times: Array, period: float) -> tuple[Array, Array]:
         """Cycles of a trajectory and times within them, shape (N,); it passes from one to the next smoothly."""
@@ -144,7 +145,7 @@ class ClockedPath:
     def _by_time_law(
         self, times: Array, stretch: NDArray[np.intp], *, quick: QuickParameters | None = None
     ) -> tuple[Array, Array, Array]:
-        """See `targets`, where each stretch takes its own start and stop of the time law."""
+        """See `targets`; the stretch says which side counts at a corner."""
         task, toolpath, behind = self.task, self.toolpath, self.behind
         begin, duration = self.corners[stretch], self.corners[stretch + 1] - self.corners[stretch]
         elapsed = np.clip(times - begin, 0.0, duration)
@@ -166,12 +167,6 @@ class ClockedPath:
             X_PT[:, :3, :3] = X_PT[:, :3, :3] @ rotation_about(TOOL_Z, cycle * toolpath.turn)
         return X_PT, twists * (law.rate * length / duration)[:, None], cycle * behind[-1] + s
 
-    def _knots(self) -> Array:
-        """Parameters of the path at which its tip or its orientation is joined, the ends included, shape (K,)."""
-        path = self.toolpath
-        knots: Array = np.unique(np.concatenate([path.tip.knots, path.orientation.knots, path.stops]))
-        return knots[(knots >= path.stops[0]) & (knots <= path.stops[-1])]
-
     def _instants(self, knots: Array) -> Array:
         """Times in [s] at which the path passes its knots, of all cycles, shape (N,)."""
         path, law = self.toolpath, self.task.time_law
@@ -192,100 +187,7 @@ class ClockedPath:
         return (self.corners[stretch] + np.diff(self.corners)[stretch] * tau).ravel()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TimedTasks:
-    """All tasks on the common clock, before they are sampled.
-
-    Attributes:
-        times: Times of the clock in [s], evenly spaced from 0, shape (N,).
-        paths: The paths of the tasks that are worked on.
-        extra_breaks: Further times in [s] that count as jumps: ends of panels where errors were too large, shape (K,).
-    """
-
-    times: Array
-    paths: tuple[ClockedPath, ...]
-    extra_breaks: Array = field(default_factory=lambda: np.zeros(0))
-
-    @property
-    def breaks(self) -> Array:
-        """Times in [s], from zero to the end of the clock, between which the motion of all tools is smooth."""
-        return self._within([path.breaks for path in self.paths])
-
-    @property
-    def jumps(self) -> Array:
-        """Those of them that do not come from knots of the paths, which join pieces smoothly."""
-        return self._within([path.jumps for path in self.paths])
-
-    def poses(self, times: Array) -> tuple[Array, ...]:
-        """Reference poses X_PT of all tasks at times in [s], shape (M,), shape (M, 4, 4) each."""
-        found = []
-        for path in self.paths:
-            X_PT, V_PT_P, _ = path.targets(times, path.stretches(times + INSTANT_ROOM))
-            stand_off(times, path.task, X_PT, V_PT_P=V_PT_P, end=path.end)
-            found.append(X_PT)
-        return tuple(found)
-
-    def _within(self, found: Sequence[Array]) -> Array:
-        """Times of all paths within the clock, and its ends."""
-        end = float(self.times[-1])
-        every = np.concatenate([self.extra_breaks, *found])
-        inner = distinct(every[(every > INSTANT_ROOM) & (every < end - INSTANT_ROOM)])
-        return np.concatenate([[0.0], inner, [end]])
-
-
 def distinct(instants: Array) -> Array:
     """Times in increasing order, one for those that are nearer to each other than rounding, shape (n,)."""
     ordered = np.sort(instants)
     return ordered[np.diff(ordered, prepend=-np.inf) > INSTANT_ROOM]
-
-
-def clock_path(cell: Cell, task: Task, toolpath: Toolpath) -> ClockedPath:
-    """Put a toolpath on the common clock.
-
-    Raises:
-        InputError: The task has no time left, or more stops than anybody counts.
-    """
-    return ClockedPath(
-        task=task,
-        toolpath=toolpath,
-        corners=_corner_times(cell, task, toolpath),
-        behind=toolpath.behind,
-        quick=quickly(toolpath.arc),
-    )
-
-
-def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
-    """Times in [s] at which the stretches of a path begin, and the one at which the last ends."""
-    if toolpath.is_timed:
-        return task.start + toolpath.duration * np.arange(task.repeat + 1.0)
-    behind = _stops(task, toolpath)
-    if task.feed is not None:
-        return task.start + peak_rate(task.time_law) / task.feed * behind
-    duration = task.time_for_path(cell.motion.duration)
-    if duration is None:
-        raise InputError(
-            f"{task.where()}: missing duration_s: expected duration_s or feed_mm_s, as "
-            "motion.duration_s is not given either"
-        )
-    if not duration > 0.0:
-        raise InputError(
-            f"{task.where('start_s')}: expected a start before the end of the clock at "
-            f"{cell.motion.duration:g} s, got {task.start:g}; make motion.duration_s longer"
-        )
-    return task.start + duration * (behind / behind[-1])
-
-
-def _stops(task: Task, toolpath: Toolpath) -> Array:
-    """Length in [m] behind each stop of all cycles, from zero to the whole way."""
-    if task.repeat == 1:
-        return toolpath.behind
-    if toolpath.runs_on:
-        return np.array([0.0, task.repeat * toolpath.length])
-    behind = toolpath.behind
-    if task.repeat * len(behind) > MOST_SAMPLES:
-        raise InputError(
-            f"{task.where('repeat')}: expected at most {MOST_SAMPLES // len(behind)} cycles of "
-            f"a path with {len(behind) - 1} stops, got {task.repeat}"
-        )
-    cycles = np.arange(task.repeat)[:, None] * toolpath.length
-    return np.append((cycles + behind[:-1]).ravel(), task.repeat * toolpath.length)
