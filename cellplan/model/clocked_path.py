@@ -187,7 +187,7 @@ class ClockedPath:
         return (self.corners[stretch] + np.diff(self.corners)[stretch] * tau).ravel()
 
 
-def distinct(instants: Array) -> Array:
+def distinct(times: Array) -> Array:
     """Times in increasing order, one for those that are nearer to each other than rounding, shape (n,)."""
-    ordered = np.sort(instants)
+    ordered = np.sort(times)
     return ordered[np.diff(ordered, prepend=-np.inf) > INSTANT_ROOM]

@@ -36,10 +36,10 @@ def desired_motion(
 
 def in_windows(desired_at: DesiredAt, windows: Sequence[Window]) -> list[Desired]:
     """The desired motion at the times of each window; each sees corners from inside its panels."""
-    times = np.concatenate([window.instants for window in windows])
+    times = np.concatenate([window.times for window in windows])
     begins, ends = (np.concatenate(parts) for parts in zip(*(window.stretches for window in windows), strict=True))
     X, V = desired_at(times, begins, ends)
-    cuts = np.cumsum([0, *(len(window.instants) for window in windows)]).tolist()
+    cuts = np.cumsum([0, *(len(window.times) for window in windows)]).tolist()
     return [(X[..., low:high].copy(), V[..., low:high].copy()) for low, high in pairwise(cuts)]
 
 

@@ -206,10 +206,10 @@ class TrackingProblem:
             signs=signs,
             mobility=np.any(signs != 0.0, axis=0) / first.weights,
         )
-        asked = self._goals.speeds(k, stance)
+        secondary = self._goals.speeds(k, stance)
         if first.secondary is not None:
-            asked = asked + first.secondary
-        return replace(first, secondary=asked, bounds=self._goals.bounds(q))
+            secondary = secondary + first.secondary
+        return replace(first, secondary=secondary, bounds=self._goals.bounds(q))
 
     def _refuse_lost_path(self, k: int, error: Array) -> None:
         """Stop where going on would be meaningless; not a number counts as lost.
@@ -230,7 +230,7 @@ class TrackingProblem:
 
 
 def _place(task: Relation) -> str:
-    """Where a tool should be, in words."""
+    """Where a tool should be, for messages."""
     return "its grasp on the part" if isinstance(task, Grasp) else f"task '{task.name}'"
 
 

@@ -208,3 +208,13 @@ def test_progress_is_told_from_zero_to_one() -> None:
     run.path(case.start, begin=0.0, end=1.0)
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1.0)
+
+
+def test_a_motion_known_at_samples_only_is_refused() -> None:
+    case = case_of(shipped("four_robots"))
+    samples = replace(case.schedule, paths=())
+
+    assert case.schedule.is_continuous
+    assert not samples.is_continuous
+    with pytest.raises(TypeError, match=r"^accurate run: expected a desired motion between samples, got none$"):
+        AccurateRun(replace(case.task, schedule=samples))

@@ -116,7 +116,7 @@ def test_an_attempt_that_does_not_settle_says_so_in_silence() -> None:
     """Even where no robot may move and the tools are desired elsewhere; no warning is let out."""
     found = collocation(CELL, mobile=np.zeros(CELL.cell.joint_count))
     window = Window((Panel(0.0, 1.0 / 3.0, 12),))
-    times, (begins, ends) = window.instants, window.stretches
+    times, (begins, ends) = window.times, window.stretches
     desired = desired_motion(CELL.schedule.paths, ())(times, begins, ends)
 
     attempt = found.attempt(
@@ -146,7 +146,7 @@ def test_targets_of_windows_are_those_of_the_tasks(name: str) -> None:
 
     for window, (desired, twists) in zip(windows, found, strict=True):
         for index, path in enumerate(case.schedule.paths):
-            X, V = path.at(window.instants, window.stretches)
+            X, V = path.at(window.times, window.stretches)
             np.testing.assert_array_equal(np.moveaxis(desired[:, :, index], -1, 0), X)
             np.testing.assert_array_equal(twists[:, index].T, V)
         for index, grasp in enumerate(grasps, start=len(case.schedule.paths)):

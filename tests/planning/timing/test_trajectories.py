@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders.roller_paths import ROLLER, clocked, task_on
+from builders.roller_paths import ROLLER, clocked, sampled, task_on
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, rotation_exp, rotation_vector
@@ -170,3 +170,14 @@ def test_a_trajectory_needs_ten_steps_and_some_time_to_be_judged() -> None:
 def test_times_that_do_not_go_on_are_refused_at_the_door(times: list[float]) -> None:
     with pytest.raises(ValueError, match=r"trajectory 'loop.csv': expected"):
         timed(np.array(times), np.zeros((len(times), 3)))
+
+
+def test_poses_are_spread_over_the_time_of_a_trajectory_and_over_the_length_of_a_path() -> None:
+    t = np.array([0.0, 0.1, 1.0])
+    uneven = timed(t, np.outer(t**2, [0.3, 0.0, 0.0]))
+    trajectory = build_toolpath(task_on(uneven, tool_axis=DOWN), ROLLER)
+    path = build_toolpath(task_on(sampled(uneven.points), tool_axis=DOWN), ROLLER)
+
+    assert np.array_equal(trajectory.spread(7), trajectory.at(np.linspace(0.0, 1.0, 7))[0])
+    assert np.allclose(path.spread(4)[:, 0, 3], [0.0, 0.1, 0.2, 0.3], atol=1e-12)
+    assert np.array_equal(trajectory.spread(1)[0], trajectory.X_PT_start)
