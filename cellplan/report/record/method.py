@@ -8,24 +8,10 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.motion import Motion, NearestSingular
-from cellplan.model.solver import Integrator, MethodName, SolverSettings
+from cellplan.model.solver import METHODS, Integrator, MethodName, MethodTraits, SolverSettings
 from cellplan.report.record.run import Record, number
 
 USUAL_METHOD: Final[MethodName] = "weighted_pseudo_inverse"  # nobody has to be told
-METHOD_NAMES: Final[dict[MethodName, str]] = {
-    "weighted_pseudo_inverse": "weighted pseudo-inverse",
-    "damped_least_squares": "damped least squares",
-    "jacobian_transpose": "Jacobian transpose",
-    "filtered_inverse": "filtered inverse I",
-    "filtered_inverse_ii": "filtered inverse II",
-    "heuristic_search": "heuristic search, the best joint first",
-    "recursive_search": "recursive search, joint by joint",
-    "quadratic_program": "quadratic program",
-}
-SEARCHES: Final[frozenset[MethodName]] = frozenset({"heuristic_search", "recursive_search"})  # no error feedback
-EULER_STEPS: Final[frozenset[MethodName]] = frozenset(  # the others go from instant to instant in ways of their own
-    {"weighted_pseudo_inverse", "damped_least_squares", "quadratic_program"}
-)
 SHOWN_DIGITS: Final = 2  # [-] of an error between nodes
 LEAST_SHOWN: Final = 1e-9  # [mm] of such an error: below it more zeros tell nothing
 SLACK_UNIT: Final = "norm of the twist given up, m/s and rad/s as they come"
@@ -87,11 +73,12 @@ def method_lines(record: Record, step_s: float) -> Iterator[str]:
 
 def _way_lines(record: Record, step: str) -> Iterator[str]:
     """The method and how it got from instant to instant."""
-    name, resolution = METHOD_NAMES[record["method"]], record["resolution"]
+    traits: MethodTraits = METHODS[record["method"]]
+    name, resolution = traits.label, record["resolution"]
     feedback = f"errors are fed back with a gain of {record['gain_per_s']:g} per second"
     if record["integrator"] != Integrator.ACCURATE:
-        steps = f", Euler steps of {step}" if record["method"] in EULER_STEPS else ""
-        yield f"Method: {name}{steps}." if record["method"] in SEARCHES else f"Method: {name}{steps}; {feedback}."
+        steps = f", Euler steps of {step}" if traits.takes_euler_steps else ""
+        yield f"Method: {name}{steps}." if traits.is_search else f"Method: {name}{steps}; {feedback}."
         return
     yield f"Method: {name}."
     if resolution is None:
@@ -140,7 +127,7 @@ def _own_settings(solver: SolverSettings) -> Record:
     if solver.method == "quadratic_program":
         program = solver.quadratic_program
         return {"slack_weight": number(program.slack_weight), "ramp_s": number(program.ramp)}
-    return _search_settings(solver) if solver.method in SEARCHES else {}
+    return _search_settings(solver) if solver.traits.is_search else {}
 
 
 def _search_settings(solver: SolverSettings) -> Record:
