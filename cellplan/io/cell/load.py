@@ -68,7 +68,7 @@ class CellFile:
             if getattr(cell, key) is not part:
                 raise InputError(
                     f"cell '{cell.name}': expected the cell as it was read, got one whose {key} was changed in Python; "
-                    "set values before, or by with_values only"
+                    "call with_values first"
                 )
         document = changed(self.document, values)
         kept = {address: value for address, value in self.changes.items() if address not in values}

@@ -239,6 +239,6 @@ def test_a_cell_changed_in_python_is_refused_rather_than_undone(cell: Cell) -> N
     other = replace(cell, motion=replace(cell.motion, duration=7.0))
 
     assert refusal(other, {"solver.seed": 3}) == [
-        "cell 'pen': expected the cell as it was read, got one whose motion was changed in Python; set values before, "
-        "or by with_values only"
+        "cell 'pen': expected the cell as it was read, got one whose motion was changed in Python; call "
+        "with_values first"
     ]
