@@ -18,8 +18,8 @@ the same as a JSON Schema for editors.
 
 - **The version is promised**: `cellplan: 1` is frozen at the first release. From then on keys are only added, each with
   a default that changes nothing for files without it; no key, value, unit or default changes its meaning. Anything else
-  gets another number, and a file with another number is refused. The same holds for robot tables, which have no number of
-  their own.
+  gets another number, and a file with another number is refused. The same holds for robot tables, which have no number
+  of their own.
 - **Units are in the keys**: `_mm`, `_deg`, `_s`, `_mm_s`, `_deg_s`, `_per_s`. Everything else is a plain number.
 - **Poses** are `{xyz_mm: [x, y, z], rpy_deg: [roll, pitch, yaw]}` with angles about fixed axes, as in URDF.
 - **Names** have 1 to 40 letters, digits, `_` or `-` and do not start with `-`.

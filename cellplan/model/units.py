@@ -1,0 +1,28 @@
+"""Units of what is printed; within the program all quantities are in SI units."""
+
+import math
+from typing import Final, NamedTuple
+
+MM: Final = 1e3  # [mm/m]
+DEG: Final = math.degrees(1.0)  # [deg/rad]
+
+
+class DisplayUnit(NamedTuple):
+    """Unit in which a quantity is printed.
+
+    Attributes:
+        name: The unit as printed.
+        scale: Printed value per value in SI units.
+    """
+
+    name: str
+    scale: float
+
+
+DEGREES: Final = DisplayUnit("deg", DEG)
+MILLIMETRES: Final = DisplayUnit("mm", MM)
+
+
+def joint_unit(*, is_revolute: bool) -> DisplayUnit:
+    """Unit of joint positions: degrees of a revolute joint, millimetres of a prismatic one."""
+    return DEGREES if is_revolute else MILLIMETRES
