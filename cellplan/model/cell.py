@@ -180,7 +180,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Obstacle:
-    """A fixed thing in the cell."""
+    """A fixed obstacle in the cell."""
 
     name: str
     shape: Shape
@@ -189,7 +189,7 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LockedJoint:
-    """A joint that fails: from the instant ``since`` in [s] on it stays where it is."""
+    """A joint that fails: from the time ``since`` in [s] on it is locked."""
 
     robot: str
     joint: str
@@ -203,9 +203,9 @@ class MotionSettings:
     Attributes:
         mode: Who moves.
         duration: Length of the common clock in [s]; None when it ends with the last task.
-        step: Time between two instants in [s].
+        step: Time between two samples in [s].
         cyclic: Whether all joints are to end where they started.
-        locked: Joints that fail on the way.
+        locked: Joints that fail during the motion.
     """
 
     mode: Mode
@@ -225,7 +225,7 @@ class Exclusion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckSettings:
-    """What the checks demand.
+    """Requirements of the checks.
 
     Attributes:
         clearance: Smallest allowed distance in [m] between things that must not touch.

@@ -1,4 +1,4 @@
-"""The solver's entries, in millimetres and degrees, become frozen settings in metres and radians."""
+"""Conversion of the solver's entries to settings in metres and radians."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -22,7 +22,7 @@ from cellplan.model.solver import (
     WeightingSettings,
 )
 
-HALF_FEEDBACK: Final = 0.5  # gain_per_s * step_s by default: a quarter of where Euler's steps begin to swing
+HALF_FEEDBACK: Final = 0.5  # gain_per_s * step_s by default: a quarter of the stability limit of Euler's steps
 
 
 def build_solver(entry: SolverEntry, step: float, models: Mapping[str, RobotModel]) -> SolverSettings:

@@ -145,7 +145,7 @@ def _edited(node: Any, steps: list[str], value: Any, *, annotation: Any) -> tupl
     elif isinstance(node, dict):
         key, rest, child = _entry(node, steps, annotation)
     else:
-        raise _AddressError(f"{AN_ADDRESS}, got one that goes on with {shown(steps[0])} below {shown(node)}")
+        raise _AddressError(f"{AN_ADDRESS}, got {shown(steps[0])} below the value {shown(node)}")
     new, below = _edited(child, rest, value, annotation=annotation_at(annotation, (key,)))
     if isinstance(node, tuple):
         if new is LEFT_OUT:

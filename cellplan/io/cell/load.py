@@ -1,4 +1,4 @@
-"""Cell file: read, understood, checked against itself and against the files it names; all findings at once."""
+"""Loading of a cell file and of the files that it names; all findings at once."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -38,13 +38,13 @@ from cellplan.model.cell import Cell, Origin
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import TimedPath
 
-PART_EXTENT_MM: Final = (1.0, 20_000.0)  # smaller or larger parts are slips of the unit
+PART_EXTENT_MM: Final = (1.0, 20_000.0)  # smaller or larger parts are a wrong unit
 PARTS: Final = ("robots", "part", "tasks", "obstacles", "motion", "solver", "checks")  # of a cell, from its document
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CellFile:
-    """The document of a cell, and where the files that it names are looked for.
+    """The document of a cell, and the folders of the files that it names.
 
     Attributes:
         document: The file, with the values that were changed since.
@@ -144,7 +144,7 @@ def _targets(pieces: Pieces, sources: Sources) -> Targets:
 
 
 def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
-    """Exclusions name bodies that exist; told only when all robots are known."""
+    """Exclusions name bodies that exist; checked only when all robots are known."""
     if pieces.checks is None or set(models) != set(pieces.names["robots"]):
         return
     known = {"part", *pieces.names["environment"]}
@@ -162,7 +162,7 @@ def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: 
 
 
 def _part_extent(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
-    """A part of a likely size; meshes are looked at by their reader."""
+    """A part of a likely size; meshes are checked by their reader."""
     shape = pieces.part.geometry if pieces.part else None
     if shape is None or shape.mesh is not None:
         return

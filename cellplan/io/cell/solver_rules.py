@@ -1,4 +1,4 @@
-"""What the solver and the motion say must fit the cell: feedback and step, joints that exist, goals that can be met."""
+"""Rules of solver and motion: stable feedback, joints that exist, goals that the method can pursue."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final
@@ -11,19 +11,19 @@ from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
 from cellplan.model.solver import ACCURATE_METHODS, METHODS, NULL_SPACE_METHODS, against_accurate
 
-FEEDBACK_LIMIT: Final = 2.0  # gain_per_s * step_s at which Euler's steps begin to swing ever wider
+FEEDBACK_LIMIT: Final = 2.0  # gain_per_s * step_s at which Euler's steps become unstable
 OR_EULER: Final = "or choose solver.integrator: euler"
 
 
 def feedback_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
-    """The error feedback dies away with Euler's steps."""
+    """The error feedback is stable with Euler's steps."""
     if pieces.motion is None or pieces.solver is None or pieces.solver.gain_per_s is None:
         return
     gain, step = pieces.solver.gain_per_s, pieces.motion.step_s
     if gain * step >= FEEDBACK_LIMIT:
         text = (
             f"expected a gain below {FEEDBACK_LIMIT / step:g} (2 / step_s), got {gain:g}; "
-            "the error feedback would swing ever wider"
+            "the error feedback would be unstable"
         )
         yield document.finding(("solver", "gain_per_s"), text)
 
@@ -55,7 +55,7 @@ def _goals(solver: SolverEntry) -> list[str]:
 
 
 def solver_findings(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
-    """Joints that the solver and the motion name exist; the method leaves room for what is asked besides the tasks.
+    """Joints that the solver and the motion name exist; the method has a null space for goals besides the tasks.
 
     Args:
         pieces: What of the file is understood.
@@ -71,7 +71,7 @@ def solver_findings(pieces: Pieces, models: Mapping[str, RobotModel], document: 
             yield document.finding(path, f"expected every joint once, got '{lock.robot}/{lock.joint}' again")
         clock = None if motion is None else motion.duration_s
         if clock is not None and lock.from_s >= clock:
-            text = f"expected an instant before the end at {clock:g} s, got {lock.from_s:g}"
+            text = f"expected a time before the end at {clock:g} s, got {lock.from_s:g}"
             yield document.finding((*path, "from_s"), text)
     if solver is None:
         return
@@ -86,8 +86,8 @@ def solver_findings(pieces: Pieces, models: Mapping[str, RobotModel], document: 
 
 
 def _without_null_space(solver: SolverEntry, pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
-    """What a method that leaves no room besides the tasks cannot do."""
-    text = f"expected a method that leaves room besides the tasks ({listed(NULL_SPACE_METHODS)})"
+    """Goals that a method without a null space cannot pursue."""
+    text = f"expected a method with a null space besides the tasks ({listed(NULL_SPACE_METHODS)})"
     if _goals(solver):
         yield document.finding(("solver", "secondary"), f"{text}, got '{solver.method}'")
     if pieces.motion is not None and pieces.motion.cyclic:

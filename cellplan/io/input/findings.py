@@ -7,7 +7,7 @@ from typing import Final
 
 from cellplan.errors import InputError, InvalidFileError
 
-COMPLAINT_LIMIT: Final = 100  # a file with more is told so; nobody reads on
+COMPLAINT_LIMIT: Final = 100  # of a file; more are counted only
 SHOWN_LENGTH: Final = 40  # characters of a wrong text that are repeated in a message
 LISTED_LIMIT: Final = 60  # words of a list in a message; more than any robot's joints
 SHORTEST_GUESS: Final = 3  # characters; for shorter words every other one is near

@@ -14,7 +14,7 @@ from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import BodyAccuracy, Joint, RobotModel
 
-FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference posture: farther is a slip of the unit
+FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference configuration: farther is a wrong unit
 Given = tuple[float, ...] | dict[str, Any] | None  # a configuration in the units of a file; None: to be found
 
 

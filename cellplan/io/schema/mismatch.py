@@ -32,7 +32,7 @@ class Mismatch:
         allowed: Words or keys that may stand there.
         at_least: Lower bound of a number or of a count; None without one.
         at_most: Upper bound; None without one.
-        is_positive: Whether the lower bound is best told as "positive".
+        is_positive: Whether the lower bound reads as "positive".
         unit: Unit of a number, as in "of millimetres"; empty without one.
         got: The value that was found.
     """

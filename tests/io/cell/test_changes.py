@@ -157,8 +157,8 @@ def test_the_digest_of_the_file_stays_that_of_the_file(cell: Cell) -> None:
         (
             {"motion.duration_s.s": 3},
             [
-                "c with motion.duration_s.s = 3: expected an address such as motion.duration_s, got one that goes on "
-                "with 's' below 2"
+                "c with motion.duration_s.s = 3: expected an address such as motion.duration_s, got 's' "
+                "below the value 2"
             ],
         ),
         (
@@ -182,7 +182,7 @@ def test_the_digest_of_the_file_stays_that_of_the_file(cell: Cell) -> None:
             {"solver.gain_per_s": 1999, "motion.step_s": 0.01},
             [
                 "c with solver.gain_per_s = 1999: solver.gain_per_s: expected a gain below 200 (2 / step_s), got "
-                "1999; the error feedback would swing ever wider"
+                "1999; the error feedback would be unstable"
             ],
         ),
         (
@@ -196,7 +196,7 @@ def test_the_digest_of_the_file_stays_that_of_the_file(cell: Cell) -> None:
             {"motion.mode": "part_at_rest", "tasks.circle.relative_to": "world"},
             [
                 "c:14 with motion.mode = part_at_rest, tasks.circle.relative_to = world: tasks.circle.path.project: "
-                "unexpected key, a path in the world is not laid on the part"
+                "unexpected key, a path in the world is not projected onto the part"
             ],
         ),
     ],
@@ -214,7 +214,7 @@ def test_a_consequence_elsewhere_is_found_at_its_line_with_the_change(cell: Cell
     ]
     assert refusal(cell, {"tasks.circle.axes": ["x", "y", "z", "rx"], "tasks.circle.path.project": None}) == [
         "c:15 with tasks.circle.axes = [x, y, z, rx], tasks.circle.path.project left out: tasks.circle.tool_axis: "
-        "tool_axis: normal needs a path that is laid on the part: add project: +z (or another side), or give "
+        "tool_axis: normal requires a path that is projected onto the part: add project: +z (or another side), or give "
         "tool_axis a direction"
     ]
 
