@@ -180,10 +180,17 @@ def test_what_was_set_when_the_cell_was_solved_is_reported(sound: Path, tmp_path
             {"method": "damped_least_squares"},  # brings its integrator along, which nobody chose
             ["solver.method was set to 'damped_least_squares' when the cell was solved"],
         ),
+        (
+            {"integrator": "euler", "settings": ["solver.seed=4"]},  # an address without an option of its own
+            [
+                "solver.integrator was set to 'euler' when the cell was solved",
+                "solver.seed was set to 4 when the cell was solved",
+            ],
+        ),
     ],
 )
 def test_a_run_with_another_integrator_passes_and_tells_what_was_chosen(
-    sound: Path, tmp_path: Path, choices: dict[str, str], remarks: list[str]
+    sound: Path, tmp_path: Path, choices: dict[str, Any], remarks: list[str]
 ) -> None:
     cell = load_cell(sound / "cell" / "small.yaml")
     write_run(solve(with_overrides(cell, **choices)), tmp_path / "run")
