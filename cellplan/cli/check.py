@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -19,7 +19,13 @@ if TYPE_CHECKING:
 SCHEMA = "cellplan.check/1"
 
 
-def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_dir: AllowDirs = None) -> None:
+def check(
+    cell: CellFile,
+    settings: Settings = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    allow_dir: AllowDirs = None,
+) -> None:
     """Read and validate everything without solving: files, robots, paths, reach and collisions at the start.
 
     Exit status: 0 sound, 1 a collision at the start, 2 bad input, 3 no start posture found, 4 internal error.
@@ -27,9 +33,12 @@ def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_d
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.io.cell.load import load_cell
         from cellplan.pipeline.check import check as check_cell
+        from cellplan.pipeline.overrides import with_overrides
 
         with progress_listener(quiet=quiet) as progress:
-            result = check_cell(load_cell(cell, allow_dirs=allow_dir or ()), progress=progress)
+            result = check_cell(
+                with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), settings or ()), progress=progress
+            )
     status = ExitStatus.PASSED if result.passed else ExitStatus.CHECK_FAILED
     record = _record(result)
     if as_json:
