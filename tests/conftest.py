@@ -1,14 +1,29 @@
 """Fixtures that every test may use."""
 
 import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-os.environ["CELLPLAN_CACHE"] = "off"  # tests neither use nor fill the cache of whoever runs them
+from builders import picture_memo
+from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parent.parent
+SESSION = "CELLPLAN_TEST_SESSION"  # folder that all processes of a session share
+settings.register_profile("quick", max_examples=25, deadline=None, derandomize=True)
+settings.register_profile("full", max_examples=200, deadline=None, derandomize=True)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Give the session a folder of its own: for caches, which are neither the user's nor left behind, and pictures."""
+    if SESSION not in os.environ:
+        os.environ[SESSION] = tempfile.mkdtemp(prefix="cellplan-tests-")
+        config.add_cleanup(lambda: shutil.rmtree(os.environ.pop(SESSION), ignore_errors=True))
+    os.environ["CELLPLAN_CACHE"] = str(Path(os.environ[SESSION]) / "cache")
+    picture_memo.install(Path(os.environ[SESSION]) / "pictures")
+    settings.load_profile("quick" if config.option.markexpr == "not slow" else "full")
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""The shape of the house: sizes, doors to the engines, and a command line that starts at once."""
+"""The structure of the code: sizes, doors to the engines, tests that assert, and a command line that starts at once."""
 
 import ast
 import os
@@ -12,7 +12,9 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+CONFIGURATION = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PACKAGE = ROOT / "cellplan"
+TESTS = ROOT / "tests"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 SCRIPTS = sorted(path for folder in ("tests", "docs", "benchmarks") for path in (ROOT / folder).rglob("*.py"))
 
@@ -21,21 +23,6 @@ BODY_LINES = 40
 CLASS_METHODS = 12
 PARAMETERS = 6
 
-# Each engine may be imported by these files only. A change of engine is then a change of one file.
-DOORS = {
-    "pinocchio": ["kinematics/pinocchio_model.py"],
-    "fcl": ["collision/engine.py"],
-    "coal": ["collision/hulls.py"],
-    "daqp": ["planning/methods/support/qp_engine.py"],
-    "trimesh": ["geometry/mesh/stl_obj.py"],
-    "matplotlib": ["report/plots/canvas.py"],
-    "jinja2": ["report/page/render.py"],
-    "yaml": ["io/yaml/reader.py", "io/yaml/writer.py"],
-    "pydantic": ["io/schema/*.py"],
-    "pydantic_core": ["io/schema/*.py"],
-    "rich": ["cli/*.py"],
-    "typer": ["cli/*.py"],
-}
 EVERYWHERE = {"cellplan", "numpy"}
 HEAVY = {"numpy", "pinocchio", "fcl", "coal", "daqp", "trimesh", "matplotlib", "pydantic", "jinja2", "yaml"}
 
@@ -133,24 +120,39 @@ def any_other_module(folder: Path) -> bool:
 
 
 def test_every_engine_has_one_door() -> None:
+    """Also an engine that no contract names yet; a change of engine is then a change of one file."""
+    doors = doors_of_the_contracts()
     imports = {path: imported_modules(path) - sys.stdlib_module_names - EVERYWHERE for path in SOURCES}
 
     smuggled = [
-        f"{place(path)} imports {name}" for path in SOURCES for name in imports[path] if not is_door(path, name)
+        f"{place(path)} imports {name}" for path in SOURCES for name in imports[path] if not is_door(path, name, doors)
     ]
 
     assert smuggled == []
 
 
-def is_door(path: Path, engine: str) -> bool:
+def doors_of_the_contracts() -> dict[str, list[str]]:
+    """Files that may import an engine, as the contracts "one door for ..." in pyproject.toml state them."""
+    doors: dict[str, list[str]] = {}
+    for contract in CONFIGURATION["tool"]["importlinter"]["contracts"]:
+        if contract["name"].startswith("one door for "):
+            assert contract["source_modules"] == ["cellplan"]
+            for allowed in contract["ignore_imports"]:
+                module, engine = allowed.removeprefix("cellplan.").split(" -> ")
+                assert engine in contract["forbidden_modules"]
+                doors.setdefault(engine, []).append(module.replace(".", "/") + ".py")
+    return doors
+
+
+def is_door(path: Path, engine: str, doors: dict[str, list[str]]) -> bool:
     """Whether a file may import an engine."""
     inside = PurePosixPath(path.relative_to(PACKAGE).as_posix())
-    return any(inside.match(door) for door in DOORS.get(engine, []))
+    return any(inside.match(door) for door in doors.get(engine, []))
 
 
 def test_every_engine_is_a_declared_dependency() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    declared = {re.split(r"[<>=!~ \[]", requirement)[0].lower() for requirement in project["dependencies"]}
+    requirements = CONFIGURATION["project"]["dependencies"]
+    declared = {re.split(r"[<>=!~ \[]", requirement)[0].lower() for requirement in requirements}
     package_of = {"pinocchio": "pin", "fcl": "python-fcl", "yaml": "pyyaml", "pydantic_core": "pydantic"}
 
     used = {name for path in SOURCES for name in imported_modules(path)} - sys.stdlib_module_names - {"cellplan"}
@@ -161,6 +163,43 @@ def test_every_engine_is_a_declared_dependency() -> None:
 @pytest.mark.parametrize("arguments", [("-c", "import cellplan.cli.main"), ("-m", "cellplan", "--help")], ids=" ".join)
 def test_help_starts_without_any_engine(arguments: tuple[str, ...]) -> None:
     assert modules_loaded_by(*arguments) & HEAVY == set()
+
+
+def test_every_test_asserts_something() -> None:
+    """With an assertion, an expected error, a function of numpy.testing, or a helper that does one of these."""
+    calls = {path: called_names(path) for path in SCRIPTS if TESTS in path.parents}
+    shared = {name: called for path in calls if path.parent.name == "builders" for name, called in calls[path].items()}
+    shared = {name: called for name, called in shared.items() if name in asserting(shared)}
+
+    silent = [
+        f"{place(path)}: {name}"
+        for path, called in calls.items()
+        for name in called.keys() - asserting(shared | called)
+        if name.startswith("test_")
+    ]
+
+    assert silent == []
+
+
+def called_names(path: Path) -> dict[str, set[str]]:
+    """What each function of a file calls, by the last part of the name; a statement ``assert`` counts as a call."""
+    found: dict[str, set[str]] = {}
+    for node in functions(ast.parse(path.read_text(encoding="utf-8"))):
+        names = found.setdefault(node.name, set())
+        for child in ast.walk(node):
+            if isinstance(child, ast.Assert):
+                names.add("assert_")
+            elif isinstance(child, ast.Call):
+                names.add(child.func.attr if isinstance(child.func, ast.Attribute) else getattr(child.func, "id", ""))
+    return found
+
+
+def asserting(calls: dict[str, set[str]]) -> set[str]:
+    """Names of the functions that assert, themselves or by a function that they call."""
+    found = {name for name, called in calls.items() if any(re.match("raises$|assert_", other) for other in called)}
+    while more := {name for name, called in calls.items() if name not in found and called & found}:
+        found |= more
+    return found
 
 
 def test_nothing_unfinished_is_shipped() -> None:

@@ -1,7 +1,7 @@
 """Batched kinematics of all robots; the last axis of every array is the batch.
 
 The arrays are laid out so that NumPy works through thousands of configurations in one call; robots lie side by side
-and are filled up to the longest chain with axes that do nothing. Lanes may differ in base poses and tools.
+and are filled up to the longest chain with axes that do nothing. Cells of a batch may differ in base poses and tools.
 """
 
 from dataclasses import dataclass
@@ -14,18 +14,18 @@ from cellplan.geometry.transforms import Array, skew
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.robot import BASE
 
-IN_CACHE: Final = 512  # lanes whose arrays stay in the processor's cache: more at once are slower
+IN_CACHE: Final = 512  # entries of a batch whose arrays stay in the processor's cache: more at once are slower
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """Where robots stand, what they hold, and how the part is held; the last axis is one for all lanes, or the lanes.
+    """Base poses and tool tips of robots; the last axis is the batch, or of length 1 where all of it shares them.
 
     Attributes:
-        R_WB: Base orientations, shape (3, 3, robots, lanes or 1).
-        p_WB: Base positions in [m], shape (3, robots, lanes or 1).
-        R_LT: Tool orientations seen from the last link, shape (3, 3, robots, lanes or 1).
-        p_LT: Tool tips seen from the last link in [m], shape (3, robots, lanes or 1).
+        R_WB: Base orientations, shape (3, 3, robots, batch or 1).
+        p_WB: Base positions in [m], shape (3, robots, batch or 1).
+        R_LT: Tool orientations seen from the last link, shape (3, 3, robots, batch or 1).
+        p_LT: Tool tips seen from the last link in [m], shape (3, robots, batch or 1).
     """
 
     R_WB: Array
@@ -33,12 +33,12 @@ class Placement:
     R_LT: Array
     p_LT: Array
 
-    def of(self, lanes: NDArray[np.intp]) -> "Placement":
-        """That of some lanes only."""
-        return self if self.R_WB.shape[-1] == 1 else Placement(*(part[..., lanes] for part in self._parts))
+    def of(self, entries: NDArray[np.intp]) -> "Placement":
+        """That of some entries of the batch only."""
+        return self if self.R_WB.shape[-1] == 1 else Placement(*(part[..., entries] for part in self._parts))
 
     def repeated(self, count: int) -> "Placement":
-        """Each lane so many times, one after the other."""
+        """Each entry of the batch so many times, one after the other."""
         if self.R_WB.shape[-1] == 1:
             return self
         return Placement(*(np.repeat(part, count, axis=-1) for part in self._parts))
@@ -51,13 +51,13 @@ class Placement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BatchState:
-    """All robots at all lanes.
+    """All robots over the batch.
 
     Attributes:
-        axes: Directions of the axes on the way to the flanges in W, shape (3, levels, robots, lanes).
-        points: A point on each, in [m], shape (3, levels, robots, lanes).
-        R_WT: Tool orientations, shape (3, 3, robots, lanes).
-        p_WT: Tool tips in [m], shape (3, robots, lanes).
+        axes: Directions of the axes on the way to the flanges in W, shape (3, levels, robots, batch).
+        points: A point on each, in [m], shape (3, levels, robots, batch).
+        R_WT: Tool orientations, shape (3, 3, robots, batch).
+        p_WT: Tool tips in [m], shape (3, robots, batch).
     """
 
     axes: Array
@@ -111,12 +111,12 @@ class BatchChains:
         self.is_plain = bool(self.levels == self.joints and np.array_equal(self.to_joints, plain))
 
     def placement(self, cell: Cell) -> Placement:
-        """Where the robots of a cell like this one stand, and their tools: one for all lanes."""
+        """Where the robots of a cell like this one stand, and their tools: one for the whole batch."""
         X_WB, X_FT = ([robot.X_WB for robot in cell.robots], [robot.tool.X_FT for robot in cell.robots])
         return self.placements(np.array([X_WB]), np.array([X_FT]))
 
     def placements(self, X_WB: Array, X_FT: Array) -> Placement:
-        """Bases and tool tips of many cells like this one, a lane each.
+        """Bases and tool tips of many cells like this one, as a batch.
 
         Args:
             X_WB: Bases in the world, shape (cells, robots, 4, 4).
@@ -128,7 +128,7 @@ class BatchChains:
         return Placement(R_WB, p_WB, R_LT, p_LT - self._last_point.T[..., None])
 
     def state(self, q: Array, placement: Placement) -> BatchState:
-        """Kinematics at stacked joint vectors, shape (nq, lanes)."""
+        """Kinematics at stacked joint vectors, shape (nq, batch)."""
         frames = self._steps(q)
         R: Array = np.broadcast_to(placement.R_WB, (3, 3, *frames.shape[3:]))
         p: Array = placement.p_WB
@@ -143,7 +143,7 @@ class BatchChains:
     def _steps(self, q: Array) -> Array:
         """How each axis turns what follows (three columns), where it is and where it points to.
 
-        All are seen from the link before it, shape (levels, 3, 5, robots, lanes).
+        All are seen from the link before it, shape (levels, 3, 5, robots, batch).
         """
         position = self._ratio[..., None] * q[self._leader] + self._offset[..., None]
         steps = np.empty((self.levels, 3, 5, *position.shape[1:]))

@@ -47,7 +47,7 @@ def draw_errors(cell: Cell, errors: CellErrors, trial: int) -> Draw:
 
 
 def perturbed_cell(cell: Cell, draw: Draw) -> Cell:
-    r"""The cell as it really stands; joint positions told to it mean the same as in the written one.
+    r"""The cell as it really stands; joint positions commanded mean the same as in the written one.
 
     With the pose ``E`` of each real frame seen from the written one
 

@@ -16,14 +16,14 @@ from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.solver import Collocation, Indices, Precision
 from cellplan.planning.collocation.windows import Window, windows_between
 from cellplan.planning.timing.timed_path import TimedTasks
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.motion_task import closures
 
 AT_ONCE: Final = 32  # candidates that are resolved together: enough for NumPy, and their arrays stay in the cache
 FIRST_DEGREE: Final = 12  # of the polynomials: enough for most windows at the accuracy of a screening
 NEWTON_STEPS: Final = 20  # to bring the tools to the starts of their paths; about six where they come there
 LARGEST_STEP: Final = 0.5  # [rad] or [m] of one of them
 QUIET: Final = 1e-3  # of the accuracy: a Newton step below this share in [rad] or [m] changes nothing any more
-ALL_WAY: Final = np.inf  # instant at which a candidate is lost that does the whole job
+ALL_WAY: Final = np.inf  # time at which a candidate is lost that does the whole job
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,11 +63,11 @@ class Candidates:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Screening:
-    """What came of each candidate; figures of one that was lost hold up to that instant.
+    """What came of each candidate; figures of one that was lost hold up to that time.
 
     Attributes:
         start: Start postures with the tools on their paths, shape (K, nq).
-        lost_at: Instant in [s] at which a tool could not follow; -inf where it did not even come to its start, inf for
+        lost_at: Time in [s] at which a tool could not follow; -inf where it did not even come to its start, inf for
             candidates that did the whole job, shape (K,).
         error: Bound of the tool error at the nodes and between them, in [m] or [rad], shape (K,).
         margins: Smallest distance of each joint from its limits in [rad] or [m], negative beyond, shape (K, nq).
@@ -188,7 +188,7 @@ class _Screen:
         cells = q.shape[1]
         desired, still = self._at_start.repeated(cells), np.zeros_like(q)
         for _ in range(NEWTON_STEPS):
-            step = self._tasks.look(q, desired, placement, mobile=self._settling).correction(still)
+            step = self._tasks.linearise(q, desired, placement, mobile=self._settling).correction(still)
             longest = np.abs(step).max(axis=0)
             if not np.any(longest > QUIET * self._accuracy):
                 break

@@ -53,7 +53,7 @@ def plan_motion(task: MotionTask, *, progress: Progress = silent) -> Motion:
 def _sampled(
     run: AccurateRun, path: CollocatedPath, problem: Callable[[], TrackingProblem], times: Array, progress: Progress
 ) -> Motion:
-    """The path at the instants of the clock; from where it ends, Euler's steps."""
+    """The path at the samples of the clock; from where it ends, Euler's steps."""
     last = len(times) - 1
     reached = int(np.searchsorted(times, path.end + INSTANT_ROOM, side="right")) - 1
     q = path.at(times[: reached + 1])

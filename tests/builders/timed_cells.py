@@ -1,7 +1,7 @@
 """Timed tasks of shipped cells and of random ones, and what is independent of the planner to judge their motion by."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,21 +24,22 @@ from cellplan.planning.plan_motion import plan_motion
 from cellplan.planning.start.search import choose_start
 from cellplan.planning.timing.schedule import clock_paths, sample, time_tasks
 from cellplan.planning.timing.timed_path import TimedTasks, clock_path, distinct
-from cellplan.planning.tracking.motion_task import MotionTask
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.motion_task import MotionTask, closures
 from cellplan.scene.scene import Scene
 
+SIDE = 0.06  # [m]
 SHIPPED = Path(__file__).parents[2] / "cells"
 
 
 @dataclass(frozen=True)
 class Case:
-    """A cell, its tasks on the clock, who moves, and where it starts."""
+    """A cell, its tasks on the clock, who moves, and where it starts; every motion of it is planned once."""
 
     cell: Cell
     timed: TimedTasks
     moving: tuple[str, ...]
     start: Array
+    _planned: dict[Any, Any] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     @property
     def schedule(self) -> Schedule:
@@ -49,19 +50,31 @@ class Case:
         return MotionTask(self.cell, self.schedule, self.moving, self.start)
 
     def resolved(self, **changes: Any) -> Motion:
-        """The motion, with changed solver settings."""
-        cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
-        return plan_motion(replace(self.task, cell=cell))
+        """The motion, with changed solver settings; not to be changed."""
+        key = ("motion", *sorted(changes.items()))
+        if key not in self._planned:
+            cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
+            self._planned[key] = plan_motion(replace(self.task, cell=cell))
+        return self._planned[key]
 
     def path(self, **changes: Any) -> CollocatedPath:
-        """The whole motion as polynomials."""
-        cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
-        run = AccurateRun(replace(self.task, cell=cell))
-        return run.path(self.start, begin=0.0, end=run.end)
+        """The whole motion as polynomials; not to be changed."""
+        key = ("path", *sorted(changes.items()))
+        if key not in self._planned:
+            cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
+            run = AccurateRun(replace(self.task, cell=cell))
+            self._planned[key] = run.path(self.start, begin=0.0, end=run.end)
+        return self._planned[key]
 
 
 def case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | None = None) -> Case:
     """All tasks of a cell at once."""
+    if moving is None and start is None:
+        return _shared("whole", cell, _case_of)
+    return _case_of(cell, moving=moving, start=start)
+
+
+def _case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | None = None) -> Case:
     cell = replace(cell, solver=replace(cell.solver, integrator=Integrator.ACCURATE))
     timed = time_tasks(
         cell, [clock_path(cell, task, build_toolpath(task, cell.part, cell.origin)) for task in cell.tasks]
@@ -69,6 +82,17 @@ def case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | N
     if start is None:
         start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     return Case(cell, timed, tuple(everyone(cell) if moving is None else moving), start)
+
+
+_SHARED: dict[tuple[str, int], tuple[Cell, Case]] = {}
+
+
+def _shared(kind: str, cell: Cell, make: Callable[[Cell], Case]) -> Case:
+    """One case for each cell, so that tests share the motions that are planned of it."""
+    key = (kind, id(cell))  # the cell is kept, so that no other takes its place in memory
+    if key not in _SHARED:
+        _SHARED[key] = (cell, make(cell))
+    return _SHARED[key][1]
 
 
 @cache
@@ -118,8 +142,14 @@ def between_samples(case: Case, path: CollocatedPath, *, count: int = 10) -> Arr
     return (ends[:-1, None] + np.diff(ends)[:, None] * shares).ravel()
 
 
-def triangles(cell: Cell, *, side: float = 0.06, start: Array | None = None, **words: Any) -> Case:
+def triangles(cell: Cell, *, side: float = SIDE, start: Array | None = None, **words: Any) -> Case:
     """A random cell whose tools go along triangles in space that begin where they are at a start posture."""
+    if side == SIDE and start is None and not words:
+        return _shared("triangles", cell, _triangles)
+    return _triangles(cell, side=side, start=start, **words)
+
+
+def _triangles(cell: Cell, *, side: float = SIDE, start: Array | None = None, **words: Any) -> Case:
     q = np.random.default_rng(2).uniform(-1.0, 1.0, cell.joint_count) if start is None else start
     seen = seen_poses(cell, q[None])[0]
     tasks = []
@@ -132,4 +162,4 @@ def triangles(cell: Cell, *, side: float = 0.06, start: Array | None = None, **w
     held_by = cell.part.held_by[:1] + tuple(replace(grasp, X_PT=X) for grasp, X in grasps)
     robots = tuple(replace(robot, start=q[cell.columns(robot.name)]) for robot in cell.robots)
     part = replace(cell.part, held_by=held_by)
-    return case_of(replace(cell, tasks=tuple(tasks), robots=robots, part=part))
+    return _case_of(replace(cell, tasks=tuple(tasks), robots=robots, part=part))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from builders.moving_cells import cell_with_bodies, program, relative
-from builders.scene_builders import floor, make_cell, placed, slide_model
+from builders.scene_builders import body, floor, joint, make_cell, no_tool, placed, slide_model
 
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.linear_motion import StraightMotion
@@ -12,8 +12,9 @@ from cellplan.certify.pair_state import PairState
 from cellplan.collision.bodies import CollisionBody
 from cellplan.collision.continuous.motion_bound import PairMotion
 from cellplan.collision.distance import measure
-from cellplan.geometry.shapes import Box
+from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import Array
+from cellplan.model.robot import RobotModel
 from cellplan.scene.scene import Scene
 
 ROUNDING = 1e-9  # [m]
@@ -182,3 +183,15 @@ def test_lever_arms_of_a_slide_are_one() -> None:
     assert chain.levers.tolist() == [1.0]
     assert chain.bend(np.full((4, 1), 0.25)).tolist() == [0.0] * 4
     assert chain.reach(np.full((4, 1), 0.25)).tolist() == [0.25] * 4
+
+
+def test_the_lever_arm_of_a_turn_that_carries_a_slide_grows_by_the_travel_of_the_slide() -> None:
+    joints = (joint("turn", -1), joint("slide", 0, axis=(1.0, 0.0, 0.0), slides=True))
+    ball = body("ball", 1, shape=Sphere(0.1))
+    model = RobotModel(name="boom", source="test", joints=joints, flange_link=1, X_BF=np.eye(4), bodies=(ball,))
+    scene = Scene.from_cell(make_cell(placed("a", model, tool=no_tool())))
+    q = np.array([[0.0, 0.0], [0.3, 0.25]])
+
+    chain = LeverArms(scene, q).chain(None, 0)
+
+    assert dict(zip(chain.axes.tolist(), chain.levers.tolist(), strict=True)) == {0: pytest.approx(0.35), 1: 1.0}

@@ -8,7 +8,11 @@ import pytest
 from cellplan.cli.main import run
 
 
-def test_a_sound_cell_is_told_with_postures_and_paths(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_sound_cell_is_told_with_postures_and_paths_and_nothing_is_written(
+    cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
     status = run(["check", str(cells / "four_robots.yaml")])
 
     lines = capsys.readouterr().out.splitlines()
@@ -16,6 +20,7 @@ def test_a_sound_cell_is_told_with_postures_and_paths(cells: Path, capsys: pytes
     assert lines[0] == "four-robots: sound"
     assert "  start of reis (given): A1_deg 0, B1_deg -93, C1_deg 108, D1_deg 0, E1_deg -15, F1_deg 0" in lines
     assert any(line.startswith("  task rectangle: path of ") for line in lines)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_collision_at_the_start_ends_with_one(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -37,13 +42,3 @@ def test_a_start_off_its_task_is_bad_input(cells: Path, tmp_path: Path, capsys: 
     assert (status, out) == (2, "")
     assert f"{path}:25: robots.kuka.start_deg" in err
     assert err.count("\n") == 1
-
-
-def test_checking_writes_nothing(
-    cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-
-    run(["check", str(cells / "four_robots.yaml")])
-
-    assert list(tmp_path.iterdir()) == []

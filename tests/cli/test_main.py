@@ -5,7 +5,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -86,8 +88,7 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Pa
         text=True,
         preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # noqa: PLW1509 - background jobs inherit SIG_IGN
     )
-    time.sleep(4.0)  # the motion of a minute takes longer than that, the imports do not
-    helpers = children(process.pid)
+    helpers = started_helpers(process.pid)
     process.send_signal(number)
     out, err = process.communicate(timeout=10)
 
@@ -102,15 +103,25 @@ def test_a_program_that_is_killed_leaves_no_process_behind(cells: Path, tmp_path
     process = subprocess.Popen(
         [*PROGRAM, "solve", str(cells / "four_robots.yaml"), "-q", "-o", str(tmp_path / "run"), "--duration", "60"]
     )
-    time.sleep(2.0)
-    helpers = children(process.pid)
+    helpers = started_helpers(process.pid)
     process.kill()
     process.wait()
 
-    patience = time.monotonic() + 20.0  # a helper ends its work first
-    while any(lives(helper) for helper in helpers) and time.monotonic() < patience:
-        time.sleep(0.1)
-    assert not any(lives(helper) for helper in helpers)
+    assert holds_within(20.0, lambda: not any(lives(helper) for helper in helpers))  # a helper ends its work first
+
+
+def started_helpers(process: int) -> list[int]:
+    """The processes that a command starts as soon as it is at work; a motion of a minute takes longer than that."""
+    assert holds_within(60.0, lambda: children(process) != [] or not Path("/proc").is_dir())
+    return children(process)
+
+
+def holds_within(seconds: float, condition: Callable[[], bool]) -> bool:
+    """Whether a condition comes true before a time limit."""
+    deadline, again = time.monotonic() + seconds, threading.Event()
+    while not (found := condition()) and time.monotonic() < deadline:
+        again.wait(0.1)
+    return found
 
 
 def children(process: int) -> list[int]:

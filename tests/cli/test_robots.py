@@ -1,10 +1,21 @@
 """The list of bundled robots."""
 
+import io
 import json
+from contextlib import redirect_stdout
+from typing import Any
 
 import pytest
 
 from cellplan.cli.main import run
+
+
+@pytest.fixture(scope="module")
+def listed() -> dict[str, Any]:
+    """What a machine gets."""
+    with redirect_stdout(io.StringIO()) as out:
+        assert run(["robots", "--json"]) == 0
+    return json.loads(out.getvalue())
 
 
 def test_every_bundled_robot_is_listed_with_reach_limits_and_source(capsys: pytest.CaptureFixture[str]) -> None:
@@ -18,11 +29,8 @@ def test_every_bundled_robot_is_listed_with_reach_limits_and_source(capsys: pyte
     assert "Ribeiro 2010, table 5" in told
 
 
-def test_a_machine_gets_the_figures_of_the_data_sheet(capsys: pytest.CaptureFixture[str]) -> None:
-    status = run(["robots", "--json"])
-
-    listed = json.loads(capsys.readouterr().out)
-    assert (status, listed["schema"]) == (0, "cellplan.robots/1")
+def test_a_machine_gets_the_figures_of_the_data_sheet(listed: dict[str, Any]) -> None:
+    assert listed["schema"] == "cellplan.robots/1"
     kuka = next(robot for robot in listed["robots"] if robot["name"] == "kuka_kr6")
     assert kuka["joints"][1] == {
         "name": "B2",
@@ -33,9 +41,6 @@ def test_a_machine_gets_the_figures_of_the_data_sheet(capsys: pytest.CaptureFixt
     }
 
 
-def test_a_robot_named_for_its_reach_has_it(capsys: pytest.CaptureFixture[str]) -> None:
-    run(["robots", "--json"])
-
-    listed = json.loads(capsys.readouterr().out)
+def test_a_robot_named_for_its_reach_has_it(listed: dict[str, Any]) -> None:
     reis = next(robot for robot in listed["robots"] if robot["name"] == "reis_rv20_16")
     assert reis["reach_mm"] == 1600.0  # RV20-16: 20 kg, 1.6 m

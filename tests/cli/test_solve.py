@@ -18,6 +18,15 @@ def coarse_cell(cells: Path, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture
+def hasty_pair(cells: Path, tmp_path: Path) -> Path:
+    """The planar pair with half a second for its motion, on a clock of 5 ms: joints are too fast."""
+    text = (cells / "planar_pair.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "hasty.yaml"
+    path.write_text(text.replace("step_s: 0.001", "step_s: 0.005"), encoding="utf-8")
+    return path
+
+
 def test_a_sound_cell_is_told_and_written(
     coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -58,15 +67,15 @@ def test_a_machine_gets_one_object_with_the_whole_report(
 
 
 def test_a_failed_cell_ends_with_one_and_leaves_no_tables(
-    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    hasty_pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "out"
 
-    status = run(["solve", str(coarse_cell), "-o", str(folder), "--task", "circle", "--duration", "0.2"])
+    status = run(["solve", str(hasty_pair), "-o", str(folder), "--duration", "0.5"])
 
     out = capsys.readouterr().out
     assert status == 1
-    assert out.startswith("four-robots: failed\n")
+    assert out.startswith("planar-pair: failed\n")
     assert "too fast" in out
     assert (folder / "report.html").is_file()
     assert not (folder / "tables").exists()
@@ -74,17 +83,15 @@ def test_a_failed_cell_ends_with_one_and_leaves_no_tables(
 
 
 def test_rejected_tables_are_kept_on_request(
-    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    hasty_pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "out"
 
-    status = run(
-        ["solve", str(coarse_cell), "-o", str(folder), "--task", "circle", "--duration", "0.2", "--keep-rejected"]
-    )
+    status = run(["solve", str(hasty_pair), "-o", str(folder), "--duration", "0.5", "--keep-rejected"])
 
     assert status == 1
     assert f"tables: {folder / 'rejected'}" in capsys.readouterr().out
-    assert "# verdict: REJECTED" in (folder / "rejected" / "kuka.csv").read_text(encoding="utf-8")
+    assert "# verdict: REJECTED" in (folder / "rejected" / "right.csv").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.collision.hulls import convex_hull
@@ -69,7 +69,6 @@ def test_thin_clouds_are_refused_and_do_not_end_the_process(thickness: float) ->
         convex_hull(cloud_of(points @ TURN + 3.0))
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(-17.0, -5.0))
 def test_heaps_of_almost_equal_points_have_a_hull(seed: int, closeness: float) -> None:
     rng = np.random.default_rng(seed)
@@ -84,7 +83,6 @@ def test_heaps_of_almost_equal_points_have_a_hull(seed: int, closeness: float) -
     assert np.all(support(hull, directions) >= support(cloud, directions) - room)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(*[st.integers(0, 3)] * 3), min_size=4, max_size=30), st.booleans())
 def test_hulls_of_points_on_a_lattice_hold_them(corners: list[tuple[int, int, int]], is_turned: bool) -> None:
     points = np.array(corners, dtype=float) @ (TURN if is_turned else np.eye(3))

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from builders.failing_disk import faulty
+from fuzz.failing_disk import faulty
 
 from cellplan.errors import InputError
 from cellplan.io.cell.load import load_cell

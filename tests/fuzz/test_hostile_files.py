@@ -6,7 +6,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from builders import hostile_files
+from fuzz import hostile_files
 
 from cellplan.cli.errors import error_lines
 from cellplan.errors import InputError, OverrunError

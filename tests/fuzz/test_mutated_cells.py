@@ -9,8 +9,8 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from builders import cell_mutations
-from builders.cell_mutations import Injury, Place
+from fuzz import cell_mutations
+from fuzz.cell_mutations import Injury, Place
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

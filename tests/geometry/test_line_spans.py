@@ -39,7 +39,6 @@ def two_boxes(gap: float) -> Mesh:
     return make_mesh(vertices, np.concatenate([one.faces, one.faces + len(one.vertices)]), source="two")
 
 
-@settings(max_examples=40)
 @given(st.sampled_from(SOLIDS), st.integers(0, 10_000))
 def test_a_line_is_inside_where_its_points_are(shape: Solid, seed: int) -> None:
     rng = np.random.default_rng(seed)

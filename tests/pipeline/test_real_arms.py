@@ -72,15 +72,25 @@ motion: {{mode: {mode}, duration_s: 4, step_s: 0.004, time_law: quintic}}
 """
 
 
-def solved(text, shared_robots, tmp_path, mode="simultaneous"):
-    path = tmp_path / "cell.yaml"
+def solved(text, shared_robots, folder, mode="simultaneous"):
+    path = folder / "cell.yaml"
     path.write_text(text.format(robots=shared_robots, mode=mode))
     return solve(load_cell(path, allow_dirs=[shared_robots]))
 
 
-@pytest.mark.parametrize("text", [ARMS, TURNTABLE], ids=["arms", "turntable"])
-def test_real_arms_work_on_a_moving_part(text, shared_robots, tmp_path):
-    solution = solved(text, shared_robots, tmp_path)
+@pytest.fixture(scope="module")
+def turntable(shared_robots, tmp_path_factory):
+    return solved(TURNTABLE, shared_robots, tmp_path_factory.mktemp("turntable"))
+
+
+@pytest.fixture(scope="module")
+def arms(shared_robots, tmp_path_factory):
+    return solved(ARMS, shared_robots, tmp_path_factory.mktemp("arms"))
+
+
+@pytest.mark.parametrize("name", ["arms", "turntable"])
+def test_real_arms_work_on_a_moving_part(name, request):
+    solution = request.getfixturevalue(name)
     report = solution.runs[0].report
 
     assert solution.passed, [check.message for check in report.checks if not check.passed]
@@ -97,9 +107,9 @@ def test_the_operators_do_all_the_work_when_the_part_is_at_rest(shared_robots, t
     assert report.motion_share["holder"][0] == 0.0
 
 
-def test_parallelogram_bars_are_driven_and_watched(shared_robots, tmp_path):
+def test_parallelogram_bars_are_driven_and_watched(turntable):
     """The bars of the IRB 2400 follow joint 3; where they meet by design is told, the rest is checked."""
-    report = solved(TURNTABLE, shared_robots, tmp_path).runs[0].report
+    report = turntable.runs[0].report
     told = {frozenset(pair[:2]): pair[2] for pair in report.clearance.exclusions}
     assert "joined by joint joint_lever_b" in told[frozenset(("lever/link_3", "lever/link_lever_b"))]
     assert "it is their shape" in told[frozenset(("lever/link_1", "lever/link_lever_b"))]

@@ -5,8 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.picture_memo import painted_anew
+from builders.timed_cells import case_of
 
 from cellplan import load_cell, solve, verify, write_run
+from cellplan.model.solver import Integrator
 from cellplan.model.task import Tolerance
 from cellplan.pipeline.overrides import with_overrides
 
@@ -14,6 +17,26 @@ from cellplan.pipeline.overrides import with_overrides
 @pytest.fixture(scope="module")
 def four_robots(cells):
     return solve(load_cell(cells / "four_robots.yaml"))
+
+
+@pytest.fixture(scope="module")
+def initial(cells):
+    return solve(load_cell(cells / "four_robots_initial.yaml"))
+
+
+@pytest.fixture(scope="module")
+def pairs(cells):
+    return solve(with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise"))
+
+
+@pytest.fixture(scope="module")
+def rectangle(cells):
+    return solve(with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise"), task="rectangle")
+
+
+@pytest.fixture(scope="module")
+def at_rest(cells):
+    return solve(with_overrides(load_cell(cells / "four_robots.yaml"), mode="part_at_rest"))
 
 
 def failed(report, name):
@@ -48,50 +71,43 @@ def test_four_robots_conform_at_four_seconds(four_robots):
     assert highest_speed(report) == pytest.approx(0.35, abs=0.02)
 
 
-def test_first_layout_breaks_kuka_b2_and_staubli_c4(cells):
-    solution = solve(load_cell(cells / "four_robots_initial.yaml"))
-    broken = failed(solution.runs[0].report, "joint_position")
+def test_first_layout_breaks_kuka_b2_and_staubli_c4(initial):
+    broken = failed(initial.runs[0].report, "joint_position")
 
-    assert not solution.passed
+    assert not initial.passed
     assert set(broken) == {"kuka/B2", "staubli/C4"}
     assert "beyond its upper limit 35 deg" in broken["kuka/B2"].message
     assert "beyond its upper limit 150 deg" in broken["staubli/C4"].message
-    assert not failed(solution.runs[0].report, "joint_velocity")
+    assert not failed(initial.runs[0].report, "joint_velocity")
 
 
-def test_pairwise_passes_for_each_task_while_the_others_stand_still(cells):
-    solution = solve(with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise"))
-
-    assert solution.passed
-    assert [run.name for run in solution.runs] == ["circle", "rhombus", "rectangle"]
-    for run in solution.runs:
+def test_pairwise_passes_for_each_task_while_the_others_stand_still(pairs):
+    assert pairs.passed
+    assert [run.name for run in pairs.runs] == ["circle", "rhombus", "rectangle"]
+    for run in pairs.runs:
         operator = run.schedule.tasks[0].task.robot
         still = {robot: np.ptp(q, axis=0).max() for robot, q in run.report.q.items()}
         assert {robot for robot, range_ in still.items() if range_ > 0} == {"reis", operator}
         assert largest_errors(run.report)[0] <= 0.003
 
 
-def test_with_the_part_at_rest_staubli_d4_and_f4_break_position_and_speed(cells):
-    solution = solve(with_overrides(load_cell(cells / "four_robots.yaml"), mode="part_at_rest"))
-    report = solution.runs[0].report
+def test_with_the_part_at_rest_staubli_d4_and_f4_break_position_and_speed(at_rest):
+    report = at_rest.runs[0].report
 
-    assert not solution.passed
+    assert not at_rest.passed
     assert set(failed(report, "joint_position")) == {"staubli/D4", "staubli/F4"}
     assert set(failed(report, "joint_velocity")) == {"staubli/D4", "staubli/F4"}
     assert np.ptp(report.q["reis"], axis=0).max() == 0.0
 
 
-def test_positioner_works_harder_together_than_in_pairs_and_operators_hardest_alone(four_robots, cells):
+def test_positioner_works_harder_together_than_in_pairs_and_operators_hardest_alone(four_robots, pairs, at_rest):
     """The qualitative conclusion of section 5.6: travel of the REIS and of the operators in modes 1, 2 and 3."""
 
     def travel(run, robot):
         return sum(use.travel for use in run.report.joints if use.robot == robot)
 
-    cell = load_cell(cells / "four_robots.yaml")
-    pairs = {run.name: run for run in solve(with_overrides(cell, mode="pairwise")).runs}
-    alone = solve(with_overrides(cell, mode="part_at_rest")).runs[0]
-    together = four_robots.runs[0]
-    for run in pairs.values():
+    alone, together = at_rest.runs[0], four_robots.runs[0]
+    for run in pairs.runs:
         operator = run.schedule.tasks[0].task.robot
         assert travel(together, "reis") > travel(run, "reis")
         assert travel(alone, operator) > travel(run, operator)
@@ -107,11 +123,11 @@ def test_planar_pair_of_appendix_e(cells):
 
 def test_euler_reference_agrees_with_a_finer_one(cells):
     """The redundancy is resolved too: the final configuration at half the step is the same to first order."""
-    cell = with_overrides(load_cell(cells / "four_robots.yaml"), integrator="euler", duration=4.0)
+    cell = with_overrides(load_cell(cells / "four_robots.yaml"), duration=4.0)
     finer = replace(
         cell, motion=replace(cell.motion, step=5e-4), solver=replace(cell.solver, gain=2 * cell.solver.gain)
     )
-    coarse_end, fine_end = (solve(c).runs[0].motion.q[-1] for c in (cell, finer))
+    coarse_end, fine_end = (case_of(c).resolved(integrator=Integrator.EULER).q[-1] for c in (cell, finer))
     assert np.degrees(np.abs(coarse_end - fine_end).max()) < 0.03  # Euler at 1 ms is 0.024 deg from the limit
 
 
@@ -178,7 +194,8 @@ def test_run_folder_holds_what_it_promises(four_robots, tmp_path):
 
 def test_same_input_gives_the_same_bytes(four_robots, cells, tmp_path):
     write_run(four_robots, tmp_path / "first")
-    write_run(solve(load_cell(cells / "four_robots.yaml")), tmp_path / "second")
+    with painted_anew():
+        write_run(solve(load_cell(cells / "four_robots.yaml")), tmp_path / "second")
     files = sorted(path.relative_to(tmp_path / "first") for path in (tmp_path / "first").rglob("*") if path.is_file())
     assert len(files) > 20
     for name in files:
@@ -191,10 +208,9 @@ def test_resolved_cell_gives_the_same_motion(four_robots, cells, tmp_path):
     np.testing.assert_array_equal(again.runs[0].motion.q, four_robots.runs[0].motion.q)
 
 
-def test_failed_run_leaves_no_tables_unless_asked(cells, tmp_path):
-    solution = solve(load_cell(cells / "four_robots_initial.yaml"))
-    write_run(solution, tmp_path / "plain")
-    write_run(solution, tmp_path / "kept", keep_rejected=True)
+def test_failed_run_leaves_no_tables_unless_asked(initial, tmp_path):
+    write_run(initial, tmp_path / "plain")
+    write_run(initial, tmp_path / "kept", keep_rejected=True)
 
     assert not (tmp_path / "plain" / "tables").exists()
     assert not (tmp_path / "plain" / "rejected").exists()
@@ -203,30 +219,28 @@ def test_failed_run_leaves_no_tables_unless_asked(cells, tmp_path):
         assert "# verdict: REJECTED: joint kuka/B2 goes" in table.read_text()
 
 
-def test_pairwise_writes_one_program_and_a_report_for_each_task(cells, tmp_path):
-    cell = with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise")
-    write_run(solve(cell, task="circle"), tmp_path / "run")
+def test_pairwise_writes_one_program_and_a_report_for_each_task(rectangle, tmp_path):
+    write_run(rectangle, tmp_path / "run")
     record = json.loads((tmp_path / "run" / "report.json").read_text())
-    assert list(record["runs"]) == ["circle"]
-    assert (tmp_path / "run" / "tables" / "kuka.csv").is_file()
-    assert not (tmp_path / "run" / "circle" / "tables").exists()
-    assert json.loads((tmp_path / "run" / "circle" / "report.json").read_text())["status"] == "passed"
+    assert list(record["runs"]) == ["rectangle"]
+    assert (tmp_path / "run" / "tables" / "staubli.csv").is_file()
+    assert not (tmp_path / "run" / "rectangle" / "tables").exists()
+    assert json.loads((tmp_path / "run" / "rectangle" / "report.json").read_text())["status"] == "passed"
 
 
-def test_idle_robots_stand_at_homes_that_are_free_of_the_part(cells, tmp_path):
+def test_idle_robots_stand_at_homes_that_are_free_of_the_part(rectangle, cells, tmp_path):
     """At their own tasks two of them would be in its way; the thesis takes them out of the cell altogether."""
-    cell = with_overrides(load_cell(cells / "four_robots.yaml"), mode="pairwise")
-    solution = solve(cell, task="rectangle")
-    write_run(solution, tmp_path / "run")
+    cell = load_cell(cells / "four_robots.yaml")
+    write_run(rectangle, tmp_path / "run")
     record = json.loads((tmp_path / "run" / "report.json").read_text())
     assert record["status"] == "passed"
     assert "before_you_run" not in record
     (line,) = record["not_in_program"]
     assert line.startswith("rectangle: idle in this run: kuka, abb stand at their homes; moves to and from home")
-    homes = [check.subject for check in solution.runs[0].report.checks if check.name == "home" and check.passed]
+    homes = [check.subject for check in rectangle.runs[0].report.checks if check.name == "home" and check.passed]
     assert homes == ["kuka", "abb"]
     for name in homes:
-        assert not np.allclose(solution.cell.robot(name).home, cell.robot(name).start, atol=1e-3)
+        assert not np.allclose(rectangle.cell.robot(name).home, cell.robot(name).start, atol=1e-3)
 
 
 def test_one_failed_run_withholds_the_tables_of_all(cells, tmp_path):

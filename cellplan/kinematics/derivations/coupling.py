@@ -32,7 +32,7 @@ def coupling_graph(cell: Cell, plane: PlaneName | None = None, *, measure_grasps
 
     Where several robots hold the part (4.5), the last links of all of them are one link with it: each further holder
     closes a real circuit over the part and the world, without a virtual chain. What its grasp leaves open is a virtual
-    joint that nobody measures. A task in the world has its chain from the world to the tool.
+    joint that is not measured. A task in the world has its chain from the world to the tool.
 
     Args:
         cell: The cell.

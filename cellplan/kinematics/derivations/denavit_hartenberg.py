@@ -87,7 +87,7 @@ class DHChain:
 
 
 def dh_chain(model: RobotModel) -> DHChain:
-    """Lay Denavit-Hartenberg frames along the joint axes of a data sheet ([Ribeiro2010]_ App. A).
+    """Place Denavit-Hartenberg frames along the joint axes of a data sheet ([Ribeiro2010]_ App. A).
 
     Frame i has its z along axis i+1 (the flange's z after the last one) and its x along the common normal from the
     axis before. Where axes intersect, x is across both; where they are parallel, the normal through the origin before

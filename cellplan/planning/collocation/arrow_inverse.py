@@ -1,7 +1,7 @@
 """Inverse of the arrow-shaped cooperation Jacobian, at thousands of configurations at once.
 
 Only the columns of the positioner couple the operators, so that the work grows linearly with their number. As in
-`kinematics.lanes` the last axis of every array is that of the configurations.
+`kinematics.batched` the last axis of every array is that of the configurations.
 """
 
 from typing import Final
@@ -29,9 +29,9 @@ class ArrowInverse:
         """Factorise.
 
         Args:
-            A: Columns of each task's own robot, shape (6, n, tasks, lanes).
-            C: Columns of the joints that all tasks share, shape (6, m, tasks, lanes).
-            mobility: Inverse weights of the own joints, 0 for those that may not move, shape (n, tasks, 1 or lanes).
+            A: Columns of each task's own robot, shape (6, n, tasks, batch).
+            C: Columns of the joints that all tasks share, shape (6, m, tasks, batch).
+            mobility: Inverse weights of the own joints, 0 for those that may not move, shape (n, tasks, 1 or batch).
             coupling_weights: Weights of the shared joints, shape (m,); their columns are 0 where they may not move.
             idle: 1 for components that a task leaves open, whose rows are 0, shape (6, tasks, 1).
         """
@@ -48,10 +48,10 @@ class ArrowInverse:
         self._S_factor = eliminated(S)
 
     def speeds(self, b: Array) -> tuple[Array, Array]:
-        """Smallest weighted joint speeds for twists, shape (6, tasks, lanes).
+        """Smallest weighted joint speeds for twists, shape (6, tasks, batch).
 
         Returns:
-            Speeds of the own joints, shape (n, tasks, lanes), and of the shared ones, shape (m, lanes).
+            Speeds of the own joints, shape (n, tasks, batch), and of the shared ones, shape (m, batch).
         """
         u = np.einsum("ijtb,jtb->itb", self._D_factor, b)
         g = np.einsum("ijb,jb->ib", self._S_factor, np.einsum("imtb,itb->mb", self._Y, u))
@@ -61,7 +61,7 @@ class ArrowInverse:
         return np.einsum("intb,itb->ntb", self._mobile_A, y), shared
 
     def twists(self, own: Array, shared: Array) -> Array:
-        """Tool twists that joint speeds give, ``J q_dot``, shape (6, tasks, lanes)."""
+        """Tool twists that joint speeds give, ``J q_dot``, shape (6, tasks, batch)."""
         return np.einsum("intb,ntb->itb", self._A, own) + np.einsum("imtb,mb->itb", self._C, shared)
 
 

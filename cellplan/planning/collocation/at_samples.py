@@ -1,4 +1,4 @@
-"""Motions that are known at instants only, brought onto their tasks at each of these, all at once."""
+"""Motions that are known at samples only, brought onto their tasks at each of these, all at once."""
 
 from typing import Final
 
@@ -16,7 +16,7 @@ SMALL: Final = 1e-3  # [rad] and [m] of such a step: a larger one is no correcti
 
 
 def brought_onto_tasks(motion: MotionTask, q: Array) -> Array:
-    """Postures near given ones, shape (N, nq), with the tools on their tasks at every instant of the clock.
+    """Configurations near given ones, shape (N, nq), with the tools on their tasks at every sample of the clock.
 
     Newton's method with the weighted pseudo-inverse moves the joints as little as it can. Where that is no small
     correction, as at a singularity or out of reach, or brings nothing, the configuration stays as it is. Joints that
@@ -38,7 +38,7 @@ def brought_onto_tasks(motion: MotionTask, q: Array) -> Array:
         still, before = np.zeros_like(at), largest(tasks.errors(at, desired, placement))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # what is not a number is left out below
             for _ in range(STEPS):
-                at = at + tasks.look(at, desired, placement, mobile=everything).correction(still)
+                at = at + tasks.linearise(at, desired, placement, mobile=everything).correction(still)
             is_better = largest(tasks.errors(at, desired, placement)) < before
         is_better &= np.abs(at - q[some].T).max(axis=0) <= SMALL
         brought[some][is_better] = at.T[is_better]

@@ -28,7 +28,7 @@ class BatchTargets:
         self._timed, self._grasps, self._offset = timed, tuple(grasps), offset
 
     def in_windows(self, windows: Sequence[Window]) -> list[Reference]:
-        """Targets at the instants of each window; each sees corners from inside its panels."""
+        """Targets at the times of each window; each sees corners from inside its panels."""
         times = np.concatenate([window.instants for window in windows])
         begins, ends = (np.concatenate(parts) for parts in zip(*(window.stretches for window in windows), strict=True))
         desired = self.at(times, begins, ends)
@@ -36,7 +36,7 @@ class BatchTargets:
         return [desired.between(low, high) for low, high in pairwise(cuts)]
 
     def at(self, times: Array, begins: Array, ends: Array) -> Reference:
-        """Targets at instants in [s], each between two breaks, shape (N,) each."""
+        """Targets at times in [s], each between two breaks, shape (N,) each."""
         return self._from_start(times, self.on_path(times, begins, ends))
 
     def on_path(self, times: Array, begins: Array, ends: Array) -> Reference:
@@ -44,7 +44,7 @@ class BatchTargets:
         return _in_batches([path.at(times, (begins, ends)) for path in self._timed.paths], self._grasps)
 
     def sampled(self, schedule: Schedule, instants: slice) -> Reference:
-        """Targets at some instants of the clock, from the sampled tasks."""
+        """Targets at some samples of the clock, from the sampled tasks."""
         return self._from_start(schedule.times[instants], sampled(schedule, instants, self._grasps))
 
     def _from_start(self, times: Array, desired: Reference) -> Reference:
@@ -60,7 +60,7 @@ def sampled(schedule: Schedule, instants: slice, grasps: Sequence[Grasp]) -> Ref
 
 
 def _in_batches(tasks: Sequence[tuple[Array, Array]], grasps: Sequence[Grasp]) -> Reference:
-    """Poses and twists of the tasks, and the grasps beside them, as lanes."""
+    """Poses and twists of the tasks, and the grasps beside them, as a batch."""
     X = np.empty((4, 4, len(tasks) + len(grasps), len(tasks[0][0])))
     twists = np.zeros((6, X.shape[2], X.shape[3]))
     for index, (X_PT, V_PT_P) in enumerate(tasks):

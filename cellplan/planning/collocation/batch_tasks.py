@@ -14,12 +14,12 @@ from cellplan.planning.tracking.task_constraints import TaskConstraints
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """Where the tools are desired, one instant per lane, in the frame that each task is relative to.
+    """References of the tools, one sample per entry of the batch, in the frame that each task is relative to.
 
     Attributes:
-        R: Reference tool orientations, shape (3, 3, tasks, lanes).
-        p: Reference tool tips in [m], shape (3, tasks, lanes).
-        twists: Reference tool twists, linear first, shape (6, tasks, lanes).
+        R: Reference tool orientations, shape (3, 3, tasks, batch).
+        p: Reference tool tips in [m], shape (3, tasks, batch).
+        twists: Reference tool twists, linear first, shape (6, tasks, batch).
     """
 
     R: Array
@@ -27,11 +27,11 @@ class Reference:
     twists: Array
 
     def between(self, low: int, high: int) -> "Reference":
-        """The instants from one number up to another."""
+        """The samples from one number up to another."""
         return Reference(*(part[..., low:high].copy() for part in (self.R, self.p, self.twists)))
 
     def repeated(self, count: int) -> "Reference":
-        """The same instants for so many cells, one cell after the other."""
+        """The same samples for so many cells, one cell after the other."""
         if count == 1:
             return self
         return Reference(*(np.concatenate([part] * count, axis=-1) for part in (self.R, self.p, self.twists)))
@@ -42,10 +42,10 @@ class ToolPoses:
     """The tools as the tasks see them.
 
     Attributes:
-        R_WR: Frames that the tasks are relative to, in W, shape (3, 3, tasks, lanes).
-        R: Tool orientations in these frames, shape (3, 3, tasks, lanes).
-        p: Tool tips in these frames in [m], shape (3, tasks, lanes).
-        p_WT: Tool tips in W in [m], shape (3, tasks, lanes).
+        R_WR: Frames that the tasks are relative to, in W, shape (3, 3, tasks, batch).
+        R: Tool orientations in these frames, shape (3, 3, tasks, batch).
+        p: Tool tips in these frames in [m], shape (3, tasks, batch).
+        p_WT: Tool tips in W in [m], shape (3, tasks, batch).
     """
 
     R_WR: Array
@@ -77,12 +77,12 @@ class BatchTasks:
         self._weights = np.concatenate([robot.weights for robot in cell.robots])
         self._may_move = constraints.may_move
 
-    def look(self, q: Array, desired: Reference, placement: Placement, *, mobile: Array) -> "Look":
-        """The tasks at stacked joint vectors, shape (nq, lanes), to first order.
+    def linearise(self, q: Array, desired: Reference, placement: Placement, *, mobile: Array) -> "Linearisation":
+        """The tasks at stacked joint vectors, shape (nq, batch), to first order.
 
         Args:
             q: The configurations.
-            desired: Where the tools are desired.
+            desired: References of the tools.
             placement: Where the robots stand.
             mobile: 1 for joints that are not locked, shape (nq,).
         """
@@ -100,30 +100,30 @@ class BatchTasks:
         )
         rows = seen.R_WR if self._is_whole else None
         errors = self._errors(seen, desired)
-        return Look(self, arrow, errors=errors, rows=rows, desired=self._twists(desired), mobile=mobile)
+        return Linearisation(self, arrow, errors=errors, rows=rows, desired=self._twists(desired), mobile=mobile)
 
     def errors(self, q: Array, desired: Reference, placement: Placement) -> Array:
-        """Pose errors, desired minus actual, as `cooperation.pose_errors` has them, shape (6, tasks, lanes).
+        """Pose errors, desired minus actual, as `cooperation.pose_errors` has them, shape (6, tasks, batch).
 
         Components that a task leaves open are zero. With free spin the rotation is given in the desired tool frame.
         """
         return self._errors(self._seen(self.chains.state(q, placement)), desired)
 
     def task_errors(self, q: Array, desired: Reference, placement: Placement) -> Array:
-        """Pose errors with all rotations in the frames of the tasks, shape (6, tasks, lanes)."""
+        """Pose errors with all rotations in the frames of the tasks, shape (6, tasks, batch)."""
         errors, free = self.errors(q, desired, placement), self._is_spin_free
         errors[3:, free] = np.einsum("ijtb,jtb->itb", desired.R[:, :, free], errors[3:, free])
         return errors
 
     def stacked(self, own: Array, shared: Array) -> Array:
-        """What belongs to the joints, sorted into the stacked joint vector, shape (nq, lanes)."""
+        """What belongs to the joints, sorted into the stacked joint vector, shape (nq, batch)."""
         everything = np.zeros((self.joint_count + 1, shared.shape[1]))
         everything[self._own_columns] = own
         everything[self._shared_columns] = shared
         return everything[:-1]
 
     def unstacked(self, everything: Array) -> tuple[Array, Array]:
-        """The parts of stacked joint vectors, shape (nq, lanes), that belong to each task and to all of them."""
+        """The parts of stacked joint vectors, shape (nq, batch), that belong to each task and to all of them."""
         padded = np.concatenate([everything, np.zeros((1, everything.shape[1]))])
         return padded[self._own_columns] * self._own, padded[self._shared_columns]
 
@@ -172,7 +172,7 @@ class BatchTasks:
     def _columns(self, state: BatchState, seen: ToolPoses, desired: Reference) -> Array:
         """Tool twists per unit speed of joints: of each task's own robot, then of the positioner at each tip.
 
-        Shape (6, joints, 2 tasks, lanes), expressed in W, or in the frames of `errors` where a task leaves components
+        Shape (6, joints, 2 tasks, batch), expressed in W, or in the frames of `errors` where a task leaves components
         open; without a positioner the second half is not used.
         """
         chains = self.chains
@@ -202,11 +202,11 @@ class BatchTasks:
         return rows
 
 
-class Look:
+class Linearisation:
     """The tasks at many configurations, to first order.
 
     Attributes:
-        errors: Pose errors, see `BatchTasks.errors`, shape (6, tasks, lanes).
+        errors: Pose errors, see `BatchTasks.errors`, shape (6, tasks, batch).
     """
 
     def __init__(
@@ -224,9 +224,9 @@ class Look:
         self.errors = errors
 
     def speeds(self, drift: Array | None = None) -> Array:
-        r"""Joint speeds ``J^# x_dot + (I - J^# J) u`` for the desired twists and a drift ``u``, shape (nq, lanes).
+        r"""Joint speeds ``J^# x_dot + (I - J^# J) u`` for the desired twists and a drift ``u``, shape (nq, batch).
 
-        The drift has the shape (nq,) or (nq, lanes).
+        The drift has the shape (nq,) or (nq, batch).
         """
         b = self._turned(self._desired)
         if drift is None:
@@ -235,7 +235,7 @@ class Look:
         return u + self._tasks.stacked(*self._arrow.speeds(b - self._arrow.twists(*self._tasks.unstacked(u))))
 
     def correction(self, moved: Array) -> Array:
-        """Newton's correction ``J^# (e - J d)`` of configurations that will be moved by ``d``, shape (nq, lanes)."""
+        """Newton's correction ``J^# (e - J d)`` of configurations that will be moved by ``d``, shape (nq, batch)."""
         b = self._turned(self.errors) - self._arrow.twists(*self._tasks.unstacked(moved))
         return self._tasks.stacked(*self._arrow.speeds(b))
 
@@ -252,7 +252,7 @@ class Look:
 def _rotation(sine_axis: Array, cosine: Array) -> Array:
     """Rotation vectors from axis times sine, shape (3, ...), and cosine of the angle, shape (...).
 
-    Of a half turn the axis is not known; it is given as one about x, so that it does not look like none.
+    Of a half turn the axis is not known; it is given as one about x, so that it does not linear like none.
     """
     sine = np.sqrt(np.einsum("i...,i...->...", sine_axis, sine_axis))
     is_small = sine <= SMALL_ANGLE

@@ -55,7 +55,7 @@ def closed_path(run: AccurateRun, problem: TrackingProblem) -> CollocatedPath | 
 
 
 def _bounds(run: AccurateRun, schedule: Schedule) -> list[float]:
-    """Instants in [s] between which the cycles lie; the whole motion when the tasks keep no common cycles."""
+    """Times in [s] between which the cycles lie; the whole motion when the tasks keep no common cycles."""
     ends = common_cycles(schedule)
     return [0.0, run.end] if ends is None else np.clip(ends, 0.0, run.end).tolist()
 
@@ -76,13 +76,13 @@ def _closing(run: AccurateRun, problem: TrackingProblem, q: Array, *, begin: flo
         found[:] = [_whole(run, q, begin=begin, end=end, drift=drift)]
         return found[0].last - q
 
-    instant = int(np.argmin(np.abs(problem.times - begin)))
-    closing_drift(problem, q, moved, duration=end - begin, instant=instant)
+    sample = int(np.argmin(np.abs(problem.times - begin)))
+    closing_drift(problem, q, moved, duration=end - begin, sample=sample)
     return found[0]
 
 
 def _whole(run: AccurateRun, q: Array, *, begin: float, end: float, drift: Array | None = None) -> CollocatedPath:
-    """Motion up to an instant, not less far."""
+    """Motion up to a time, not less far."""
     path = run.path(q, begin=begin, end=end, drift=drift)
     if path.end < end - INSTANT_ROOM:
         raise _NoConvergenceError("collocation did not converge over the first cycle")

@@ -16,7 +16,7 @@ class CollocatedPath:
 
     Attributes:
         start: Stacked joint vector at the beginning, shape (nq,).
-        begin: First instant in [s].
+        begin: First time in [s].
         panels: Stretches of time, one after the other; none where collocation did not converge.
         nodes: Stacked joint vectors at the nodes of each panel, shape (nq, degree + 1).
         worst: Largest tool error at the nodes and between them, in [m] or [rad].
@@ -30,7 +30,7 @@ class CollocatedPath:
 
     @property
     def end(self) -> float:
-        """Last instant in [s]."""
+        """Last time in [s]."""
         return self.panels[-1].end if self.panels else self.begin
 
     @property
@@ -40,7 +40,7 @@ class CollocatedPath:
 
     @property
     def node_count(self) -> int:
-        """Instants at which the joints were solved for; where two panels meet, there is one."""
+        """Times at which the joints were solved for; where two panels meet, there is one."""
         return 1 + sum(panel.degree for panel in self.panels)
 
     @property

@@ -72,8 +72,8 @@ class AccurateRun:
 
         Args:
             q: The configuration.
-            begin: First instant in [s].
-            end: Last instant in [s].
+            begin: First time in [s].
+            end: Last time in [s].
             drift: Mean joint velocities that are added in the null space of the tasks, shape (nq,); they begin and end
                 with rest.
         """
@@ -102,7 +102,7 @@ class AccurateRun:
         return CollocatedPath(q, begin, panels, nodes, max(errors))
 
     def gaps(self, begin: float, end: float) -> Array:
-        """How far each tool is desired at one instant from where it is desired at a later one, in pose entries."""
+        """How far each tool is desired at one time from where it is desired at a later one, in pose entries."""
         inside = np.array([begin, end - INSTANT_ROOM])
         desired = self._targets.on_path(np.array([begin, end]), inside, inside + INSTANT_ROOM)
         turned = np.abs(np.diff(desired.R))[..., 0].max(axis=(0, 1))
@@ -118,7 +118,7 @@ class AccurateRun:
         return worst
 
     def repeated(self, cycle: CollocatedPath, *, begin: float) -> CollocatedPath | None:
-        """The motion of a cycle once more from another instant on; None where its tasks ask for something else."""
+        """The motion of a cycle once more from another time on; None where its tasks ask for something else."""
         again = cycle.shifted(begin - cycle.begin)
         if np.any((self._locked_since > cycle.begin) & (self._locked_since < again.end)):
             return None
@@ -127,7 +127,7 @@ class AccurateRun:
         return again if gap <= SAME_POSE else None
 
     def _stretches(self, begin: float, end: float) -> list[Array]:
-        """Breaks between two instants, cut where a joint fails; none when there is no time between them."""
+        """Breaks between two times, cut where a joint fails; none when there is no time between them."""
         if end - begin <= INSTANT_ROOM:
             return []
         inner = self._breaks[(self._breaks > begin + INSTANT_ROOM) & (self._breaks < end - INSTANT_ROOM)]
@@ -138,7 +138,7 @@ class AccurateRun:
 
 
 def _paced(drift: Array, begin: float, end: float) -> Drift:
-    """Speeds at instants in [s] that begin and end with rest, for mean ones of shape (nq,)."""
+    """Speeds at times in [s] that begin and end with rest, for mean ones of shape (nq,)."""
 
     def speeds(instants: Array) -> Array:
         return drift[:, None] * drift_pace((instants - begin) / (end - begin))
@@ -147,7 +147,7 @@ def _paced(drift: Array, begin: float, end: float) -> Drift:
 
 
 def _settled(cell: Cell, timed: TimedTasks, grasps: int) -> Array:
-    """Instants in [s] until which each tool, and that of each further holder, may be on its way to where it belongs."""
+    """Times in [s] until which each tool, and that of each further holder, may be on its way to where it belongs."""
     given = [path.task.start + path.task.settle if path.task.settle else 0.0 for path in timed.paths]
     soon = min(SETTLING_STEPS * cell.motion.step, 0.5 * float(timed.times[-1]))
     return np.maximum(np.array(given + [0.0] * grasps), soon)

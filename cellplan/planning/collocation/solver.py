@@ -27,12 +27,12 @@ Indices = NDArray[np.intp]
 Drift = Callable[[Array], Array]  # times in [s], shape (K,), to joint velocities, shape (nq, K)
 Record = Callable[[Window, Indices, Array, Array], None]  # window, cells, q (nq, cells, nodes), bounds (cells,)
 
-AT_ONCE: Final = 200  # windows whose targets are looked up together: some 20 000 instants
+AT_ONCE: Final = 200  # windows whose targets are evaluated together: some 20 000 times
 MOST_PASSES: Final = 20  # over a window; where passes help, about eight do
 SLOW: Final = 0.7  # a pass that leaves more than this share of the change before does not lead to a solution
 FREE_PASSES: Final = 3  # before a pass is judged by that
 LONGEST_MOVE: Final = np.pi  # [rad] or [m]: a pass that moves a joint farther has lost its way
-OVERSHOOT: Final = 2.0  # largest error anywhere, of the largest that is looked at; see `_errors`
+OVERSHOOT: Final = 2.0  # largest error anywhere, of the largest that is checked; see `_errors`
 TOOL_SHARE: Final = 0.25  # of the accuracy: tool errors at the nodes that passes may leave
 CONFIGURATION_SHARE: Final = (
     10.0  # configurations may be this many times as far from their limit as tools, in [rad] for [m]
@@ -171,13 +171,13 @@ class Collocation:
         """Corrections of q at the nodes in one pass, (nq, cells, nodes), and tool errors before it, (cells,)."""
         self.sweeps += 1
         self.solves += q.shape[1] * q.shape[2]
-        look = self._tasks.look(q.reshape(len(q), -1), desired, placement, mobile=self._mobile)
+        linear = self._tasks.linearise(q.reshape(len(q), -1), desired, placement, mobile=self._mobile)
         drift = None if self._drift is None else np.tile(self._drift(window.instants[: window.count]), q.shape[1])
-        speeds = look.speeds(drift).reshape(q.shape)
+        speeds = linear.speeds(drift).reshape(q.shape)
         picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
-        moved: Array = (picard + look.correction(picard)).reshape(q.shape)
+        moved: Array = (picard + linear.correction(picard)).reshape(q.shape)
         moved[:, :, 0] = 0.0
-        return moved, np.abs(look.errors).max(axis=(0, 1)).reshape(q.shape[1:]).max(axis=1)
+        return moved, np.abs(linear.errors).max(axis=(0, 1)).reshape(q.shape[1:]).max(axis=1)
 
     def _errors(self, window: Window, desired: Reference, q: Array, placement: Placement) -> Array:
         r"""Bounds of the tool errors at the nodes and between them, by panel, shape (panels, cells).
@@ -195,6 +195,6 @@ class Collocation:
 
 
 def largest(errors: Array) -> Array:
-    """Largest distance in [m] or angle in [rad] of all tasks, shape (6, tasks, lanes) to (lanes,)."""
+    """Largest distance in [m] or angle in [rad] of all tasks, shape (6, tasks, batch) to (batch,)."""
     squares = np.maximum(np.sum(errors[:3] ** 2, axis=0), np.sum(errors[3:] ** 2, axis=0))
     return np.sqrt(squares.max(axis=0))

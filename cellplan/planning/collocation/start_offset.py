@@ -12,7 +12,7 @@ from cellplan.planning.timing.approach_retract import REST_TO_REST
 from cellplan.planning.timing.time_law import advance
 
 QUIET: Final = 0.1  # share of the accuracy up to which a start counts as on its path
-ROUNDS: Final = 8  # of looking at the offset through the components that a task keeps; the first is nearly right
+ROUNDS: Final = 8  # of projecting the offset through the components that a task keeps; the first is nearly right
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,7 +25,7 @@ class StartOffset:
     Attributes:
         linear: Reference tip minus actual one at the start in the frame of each task, in [m], shape (3, tasks).
         angular: Rotation vector from the actual to the desired orientation, in [rad], shape (3, tasks).
-        until: Instants in [s] from which on nothing is left of it, shape (tasks,).
+        until: Times in [s] from which on nothing is left of it, shape (tasks,).
     """
 
     linear: Array
@@ -36,7 +36,7 @@ class StartOffset:
         """Targets moved so that they begin where the tools are.
 
         Args:
-            times: Instants in [s], shape (N,).
+            times: Times in [s], shape (N,).
             R: Reference orientations, shape (3, 3, tasks, N).
             p: Reference tips, shape (3, tasks, N).
             twists: Reference twists, shape (6, tasks, N).
@@ -57,10 +57,10 @@ def start_offset(
 
     Args:
         tasks: The tasks.
-        desired: Where the tools are desired at first, one lane.
+        desired: References of the tools at first, a batch of one.
         placement: Where the robots stand.
         start: Stacked start posture, shape (nq,).
-        until: Instants in [s] from which on they have to be there, shape (tasks,).
+        until: Times in [s] from which on they have to be there, shape (tasks,).
         accuracy: Largest tool error that is let pass, in [m] and [rad].
     """
     offset = StartOffset(np.zeros((3, len(until))), np.zeros((3, len(until))), until)

@@ -27,7 +27,7 @@ FINE_SHARES: Final = (1.0 / 128.0, 1.0 / 32.0)  # of the motion: a stretch below
 class Panel:
     """A stretch of time between smooth targets: its ends in [s] and the degree of the polynomials on it.
 
-    Inside it there may be knots, instants in [s] at which a higher derivative of the targets jumps.
+    Inside it there may be knots, times in [s] at which a higher derivative of the targets jumps.
     """
 
     begin: float
@@ -42,7 +42,7 @@ class Panel:
 
     @cached_property
     def looks(self) -> Array:
-        """Points of 0..1 at which the error is looked at: between the nodes, and the knots, shape (points,)."""
+        """Points of 0..1 at which the error is checked: between the nodes, and the knots, shape (points,)."""
         return np.append(chebyshev(self.degree).gaps, (np.array(self.knots) - self.begin) / self.length)
 
     def refined(self) -> "tuple[Panel, ...]":
@@ -88,14 +88,14 @@ class Window:
 
     @cached_property
     def instants(self) -> Array:
-        """The nodes, then the points between them at which the error is looked at, in [s]."""
+        """The nodes, then the points between them at which the error is checked, in [s]."""
         nodes = [panel.begin + panel.length * chebyshev(panel.degree).nodes for panel in self.panels]
         looks = [panel.begin + panel.length * panel.looks for panel in self.panels]
         return np.concatenate([*nodes, *looks])
 
     @cached_property
     def stretches(self) -> tuple[Array, Array]:
-        """Begin and end in [s] of the panel that each of the instants belongs to."""
+        """Begin and end in [s] of the panel that each of the times belongs to."""
         begins, ends = (np.array(part) for part in zip(*((each.begin, each.end) for each in self.panels), strict=True))
         return begins[self.panel_of], ends[self.panel_of]
 
@@ -132,7 +132,7 @@ class Window:
 
     @cached_property
     def panel_of(self) -> NDArray[np.intp]:
-        """Number of the panel that each of the instants belongs to."""
+        """Number of the panel that each of the times belongs to."""
         counts = [panel.degree + 1 for panel in self.panels] + [len(panel.looks) for panel in self.panels]
         return np.repeat(np.tile(np.arange(len(self.panels)), 2), counts)
 
@@ -162,10 +162,10 @@ def windows_between(
     """Windows over a stretch of a motion.
 
     Args:
-        breaks: Instants in [s], increasing, between neighbours of which the targets are smooth but for the knots,
+        breaks: Times in [s], increasing, between neighbours of which the targets are smooth but for the knots,
             shape (n,).
         whole: Duration of the whole motion in [s].
-        knots: Instants in [s], increasing, at which higher derivatives of the targets may jump, shape (K,). Where they
+        knots: Times in [s], increasing, at which higher derivatives of the targets may jump, shape (K,). Where they
             follow each other closely, panels may reach over several of them.
         highest: Highest degree to begin with where there are no knots; what is not exact enough gets a higher one.
     """
@@ -179,7 +179,7 @@ def windows_between(
 
 
 def _groups(instants: Sequence[float], *, fine: float, longest: float) -> list[tuple[float, ...]]:
-    """Neighbouring instants, those together that follow each other closely; groups meet at their ends."""
+    """Neighbouring times, those together that follow each other closely; groups meet at their ends."""
     groups: list[list[float]] = []
     for low, high in pairwise(instants):
         last = groups[-1] if groups else []
@@ -192,14 +192,14 @@ def _groups(instants: Sequence[float], *, fine: float, longest: float) -> list[t
 
 
 def _over(instants: Sequence[float]) -> tuple[Panel, ...]:
-    """One panel over many instants, or one between each two where they are few."""
+    """One panel over many times, or one between each two where they are few."""
     if len(instants) - 2 < FEWEST_KNOTS:
         return tuple(Panel(low, high, DEGREES[0]) for low, high in pairwise(instants))
     return (Panel(instants[0], instants[-1], DEGREES[-1], tuple(instants[1:-1])),)
 
 
 def _even(begin: float, end: float, *, whole: float, longest: float, highest: int) -> list[Panel]:
-    """Panels of the same length between two instants."""
+    """Panels of the same length between two times."""
     degree = min(highest, DEGREES[int(np.searchsorted(FINE_SHARES, (end - begin) / whole))])
     cuts = np.linspace(begin, end, int(np.ceil((end - begin) / longest)) + 1).tolist()
     return [Panel(low, high, degree) for low, high in pairwise(cuts)]

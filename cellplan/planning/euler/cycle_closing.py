@@ -31,7 +31,7 @@ def closed(problem: TrackingProblem, integrate: Callable[[TrackingProblem, int],
         integrate: Motion of a problem from its start to the sample k, shape (k + 1, nq).
 
     Raises:
-        InputError: A path is open, or its cycle does not end on an instant of the clock.
+        InputError: A path is open, or its cycle does not end on a sample of the clock.
         NoSolutionError: The cycle does not close.
     """
     schedule, start = problem.motion.schedule, problem.motion.start
@@ -66,7 +66,7 @@ def drift_pace(share: Array) -> Array:
 
 
 def closing_drift(
-    problem: TrackingProblem, start: Array, moved: Callable[[Array], Array], *, duration: float, instant: int = 0
+    problem: TrackingProblem, start: Array, moved: Callable[[Array], Array], *, duration: float, sample: int = 0
 ) -> Array:
     r"""Joint speeds that, added in the null space at all times, close the joint motion over one cycle.
 
@@ -79,15 +79,15 @@ def closing_drift(
         start: Stacked configuration at the beginning of the cycle, shape (nq,).
         moved: How far the joints are from where they began after one cycle, by the mean of the drift, shape (nq,).
         duration: Time ``T`` of the cycle in [s].
-        instant: Number of the instant of the clock at which the cycle begins.
+        sample: Number of the sample of the clock at which the cycle begins.
 
     Returns:
-        Mean speeds in [rad/s] or [m/s], shape (nq,); ``moved`` was asked about them last.
+        Mean speeds in [rad/s] or [m/s], shape (nq,); ``moved`` was evaluated for them last.
 
     Raises:
         NoSolutionError: The cycle does not close.
     """
-    N = _null_space(problem, instant, start)
+    N = _null_space(problem, sample, start)
     u = np.zeros(N.shape[1])
     B = np.eye(len(u)) / duration  # inverse of the derivative
 
@@ -108,12 +108,12 @@ def closing_drift(
     raise NoSolutionError(
         f"{problem.cell.origin.at('motion.cyclic')}: the joint motion does not close, joint '{joint}' of '{robot}' is "
         f"still {np.degrees(left.max(initial=0.0)):.3g} deg away after {ROUNDS} tries"
-        f"{singular_words(problem, instant, start)}; another start may help, or no goal that keeps off obstacles"
+        f"{singular_words(problem, sample, start)}; another start may help, or no goal that keeps off obstacles"
     )
 
 
 def first_cycle(cell: Cell, schedule: Schedule) -> tuple[int, int]:
-    """Instants at which the first cycle begins and ends: the whole motion when the tasks keep no common cycle.
+    """Times at which the first cycle begins and ends: the whole motion when the tasks keep no common cycle.
 
     Raises:
         InputError: The tools are not back at its end.
@@ -130,7 +130,7 @@ def first_cycle(cell: Cell, schedule: Schedule) -> tuple[int, int]:
 
 
 def not_back(cell: Cell, task: Relation, end: float) -> str:
-    """What to say of a tool that is not back at the end of a cycle, an instant in [s]."""
+    """What to say of a tool that is not back at the end of a cycle, a time in [s]."""
     name = task.robot if isinstance(task, Grasp) else task.name
     return (
         f"{cell.origin.at('motion.cyclic')}: expected closed paths whose cycles end on a multiple of motion.step_s, "
@@ -138,10 +138,10 @@ def not_back(cell: Cell, task: Relation, end: float) -> str:
     )
 
 
-def _null_space(problem: TrackingProblem, instant: int, start: Array) -> Array:
+def _null_space(problem: TrackingProblem, sample: int, start: Array) -> Array:
     """Orthonormal joint directions that move no task at the beginning, shape (nq, r)."""
-    J = problem.first_order(instant, start).J
-    free = np.flatnonzero(np.any(problem.signs != 0.0, axis=0) & (problem.mobile(instant) > 0.0))
+    J = problem.first_order(sample, start).J
+    free = np.flatnonzero(np.any(problem.signs != 0.0, axis=0) & (problem.mobile(sample) > 0.0))
     _, s, Vt = np.linalg.svd(J[:, free])
     rank = int(np.sum(s > SINGULAR * s.max(initial=0.0)))
     N = np.zeros((len(start), len(free) - rank))

@@ -32,13 +32,13 @@ def corrected_references(desired: Schedule, references: Schedule, measured: Sequ
 
     .. math:: X_{ref}^{i+1}(k) = \Delta(k) \, X_{ref}^{i}(k), \quad \Delta = X_{PT,d} \, X_{PT,measured}^{-1}
 
-    Where a task leaves components open, ``Delta`` takes the measured pose to the nearest one that the task wants. A
+    Where a task leaves components open, ``Delta`` takes the measured pose to the nearest one that the task desires. A
     real cell whose tool stands at ``X_ref E``, with an ``E`` that does not depend on the reference, is corrected in one
     pass. In general the error shrinks as long as ``E`` changes less than its argument, which is so for small errors.
 
     Args:
-        desired: What the tasks want.
-        references: What the model was told in the last pass.
+        desired: The desired motion of the tasks.
+        references: What the model was given in the last pass.
         measured: Measured tool poses of that pass, shape (N, 4, 4) for each task.
     """
     told = zip(desired.tasks, references.tasks, measured, strict=True)
@@ -98,17 +98,17 @@ def measured_start(motion: MotionTask, *, measure: Measure) -> Array:
 
 
 def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
-    r"""Follow a schedule with the error measured at each instant fed back at once ([Nicolato2007]_ section 3.5).
+    r"""Follow a schedule with the error measured at each sample fed back at once ([Nicolato2007]_ section 3.5).
 
-    At instant k the method is told ``Delta(k) X_nominal(q_k)`` in place of the desired pose, with ``Delta`` of
-    `corrected_references`, and for the next instant the displacement from what is measured now to what is desired then.
+    At sample k the method is given ``Delta(k) X_nominal(q_k)`` in place of the desired pose, with ``Delta`` of
+    `corrected_references`, and for the next sample the displacement from what is measured now to what is desired then.
 
     Args:
         motion: The tasks in the written cell: what the method knows.
         measure: The measuring system.
 
     Raises:
-        NoSolutionError: A tool lost its path, or the method found no way on.
+        NoSolutionError: A tool lost its path, or the method found no step.
     """
     cell, desired = motion.cell, motion.schedule
     problem = TrackingProblem(motion)
@@ -118,7 +118,7 @@ def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
     q[0] = motion.start
     for k in range(len(q) - 1):
         state = problem.state(q[k])
-        nominal = inverse(problem.constraints.reference_frames(state.X_WP)) @ state.X_WT[problem.operators]
+        nominal = inverse(problem.constraints.reference_frames(state.X_WP)) @ state.X_WT[problem.constraints.operators]
         for place, (scheduled, X_seen) in enumerate(zip(desired.tasks, measure(q[k : k + 1]), strict=True)):
             seen, told = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
             problem.desired[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=told)
@@ -133,7 +133,7 @@ def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
 
 
 def _with_poses(scheduled: TaskSchedule, X_PT: Array, times: Array) -> TaskSchedule:
-    """A schedule of other poses, with the mean twist from each instant to the next; it ends at rest."""
+    """A schedule of other poses, with the mean twist from each sample to the next; it ends at rest."""
     step = np.diff(times)[:, None]
     V_PT_P = np.zeros((len(times), 6))
     V_PT_P[:-1, :3] = np.diff(X_PT[:, :3, 3], axis=0) / step
@@ -142,7 +142,7 @@ def _with_poses(scheduled: TaskSchedule, X_PT: Array, times: Array) -> TaskSched
 
 
 def _standing(scheduled: TaskSchedule, count: int) -> TaskSchedule:
-    """A tool that stands still at its first pose for so many instants."""
+    """A tool that stands still at its first pose for so many samples."""
     return replace(
         scheduled,
         X_PT=np.repeat(scheduled.X_PT[:1], count, axis=0),

@@ -1,7 +1,7 @@
 """Resolution methods: one file and one signature each, found by the name that ``MethodName`` lists.
 
-A method is given the tracking problem and returns the step it takes: from an instant k and the stacked joint vector
-there to the configuration at the next instant. What a method remembers from step to step lives inside that step.
+A method is given the tracking problem and returns the step it takes: from a sample k and the stacked joint vector
+there to the configuration at the next sample. What a method remembers from step to step lives inside that step.
 """
 
 from collections.abc import Callable

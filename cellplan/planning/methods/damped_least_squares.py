@@ -19,7 +19,7 @@ def damped_least_squares(problem: TrackingProblem) -> Callable[[int, Array], Adv
               \qquad v = \dot x_d + \varrho K e
 
     that is ``qdot = W^-1 J^T (J W^-1 J^T + lambda^2 I)^-1 v``: Eq. 2.11 in the metric of the joint weights. Secondary
-    goals follow in the null space of the undamped rows, where no task notices them.
+    goals follow in the null space of the undamped rows, in which they move no tool.
     """
     settings = problem.cell.solver.damped_least_squares
 

@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.planning.methods.support.configuration_search import Bounds, ConfigurationSearch, Pass, position_bounds
 from cellplan.planning.methods.support.joint_line import joint_lines
-from cellplan.planning.methods.support.search_cost import NO_EFFECT, Look, SearchCost
+from cellplan.planning.methods.support.search_cost import NO_EFFECT, Expansion, SearchCost
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
 NEGLIGIBLE: Final = 1e-12  # share of the cost that a move must gain: below it a joint would turn for rounding errors
@@ -29,7 +29,7 @@ def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     """
     tolerance = problem.cell.solver.search.tolerance
     search = ConfigurationSearch(problem, lambda cost: _best_first(cost, tolerance**2))
-    before: dict[int, Array] = {}  # configuration at the instant before the last one, by that one's number
+    before: dict[int, Array] = {}  # configuration at the time before the last one, by that one's number
 
     def advance(k: int, q: Array) -> Advance:
         problem.first_order(k, q)  # refuses a lost path
@@ -44,36 +44,36 @@ def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
 def _best_first(cost: SearchCost, target: float) -> Pass:
     """One round of Algorithm 1 as a pass."""
 
-    def improve(look: Look, bounds: Bounds, _rounds: int) -> tuple[Look, int]:
-        return _round(cost, look, bounds, target), 1
+    def improve(expansion: Expansion, bounds: Bounds, _rounds: int) -> tuple[Expansion, int]:
+        return _round(cost, expansion, bounds, target), 1
 
     return improve
 
 
-def _round(cost: SearchCost, look: Look, bounds: Bounds, target: float) -> Look:
+def _round(cost: SearchCost, expansion: Expansion, bounds: Bounds, target: float) -> Expansion:
     """Every joint moves once, the best one first (steps 6 to 12)."""
-    is_open = np.ones(len(look.q), dtype=bool)
-    while is_open.any() and look.cost > target:
-        lines = joint_lines(look)
+    is_open = np.ones(len(expansion.q), dtype=bool)
+    while is_open.any() and expansion.cost > target:
+        lines = joint_lines(expansion)
         effects = lines.aa + lines.nn
         acts = effects > NO_EFFECT * effects.max(initial=0.0)
-        moves = lines.best(bounds.lowest - look.q, bounds.highest - look.q)
+        moves = lines.best(bounds.lowest - expansion.q, bounds.highest - expansion.q)
         gains = np.where(is_open & acts, lines.gain(moves), -np.inf)
         best = int(np.argmax(gains))
-        if not gains[best] > NEGLIGIBLE * look.cost:
+        if not gains[best] > NEGLIGIBLE * expansion.cost:
             break
-        look = _moved(cost, look, best, float(moves[best]))
+        expansion = _moved(cost, expansion, best, float(moves[best]))
         is_open[best] = False
-    return look
+    return expansion
 
 
-def _moved(cost: SearchCost, look: Look, joint: int, move: float) -> Look:
-    """The look after one joint's move; a move that costs more, as a linkage may make it, is halved."""
+def _moved(cost: SearchCost, expansion: Expansion, joint: int, move: float) -> Expansion:
+    """The expansion after one joint's move; a move that costs more, as a linkage may make it, is halved."""
     for _ in range(HALVINGS):
-        q = look.q.copy()
+        q = expansion.q.copy()
         q[joint] += move
-        moved = cost.look(q)
-        if moved.cost < look.cost:
+        moved = cost.expand(q)
+        if moved.cost < expansion.cost:
             return moved
         move *= 0.5
-    return look
+    return expansion

@@ -23,7 +23,7 @@ def jacobian_transpose(problem: TrackingProblem) -> Callable[[int, Array], Advan
 
     One step of that length per sample swings up where ``K dt`` times the largest eigenvalue of ``J W^-1 J^T`` is
     above 2, and does next to nothing where it is small. So each sample takes the step of the law again and again, each
-    of its own length ``alpha``, until the error of the coming instant is smaller by the share ``K dt`` that the gain
+    of its own length ``alpha``, until the error of the coming sample is smaller by the share ``K dt`` that the gain
     asks for, or all of it where ``K dt`` is above 1:
 
     .. math:: \Delta q \leftarrow \Delta q + \alpha W^{-1} J^T r, \qquad r \leftarrow r - \alpha J W^{-1} J^T r

@@ -15,13 +15,11 @@ from cellplan.planning.methods.support.configuration_search import (
     Pass,
     speed_bounds,
 )
-from cellplan.planning.methods.support.search_cost import NO_EFFECT, Look, SearchCost
+from cellplan.planning.methods.support.search_cost import NO_EFFECT, Expansion, SearchCost
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
-SMALL_ANGLE: Final = 0.1  # [rad] or [m]: farther from a look its first order is not trusted at first
-ROUNDS_ON_A_LOOK: Final = (
-    50  # before the cell is looked at again: near a singularity all depends on where the joints are
-)
+SMALL_ANGLE: Final = 0.1  # [rad] or [m]: farther from an expansion its first order is not trusted at first
+ROUNDS_ON_A_LOOK: Final = 50  # before the cell is checked again: near a singularity all depends on where the joints are
 SMALLEST_TRUST: Final = 1e-9  # [rad] or [m]: where even moves this small gain nothing there is nothing to gain
 AIM: Final = 0.25  # share of the allowed cost that the rounds are to leave to first order
 
@@ -45,10 +43,10 @@ def recursive_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     multiplied by ``4 (q_max - q)(q - q_min) / (q_max - q_min)^2`` (Eqs. 3.29, 3.30), moves away from it are not: the
     printed form holds a joint at a limit for ever.
 
-    As all angles are small, rounds over the sequence are made on one look at the cell (``e`` follows each move to first
-    order) until nothing is left of ``e``, nothing can be gained or many are made; then the cell is looked at again. A
-    look that turns out no better than the one before is forgotten and the same rounds are made with less room. Looks
-    that gain little are carried on (see `ConfigurationSearch`).
+    As all angles are small, rounds over the sequence are made on one expansion of the cost (``e`` follows each move to
+    first order) until nothing is left of ``e``, nothing can be gained or many are made; then the cost is expanded anew.
+    An expansion that turns out no better than the one before is forgotten and the same rounds are made with less room.
+    Those that gain little are carried on (see `ConfigurationSearch`).
     """
     sequence = _sequence(problem.cell)
 
@@ -93,26 +91,28 @@ class _Rounds:
         self._target = AIM * cell.solver.search.tolerance**2
 
     def on(self, cost: SearchCost) -> Pass:
-        """Rounds on one look after another, for one cost."""
+        """Rounds on one expansion after another, for one cost."""
 
-        def improve(look: Look, bounds: Bounds, rounds: int) -> tuple[Look, int]:
+        def improve(expansion: Expansion, bounds: Bounds, rounds: int) -> tuple[Expansion, int]:
             trust, used = SMALL_ANGLE, 0
             while used < rounds and trust > SMALLEST_TRUST:
-                near = Bounds(np.maximum(bounds.lowest, look.q - trust), np.minimum(bounds.highest, look.q + trust))
-                q, spent = self._to_first_order(look, near, min(rounds - used, ROUNDS_ON_A_LOOK))
+                near = Bounds(
+                    np.maximum(bounds.lowest, expansion.q - trust), np.minimum(bounds.highest, expansion.q + trust)
+                )
+                q, spent = self._to_first_order(expansion, near, min(rounds - used, ROUNDS_ON_A_LOOK))
                 used += spent
-                found = cost.look(q)
-                if found.cost < look.cost:
+                found = cost.expand(q)
+                if found.cost < expansion.cost:
                     return found, used
-                trust = 0.25 * float(np.max(np.abs(q - look.q)))
-            return look, max(used, 1)
+                trust = 0.25 * float(np.max(np.abs(q - expansion.q)))
+            return expansion, max(used, 1)
 
         return improve
 
-    def _to_first_order(self, look: Look, bounds: Bounds, rounds: int) -> tuple[Array, int]:
-        """Rounds over the sequence on one look: the configuration they lead to and how many they were."""
+    def _to_first_order(self, expansion: Expansion, bounds: Bounds, rounds: int) -> tuple[Array, int]:
+        """Rounds over the sequence on one expansion: the configuration they lead to and how many they were."""
         chosen = self._sequence
-        a, e, q = look.a[:, chosen], look.e, look.q[chosen]
+        a, e, q = expansion.a[:, chosen], expansion.e, expansion.q[chosen]
         k0 = np.einsum("ij,ij->j", a, a)
         moves = k0 > NO_EFFECT * k0.max(initial=0.0)
         chosen, a, q, k0 = chosen[moves], a[:, moves], q[moves], k0[moves]
@@ -129,7 +129,7 @@ class _Rounds:
             q, before, cost, used = reached, cost, float(e @ e), used + 1
             if not cost < (1.0 - STALLED) * before:
                 break
-        configuration = look.q.copy()
+        configuration = expansion.q.copy()
         configuration[chosen] = q
         return configuration, used
 

@@ -1,4 +1,4 @@
-"""Paths of an unlikely size or place: slips of the unit, told before anything is planned."""
+"""Paths of an unlikely size or place: errors of the unit, reported before anything is planned."""
 
 from typing import Final
 

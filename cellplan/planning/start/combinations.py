@@ -19,7 +19,7 @@ def best_combinations(scores: Sequence[Sequence[float]], is_ruled_out: Callable[
     Args:
         scores: Scores of each robot's branches; a larger one is better.
         is_ruled_out: Says of a partial combination, one pick for each of the first robots, that nothing can come of it;
-            asked anew for each, so that what is learned meanwhile counts.
+            evaluated anew for each, so that what is learned meanwhile counts.
 
     Yields:
         The index of the branch for each robot.

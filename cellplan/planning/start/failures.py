@@ -8,8 +8,8 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Relation
 
-MOST_KEPT: Final = 24  # configurations of a robot, or of the cell, that are looked at again
-MOST_GOALS: Final = 6  # goals of a robot that are looked at again
+MOST_KEPT: Final = 24  # configurations of a robot, or of the cell, that are considered again
+MOST_GOALS: Final = 6  # goals of a robot that are considered again
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

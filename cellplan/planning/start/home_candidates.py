@@ -1,6 +1,6 @@
 """Home candidates: configurations in which an idle robot may stand out of the way, the nearest to its start first.
 
-How far a configuration is from the start is told by the time that the slowest joint needs to go there at top speed;
+How far a configuration is from the start is measured by the time that the slowest joint takes to it at top speed;
 so turning and sliding joints, quick and slow ones, can be compared.
 """
 
@@ -19,7 +19,7 @@ RETREATS: Final = (0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7)  # [m] 
 SHARES: Final = (0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)  # of its range by which a single joint moves
 BOXES: Final = (0.05, 0.1, 0.2, 0.4, 1.0)  # half-widths of the boxes round the start, as shares of the joint ranges
 DRAWS: Final = 80  # configurations drawn from each box
-ITERATIONS: Final = 6  # Newton steps from one retreat to the next: nobody needs them to arrive
+ITERATIONS: Final = 6  # Newton steps from one retreat to the next: they need not converge
 DAMPING: Final = 0.02  # [-] keeps the steps finite where the arm is stretched
 LONGEST_MOVE: Final = 0.3  # [rad, m] of a joint in one step
 SAME: Final = 1e-9  # [s] displacements that differ by less are equal, whatever the rounding

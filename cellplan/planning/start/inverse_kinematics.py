@@ -35,7 +35,7 @@ def finite_limits(model: RobotModel) -> tuple[Array, Array]:
 def reaching_configurations(chain: ScrewChain, task: Relation, X_PT: Array, *, X_WP: Array, seeds: Array) -> Array:
     """Run damped Newton iterations from all seeds at once and keep what arrives.
 
-    Joint limits are not looked at here: a configuration out of limits may have an equal one a turn away.
+    Joint limits are not checked here: a configuration out of limits may have an equal one a turn away.
 
     Args:
         chain: The operator.

@@ -28,9 +28,9 @@ from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.mounting import Mount
 from cellplan.scene.scene import Scene
 
-SAMPLES: Final = 160  # instants of the coarse motion that a configuration is judged by
+SAMPLES: Final = 160  # times of the coarse motion that a configuration is judged by
 GAIN: Final = 0.5  # feedback gain times step of the coarse motion
-TOUCH_INSTANTS: Final = 12  # instants of the coarse motion that are looked at for collisions
+TOUCH_INSTANTS: Final = 12  # times of the coarse motion that are considered for collisions
 TRIED_WITH: Final = "weighted_pseudo_inverse"  # fast, and it shows how far a configuration would go beyond its limits
 CLOSE_ENOUGH: Final = 1e-4  # [m] and [rad] tool error of the closer look: it is about joints
 MOST_BREAKS: Final = 500  # of the desired motion up to which a closer look costs some tenths of a second
@@ -174,7 +174,7 @@ class StartTrials:
     def judge_alone(self, task: Task, configuration: Array, holder_configuration: Array | None) -> Array:
         """Shares that one operator's configuration leaves free if its task were the only one, the worst first.
 
-        Of the other robots only the first holder moves. Collisions and the other holders are not looked at.
+        Of the other robots only the first holder moves. Collisions and the other holders are not checked.
         """
         cell = self._cell_alone(task.robot)
         start = np.concatenate([np.clip(0.0, *finite_limits(robot.model)) for robot in cell.robots])

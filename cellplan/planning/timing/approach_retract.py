@@ -16,7 +16,7 @@ def stand_off(times: Array, task: Task, X_PT: Array, *, V_PT_P: Array, end: floa
     when the path ends. Before and after that the tool rests off the part.
 
     Args:
-        times: Instants in [s], shape (N,).
+        times: Times in [s], shape (N,).
         task: The task.
         X_PT: Reference poses, held still before the start and after the end of the path, shape (N, 4, 4).
         V_PT_P: Reference twists, zero there, shape (N, 6).

@@ -1,4 +1,4 @@
-"""Room for the samples of all joints: refused before it is asked for, with the memory that it would take."""
+"""Room for the samples of all joints: refused in advance, with the memory that it would take."""
 
 import math
 from typing import Final

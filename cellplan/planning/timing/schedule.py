@@ -43,7 +43,7 @@ def time_tasks(cell: Cell, paths: Sequence[ClockedPath]) -> TimedTasks:
         paths: The paths to work on.
 
     Raises:
-        InputError: A task does not fit the clock, or the clock would have more than two million instants.
+        InputError: A task does not fit the clock, or the clock would have more than two million samples.
     """
     times = np.round(np.arange(_step_count(cell, paths) + 1) * cell.motion.step, TIME_DECIMALS)
     return TimedTasks(times=times, paths=tuple(paths))
@@ -73,7 +73,7 @@ def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
     for index, lock in enumerate(cell.motion.locked):
         if lock.since >= end:
             where = cell.origin.at(f"motion.locked_joints[{index}].from_s")
-            raise InputError(f"{where}: expected an instant before the end at {end:g} s, got {lock.since:g}")
+            raise InputError(f"{where}: expected a time before the end at {end:g} s, got {lock.since:g}")
     least = FEWEST_STEPS * cell.motion.step
     for path in paths:
         task, whole = path.task, path.end - path.start
@@ -153,7 +153,7 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
 
 
 def _cycle_ends(task: Task, toolpath: Toolpath, corners: Array) -> tuple[float, ...]:
-    """Instants at which the tool is back at its start; none when it does not come back, or turned."""
+    """Times at which the tool is back at its start; none when it does not come back, or turned."""
     turn = np.pi - abs(abs(toolpath.turn) % (2.0 * np.pi) - np.pi)
     is_turned = turn > WHOLE_TURN and not task.is_spin_free and any(axis >= ROTATIONS for axis in task.axes)
     if not toolpath.is_closed or is_turned:
@@ -165,9 +165,9 @@ def _cycle_ends(task: Task, toolpath: Toolpath, corners: Array) -> tuple[float, 
 
 
 def _even_out_jumps(times: Array, corners: Array, X_PT: Array, *, V_PT_P: Array) -> None:
-    """Put mean twists, in place, where a tool starts, passes a corner or comes to rest between two instants.
+    """Put mean twists, in place, where a tool starts, passes a corner or comes to rest between two times.
 
-    The speed of a constant law jumps there: the twist at the instant before would miss the pose at the next one.
+    The speed of a constant law jumps there: the twist at the sample before would miss the pose at the next one.
     """
     before = np.searchsorted(times, corners, side="right") - 1
     after = np.minimum(before + 1, len(times) - 1)

@@ -1,4 +1,4 @@
-"""Timing: when each tool is where on its path, at any instant, and at which instants its motion is not smooth."""
+"""Timing: when each tool is where on its path, at any time, and at which times its motion is not smooth."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -19,7 +19,9 @@ from cellplan.planning.timing.time_law import advance, peak_rate, reached_at
 
 MOST_SAMPLES: Final = 2_000_000  # tables longer than this fill disks, not controllers
 SAME_PLACE: Final = 1e-12  # [-] of the whole length: knots nearer to a stop lie on it
-MOST_BREAKS: Final = 2_000_000  # smooth stretches of a motion beyond which nobody integrates from one to the next
+MOST_BREAKS: Final = (
+    2_000_000  # smooth stretches of a motion beyond which integration from one to the next takes too long
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,10 +31,10 @@ class ClockedPath:
     Attributes:
         task: The task.
         toolpath: Where its tool must be.
-        corners: Instants in [s] at which the stretches begin, and the one at which the last ends: each takes its own
+        corners: Times in [s] at which the stretches begin, and the one at which the last ends: each takes its own
             start and stop of the time law. The cycles of a trajectory are its stretches.
         behind: Length in [m] behind each stop of one cycle, shape (pieces + 1,).
-        quick: Way from lengths to parameters of the path for a few instants at a time.
+        quick: Way from lengths to parameters of the path for a few times at a time.
         where: Place of the path in the cell file, for findings.
     """
 
@@ -45,22 +47,22 @@ class ClockedPath:
 
     @property
     def start(self) -> float:
-        """Instant in [s] at which the path begins; an approach is over."""
+        """Time in [s] at which the path begins; an approach is over."""
         return float(self.corners[0])
 
     @property
     def end(self) -> float:
-        """Instant in [s] at which the path is done; leaving begins."""
+        """Time in [s] at which the path is done; leaving begins."""
         return float(self.corners[-1])
 
     @property
     def over(self) -> float:
-        """Instant in [s] from which on the tool rests: it is out of the way."""
+        """Time in [s] from which on the tool rests: it is out of the way."""
         return self.end + self.task.leaving
 
     @property
     def breaks(self) -> Array:
-        """Instants in [s], increasing, at which the desired pose or one of its derivatives may jump, shape (B,).
+        """Times in [s], increasing, at which the desired pose or one of its derivatives may jump, shape (B,).
 
         These are the ends of an approach, of the stretches, of the cycles, of the ramps of a trapezoid and of a
         retreat, and all knots of the tip's curve and of the orientation. Between two neighbours the motion is
@@ -90,12 +92,12 @@ class ClockedPath:
         return distinct(np.concatenate(found))
 
     def at(self, times: Array, within: Interval) -> tuple[Array, Array]:
-        """Reference poses and twists at instants of a smooth stretch of time, its ends seen from inside.
+        """Reference poses and twists at times of a smooth stretch of time, its ends seen from inside.
 
         Args:
-            times: Instants in [s], shape (N,).
-            within: Two neighbours of the `breaks`, of this path or of all, between which the instants lie, ends
-                included: one pair for all, or arrays of shape (N,) with a pair for each instant. At its ends the
+            times: Times in [s], shape (N,).
+            within: Two neighbours of the `breaks`, of this path or of all, between which the times lie, ends
+                included: one pair for all, or arrays of shape (N,) with a pair for each sample. At its ends the
                 twist is the one inside: that of a moving tool where a constant law starts or passes a corner.
 
         Returns:
@@ -113,7 +115,7 @@ class ClockedPath:
         return X_PT, V_PT_P
 
     def stretches(self, times: Array) -> NDArray[np.intp]:
-        """Number of the stretch that instants in [s] fall into, shape (N,); the nearest before and after all."""
+        """Number of the stretch that times in [s] fall into, shape (N,); the nearest before and after all."""
         stretch = np.searchsorted(self.corners, times, side="right") - 1
         return np.clip(stretch, 0, len(self.corners) - 2)
 
@@ -121,7 +123,7 @@ class ClockedPath:
         """Poses, twists and lengths behind the tool while it follows its path, without approach and retreat.
 
         Args:
-            times: Instants in [s], shape (N,); beyond its stretch the nearer end is taken.
+            times: Times in [s], shape (N,); beyond its stretch the nearer end is taken.
             stretch: Stretch that each belongs to, shape (N,): it says which side counts at a corner.
 
         Returns:
@@ -173,7 +175,7 @@ class ClockedPath:
         return knots[(knots >= path.stops[0]) & (knots <= path.stops[-1])]
 
     def _instants(self, knots: Array) -> Array:
-        """Instants in [s] at which the path passes its knots, of all cycles, shape (N,)."""
+        """Times in [s] at which the path passes its knots, of all cycles, shape (N,)."""
         path, law = self.toolpath, self.task.time_law
         cycles = np.arange(self.task.repeat)[:, None]
         if isinstance(path, Trajectory):
@@ -197,7 +199,7 @@ class TimedTasks:
     """All tasks on the common clock, before they are sampled.
 
     Attributes:
-        times: Instants of the clock in [s], evenly spaced from 0, shape (N,).
+        times: Times of the clock in [s], evenly spaced from 0, shape (N,).
         paths: The paths of the tasks that are worked on.
         extra_breaks: Further times in [s] that count as jumps: ends of panels where errors were too large, shape (K,).
     """
@@ -208,7 +210,7 @@ class TimedTasks:
 
     @property
     def breaks(self) -> Array:
-        """Instants in [s], from zero to the end of the clock, between which the motion of all tools is smooth."""
+        """Times in [s], from zero to the end of the clock, between which the motion of all tools is smooth."""
         return self._within([path.breaks for path in self.paths])
 
     @property
@@ -217,7 +219,7 @@ class TimedTasks:
         return self._within([path.jumps for path in self.paths])
 
     def poses(self, times: Array) -> tuple[Array, ...]:
-        """Reference poses X_PT of all tasks at instants in [s], shape (M,), shape (M, 4, 4) each."""
+        """Reference poses X_PT of all tasks at times in [s], shape (M,), shape (M, 4, 4) each."""
         found = []
         for path in self.paths:
             X_PT, V_PT_P, _ = path.targets(times, path.stretches(times + INSTANT_ROOM))
@@ -226,7 +228,7 @@ class TimedTasks:
         return tuple(found)
 
     def _within(self, found: Sequence[Array]) -> Array:
-        """Instants of all paths within the clock, and its ends."""
+        """Times of all paths within the clock, and its ends."""
         end = float(self.times[-1])
         every = np.concatenate([self.extra_breaks, *found])
         inner = distinct(every[(every > INSTANT_ROOM) & (every < end - INSTANT_ROOM)])
@@ -234,7 +236,7 @@ class TimedTasks:
 
 
 def distinct(instants: Array) -> Array:
-    """Instants in increasing order, one for those that are nearer to each other than rounding, shape (n,)."""
+    """Times in increasing order, one for those that are nearer to each other than rounding, shape (n,)."""
     ordered = np.sort(instants)
     return ordered[np.diff(ordered, prepend=-np.inf) > INSTANT_ROOM]
 
@@ -256,7 +258,7 @@ def clock_path(cell: Cell, task: Task, toolpath: Toolpath) -> ClockedPath:
 
 
 def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
-    """Instants in [s] at which the stretches of a path begin, and the one at which the last ends."""
+    """Times in [s] at which the stretches of a path begin, and the one at which the last ends."""
     if isinstance(toolpath, Trajectory):
         return task.start + toolpath.duration * np.arange(task.repeat + 1.0)
     behind = _stops(cell, task, toolpath)

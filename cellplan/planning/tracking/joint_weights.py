@@ -16,7 +16,7 @@ HEADING_DAMPING: Final = 1e-4  # squared damping factor of the motion that tells
 
 
 class JointWeights:
-    """The diagonal of W along the motion; it depends on instant and configuration only, not on what went before."""
+    """The diagonal of W along the motion; it depends on sample and configuration only, not on what went before."""
 
     def __init__(self, cell: Cell, model: CombinedModel) -> None:
         """Take the constant weights, the limits and the masses of all robots."""
@@ -31,7 +31,7 @@ class JointWeights:
         self._varies = self._near_limits > 0.0 or self._load > 0.0
 
     def at(self, state: CellState, q: Array, *, J: Array, xdot: Array, secondary: Array | None) -> Array:
-        r"""Weights at one instant and configuration.
+        r"""Weights at one sample and configuration.
 
         .. math:: w_i = w_{0i} \left(1 + a \left|\partial H / \partial q_i\right|\right) \left(1 + b \, g_i\right)
 

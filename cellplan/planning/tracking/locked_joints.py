@@ -1,4 +1,4 @@
-"""Locked joints: which joints stand still from which instant on."""
+"""Locked joints: which joints stand still from which time on."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from cellplan.model.cell import Cell
 
 
 def locked_since(cell: Cell) -> Array:
-    """Instant in [s] from which each joint stays where it is, inf for those that do not fail, shape (nq,)."""
+    """Time in [s] from which each joint stays where it is, inf for those that do not fail, shape (nq,)."""
     since = np.full(cell.joint_count, np.inf)
     for lock in cell.motion.locked:
         index = cell.columns(lock.robot).start + cell.robot(lock.robot).model.joint_names.index(lock.joint)

@@ -41,7 +41,7 @@ class ClosestPair:
 class ClosestPairs:
     """What is near what in one scene, configuration by configuration.
 
-    Looked at are pairs that must keep the demanded clearance. Pairs whose distance is a matter of design, and tools at
+    Considered are pairs that must keep the demanded clearance. Pairs whose distance is a matter of design, and tools at
     work on the part, are left out. Bounding spheres and boxes clear what is far away; only what is left is measured.
     """
 
@@ -50,7 +50,7 @@ class ClosestPairs:
 
         Args:
             scene: The scene.
-            classes: Classes of pairs that are looked at; those of one robot with itself only when asked for.
+            classes: Classes of pairs that are considered; those of one robot with itself only when asked for.
         """
         self._scene, self._model = scene, CombinedModel(scene.cell)
         chosen = np.array([pair.rule is Rule.CLEARANCE and pair.clearance_class in classes for pair in scene.pairs])

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.errors import DivergedError
 from cellplan.geometry.transforms import Array, inverse
@@ -19,7 +18,6 @@ from cellplan.planning.tracking.joint_weights import JointWeights
 from cellplan.planning.tracking.locked_joints import locked_since
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, share_within
-from cellplan.planning.tracking.targets import targets
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 
 Drift = Callable[[int, Array], Array]
@@ -31,7 +29,7 @@ LOST_DISTANCE: Final = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstOrder:
-    """All tasks at one instant and configuration, to first order; only the components that they constrain.
+    """All tasks at one sample and configuration, to first order; only the components that they constrain.
 
     Attributes:
         J: Rows of the cooperation Jacobian, shape (m, nq); zero columns for joints that may not move.
@@ -50,7 +48,7 @@ class FirstOrder:
     bounds: tuple[Array, Array] | None = None
 
     def bounded(self, null_space_projection: Array, *, beside: Array) -> Array:
-        """What of joint speeds that no task notices may be added to the speeds that the tasks need, shape (nq,).
+        """Share of null-space velocities that may be added to the velocities that the tasks need, shape (nq,).
 
         They are scaled together, so they still move no tool.
 
@@ -69,9 +67,9 @@ class Advance:
     """One step of a resolution method.
 
     Attributes:
-        q: Stacked joint vector at the next instant, shape (nq,).
-        iterations: How often the method looked at the tasks.
-        slack: Norm of the twist that was given up on purpose, metres and radians per second as they come.
+        q: Stacked joint vector at the next sample, shape (nq,).
+        iterations: Number of evaluations of the tasks.
+        slack: Norm of the twist that was given up (task slack), in mixed units of m/s and rad/s.
     """
 
     q: Array
@@ -93,7 +91,7 @@ class TrackingProblem:
         signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
         gain: Error feedback gain in [1/s].
         damping: Largest damping factor; None leaves it to the method.
-        drift: Joint speeds that are asked for at instant k and configuration q besides the tasks, shape (nq,): what
+        drift: Joint velocities that are added at sample k and configuration q besides the tasks, shape (nq,): what
             closes a cycle.
     """
 
@@ -105,31 +103,25 @@ class TrackingProblem:
             drift: Joint velocities in the null space of the tasks that close a cycle; None for none.
         """
         cell, schedule = motion.cell, motion.schedule
-        asked = targets(motion)
-        tasks = tuple(target.relation for target in asked)
+        tasks, (self.desired, self.twists) = motion.relations, motion.references()
         self._model = CombinedModel(cell)
-        self._rows = [constraint_rows(target.relation, target.X_PT) for target in asked]
+        self._rows = [
+            constraint_rows(task, X_RT) for task, X_RT in zip(tasks, self.desired.swapaxes(0, 1), strict=True)
+        ]
         self.constraints = TaskConstraints.of(cell, tasks, motion.moving)
         self._is_on_part = bool(self.constraints.is_on_part.all())
-        self._lost = np.array([max(LOST_DISTANCE, 2.0 * target.tolerance) for target in asked])
-        self._settled = np.array([target.settled for target in asked])
+        self._lost = np.array([max(LOST_DISTANCE, 2.0 * _tolerance(cell, task)) for task in tasks])
+        self._settled = np.array([_settled_from(task) for task in tasks])
         self._weights = JointWeights(cell, self._model)
         self.cell, self.times, self.tasks = cell, schedule.times, tasks
-        self.desired = np.stack([target.X_PT for target in asked], axis=1)
-        self.twists = np.stack([target.V_PT_P for target in asked], axis=1)
         self.signs = self.constraints.column_signs(self._model.carries_flange)
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
         self.motion, self.drift = motion, drift
         self._goals = self._secondary_goals() if cell.solver.goals else None
         self._locked_since = locked_since(cell)
 
-    @property
-    def operators(self) -> NDArray[np.intp]:
-        """Index of the robot of each task and grasp in the cell, shape (tasks,)."""
-        return self.constraints.operators
-
     def step(self, k: int) -> float:
-        """Time from instant k to the next in [s]."""
+        """Time from sample k to the next in [s]."""
         return float(self.times[k + 1] - self.times[k])
 
     def state(self, q: Array) -> CellState:
@@ -137,25 +129,25 @@ class TrackingProblem:
         return self._model.state(q)
 
     def mobile(self, k: int) -> Array:
-        """1 for joints that may move at instant k, 0 for those that stand still or are locked, shape (nq,)."""
+        """1 for joints that may move at sample k, 0 for those that stand still or are locked, shape (nq,)."""
         return self.constraints.may_move * (self.times[k] < self._locked_since)
 
     def rows(self, k: int, q: Array) -> list[Array]:
         """Rows of the cooperation Jacobian for each task at sample k and configuration q, shape (m, nq) each."""
         state = self.state(q)
-        X_WT, X_WR = state.X_WT[self.operators], self.constraints.reference_frames(state.X_WP)
+        X_WT, X_WR = state.X_WT[self.constraints.operators], self.constraints.reference_frames(state.X_WP)
         J = cooperation_jacobian(state, X_WT[:, :3, 3], self.signs * self.mobile(k), X_WR=X_WR)
         return [rows[k] @ block for rows, block in zip(self._rows, J, strict=True)]
 
     def first_order(self, k: int, q: Array) -> FirstOrder:
-        """The tasks at instant k and configuration q, to first order.
+        """The tasks at sample k and configuration q, to first order.
 
         Raises:
             DivergedError: A tool lost its path.
         """
         state = self.state(q)
         signs = self.signs * self.mobile(k)
-        X_WT = state.X_WT[self.operators]
+        X_WT = state.X_WT[self.constraints.operators]
         X_WR = None if self._is_on_part else self.constraints.reference_frames(state.X_WP)
         J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
         X_RT = inverse(state.X_WP if X_WR is None else X_WR) @ X_WT
@@ -196,7 +188,7 @@ class TrackingProblem:
         )
 
     def _drift(self, k: int, q: Array) -> Array | None:
-        """Joint speeds that are asked for to close a cycle, of those joints that may move."""
+        """Joint velocities that are added to close a cycle, of those joints that may move."""
         if self.drift is None:
             return None
         return self.drift(k, q) * self.mobile(k)
@@ -241,8 +233,18 @@ def _place(task: Relation) -> str:
     return "its grasp on the part" if isinstance(task, Grasp) else f"task '{task.name}'"
 
 
+def _tolerance(cell: Cell, task: Relation) -> float:
+    """Allowed distance of a tool from its path or its grasp in [m]."""
+    return cell.checks.closure_position if isinstance(task, Grasp) else task.tolerance.position
+
+
+def _settled_from(task: Relation) -> float:
+    """Time in [s] until which a tool may come to its path; -inf when it is there from the start."""
+    return task.start + task.settle if not isinstance(task, Grasp) and task.settle else -np.inf
+
+
 def _rests(cell: Cell, schedule: Schedule) -> Array:
-    """Instants in [s] at which goals ask for nothing: the ends of the motion, and of each cycle that is to close."""
+    """Times in [s] at which goals ask for nothing: the ends of the motion, and of each cycle that is to close."""
     bounds = common_cycles(schedule) if cell.motion.cyclic else None
     ends = schedule.times[[0, -1]]
     return ends if bounds is None else np.unique(np.concatenate([ends, bounds]))

@@ -34,7 +34,7 @@ FADE_SHARE: Final = 0.25  # [-] of the whole motion that this may take at most
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stance:
-    """The cell at one instant and configuration, as goals look at it.
+    """The cell at one sample and configuration, as goals look at it.
 
     Attributes:
         q: Stacked joint vector, shape (nq,), in [rad] or [m].
@@ -81,9 +81,9 @@ class SecondaryGoals:
             cell: The cell.
             model: The combined model of its robots.
             tasks: The tasks and closures, one block row each.
-            times: Instants of the motion in [s], shape (N,).
-            start: Stacked configuration at the first instant, shape (nq,).
-            rests: Instants in [s] at which the goals ask for nothing: the ends of the motion and of cycles to close.
+            times: Times of the motion in [s], shape (N,).
+            start: Stacked configuration at the first time, shape (nq,).
+            rests: Times in [s] at which the goals ask for nothing: the ends of the motion and of cycles to close.
         """
         self._pulls = [(goal.gain, _pull(goal, cell, model, tasks=tasks, start=start)) for goal in cell.solver.goals]
         limits = cell.joint_limits
@@ -92,7 +92,7 @@ class SecondaryGoals:
         self._fade = _fade(times, rests)
 
     def speeds(self, k: int, stance: Stance) -> Array:
-        r"""Joint speeds that the goals ask for at an instant, shape (nq,), in [rad/s] or [m/s].
+        r"""Joint speeds that the goals ask for at a time, shape (nq,), in [rad/s] or [m/s].
 
         The gain of each goal is taken as in an implicit step of length ``h``, with the curvature ``c`` of ``-w``,
 
@@ -134,7 +134,7 @@ def share_within(speeds: Array, extra: Array, *, lowest: Array, highest: Array) 
 
 
 def _fade(times: Array, rests: Array) -> Array:
-    """Share of the goals at each instant: 0 at every rest, 1 away from them, smooth in between."""
+    """Share of the goals at each sample: 0 at every rest, 1 away from them, smooth in between."""
     length = float(np.diff(rests).max())
     away = np.min(np.abs(times[:, None] - rests), axis=1)
     x = np.clip(away / max(min(FADE, FADE_SHARE * length), np.finfo(float).tiny), 0.0, 1.0)

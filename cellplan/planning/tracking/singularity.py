@@ -1,4 +1,4 @@
-"""Singularity: which robot is nearest to a singular configuration where a motion finds no way on."""
+"""Singularity: which robot is nearest to a singular configuration where a motion cannot be continued."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def nearest_to_singular(problem: TrackingProblem, k: int, q: Array) -> NearestSi
 
     Args:
         problem: The tasks.
-        k: Instant of the clock.
+        k: Time of the clock.
         q: Stacked configuration, shape (nq,), in [rad] or [m].
 
     Returns:
@@ -34,7 +34,7 @@ def nearest_to_singular(problem: TrackingProblem, k: int, q: Array) -> NearestSi
 
 
 def singular_words(problem: TrackingProblem, k: int, q: Array) -> str:
-    """What to add to a finding about a motion that finds no way on; nothing where there is nothing to say."""
+    """What to add to a finding about a motion that cannot be continued; nothing where there is nothing to say."""
     nearest = nearest_to_singular(problem, k, q)
     return "" if nearest is None else f"; {nearest.words}"
 

@@ -1,4 +1,4 @@
-"""Weighted inverse of the task rows: smallest weighted joint speeds, and the motion that no task notices."""
+"""Weighted inverse of the task rows: smallest weighted joint speeds, and the motion in the null space of the tasks."""
 
 from typing import Final
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
@@ -93,7 +93,6 @@ def test_accelerations_of_a_point_on_a_circle() -> None:
     assert found[0] == pytest.approx(0.0, abs=0.1)
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=40), st.sampled_from([0.001, 0.004, 0.03]))
 def test_accelerations_times_the_step_add_up_to_nothing(speeds: list[float], step: float) -> None:
     positions = np.concatenate([[0.2], 0.2 + np.cumsum(np.array(speeds) * step)])
@@ -104,7 +103,6 @@ def test_accelerations_times_the_step_add_up_to_nothing(speeds: list[float], ste
     assert change == pytest.approx(0.0, abs=1e-9)  # from rest to rest
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=40), st.sampled_from([0.001, 0.004, 0.03]))
 def test_a_motion_run_backwards_has_the_same_accelerations(speeds: list[float], step: float) -> None:
     positions = np.concatenate([[0.2], 0.2 + np.cumsum(np.array(speeds) * step)])

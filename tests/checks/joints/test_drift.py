@@ -67,6 +67,15 @@ def test_tasks_that_do_not_come_back_together_make_one_cycle_of_the_run():
     assert found.drifts[2].drift == pytest.approx([0.04], abs=1e-15)
 
 
+def test_one_cycle_of_the_run_lasts_from_the_first_start_to_the_last_end():
+    timed = clocked((1.0, 3.0), (2.0, 4.0))
+    late = replace(timed.tasks[0], task=replace(timed.tasks[0].task, start=0.5))
+
+    found = repeatability(CELL, replace(timed, tasks=(late, timed.tasks[1])), positions())
+
+    assert found.instants.tolist() == [0.0, 4.0]
+
+
 def test_an_open_task_or_none_leaves_nothing_to_say():
     assert repeatability(CELL, clocked((2.0, 4.0), ()), positions()) is None
     assert repeatability(CELL, clocked(), positions()) is None

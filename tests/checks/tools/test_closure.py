@@ -51,6 +51,18 @@ def test_a_block_that_runs_ahead_is_away_from_its_grasp_by_as_much():
     np.testing.assert_allclose(closure.position_error[:, [0, 2]], 0.0, atol=1e-15)
 
 
+def test_a_tool_that_is_turned_in_its_grasp_is_away_by_that_angle_and_no_distance():
+    cell = two_slides()
+    first, second = cell.part.held_by
+    turned = replace(second, X_PT=second.X_PT @ pose((0.0, 0.0, 0.0), (0.0, 1e-3, 0.0)))
+
+    (closure,) = closures_of(replace(cell, part=replace(cell.part, held_by=(first, turned))), [0.0] * 3, [0.0] * 3)
+
+    assert closure.position_error.shape == (3, 3)
+    assert np.abs(closure.position_error).max() < 1e-15
+    np.testing.assert_allclose(np.abs(closure.orientation_error), [[1e-3, 0.0, 0.0]] * 3, atol=1e-12)
+
+
 def test_components_that_the_grasp_leaves_open_do_not_count():
     (closure,) = closures_of(two_slides(axes=(0, 2)), [0.0, 0.1, 0.2], [0.0, 0.4, 0.2])
     assert not closure.position_error[:, 1].any()

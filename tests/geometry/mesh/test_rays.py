@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.geometry.mesh.load import (
@@ -53,7 +53,6 @@ def test_rays_through_edges_and_vertices_of_a_cylinder_are_not_lost() -> None:
     assert through_caps.points[:, 2] == pytest.approx(0.25, abs=1e-15)
 
 
-@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_rays_lie_on_the_plane_of_the_triangle_they_hit_and_nothing_lies_before(seed: int) -> None:
     rng = np.random.default_rng(seed)

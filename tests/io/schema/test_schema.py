@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.errors import InvalidFileError
@@ -65,7 +65,6 @@ def lines_of(findings: list[str]) -> list[int]:
     return [int(line.split(":")[1]) for line in findings]
 
 
-@settings(max_examples=40, deadline=None)
 @given(place=st.sampled_from(PLACES))
 def test_a_dropped_key_is_a_default_or_a_located_finding(place: Place) -> None:
     document = four_robots()
@@ -76,7 +75,6 @@ def test_a_dropped_key_is_a_default_or_a_located_finding(place: Place) -> None:
     assert all(1 <= line <= len(text.splitlines()) for line in lines_of(told(text)))
 
 
-@settings(max_examples=40, deadline=None)
 @given(place=st.sampled_from([place for place in PLACES if isinstance(place[-1], str)]))
 def test_a_renamed_key_is_named_with_its_own_line(place: Place) -> None:
     document = four_robots()
@@ -98,7 +96,6 @@ def test_a_renamed_key_is_named_with_its_own_line(place: Place) -> None:
 WRONG = [True, "wrong word", [], {}, [1, 2], {"a": 1}, -1, 1e300, 5e-324, "", -7.5, ["x"], 10**25]
 
 
-@settings(max_examples=100, deadline=None)
 @given(place=st.sampled_from(PLACES), wrong=st.sampled_from(WRONG))
 def test_a_value_of_another_kind_is_fine_or_named_with_its_line(place: Place, wrong: Any) -> None:
     document = four_robots()
@@ -115,7 +112,6 @@ def test_a_value_of_another_kind_is_fine_or_named_with_its_line(place: Place, wr
         assert any(found.startswith(f":{line}: {key_text(place)}") for found in findings)
 
 
-@settings(max_examples=50, deadline=None)
 @given(
     place=st.sampled_from(
         [place for place in PLACES if isinstance(owner(four_robots(), place)[place[-1]], int | float)]

@@ -10,7 +10,7 @@ from builders.batch_cells import CELLS, configurations, everyone, random_desired
 from cellplan.geometry.transforms import Array, inverse, rotation_exp, rotation_vector
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Cell
-from cellplan.planning.collocation.batch_tasks import BatchTasks, Look, Reference
+from cellplan.planning.collocation.batch_tasks import BatchTasks, Linearisation, Reference
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
@@ -48,10 +48,10 @@ class Dense:
 
 def looked(
     cell: Cell, q: Array, desired: Reference, *, moving: list[str] | None = None, mobile: Array | None = None
-) -> Look:
+) -> Linearisation:
     tasks = BatchTasks(cell, relations(cell), moving or everyone(cell))
     mobile = np.ones(cell.joint_count) if mobile is None else mobile
-    return tasks.look(q, desired, tasks.chains.placement(cell), mobile=mobile)
+    return tasks.linearise(q, desired, tasks.chains.placement(cell), mobile=mobile)
 
 
 @pytest.mark.parametrize("name", CELLS)
@@ -79,9 +79,9 @@ def test_speeds_are_the_smallest_weighted_ones_and_the_drift_that_no_task_notice
     q = configurations(cell, LANES)
     desired, X = random_desired(len(relations(cell)), LANES)
     drift = np.random.default_rng(5).normal(size=cell.joint_count)
-    look = looked(cell, q, desired)
+    linear = looked(cell, q, desired)
 
-    plain, drifting = look.speeds(), look.speeds(drift)
+    plain, drifting = linear.speeds(), linear.speeds(drift)
 
     for lane in range(LANES):
         dense = Dense(cell, q[:, lane], X[lane], desired.twists[..., lane], moving=everyone(cell), mobile=ONES[name])
@@ -107,9 +107,9 @@ def test_corrections_lead_onto_the_tasks_in_quadratic_steps(name: str) -> None:
     q = goal + 2e-4 * configurations(cell, LANES, seed=9)
     found = []
     for _ in range(6):
-        look = looked(cell, q, desired)
-        found.append(np.abs(look.errors).max())
-        q = q + look.correction(np.zeros_like(q))
+        linear = looked(cell, q, desired)
+        found.append(np.abs(linear.errors).max())
+        q = q + linear.correction(np.zeros_like(q))
 
     assert found[0] > 1e-5
     assert found[-1] <= 1e-13 * 50.0  # lengths of some ten metres
@@ -138,9 +138,9 @@ def test_a_part_at_rest_is_left_to_the_operators(name: str) -> None:
     at_rest = replace(cell, part=replace(cell.part, held_by=cell.part.held_by[:1]))  # further holders rest as well
     q = configurations(cell, LANES)
     desired, X = random_desired(len(cell.tasks), LANES)
-    look = looked(at_rest, q, desired, moving=operators)
+    linear = looked(at_rest, q, desired, moving=operators)
 
-    speeds = look.speeds()
+    speeds = linear.speeds()
 
     for robot in cell.robots:
         assert robot.name in operators or not speeds[cell.columns(robot.name)].any()
@@ -160,17 +160,17 @@ def test_locked_joints_get_exactly_nothing_and_the_others_make_up_for_it(name: s
     mobile = np.ones(cell.joint_count)
     mobile[[0, cell.columns(cell.tasks[0].robot).start]] = 0.0
     desired, X = random_desired(len(relations(cell)), LANES)
-    look = looked(cell, q, desired, mobile=mobile)
+    linear = looked(cell, q, desired, mobile=mobile)
     drift = np.ones(cell.joint_count)
 
-    for found in (look.speeds(), look.speeds(drift), look.correction(np.zeros_like(q))):
+    for found in (linear.speeds(), linear.speeds(drift), linear.correction(np.zeros_like(q))):
         assert not found[mobile == 0.0].any()
     for lane in range(LANES):
         dense = Dense(cell, q[:, lane], X[lane], desired.twists[..., lane], moving=everyone(cell), mobile=mobile)
         if dense.rank == len(dense.J):
             room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2
             expected = dense.inverse.speeds(dense.twist, 0.0)
-            np.testing.assert_allclose(look.speeds()[:, lane], expected, atol=room * np.abs(expected).max())
+            np.testing.assert_allclose(linear.speeds()[:, lane], expected, atol=room * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", ["plain", "sliding", "followers", "mixed", "fixture", "closed", "carried"])

@@ -19,7 +19,7 @@ from cellplan.scene.scene import Scene
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
 METHODS = get_args(MethodName)
 WRITTEN = 2e-9  # [m] by which written tables may differ from the motion: twelve decimals of a degree, arms of a few m
-CAUSES = ("singular", "limits", "leap", "from its grasp", "from task", "joint speed", "rotations", "search")
+CAUSES = ("singular", "limits", "half a turn", "from its grasp", "from task", "joint speed", "rotations", "search")
 
 
 @pytest.mark.parametrize("method", METHODS)

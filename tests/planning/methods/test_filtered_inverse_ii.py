@@ -2,7 +2,7 @@
 
 import numpy as np
 from builders.planar_arms import planar_cell, tip_jacobians, tip_schedule, tips
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.model.solver import FilteredInverseSettings, SolverSettings
@@ -37,7 +37,6 @@ def resting_problem(q):
 
 
 @given(q=st.tuples(ANGLE, ANGLE, ANGLE), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=50, deadline=None)
 def test_the_error_falls_even_with_a_random_filter(q, seed):
     """``e . e_dot = -K |P^T e|^2`` (Eq. 37 for a tool at rest)."""
     q = np.array(q)

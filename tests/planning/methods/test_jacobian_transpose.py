@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders.planar_arms import planar_cell, tip_schedule, tips
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.model.cell import LockedJoint
@@ -54,7 +54,6 @@ def errors(schedule, motion):
     shape=st.tuples(st.integers(1, 8), st.integers(1, 8)),
     exponents=st.lists(st.floats(-12.0, 1.0), min_size=8, max_size=8),
 )
-@settings(max_examples=100, deadline=None)
 def test_motion_never_leaves_more_than_there_was_and_stays_bounded(seed, shape, exponents):
     """A hundred times: ``s |dq_s| <= 2 |x|`` where steps reach far, ``|dq_s| <= 50 |x|`` where s is below 1/50."""
     rng = np.random.default_rng(seed)

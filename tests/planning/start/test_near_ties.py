@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.planning.start.near_ties import best_first, levels
@@ -26,7 +26,6 @@ def test_what_no_figure_tells_apart_stays_in_its_order():
     assert best_first(np.zeros((0, 3))) == []
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.permutations(range(6)), st.lists(st.sampled_from([0.0, 0.25, 0.5]), min_size=12, max_size=12))
 def test_the_order_of_candidates_does_not_matter_where_the_last_figure_is_their_own(order, drawn):
     figures = np.column_stack([np.array(drawn).reshape(6, 2), np.arange(6.0)])

@@ -79,7 +79,7 @@ def test_planar_holders_are_found_where_the_path_in_the_world_begins(planar):
 
 
 def test_given_starts_that_close_the_loop_are_accepted(shared, found):
-    examine_given_starts(with_starts(shared, found, "left", "right"), toolpaths_of(shared))
+    assert examine_given_starts(with_starts(shared, found, "left", "right"), toolpaths_of(shared)) is None
 
 
 def test_a_holder_off_its_grasp_is_named_with_line_distance_and_cure(planar):

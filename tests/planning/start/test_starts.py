@@ -49,7 +49,7 @@ def distance_from_task(cell, task, q):
 
 
 def test_given_starts_of_the_reference_cell_are_accepted(cell):
-    examine_given_starts(cell, toolpaths_of(cell))
+    assert examine_given_starts(cell, toolpaths_of(cell)) is None
 
 
 def test_start_outside_limits_is_named_with_its_line(cell):
@@ -232,5 +232,8 @@ def test_a_task_that_settles_may_start_beside_its_path(cell):
     start = cell.robot("abb").start.copy()
     start[0] += np.radians(20.0)
     tasks = tuple(replace(task, settle=1.0) if task.robot == "abb" else task for task in cell.tasks)
+    beside = with_start(cell, "abb", start)
 
-    examine_given_starts(replace(with_start(cell, "abb", start), tasks=tasks), toolpaths_of(cell))
+    assert examine_given_starts(replace(beside, tasks=tasks), toolpaths_of(cell)) is None
+    with pytest.raises(StartOffTaskError):
+        examine_given_starts(beside, toolpaths_of(cell))

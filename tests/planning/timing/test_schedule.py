@@ -252,4 +252,4 @@ def test_a_task_too_short_to_be_judged_by_its_samples_is_refused(words: Any, got
 def test_ten_steps_are_enough() -> None:
     one = on_roller(duration=0.01)
 
-    clock_paths(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])
+    assert len(clock_paths(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])) == 1

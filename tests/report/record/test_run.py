@@ -213,6 +213,7 @@ def test_run_folder_knows_the_report_as_its_own(tmp_path: Path, passed_run: Any,
     for text in (one, several, one):  # each replaces the one before, which must be recognised
         with RunFolder(tmp_path / "run") as folder:
             folder.write_text("report.json", text)
+        assert (tmp_path / "run" / "report.json").read_text(encoding="utf-8") == text
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False, min_value=-1e9, max_value=1e9))

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.methods.support.search_cost import Look, SearchCost
+from cellplan.planning.methods.support.search_cost import Expansion, SearchCost
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
 POSITION_MARGIN: Final = 1e-11  # [rad] or [m] that a search stays inside a limit: rounding of the written tables
@@ -33,7 +33,9 @@ class Bounds:
         return np.clip(q, self.lowest, self.highest)
 
 
-Pass = Callable[[Look, Bounds, int], tuple[Look, int]]  # from a look, with so many rounds left, to a better one
+Pass = Callable[
+    [Expansion, Bounds, int], tuple[Expansion, int]
+]  # from an expansion, with so many rounds left, to a better one
 
 
 class ConfigurationSearch:
@@ -58,10 +60,10 @@ class ConfigurationSearch:
         self._rounds = settings.rounds
 
     def advance(self, k: int, start: Array, bounds: Bounds, *, momentum: Array | None = None) -> Advance:
-        """Search for the configuration at the instant after k.
+        """Search for the configuration at the sample after k.
 
         Args:
-            k: The instant.
+            k: The sample.
             start: Configuration there, shape (nq,); it sets which joints may move and which way tools lean.
             bounds: Where the joints may go.
             momentum: What the joints moved in the step before, shape (nq,): the search begins as far along it as
@@ -71,35 +73,35 @@ class ConfigurationSearch:
             The best configuration found; its slack is the root of the cost that is left over the step.
         """
         self._cost.aim(k + 1, start)
-        look = self._cost.look(start)
-        if momentum is not None and look.cost > self._target:
-            moved = look.q + _scaled(look, momentum) * self._problem.mobile(k)
-            look = cheaper(look, self._cost.look(bounds.held(moved)))
-        look, used = self._repeat(look, bounds, self._rounds)
-        if look.cost > self._target and used < self._rounds:
-            nudged = self._cost.look(bounds.held(look.q + self._nudge(k)))
+        expansion = self._cost.expand(start)
+        if momentum is not None and expansion.cost > self._target:
+            moved = expansion.q + _scaled(expansion, momentum) * self._problem.mobile(k)
+            expansion = cheaper(expansion, self._cost.expand(bounds.held(moved)))
+        expansion, used = self._repeat(expansion, bounds, self._rounds)
+        if expansion.cost > self._target and used < self._rounds:
+            nudged = self._cost.expand(bounds.held(expansion.q + self._nudge(k)))
             found, more = self._repeat(nudged, bounds, self._rounds - used)
             used += more
-            look = found if found.cost < (1.0 - WORTH_IT) * look.cost else look
-        left = np.sqrt(look.cost) / self._problem.step(k) if look.cost > self._target else 0.0
-        return Advance(q=look.q, iterations=used, slack=float(left))
+            expansion = found if found.cost < (1.0 - WORTH_IT) * expansion.cost else expansion
+        left = np.sqrt(expansion.cost) / self._problem.step(k) if expansion.cost > self._target else 0.0
+        return Advance(q=expansion.q, iterations=used, slack=float(left))
 
-    def _repeat(self, look: Look, bounds: Bounds, rounds: int) -> tuple[Look, int]:
-        """Pass after pass; the best look and the rounds used."""
+    def _repeat(self, expansion: Expansion, bounds: Bounds, rounds: int) -> tuple[Expansion, int]:
+        """Pass after pass; the best expansion and the rounds used."""
         used = 0
         ways: list[Array] = []
-        while look.cost > self._target and used < rounds:
-            better, spent = self._improve(look, bounds, rounds - used)
+        while expansion.cost > self._target and used < rounds:
+            better, spent = self._improve(expansion, bounds, rounds - used)
             used += spent
-            if max(self._target, SLOW * look.cost) < better.cost < look.cost:
-                moves = np.stack([*ways, better.q - look.q], axis=1)
-                better = cheaper(better, self._cost.look(bounds.held(better.q + _carried_on(better, moves))))
-            ways = [*ways[1 - WAYS :], better.q - look.q]
-            has_stalled = not better.cost < (1.0 - STALLED) * look.cost
-            look = cheaper(look, better)
+            if max(self._target, SLOW * expansion.cost) < better.cost < expansion.cost:
+                moves = np.stack([*ways, better.q - expansion.q], axis=1)
+                better = cheaper(better, self._cost.expand(bounds.held(better.q + _carried_on(better, moves))))
+            ways = [*ways[1 - WAYS :], better.q - expansion.q]
+            has_stalled = not better.cost < (1.0 - STALLED) * expansion.cost
+            expansion = cheaper(expansion, better)
             if has_stalled:
                 break
-        return look, used
+        return expansion, used
 
     def _nudge(self, k: int) -> Array:
         """A disturbance that no two joints share, of those that may move."""
@@ -107,25 +109,25 @@ class ConfigurationSearch:
         return NUDGE * np.cos(1.0 + 2.4 * np.arange(len(mobile))) * mobile
 
 
-def cheaper(one: Look, other: Look) -> Look:
-    """The look that costs less; the first one if they cost the same."""
+def cheaper(one: Expansion, other: Expansion) -> Expansion:
+    """The expansion that costs less; the first one if they cost the same."""
     return other if other.cost < one.cost else one
 
 
-def _scaled(look: Look, way: Array) -> Array:
+def _scaled(expansion: Expansion, way: Array) -> Array:
     """As much of a way as brings all tools nearest to first order, at most its whole length, shape (nq,).
 
-    Anything longer would let motion that no tool notices grow from step to step, without end.
+    Anything longer would let motion in the null space grow from step to step, without end.
     """
-    shift = look.a @ way
+    shift = expansion.a @ way
     square = float(shift @ shift)
-    share = float(look.e @ shift) / square if square > 0.0 else 0.0
+    share = float(expansion.e @ shift) / square if square > 0.0 else 0.0
     return min(max(share, 0.0), 1.0) * way
 
 
-def _carried_on(look: Look, ways: Array) -> Array:
+def _carried_on(expansion: Expansion, ways: Array) -> Array:
     """The sum of multiples of ways, shape (nq, n), that brings all tools nearest to first order, shape (nq,)."""
-    shares = np.linalg.lstsq(look.a @ ways, look.e, rcond=DEPENDENT)[0]
+    shares = np.linalg.lstsq(expansion.a @ ways, expansion.e, rcond=DEPENDENT)[0]
     move = ways @ shares
     longest, most = float(np.max(np.abs(move))), FARTHEST * float(np.max(np.abs(ways)))
     return move if longest <= most else move * (most / longest)

@@ -80,7 +80,7 @@ class FilteredMotion:
         self.theta: Array | None = None
 
     def advance(self, k: int, q: Array) -> Advance:
-        """One step, in as many sub-steps as it needs; between two instants the desired twist is held.
+        """One step, in as many sub-steps as it needs; between two times the desired twist is held.
 
         Raises:
             DivergedError: No sub-step is short enough.
@@ -125,12 +125,12 @@ class FilteredMotion:
         )
 
     def _start(self, relaxation: Relaxation, J: Array) -> Array:
-        """Theta at the first instant."""
+        """Theta at the first time."""
         return np.zeros_like(J.T) if self._settings.starts_at_zero else relaxation.inverse()
 
 
 def _besides(tasks: FirstOrder) -> Array:
-    """Joint speeds for the secondary goals that no task notices, shape (nq,)."""
+    """Joint speeds for the secondary goals in the null space of the tasks, shape (nq,)."""
     if tasks.secondary is None:
         return np.zeros_like(tasks.weights)
     return WeightedInverse(tasks.J, tasks.weights).null_space_projection(tasks.secondary)

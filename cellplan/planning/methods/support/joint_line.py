@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.methods.support.search_cost import Look
+from cellplan.planning.methods.support.search_cost import Expansion
 
 ROUND: Final = 1e-12  # share of the largest aa: how well a way must be a circle on the axes that count to pass for one
 
@@ -84,13 +84,13 @@ class JointLines:
         return float(tried[np.argmax(gain)])
 
 
-def joint_lines(look: Look) -> JointLines:
+def joint_lines(expansion: Expansion) -> JointLines:
     """The cost along every joint from a configuration."""
     return JointLines(
-        ae=look.e @ look.a,
-        ne=look.e @ look.n,
-        aa=np.einsum("ij,ij->j", look.a, look.a),
-        nn=np.einsum("ij,ij->j", look.n, look.n),
-        an=np.einsum("ij,ij->j", look.a, look.n),
-        turns=look.turns,
+        ae=expansion.e @ expansion.a,
+        ne=expansion.e @ expansion.n,
+        aa=np.einsum("ij,ij->j", expansion.a, expansion.a),
+        nn=np.einsum("ij,ij->j", expansion.n, expansion.n),
+        an=np.einsum("ij,ij->j", expansion.a, expansion.n),
+        turns=expansion.turns,
     )

@@ -18,7 +18,7 @@ COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class Expansion:
     r"""The cost at one configuration, and the circle on which each joint moves the tools seen from the part.
 
     The cost ``h = e^T e`` is a sum of squared distances: of each tool tip from its desired place, and of each
@@ -71,7 +71,7 @@ class SearchCost:
     """
 
     def __init__(self, problem: TrackingProblem) -> None:
-        """List the points and directions that count; the joints are looked at when the first configuration is known."""
+        """List the points and directions that count; the joints are checked when the first configuration is known."""
         self._problem = problem
         self._signs = problem.signs
         self._turns = turning_joints(problem.cell)
@@ -92,7 +92,7 @@ class SearchCost:
         self._is_tip = (self._columns == 3).astype(float)[:, None, None]
 
     def aim(self, k: int, q: Array) -> None:
-        """Take the desired poses at instant k as the goal, and the joints that may move on the way there from q."""
+        """Take the desired poses at sample k as the goal, and the joints that may move on the way there from q."""
         problem = self._problem
         self._signs = problem.signs * problem.mobile(k - 1)
         desired = problem.desired[k]
@@ -101,14 +101,14 @@ class SearchCost:
             desired = self._with_reachable_turns(desired, q)
         self._goal = desired[self._owners, :3, self._columns]
 
-    def look(self, q: Array) -> Look:
+    def expand(self, q: Array) -> Expansion:
         """The cost at a configuration, and what each joint does to it."""
         state = self._problem.state(q)
         X_WR = self._problem.constraints.reference_frames(state.X_WP)
         R, p = np.swapaxes(X_WR[:, :3, :3], 1, 2), X_WR[:, :3, 3]
         w = R @ state.screws_W[3:]
         v = R @ (state.screws_W[:3] - skew(p) @ state.screws_W[3:])  # of the point at the origin of P
-        poses = R @ state.X_WT[self._problem.operators][:, :3, :]
+        poses = R @ state.X_WT[self._problem.constraints.operators][:, :3, :]
         poses[:, :, 3] -= (R @ p[:, :, None])[:, :, 0]
         x = poses[self._owners, :, self._columns]
         signs = self._signs[self._owners][:, None, :]
@@ -117,7 +117,7 @@ class SearchCost:
         n = _cross(turns, a) * self._turns
         scale = self._weights[:, :, None]
         m = x.size
-        return Look(
+        return Expansion(
             q=q,
             e=(self._weights * (self._goal - x)).reshape(m),
             a=(scale * a).reshape(m, -1),
@@ -152,7 +152,7 @@ class SearchCost:
         for index, (task, kind) in enumerate(zip(self._problem.tasks, self._kinds, strict=True)):
             if kind == "turn":
                 rotations = [axis - 3 for axis in task.axes if axis >= 3]
-                R = X_WR[index, :3, :3].T @ state.X_WT[self._problem.operators[index], :3, :3]
+                R = X_WR[index, :3, :3].T @ state.X_WT[self._problem.constraints.operators[index], :3, :3]
                 desired[index, :3, :3] = _twist(desired[index, :3, :3] @ R.T, rotations) @ R
         return desired
 

@@ -25,7 +25,7 @@ class SpeedBounds:
 class JointBounds:
     """The limits of all joints of a cell, as bounds on the speeds of one step.
 
-    A joint keeps the speed of a step until the next instant, as the written tables mean it.
+    A joint keeps the speed of a step until the next sample, as the written tables mean it.
     """
 
     def __init__(self, cell: Cell) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.planning.methods.support.filtered_jacobian import LEAST_AT_START, Relaxation
@@ -41,7 +41,6 @@ def test_the_exact_step_is_what_fine_integration_gives(shape, lost):
 
 
 @given(seed=st.integers(0, 2**32 - 1), lost=st.integers(0, 2), time=st.floats(0.0, 10.0), share=st.floats(0.0, 1.0))
-@settings(max_examples=60, deadline=None)
 def test_two_steps_are_one(seed, lost, time, share):
     J, theta = drawn(seed, (3, 5), lost=lost)
     relaxation = Relaxation(J)

@@ -59,29 +59,30 @@ CELLS = {
 @pytest.mark.parametrize("name", CELLS)
 def test_closed_form_is_the_cost_itself_along_every_joint(name):
     _, cost, q = cost_of(CELLS[name], 11)
-    look = cost.look(q)
-    lines = joint_lines(look)
+    expansion = cost.expand(q)
+    lines = joint_lines(expansion)
     for i in range(len(q)):
         for theta in (-2.0, -0.3, 1e-3, 0.9, 3.0):
             along = q.copy()
             along[i] += theta
-            expected = look.cost - cost.look(along).cost
+            expected = expansion.cost - cost.expand(along).cost
             gain = lines.gain(np.full(len(q), theta))[i]
-            assert gain == pytest.approx(expected, abs=1e-12 * max(1.0, look.cost))  # rounding of sums of squares
+            assert gain == pytest.approx(expected, abs=1e-12 * max(1.0, expansion.cost))  # rounding of sums of squares
 
 
 @pytest.mark.parametrize("name", CELLS)
 def test_best_move_is_the_lowest_point_of_a_fine_grid(name):
     _, cost, q = cost_of(CELLS[name], 12)
-    look = cost.look(q)
-    lines = joint_lines(look)
+    expansion = cost.expand(q)
+    lines = joint_lines(expansion)
     everywhere = np.full(len(q), np.inf)
     best = lines.best(-everywhere, everywhere)
 
     on_grid = np.array([lines.gain(np.full(len(q), theta)) for theta in GRID]).max(axis=0)
 
     assert np.all(lines.gain(best) >= on_grid - 1e-12)
-    assert np.all(lines.gain(best)[look.turns] <= on_grid[look.turns] + 1e-4)  # what a grid of 3 mrad may miss
+    missed = 1e-4  # by a grid of 3 mrad
+    assert np.all(lines.gain(best)[expansion.turns] <= on_grid[expansion.turns] + missed)
 
 
 def test_error_of_the_cost_is_the_sum_of_squares_of_the_paper():
@@ -89,16 +90,16 @@ def test_error_of_the_cost_is_the_sum_of_squares_of_the_paper():
     cell = CELLS["poses"]
     problem, cost, q = cost_of(cell, 13)
     state = problem.state(q)
-    X_PT = np.linalg.inv(state.X_WP) @ state.X_WT[problem.operators]
+    X_PT = np.linalg.inv(state.X_WP) @ state.X_WT[problem.constraints.operators]
     gamma = cell.solver.search.orientation_weight
     difference = problem.desired[1] - X_PT
     expected = np.sum(difference[:, :3, 3] ** 2) + gamma * np.sum(difference[:, :3, :3] ** 2)
-    assert cost.look(q).cost == pytest.approx(expected, rel=1e-12)
+    assert cost.expand(q).cost == pytest.approx(expected, rel=1e-12)
 
 
 def test_bounds_stop_a_move_and_a_move_that_costs_more_is_none():
     _, cost, q = cost_of(CELLS["poses"], 14)
-    lines = joint_lines(cost.look(q))
+    lines = joint_lines(cost.expand(q))
     free = lines.best(np.full(len(q), -np.inf), np.full(len(q), np.inf))
     held = lines.best(np.full(len(q), -0.01), np.full(len(q), 0.01))
     np.testing.assert_array_equal(held, np.clip(free, -0.01, 0.01))
@@ -109,10 +110,10 @@ def test_derivatives_also_hold_through_linkages():
     """Central differences of the errors; with followers on the way a joint's way is no circle, but has a tangent."""
     cell = random_cell(7, operators=2, joints=6, with_follower=True)
     _, cost, q = cost_of(cell, 15)
-    look, h = cost.look(q), 1e-6
+    expansion, h = cost.expand(q), 1e-6
     for i in range(len(q)):
         step = np.zeros(len(q))
         step[i] = h
-        slope = -(cost.look(q + step).e - cost.look(q - step).e) / (2 * h)
-        np.testing.assert_allclose(look.a[:, i], slope, atol=1e-8)  # differences of 1e-16 over 2e-6, and h^2
-    assert not look.turns[cell.columns("op0").start + 1]
+        slope = -(cost.expand(q + step).e - cost.expand(q - step).e) / (2 * h)
+        np.testing.assert_allclose(expansion.a[:, i], slope, atol=1e-8)  # differences of 1e-16 over 2e-6, and h^2
+    assert not expansion.turns[cell.columns("op0").start + 1]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders.planar_arm import START, planar_arm_cell
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.errors import StartOutsideLimitsError
@@ -38,7 +38,6 @@ def test_without_an_acceleration_limit_a_joint_may_reach_its_limit_in_one_step()
     np.testing.assert_array_equal(v, [50.0, np.inf, 0.0])
 
 
-@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10_000), dt=st.sampled_from([1e-4, 1e-3, 0.02, 0.1]))
 def test_bounds_kept_once_can_be_kept_for_ever(seed, dt):
     """Speeds drawn anywhere between the bounds, often at their ends, for 300 steps."""
