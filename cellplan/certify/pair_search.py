@@ -20,7 +20,7 @@ from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.pair_state import PairState, StepBounds
 from cellplan.collision.continuous.motion_bound import Motion, Pair, PairMotion
 from cellplan.collision.continuous.pieces import PieceMotion, can_be_split, read_piece, split
-from cellplan.collision.distance import SURELY_APART, TIGHT, Reading, look, sharpen
+from cellplan.collision.distance import SURELY_APART, TIGHT, Reading, exact_reading, quick_reading
 from cellplan.collision.engine import Engine
 from cellplan.collision.overlap.containment import is_inside
 from cellplan.geometry.arrays import Array, Flags, Indices
@@ -205,10 +205,10 @@ class SolidSearch(Search):
     def _measured(self, sample: int, goal: float) -> Reading:
         """Reading of the engine at a sample."""
         poses = self._motion.poses
-        reading = look(self._engine, self._pair, poses, sample=sample)
+        reading = quick_reading(self._engine, self._pair, poses, sample=sample)
         if reading.is_exact or reading.bound >= goal:
             return reading
-        sharp = sharpen(self._engine, self._pair, poses, sample=sample, reading=reading)
+        sharp = exact_reading(self._engine, self._pair, poses, sample=sample, reading=reading)
         self._loose += sharp.bound > reading.bound + TIGHT
         return sharp
 

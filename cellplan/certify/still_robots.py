@@ -12,7 +12,7 @@ import numpy as np
 
 from cellplan.collision.bodies import BodyPoses
 from cellplan.collision.continuous.motion_bound import Pair
-from cellplan.collision.distance import SURELY_APART, look, sharpen
+from cellplan.collision.distance import SURELY_APART, exact_reading, quick_reading
 from cellplan.collision.overlap.containment import is_inside
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import ClearanceClass
@@ -21,7 +21,7 @@ from cellplan.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Instants:
+class RunSamples:
     """Some instants of one run.
 
     Attributes:
@@ -40,12 +40,12 @@ class HomeTrials:
         refused: How often each pair was too near, by the names of its bodies.
     """
 
-    def __init__(self, robot: str, runs: Sequence[Instants]) -> None:
+    def __init__(self, robot: str, runs: Sequence[RunSamples]) -> None:
         """Place everything else.
 
         Args:
             robot: Name of the robot that is to stand somewhere.
-            runs: Instants of the runs in which it is idle.
+            runs: RunSamples of the runs in which it is idle.
         """
         self.refused: Counter[tuple[str, str]] = Counter()
         self._tables = [_Table(robot, run) for run in runs]
@@ -74,7 +74,7 @@ class HomeTrials:
 class _Table:
     """The instants of one run."""
 
-    def __init__(self, robot: str, run: Instants) -> None:
+    def __init__(self, robot: str, run: RunSamples) -> None:
         """Sort the pairs of the robot into those that no other robot changes and the others."""
         self._scene, self._robot = run.scene, robot
         self._own = [index for index, body in enumerate(_solids(self._scene)) if body == robot]
@@ -144,12 +144,12 @@ class _Table:
     def _is_too_near(self, pair: Pair, poses: BodyPoses, sample: int, limit: float) -> bool:
         """Whether two bodies touch, or are nearer than they may be."""
         engine = self._scene.engine
-        reading = look(engine, pair, poses, sample=sample)
+        reading = quick_reading(engine, pair, poses, sample=sample)
         if reading.touches or reading.bound >= limit:
             return reading.touches
         if reading.bound <= SURELY_APART and is_inside(engine, pair, poses, sample=sample):
             return True
-        return sharpen(engine, pair, poses, sample=sample, reading=reading).bound < limit
+        return exact_reading(engine, pair, poses, sample=sample, reading=reading).bound < limit
 
 
 def _solids(scene: Scene) -> list[str | None]:

@@ -65,8 +65,7 @@ class Engine:
 
     def sphere_centres(self, poses: BodyPoses, *, sample: int) -> Array:
         """Centres of the bounding spheres in the world at a sample in [m], shape (B, 3)."""
-        centres: Array = (poses.R[:, sample] @ self.centres[..., None])[..., 0] + poses.p[:, sample]
-        return centres
+        return (poses.R[:, sample] @ self.centres[..., None])[..., 0] + poses.p[:, sample]
 
     def touch(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> bool:
         """Say whether two bodies touch at a sample. A mesh is its surface here; what lies inside is asked elsewhere."""

@@ -18,7 +18,7 @@ CAUTION = (
 )
 
 
-EVEN = 1e-9  # [-] of the whole time: cycles that differ by less are equally long
+CYCLE_TOL = 1e-9  # [-] of the whole time: cycles that differ by less are equally long
 REDUCED_SPEED = 0.25  # [m/s] of the tool tip: what ISO 10218-1 allows while people are near
 
 
@@ -324,7 +324,7 @@ class Repeatability:
     def period(self) -> float | None:
         """Length of a cycle in [s]; None when the cycles differ in length."""
         lengths = np.diff(self.instants)
-        return float(lengths.mean()) if np.ptp(lengths) <= EVEN * self.instants[-1] else None
+        return float(lengths.mean()) if np.ptp(lengths) <= CYCLE_TOL * self.instants[-1] else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -30,14 +30,14 @@ from cellplan.scene.mounting import (
 )
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, near_in_chain, stands_on
 
-POSTURES: Final = (
+CONFIGURATION_COUNT: Final = (
     48  # random configurations beside the reference; a pair that is free in one of ten escapes 0.6 % of trials
 )
 CONSTANT_DISTANCE_TOL: Final = (
     1e-3  # [m] a distance that varies by less over all configurations is a matter of mounting, not of motion
 )
-ROUNDING: Final = 1e-6  # [m] poses are worked out to less than that: what stands on a floor may seem to float
-ENDLESS: Final = np.pi  # [rad] or [m] range sampled to either side of zero where a joint has no limit
+CONTACT_TOL: Final = 1e-6  # [m] poses are worked out to less than that: what stands on a floor may seem to float
+UNLIMITED_RANGE: Final = np.pi  # [rad] or [m] range sampled to either side of zero where a joint has no limit
 
 
 @dataclass(slots=True)
@@ -148,9 +148,9 @@ class _Sampled:
         """Whether a link touches a thing in every configuration, rounding aside."""
         poses, (first, second) = self.poses(None), (pair.first, pair.second)
         if not is_ground(self.bodies[second]):
-            return self.distances(pair, None)[1] <= ROUNDING
+            return self.distances(pair, None)[1] <= CONTACT_TOL
         height = heights(self.engine.bodies[first].hull, poses.R[first], poses.p[first], X_WS=self.bodies[second].X_BS)
-        return bool(np.all(height <= ROUNDING))
+        return bool(np.all(height <= CONTACT_TOL))
 
     def distances(self, pair: ScenePair, holder: str | None) -> tuple[float, float]:
         """Smallest and largest distance of two bodies in [m]."""
@@ -170,15 +170,15 @@ def _views(cell: Cell, bodies: Sequence[SceneBody]) -> dict[str | None, Sequence
 
 
 def _configurations(cell: Cell) -> dict[str, Array]:
-    """Reference configuration and random ones within the limits, by robot, shape (POSTURES + 1, n)."""
+    """Reference configuration and random ones within the limits, by robot, shape (CONFIGURATION_COUNT + 1, n)."""
     return {robot.name: _random_configurations(robot.model, generator(robot.name)) for robot in cell.robots}
 
 
 def _random_configurations(model: RobotModel, rng: np.random.Generator) -> Array:
     """Reference configuration first, then random ones."""
-    lower = np.where(np.isfinite(model.lower), model.lower, -ENDLESS)
-    upper = np.where(np.isfinite(model.upper), model.upper, ENDLESS)
-    q = rng.uniform(lower, upper, size=(POSTURES + 1, len(model.joints)))
+    lower = np.where(np.isfinite(model.lower), model.lower, -UNLIMITED_RANGE)
+    upper = np.where(np.isfinite(model.upper), model.upper, UNLIMITED_RANGE)
+    q = rng.uniform(lower, upper, size=(CONFIGURATION_COUNT + 1, len(model.joints)))
     q[0] = 0.0
     return q
 
@@ -197,9 +197,8 @@ def _stands(design: Design, cell: Cell, pair: ScenePair) -> bool:
 def _own_links(design: Design, sampled: _Sampled, pair: ScenePair) -> bool:
     """Leave out two near links of one robot's file that always touch; of the others only contact is looked for."""
     if sampled.always_touch(pair, None):
-        reason = (
-            f"touch at the reference configuration and at {POSTURES} random ones: it is their shape, not the motion"
-        )
+        configurations = f"the reference configuration and at {CONFIGURATION_COUNT} random ones"
+        reason = f"touch at {configurations}: it is their shape, not the motion"
         design.excluded.append(Excluded(pair.first, pair.second, reason))
     else:
         reason = "checked for contact only: two joints apart, their distance is set by the robot's design"

@@ -6,7 +6,7 @@ import numpy as np
 
 from cellplan.checks.tools.tracking import seen_from_task
 from cellplan.geometry.transforms import Array
-from cellplan.model.acceleration import STEADY, ProcessSpeed
+from cellplan.model.acceleration import STEADY_FRACTION, ProcessSpeed
 from cellplan.model.motion import Schedule, TaskSchedule
 
 
@@ -39,7 +39,7 @@ def _speed(scheduled: TaskSchedule, times: Array, X_WT: Array, *, X_WP: Array) -
     peak = float(speeds.max())
     if not peak > 0.0:
         return None
-    is_slow = speeds < (1.0 - STEADY) * peak
+    is_slow = speeds < (1.0 - STEADY_FRACTION) * peak
     return ProcessSpeed(
         mean=float(speeds @ lengths / lengths.sum()),
         peak=peak,

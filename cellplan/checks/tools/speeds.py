@@ -34,5 +34,4 @@ def robot_speed(robot: Robot, chain: ScrewChain, times: Array, q: Array) -> Robo
 def _speeds(points: Array, times: Array) -> Array:
     """Speeds of points, shape (N, ..., 3), between the samples in [m/s], shape (N - 1, ...)."""
     steps = np.diff(times).reshape(-1, *[1] * (points.ndim - 2))
-    speeds: Array = np.linalg.norm(np.diff(points, axis=0), axis=-1) / steps
-    return speeds
+    return np.linalg.norm(np.diff(points, axis=0), axis=-1) / steps

@@ -21,8 +21,7 @@ def part_poses(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Arr
             raise ValueError("a part that nobody holds needs a pose in the world")
         return cell.part.X_WP[None]
     grasp = cell.part.held_by[0]
-    poses: Array = chains[grasp.robot].tool_poses(q[grasp.robot]) @ inverse(grasp.X_PT)
-    return poses
+    return chains[grasp.robot].tool_poses(q[grasp.robot]) @ inverse(grasp.X_PT)
 
 
 def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP: Array) -> TaskAccuracy:

@@ -15,10 +15,10 @@ from cellplan.geometry.mesh.tessellation import halved, tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere
 from cellplan.geometry.transforms import Array
 
-CLOSE: Final = 5e-4  # [m] points that may be deeper than the deepest known one by less are not sought
-MOST_POINTS: Final = 4000  # [-] points of one surface that are measured; with more, the most promising ones are
-ROUND_SIDES: Final = 96  # [-] sides of the surface of a sphere or capsule: within 0.1 % of the radius
-POINT: Final = 1e-9  # [m] radius of the ball that stands for a point
+DEPTH_TOL: Final = 5e-4  # [m] points that may be deeper than the deepest known one by less are not sought
+MAX_POINTS: Final = 4000  # [-] points of one surface that are measured; with more, the most promising ones are
+ROUND_SIDE_COUNT: Final = 96  # [-] sides of the surface of a sphere or capsule: within 0.1 % of the radius
+POINT_RADIUS: Final = 1e-9  # [m] radius of the ball that stands for a point
 RAYS: Final = np.array([[0.8, 0.36, 0.48], [-0.48, 0.8, 0.36], [0.36, 0.48, -0.8]])  # unit, along no usual edge
 
 
@@ -27,7 +27,7 @@ def deepest_point(guest: CollisionBody, host: CollisionBody, R_HG: Array, p_HG: 
 
     The depth changes no faster than the point moves, so a triangle holds nothing deeper than its centre by more than
     its radius. Triangles that may be deeper than the deepest known point are cut in two, the most promising first,
-    until none is left or ``MOST_POINTS`` were measured.
+    until none is left or ``MAX_POINTS`` were measured.
 
     Args:
         guest: The solid whose surface is looked at.
@@ -37,25 +37,25 @@ def deepest_point(guest: CollisionBody, host: CollisionBody, R_HG: Array, p_HG: 
     """
     if isinstance(host.shape, Mesh) and not host.shape.is_closed:
         return 0.0
-    surface, probe = _surface(guest), Engine((host, prepare("point", Sphere(POINT))))
+    surface, probe = _surface(guest), Engine((host, prepare("point", Sphere(POINT_RADIUS))))
     open_ = surface.vertices[surface.faces] @ R_HG.T + p_HG
     best, measured = 0.0, 0
-    while len(open_) and measured < MOST_POINTS:
+    while len(open_) and measured < MAX_POINTS:
         centres, radii = _balls(open_)
         reach = host.radius - np.linalg.norm(centres - host.centre, axis=1) + radii  # no point is deeper than that
-        promising = np.flatnonzero(reach > best + CLOSE)
-        promising = promising[np.argsort(-reach[promising], kind="stable")][: MOST_POINTS - measured]
+        promising = np.flatnonzero(reach > best + DEPTH_TOL)
+        promising = promising[np.argsort(-reach[promising], kind="stable")][: MAX_POINTS - measured]
         open_, centres, radii = open_[promising], centres[promising], radii[promising]
         measured += len(open_)
-        depths = _depths(probe, centres, worth=best + CLOSE - radii)
+        depths = _depths(probe, centres, worth=best + DEPTH_TOL - radii)
         best = max(best, float(depths.max(initial=0.0)))
-        open_ = halved(open_[depths + radii > best + CLOSE])
+        open_ = halved(open_[depths + radii > best + DEPTH_TOL])
     return best
 
 
 def _surface(body: CollisionBody) -> Mesh:
     """The surface of a solid as triangles."""
-    return tessellate(body.shape, ROUND_SIDES) if isinstance(body.shape, Capsule | Sphere) else body.core
+    return tessellate(body.shape, ROUND_SIDE_COUNT) if isinstance(body.shape, Capsule | Sphere) else body.core
 
 
 def _balls(triangles: Array) -> tuple[Array, Array]:

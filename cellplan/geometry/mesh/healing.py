@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.counts import Indices, components, count_edges, face_volumes, shells, winding_numbers
+from cellplan.geometry.arrays import Indices
+from cellplan.geometry.mesh.counts import components, count_edges, face_volumes, shells, winding_numbers
 from cellplan.geometry.transforms import Array
 
 MAX_PIECES: Final = 5000  # [-] an assembly with its screws has some hundreds
-PROBES: Final = 64  # [-] vertices of a shell that are asked whether they lie inside the others
+PROBE_COUNT: Final = 64  # [-] vertices of a shell that are asked whether they lie inside the others
 
 
 def require_few_pieces(faces: Indices, *, source: str) -> None:
@@ -88,7 +89,7 @@ def turn_outward(vertices: Array, faces: Indices, *, source: str) -> Indices:
 
 def _all_within(around: Array, points: Array) -> bool:
     """Whether a surface, triangles of shape (M, 3, 3), winds round all of some points, as far as a few of them tell."""
-    step = max(1, len(points) // PROBES)
+    step = max(1, len(points) // PROBE_COUNT)
     return all(winding_numbers(around, points[k : k + 1])[0] >= 0.5 for k in range(0, len(points), step))
 
 
@@ -123,5 +124,4 @@ def _without_twins(faces: Indices) -> Indices:
 def _parity(faces: Indices) -> Indices:
     """1 for triangles whose corners stand in an even order, -1 for an odd one: which way they face, shape (M,)."""
     a, b, c = faces.T
-    parity: Indices = np.sign(b - a) * np.sign(c - b) * np.sign(c - a)
-    return parity
+    return np.sign(b - a) * np.sign(c - b) * np.sign(c - a)

@@ -37,7 +37,7 @@ __all__ = [
 MAX_BYTES: Final = 100_000_000
 MIN_EXTENT: Final = 1e-3  # [m] smaller things in a robot cell are slips of the unit
 MAX_EXTENT: Final = 20.0  # [m] larger ones as well
-FLAT_SHARE: Final = 1e-6  # [-] of the extent: thinner than this is a sheet without inside
+FLAT_FRACTION: Final = 1e-6  # [-] of the extent: thinner than this is a sheet without inside
 CREASE: Final = np.radians(30.0)  # [rad] sharper edges stay edges when normals are smoothed
 
 
@@ -116,7 +116,7 @@ def is_flat(mesh: Mesh) -> bool:
     """Whether all vertices lie in one plane, up to a millionth of the extent."""
     centred = mesh.vertices - mesh.vertices.mean(axis=0)
     spread = np.linalg.eigvalsh(centred.T @ centred)
-    return bool(spread[0] <= FLAT_SHARE**2 * spread[2])
+    return bool(spread[0] <= FLAT_FRACTION**2 * spread[2])
 
 
 def corner_normals(mesh: Mesh, crease: float = CREASE) -> Array:
@@ -136,7 +136,7 @@ def corner_normals(mesh: Mesh, crease: float = CREASE) -> Array:
     np.add.at(summed, group, (angles[..., None] * normals[:, None, :]).reshape(-1, 3))
     length = np.linalg.norm(summed, axis=1, keepdims=True)
     flat = np.repeat(normals, 3, axis=0)
-    shared = length[group] > FLAT_SHARE  # the normals round a spike can cancel: there the triangle's own one stands
+    shared = length[group] > FLAT_FRACTION  # the normals round a spike can cancel: there the triangle's own one stands
     smooth: Array = np.where(shared, summed[group] / np.where(shared, length[group], 1.0), flat)
     return smooth.reshape(-1, 3, 3)
 
