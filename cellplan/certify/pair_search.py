@@ -143,7 +143,7 @@ class Search(ABC):
 
     @abstractmethod
     def _read(self, sample: int, goal: float) -> None:
-        """Measure at a sample, finely enough to tell whether the distance reaches a goal."""
+        """Measure at a sample, finely enough to decide whether the distance reaches a goal."""
 
     @abstractmethod
     def _finish(self) -> None:

@@ -122,7 +122,7 @@ def _hull(shape: Solid) -> tuple[Solid, bool]:
 
 
 def _is_convex(mesh: Mesh) -> bool:
-    """Whether a closed mesh has all its vertices behind the plane of each of its triangles, rounding aside.
+    """Whether a closed mesh has all its vertices behind the plane of each of its triangles, apart from rounding.
 
     Most collision meshes are convex hulls already. A mesh too large for this test counts as not convex, which costs
     time but no accuracy.

@@ -1,4 +1,4 @@
-"""Distance of two bodies at one sample: proved, never above the truth, and within 0.1 mm of it when asked for."""
+"""Distance of two bodies at one sample: proved, never above the truth, and within 0.1 mm of it where that is needed."""
 
 from dataclasses import dataclass
 from typing import Final

@@ -138,7 +138,7 @@ def bounding_sphere(shape: Solid) -> tuple[Array, float]:
 def bounding_capsule(shape: Solid) -> tuple[Array, float]:
     """Both ends of a line in the shape's frame, shape (2, 3), and a radius round it that hold the whole shape.
 
-    The line lies along the longest extent: for slender shapes this tells much more than a sphere does.
+    The line lies along the longest extent: for slender shapes this bounds much better than a sphere.
     """
     match shape:
         case Box(size):

@@ -15,7 +15,7 @@ from cellplan.geometry.shapes import Mesh, Solid, support_point
 from cellplan.geometry.transforms import Array
 
 GRAZE_TOL: Final = (
-    1e-5  # [m] an axis that is free this far aside, or a back end that is so near the far side, only touches
+    1e-5  # [m] an axis that is free this far to the side, or a back end that is so near the far side, only touches
 )
 SIDE_TOL: Final = 1e-4  # [m] what the side of a body reaches into a wall along it by less is touching, not depth
 EDGE_TOL: Final = 1e-6  # [m] columns of a rim stand this far within it, so that rounding does not lose them
@@ -103,7 +103,7 @@ def body_columns(shape: Solid, X_TS: Array, zone: float) -> Columns:
     Args:
         shape: The body.
         X_TS: Its pose in the tool frame.
-        zone: Radius round the tool's axis in [m] that is looked at more closely when the body is wider.
+        zone: Radius round the tool's axis in [m] that is sampled more densely when the body is wider.
     """
     centre, rim = _outline(shape, X_TS)
     lengths = np.linalg.norm(rim - centre, axis=1)

@@ -1,4 +1,4 @@
-"""Run functions in a background process; what cannot be done there is done in this one."""
+"""Run functions in a background process; fall back to this process."""
 
 import os
 from collections.abc import Callable
@@ -18,15 +18,15 @@ Value = TypeVar("Value")
 class BackgroundProcess:
     """Does jobs in a child process, one after the other, until the ``with`` statement ends.
 
-    The child is no more than a help: without a second processor there is none, and whatever it cannot do, for want of
-    memory or of leave to start a process, is done in this process as soon as its result is asked for.
+    The child is no more than a help: without a second processor there is none, and whatever it cannot do, for lack
+    of memory or of permission to start a process, is done in this process as soon as its result is needed.
     """
 
     def __init__(self) -> None:
         """Prepare; the process is started with the first job."""
         self._child: ChildProcess | None = None
         self._is_desired = processors() > 1
-        self._waiting = ThreadPoolExecutor(max_workers=1, thread_name_prefix="cellplan-aside")
+        self._waiting = ThreadPoolExecutor(max_workers=1, thread_name_prefix="cellplan-background")
 
     def __enter__(self) -> Self:
         """Begin to take jobs."""
@@ -65,9 +65,9 @@ class BackgroundProcess:
         return result
 
     def _begun(self, job: Job) -> Future[Answer | None] | None:
-        """The answer to come; None when there is no child to ask."""
+        """The future answer; None when there is no child."""
         if self._is_desired and self._child is None:
-            with suppress(OSError, TypeError):  # no leave, no memory, no interpreter
+            with suppress(OSError, TypeError):  # no permission, no memory, no interpreter
                 self._child = ChildProcess()
         if not self._is_desired or self._child is None:
             self._is_desired = False

@@ -25,10 +25,10 @@ RIGID: Final = "checked for contact only: rigid with a flange that holds the par
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GripWatch:
-    """What is asked of a further holder's body and the part.
+    """What is demanded of a further holder's body and the part.
 
     Attributes:
-        rule: What is asked.
+        rule: What is demanded.
         reason: Why less than the full distance is.
         is_whole: Whether the whole body is watched.
         outside: What of it is watched otherwise; None when nothing is.

@@ -90,7 +90,7 @@ def left_out_kind(a: SceneBody, b: SceneBody) -> LeftOutKind | None:
 
 
 def mounted_pair(a: SceneBody, b: SceneBody, ends: tuple[int, int], cell: Cell) -> MountedPair | None:
-    """What is asked of two bodies of which one holds the part or stands on the other; None for all others."""
+    """The depth allowed for two bodies of which one holds the part or stands on the other; None for all others."""
     first, second = ends
     if stand_on_each_other(a, b):
         return MountedPair(first=first, second=second, mount=Mount.STANDING, limit=cell.checks.standing_depth)

@@ -63,9 +63,9 @@ def apply_design(
     engine: Engine,
     chains: Mapping[str, ScrewChain],
 ) -> Design:
-    """Leave out what always touches by a robot's own design, and ask only for "no contact" where it sets the distance.
+    """Leave out pairs in permanent contact by a robot's design; forbid only contact where design sets the distance.
 
-    Looked at are pairs of one robot at the reference configuration and at random ones within the joint limits:
+    Examined are pairs of one robot at the reference configuration and at random ones within the joint limits:
 
     - two links of its own file, with at most two joints between them or with a bar of a linkage, that touch in all of
       them: left out; else checked for contact, not for distance;
@@ -75,7 +75,7 @@ def apply_design(
 
     Where a flange has no body, tool and part may touch the link before it; how deep is judged. A robot whose foot has
     no body may likewise stand with its first link in the surroundings, if it does so in every configuration. The
-    links of each robot that holds the part are looked at as if it were the one that carries it.
+    links of each robot that holds the part are examined as if it were the one that carries it.
     """
     sampled = _Sampled(cell, bodies, engine, chains)
     design, faults = Design(), dict[tuple[int, str | None], list[int]]()
@@ -118,7 +118,7 @@ class _Sampled:
     def __init__(
         self, cell: Cell, bodies: Sequence[SceneBody], engine: Engine, chains: Mapping[str, ScrewChain]
     ) -> None:
-        """Draw the configurations; nothing is placed before it is asked for."""
+        """Draw the configurations; bodies are placed when they are first needed."""
         self.cell, self.bodies, self.engine = cell, bodies, engine
         self.views = _views(cell, bodies)
         self._chains, self._configurations = chains, _configurations(cell)
@@ -145,7 +145,7 @@ class _Sampled:
         )
 
     def always_stands(self, pair: ScenePair) -> bool:
-        """Whether a link touches a thing in every configuration, rounding aside."""
+        """Whether a link touches a thing in every configuration, apart from rounding."""
         poses, (first, second) = self.poses(None), (pair.first, pair.second)
         if not is_ground(self.bodies[second]):
             return self.distances(pair, None)[1] <= CONTACT_TOL
@@ -195,7 +195,7 @@ def _stands(design: Design, cell: Cell, pair: ScenePair) -> bool:
 
 
 def _own_links(design: Design, sampled: _Sampled, pair: ScenePair) -> bool:
-    """Leave out two near links of one robot's file that always touch; of the others only contact is looked for."""
+    """Leave out two near links of one robot's file that always touch; the others are checked for contact only."""
     if sampled.always_touch(pair, None):
         configurations = f"the reference configuration and at {CONFIGURATION_COUNT} random ones"
         reason = f"touch at {configurations}: it is their shape, not the motion"

@@ -42,7 +42,7 @@ def check_mounting(scene: Scene, q: Array, times: Array | None = None) -> tuple[
 
 
 def _passed(found: FoundDepth) -> bool:
-    """Whether a depth is within its limit, rounding aside."""
+    """Whether a depth is within its limit, apart from rounding."""
     return found.depth <= found.pair.limit + DEPTH_TOL
 
 

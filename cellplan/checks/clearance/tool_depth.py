@@ -20,12 +20,12 @@ from cellplan.model.units import MM
 AXIS: Final = "axis"
 AXIS_COMPONENTS: Final = (0, 1, 2, 3, 4)  # of a task: they leave no more than the turn about one axis open
 DEPTH_TOL: Final = 1e-6  # [m] tracking errors of a micrometre do not decide about a cut that is as deep as it may be
-FINE_STEP: Final = 1e-3  # [m] longer steps of a tool between two rows are looked at in between, joints moving evenly
+FINE_STEP: Final = 1e-3  # [m] longer steps of a tool between two rows are subdivided, joints moving evenly
 MAX_TIMES: Final = 4000  # instants to which long steps are refined; programs of more rows are taken as they are
-POSE_COUNT: Final = 400  # poses of a body that are looked at, beside those round the deepest of them
+POSE_COUNT: Final = 400  # poses of a body that are evaluated, beside those round the deepest of them
 MESH_POSE_COUNT: Final = 100  # likewise on a mesh, where a line costs fifty times as much
-NEAR_WORST_COUNT: Final = 20  # rows looked at round the deepest pose of a body
-RADIUS_FRACTION: Final = 0.5  # [-] of a body's radius that it moves between two poses at which it is looked at
+NEAR_WORST_COUNT: Final = 20  # rows evaluated round the deepest pose of a body
+RADIUS_FRACTION: Final = 0.5  # [-] of a body's radius that it moves between two poses at which it is evaluated
 
 
 def tool_depths(
@@ -34,7 +34,7 @@ def tool_depths(
     """The largest depth of the tool of every task on the part, at any instant of the program.
 
     The axis of a tool counts from the tip back to where the flange stands beside it, and its bodies count. The axis is
-    looked at at every row, and between rows that are more than a millimetre apart. Bodies are looked at whenever the
+    evaluated at every row, and between rows that are more than a millimetre apart. Bodies are evaluated whenever the
     tool has moved on by half of a body's radius, so that no spot that a body passes over is left out, and at the rows
     round the deepest of these; a program that is too long for that is cut into even steps of motion.
 

@@ -84,7 +84,7 @@ def jerks(times: Array, accelerations: Array, *, window: float) -> Array:
     """Size of the jerk at the rows: the change of acceleration over a window, divided by the window.
 
     Between two rows the acceleration is taken to change evenly; before the first row and after the last one it is zero.
-    For each row the window that begins there and the one that ends there are looked at, and the larger change counts;
+    For each row the window that begins there and the one that ends there are compared, and the larger change counts;
     as the acceleration is piecewise linear, no window elsewhere has a larger one. A window that is shorter than the
     step gives the change over that step, divided by the step.
 

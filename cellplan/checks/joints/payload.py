@@ -18,7 +18,7 @@ from cellplan.model.units import MM
 
 GRAVITY: Final = 9.80665  # [m/s^2] standard gravity, downwards along the world's z
 UP: Final = np.array([0.0, 0.0, 1.0])
-WRIST_AXIS_COUNT: Final = 3  # [-] turning axes before the flange that are looked at
+WRIST_AXIS_COUNT: Final = 3  # [-] revolute axes before the flange that are judged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

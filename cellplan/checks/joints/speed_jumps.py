@@ -1,4 +1,4 @@
-"""Jumps of speed that the desired motion asks for, and what joints make of them in rows that were read back."""
+"""Velocity jumps of the desired motion, and the joint accelerations that they cause in the rows read back."""
 
 from typing import Final
 

@@ -9,7 +9,7 @@ so does the desired point within its own sag. The error is then nowhere larger t
 with the errors at both rows and in the middle, and the distance :math:`\sigma` of the desired point in the middle from
 the middle of both ends: a smooth path sags by a quarter of it in half a step, of which twice as much is taken.
 Rotations likewise: as chords of unit vectors, with the square of the sum of all turns in place of M. Where this bound
-is wider than what is allowed, and where the motion of a tool is not smooth, the step is looked at in ten parts.
+is wider than what is allowed, and where the motion of a tool is not smooth, the step is subdivided into ten parts.
 """
 
 import math
@@ -33,9 +33,9 @@ from cellplan.scene.scene import Scene
 
 SUBDIVISION_COUNT: Final = 10  # [-] subdivisions of a step
 WORST_COUNT: Final = 20  # [-] steps with the largest errors in their middle that are subdivided in any case
-MAX_TIMES: Final = 4000  # [-] instants looked at at once
+MAX_TIMES: Final = 4000  # [-] times evaluated at once
 ESTIMATE_FRACTION: Final = 0.1  # [-] taken off a step that is estimated from a much longer one
-SIDE_FRACTION: Final = 1e-4  # [-] of a step: how far on both sides of an instant a change of speed is looked for
+SIDE_FRACTION: Final = 1e-4  # [-] of a step: how far on both sides of a time a change of velocity is measured
 SIDES: Final = (-SIDE_FRACTION, 0.0, SIDE_FRACTION)
 KINK_FRACTION: Final = 0.1  # [-] of what is allowed: a smaller error by a change of speed does not count
 ROTATIONS: Final = (3, 4, 5)
@@ -64,7 +64,7 @@ class ErrorsBetweenRows:
     """A program between its rows."""
 
     def __init__(self, scene: Scene, schedule: Schedule, desired: DesiredMotion, q: Mapping[str, Array]) -> None:
-        """Take the program.
+        """Store the program.
 
         Args:
             scene: The cell made computable.
@@ -184,10 +184,10 @@ class ErrorsBetweenRows:
         bound[:, 0] = nearby[:, 0] + chain.bend(self._moved) / 32.0 + 0.5 * sag[:, 0]
         chord = 2.0 * np.sin(0.5 * nearby[:, 1]) + chain.turn_bend(self._moved) / 32.0 + 0.5 * sag[:, 1]
         bound[:, 1] = 2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord))
-        asked = sum(axis in relation.axes for axis in ROTATIONS)
-        if not asked:
+        constrained = sum(axis in relation.axes for axis in ROTATIONS)
+        if not constrained:
             bound[:, 1] = 0.0
-        elif asked < len(ROTATIONS) and not relation.is_spin_free:
+        elif constrained < len(ROTATIONS) and not relation.is_spin_free:
             bound[:, 1] = np.inf
         return bound
 
@@ -195,7 +195,7 @@ class ErrorsBetweenRows:
         """Instants at which tools may change their speed at once, and the error of each tool there.
 
         A change of speed by v at a share s of a step of length h makes an error of ``v h s (1 - s)``. Where the rows of
-        a shorter step would lie is not asked: the error is that of a corner in the middle of a step.
+        a shorter step would lie does not matter: the error is that of a corner in the middle of a step.
 
         Returns:
             Instants in [s], shape (J,), and errors with the present step in [m] and [rad], shape (J, tools, 2).
@@ -269,7 +269,7 @@ class _Found:
         tool: The tool.
         middle: Errors in the middle of all steps, shape (N - 1, 2).
         bounds: No error in a step is larger, shape (N - 1, 2).
-        chosen: Steps that were looked at closely, shape (N - 1,).
+        chosen: Steps that were subdivided, shape (N - 1,).
         k: Indices of the instants looked at, shape (M,).
         s: Shares of these steps, shape (M,).
         fine: Errors there, shape (M, 2).

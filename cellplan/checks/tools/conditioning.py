@@ -32,7 +32,7 @@ def conditioning(
 
     An operator's Jacobian has the rows its task constrains, a further holder's those of its grasp; that of the robot
     that carries the part gives the twist of the part frame, or has the rows of the path it carries the part along.
-    Joints that stand still are left out. Metres and radians stand side by side as they come.
+    Joints that stand still are left out. The units are mixed: metres and radians, without weights.
 
     Args:
         cell: The cell.

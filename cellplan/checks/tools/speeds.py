@@ -1,4 +1,4 @@
-"""How fast tools and arms move in the world: what a risk assessment asks first."""
+"""Speeds of tools and arms in the world, as a risk assessment needs them."""
 
 import numpy as np
 

@@ -92,7 +92,7 @@ class PairMotion:
         self._strays_b, self._strays_a = self._bends.second / 8.0, self._bends.first / 8.0
 
     def step_travel(self, step: int) -> float:
-        """How far no point of the one body travels farther in a step, seen from the other, in [m]."""
+        """Upper bound of the distance that any point of either body travels in a step, seen from the other, in [m]."""
         along_b, along_a = (float(moved[0]) for moved in self.displacement(step, slice(step + 1, step + 2)))
         along_b += float(self._bends.second[step]) / 3.0
         along_a += float(self._bends.first[step]) / 3.0
@@ -103,7 +103,7 @@ class PairMotion:
 
         Args:
             sample: The sample that is compared with.
-            others: The samples that are asked about, m of them.
+            others: The samples to compare with it, m of them.
 
         Returns:
             Two arrays in [m], shape (m,).

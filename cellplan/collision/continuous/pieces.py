@@ -86,7 +86,7 @@ def can_be_split(body: CollisionBody) -> bool:
 def split(engine: Engine, pair: Pair) -> tuple[Engine, bool]:
     """The pieces of that body of a pair which has more triangles, after the other one; and whether it is the first.
 
-    At least one of the two must be one that can be split. It is taken apart once, however often it is asked for.
+    At least one of the two must be one that can be split. It is taken apart once only.
     """
     sizes = [len(engine.bodies[k].core.faces) if can_be_split(engine.bodies[k]) else 0 for k in pair]
     is_first = sizes[0] > sizes[1]
@@ -95,7 +95,7 @@ def split(engine: Engine, pair: Pair) -> tuple[Engine, bool]:
 
 
 def read_piece(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, goal: float) -> tuple[Reading, bool]:
-    """Reading of a piece and another body, and whether a direction proves as much as there is, or as is asked for.
+    """Reading of a piece and another body, and whether a direction proves all of it, or reaches the goal.
 
     Where the hulls do not prove the goal, small pieces are measured exactly; large ones are not, as their own pieces
     are less work.
@@ -105,7 +105,7 @@ def read_piece(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, goa
         pair: The piece and the other body, or the other way round.
         poses: Where they are.
         sample: The sample.
-        goal: Distance in [m] that is asked for.
+        goal: Distance in [m] that is to be proved.
     """
     reading = quick_reading(engine, pair, poses, sample=sample)
     if reading.touches or reading.is_exact or reading.bound >= goal:

@@ -30,7 +30,7 @@ def deepest_point(guest: CollisionBody, host: CollisionBody, R_HG: Array, p_HG: 
     until none is left or ``MAX_POINTS`` were measured.
 
     Args:
-        guest: The solid whose surface is looked at.
+        guest: The solid whose surface is measured.
         host: The solid it is in; a mesh that is not closed has no inside.
         R_HG: Rotation of the guest in the host, shape (3, 3).
         p_HG: Its position in [m], shape (3,).
@@ -71,7 +71,7 @@ def _depths(probe: Engine, points: Array, *, worth: Array) -> Array:
     Args:
         probe: The solid, and a point.
         points: Shape (N, 3), in the frame of the solid in [m].
-        worth: Of points nearer to the surface than that in [m], shape (N,), it is not asked on which side they are.
+        worth: Of points nearer to the surface than that in [m], shape (N,), their side is not determined.
     """
     match probe.bodies[0].shape:
         case Box(size):
@@ -95,13 +95,13 @@ def _depths_in_mesh(probe: Engine, mesh: Mesh, points: Array, *, worth: Array) -
     p = np.stack([np.zeros_like(points), points])
     poses = BodyPoses(np.ascontiguousarray(R), p)
     depths = np.array([probe.surface_distance(0, 1, poses, sample=k) for k in range(len(points))])
-    asked = depths > worth
-    votes = np.zeros(np.count_nonzero(asked))
+    is_relevant = depths > worth
+    votes = np.zeros(np.count_nonzero(is_relevant))
     corner = mesh.vertices[mesh.faces]
     normals = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     for ray in RAYS if len(votes) else ():
-        hits = ray_hits(mesh, points[asked], ray)
+        hits = ray_hits(mesh, points[is_relevant], ray)
         votes += hits.is_hit & (normals[hits.faces] @ ray > 0.0)  # the first triangle is seen from within
-    depths[asked] = np.where(votes >= 2.0, depths[asked], -depths[asked])
-    depths[~asked] = np.minimum(depths[~asked], 0.0)
+    depths[is_relevant] = np.where(votes >= 2.0, depths[is_relevant], -depths[is_relevant])
+    depths[~is_relevant] = np.minimum(depths[~is_relevant], 0.0)
     return depths

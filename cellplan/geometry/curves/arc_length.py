@@ -16,9 +16,9 @@ RESOLVED_FRACTION: Final = 1e-12  # [-] a speed whose last Legendre coefficients
 NEGLIGIBLE_FRACTION: Final = (
     1e-14  # [-] of the whole length: less than this is rounding, whatever share of a panel it is
 )
-MAX_SPLITS: Final = 24  # halvings of a panel; only a cusp asks for more
+MAX_SPLITS: Final = 24  # halvings of a panel; only a cusp needs more
 MAX_NEWTON_STEPS: Final = 60  # far more than Newton needs; a step that leaves its bracket halves it instead
-MAX_QUICK_STEPS: Final = 8  # Newton steps without a bracket; speeds that are resolved on a panel hardly ask for five
+MAX_QUICK_STEPS: Final = 8  # Newton steps without a bracket; speeds that are resolved on a panel hardly need five
 PARAMETER_TOL: Final = 1e-13  # [-] of a panel from -1 to 1: a Newton step as small as this lands on the last digit
 
 

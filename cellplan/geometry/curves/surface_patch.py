@@ -135,12 +135,12 @@ class Ball:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ProjectedCurve:
-    """A curve laid on a patch along a direction.
+    """A curve projected onto a patch along a direction.
 
     With the height h along the direction d, ``p = c + h d`` stays on the patch when ``n . (dc + dh d) = 0``.
 
     Attributes:
-        curve: The curve before it is laid.
+        curve: The curve before projection.
         patch: Where it comes to lie.
         direction: Unit direction towards the side it comes from, shape (3,).
     """
@@ -151,7 +151,7 @@ class ProjectedCurve:
 
     @property
     def knots(self) -> Array:
-        """The knots of the curve that is laid."""
+        """The knots of the projected curve."""
         return self.curve.knots
 
     def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:
@@ -209,8 +209,8 @@ def _round_hits(points: Array, direction: Array, *, across: Array, offset: Array
     ``offset`` and ``across`` are position and direction in the section's plane (for a ball: in space).
     """
     square = across @ across
-    aside = cross(offset, across)
-    rest = radius**2 * square - np.sum(aside * aside, axis=-1)
+    normal = cross(offset, across)
+    rest = radius**2 * square - np.sum(normal * normal, axis=-1)
     root = np.sqrt(np.where(rest >= 0.0, rest, np.nan))
     height = (root - offset @ across) / square
     return points + height[..., None] * direction

@@ -1,4 +1,4 @@
-"""Meshes: read from files, checked to be sound, and asked where a ray meets them and what lies inside."""
+"""Meshes: read from files, checked to be sound, and queried by rays and for what lies inside."""
 
 import stat
 from pathlib import Path
@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 MAX_BYTES: Final = 100_000_000
-MIN_EXTENT: Final = 1e-3  # [m] smaller things in a robot cell are slips of the unit
+MIN_EXTENT: Final = 1e-3  # [m] smaller things in a robot cell are errors of the unit
 MAX_EXTENT: Final = 20.0  # [m] larger ones as well
 FLAT_FRACTION: Final = 1e-6  # [-] of the extent: thinner than this is a sheet without inside
 CREASE: Final = np.radians(30.0)  # [rad] sharper edges stay edges when normals are smoothed
@@ -47,7 +47,7 @@ def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
     What was read once is found again by the bytes of the file, as long as they and the reading code are the same.
 
     Args:
-        path: The file; its suffix tells the format.
+        path: The file; its suffix gives the format.
         scale: Metres per unit of the file, one number or one for each axis; negative ones mirror.
 
     Returns:
@@ -144,7 +144,7 @@ def corner_normals(mesh: Mesh, crease: float = CREASE) -> Array:
 def contains(mesh: Mesh, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Say which points, shape (N, 3), lie inside the mesh: those its surface winds round, shape (N,).
 
-    A few open edges do no harm. Points on the surface itself may be told either way.
+    A few open edges do no harm. Points on the surface itself may count either way.
     """
     inside = winding_numbers(mesh.vertices[mesh.faces], points) > 0.5
     return np.asarray(inside, dtype=np.bool_)

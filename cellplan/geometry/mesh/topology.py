@@ -60,7 +60,7 @@ def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
 def mesh_volume(mesh: Mesh) -> float:
     """Enclosed volume in [m³] by the divergence theorem; positive when the triangles face outward.
 
-    An open mesh encloses nothing: the figure then only tells how its triangles lean.
+    An open mesh encloses nothing: the figure then only shows how its triangles lean.
     """
     return _volume(mesh.vertices, mesh.faces)
 
@@ -71,7 +71,7 @@ def _weld(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
     if not count_edges(corners[_has_three_corners(corners)]).open:
         return points, corners
     grid = WELD_FRACTION * float(np.ptp(points, axis=0).max())
-    for shift in GRID_SHIFTS:  # two vertices that one grid tells apart lie in one cell of another
+    for shift in GRID_SHIFTS:  # two vertices that one grid separates lie in one cell of another
         near, joined = _merge(points, corners, key=np.round(points / grid + shift))
         if len(near) == len(points):
             break  # no two vertices are that near: the file is not one that rounds
