@@ -9,7 +9,7 @@ import numpy as np
 
 from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
 from cellplan.checks.joints.speed_jumps import NO_TIMES, desired_jumps
-from cellplan.checks.tools.process_speed import process_speeds
+from cellplan.checks.tools.speeds import process_speeds
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.shapes import bounding_box
 from cellplan.kinematics.screw_chain import ScrewChain
