@@ -15,7 +15,7 @@ HOME_TOL: Final = 1e-7  # [deg] or [mm]: tables have twelve decimals, and cells 
 
 
 def check_idle(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> list[Check]:
-    """One check for each robot that has nothing to do: how far it is from its home at most.
+    """One check for each idle robot: its largest distance from its home.
 
     Args:
         cell: The cell; a robot without a home is held against its first row.
@@ -34,7 +34,7 @@ def _stands(robot: Robot, times: Array, q: Array) -> Check:
     joint, value = robot.model.joints[column], float(away[row, column])
     unit, passed = joint.display_unit.name, value <= HOME_TOL
     found = f"stands at its home, {value:.2g} {unit} from it at most" if passed else ""
-    far = f"joint {joint.name} is {value:.6g} {unit} from its home at {times[row]:.3f} s, and has nothing to do"
+    far = f"joint {joint.name} is {value:.6g} {unit} from its home at {times[row]:.3f} s, although the robot is idle"
     return Check(
         name="home",
         subject=robot.name,

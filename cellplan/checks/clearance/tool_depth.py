@@ -172,11 +172,11 @@ def _check(task: Task, found: ToolDepth) -> Check:
 def _cures(task: Task, found: ToolDepth) -> Iterator[str]:
     """What may be wrong when a tool is too deep."""
     if task.project is not None and task.tool_axis is not None and task.tool_axis @ task.project > 0.0:
-        yield "turn tool_axis round: it points out of the surface, so that the tool comes through the part"
+        yield "reverse tool_axis: it points out of the surface, so that the tool comes through the part"
     elif task.project is None and isinstance(task.path, SampledPath | TimedPath):
         yield "check the points and axes of the file: do they lie on the surface, do the axes point into it?"
     elif task.project is None:
-        yield "lay the path on the surface with path.project, or check its place, the sign of offset_mm and tool_axis"
+        yield "project the path onto the surface (path.project), or check its place, the sign of offset_mm and tool_axis"
     elif found.body == AXIS:
         yield "check the tool's pose and the side that the path is projected from"
     else:
