@@ -176,7 +176,7 @@ def _cures(task: Task, found: ToolDepth) -> Iterator[str]:
     elif task.project is None and isinstance(task.path, SampledPath | TimedPath):
         yield "check the points and axes of the file: do they lie on the surface, do the axes point into it?"
     elif task.project is None:
-        yield "project the path onto the surface (path.project), or check its place, the sign of offset_mm and tool_axis"
+        yield "project the path onto the surface (path.project), or check its place, the sign of offset_mm, tool_axis"
     elif found.body == AXIS:
         yield "check the tool's pose and the side that the path is projected from"
     else:
