@@ -62,8 +62,8 @@ def closing_tol(case: Case) -> float:
 
     Broyden's method ends when each of the r coordinates of ``q(T) - q(0)`` in the null space of the tasks at the start
     is at most ``CLOSED``; a joint takes up at most the length of that vector, ``sqrt(r)`` of it. Across the null space
-    the tools are back, and both configurations are within ``STEADY`` of the limit of their passes: twice that, and twice
-    again for the estimate by which passes are stopped.
+    the tools are back, and both configurations are within ``STEADY`` of the limit of their passes: twice that, and
+    twice again for the estimate by which passes are stopped.
     """
     J = TrackingProblem(case.task).first_order(0, case.start).J
     free = case.cell.joint_count - int(np.linalg.matrix_rank(J))
