@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from asked import asked
 from generated_cells import cell_with
+from options import benchmark_options
 from sections import Goal, Section, digits, table
 
 from cellplan import Cell, load_cell
@@ -37,7 +37,7 @@ class Cost:
     Attributes:
         robots: How many robots it has.
         joints: How many joints.
-        nodes: Instants at which its joints are solved for.
+        nodes: Times at which its joints are solved for.
         cpu_s: Median processor time in [s].
     """
 
@@ -128,7 +128,9 @@ def section(costs: Sequence[Cost], rounds: int) -> Section:
 
 def main() -> None:
     """Measure and print."""
-    options = asked("Resolve generated cells with more and more robots.", what="runs of each cell", rounds=5)
+    options = benchmark_options(
+        "Resolve generated cells with more and more robots.", what="runs of each cell", rounds=5
+    )
     costs = measure(options.rounds)
     print(
         json.dumps([asdict(cost) for cost in costs], indent=1)

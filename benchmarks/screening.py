@@ -18,7 +18,7 @@ from multiprocessing import get_context
 from typing import Final
 
 import numpy as np
-from asked import asked
+from options import benchmark_options
 from reference_job import CELL
 from sections import Goal, Section, digits, table
 
@@ -153,7 +153,7 @@ def section(figures: Figures, rounds: int) -> Section:
 
 def main() -> None:
     """Measure and print."""
-    options = asked("Screen many candidate layouts of the reference cell.", what="screenings", rounds=5)
+    options = benchmark_options("Screen many candidate layouts of the reference cell.", what="screenings", rounds=5)
     figures = measure(options.rounds)
     print(json.dumps(asdict(figures), indent=1) if options.json else section(figures, options.rounds).text())
 

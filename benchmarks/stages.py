@@ -42,7 +42,7 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     "writing and reading back the tables": {
         "cellplan.io.run.joint_tables": ("render_table", "parse_table", "replace_header")
     },
-    "verifying tools, joints, conditioning": {"cellplan.checks.verify": ("verify",)},
+    "verifying tools, joints, conditioning": {"cellplan.checks.verify": ("verify_motion", "with_clearance")},
     "certifying the clearance": {"cellplan.checks.clearance.check": ("check_clearance",)},
     "laying out the plots": {"cellplan.report.plots.run": ("motion_sheets", "clearance_sheets")},
     "waiting for the painted plots": {"concurrent.futures": ("Future.result",)},

@@ -15,7 +15,7 @@ from cellplan.model.phase import Phase
 from cellplan.model.task import Frame, PlaneName
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.motion_task import closures
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 
 RANK_TOL = 1e-10  # [-] singular values below this share of the largest one are zero: rounding of the matrix

@@ -16,7 +16,7 @@ from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.solver import Collocation, Indices, Precision
 from cellplan.planning.collocation.windows import Window, windows_between
 from cellplan.planning.timing.timed_path import TimedTasks
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.motion_task import closures
 
 AT_ONCE: Final = 32  # candidates that are resolved together: enough for NumPy, and their arrays stay in the cache
 FIRST_DEGREE: Final = 12  # of the polynomials: enough for most windows at the accuracy of a screening

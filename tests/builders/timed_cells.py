@@ -24,8 +24,7 @@ from cellplan.planning.plan_motion import plan_motion
 from cellplan.planning.start.search import choose_start
 from cellplan.planning.timing.schedule import clock_paths, sample, time_tasks
 from cellplan.planning.timing.timed_path import TimedTasks, clock_path, distinct
-from cellplan.planning.tracking.motion_task import MotionTask
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.motion_task import MotionTask, closures
 from cellplan.scene.scene import Scene
 
 SHIPPED = Path(__file__).parents[2] / "cells"

@@ -19,7 +19,6 @@ from cellplan.planning.tracking.joint_weights import JointWeights
 from cellplan.planning.tracking.locked_joints import locked_since
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, share_within
-from cellplan.planning.tracking.targets import targets
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 
 Drift = Callable[[int, Array], Array]
@@ -105,18 +104,17 @@ class TrackingProblem:
             drift: Joint velocities in the null space of the tasks that close a cycle; None for none.
         """
         cell, schedule = motion.cell, motion.schedule
-        asked = targets(motion)
-        tasks = tuple(target.relation for target in asked)
+        tasks, (self.desired, self.twists) = motion.relations, motion.references()
         self._model = CombinedModel(cell)
-        self._rows = [constraint_rows(target.relation, target.X_PT) for target in asked]
+        self._rows = [
+            constraint_rows(task, X_RT) for task, X_RT in zip(tasks, self.desired.swapaxes(0, 1), strict=True)
+        ]
         self.constraints = TaskConstraints.of(cell, tasks, motion.moving)
         self._is_on_part = bool(self.constraints.is_on_part.all())
-        self._lost = np.array([max(LOST_DISTANCE, 2.0 * target.tolerance) for target in asked])
-        self._settled = np.array([target.settled for target in asked])
+        self._lost = np.array([max(LOST_DISTANCE, 2.0 * _tolerance(cell, task)) for task in tasks])
+        self._settled = np.array([_settled_from(task) for task in tasks])
         self._weights = JointWeights(cell, self._model)
         self.cell, self.times, self.tasks = cell, schedule.times, tasks
-        self.desired = np.stack([target.X_PT for target in asked], axis=1)
-        self.twists = np.stack([target.V_PT_P for target in asked], axis=1)
         self.signs = self.constraints.column_signs(self._model.carries_flange)
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
         self.motion, self.drift = motion, drift
@@ -239,6 +237,16 @@ class TrackingProblem:
 def _place(task: Relation) -> str:
     """Where a tool should be, in words."""
     return "its grasp on the part" if isinstance(task, Grasp) else f"task '{task.name}'"
+
+
+def _tolerance(cell: Cell, task: Relation) -> float:
+    """Allowed distance of a tool from its path or its grasp in [m]."""
+    return cell.checks.closure_position if isinstance(task, Grasp) else task.tolerance.position
+
+
+def _settled_from(task: Relation) -> float:
+    """Time in [s] until which a tool may come to its path; -inf when it is there from the start."""
+    return task.start + task.settle if not isinstance(task, Grasp) and task.settle else -np.inf
 
 
 def _rests(cell: Cell, schedule: Schedule) -> Array:

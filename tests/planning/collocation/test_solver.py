@@ -15,7 +15,7 @@ from cellplan.planning.collocation.batch_targets import BatchTargets
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Reference
 from cellplan.planning.collocation.solver import Collocation, Precision
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.motion_task import closures
 
 ACCURACY = 1e-7
 CELL = triangles(CELLS["mixed"])

@@ -66,7 +66,7 @@ def test_line_of_singular_points_only_is_followed():
 
 @pytest.mark.parametrize("method", BOTH)
 @pytest.mark.parametrize(
-    ("posture", "goal"), [([0, 0, 0, 0], 0.799), ([0, 0, 0, 0], 0.75), ([0.4] * 1 + [0] * 3, 0.79)]
+    ("configuration", "goal"), [([0, 0, 0, 0], 0.799), ([0, 0, 0, 0], 0.75), ([0.4] * 1 + [0] * 3, 0.79)]
 )
 def test_stretched_arm_gets_away_towards_a_goal_on_its_own_line(method, configuration, goal):
     """The only singular situation (3.2.2): no joint alone can gain anything."""
