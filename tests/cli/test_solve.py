@@ -1,16 +1,19 @@
 """Solving a cell from the shell: what is said, what is written, how it ends."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
 
+from cellplan.cli import progress
 from cellplan.cli.main import run
 
 
 @pytest.fixture
-def coarse_cell(cells: Path, tmp_path: Path) -> Path:
-    """The four robots on a clock of 5 ms, which is quick; the gain goes with the step."""
+def coarse_cell(cells: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The four robots on a clock of 5 ms, which is quick; the gain goes with the step. No line tells of slow work."""
+    monkeypatch.setattr(progress, "LINE_EVERY_S", math.inf)
     text = (cells / "four_robots.yaml").read_text(encoding="utf-8")
     text = text.replace("step_s: 0.001", "step_s: 0.005").replace("gain_per_s: 650", "gain_per_s: 200")
     path = tmp_path / "coarse.yaml"
@@ -20,7 +23,7 @@ def coarse_cell(cells: Path, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def hasty_pair(cells: Path, tmp_path: Path) -> Path:
-    """The planar pair with half a second for its motion, on a clock of 5 ms: joints are too fast."""
+    """The planar pair with a tenth of a second for its motion, on a clock of 5 ms: joints are too fast."""
     text = (cells / "planar_pair.yaml").read_text(encoding="utf-8")
     path = tmp_path / "hasty.yaml"
     path.write_text(text.replace("step_s: 0.001", "step_s: 0.005"), encoding="utf-8")
@@ -71,7 +74,7 @@ def test_a_failed_cell_ends_with_one_and_leaves_no_tables(
 ) -> None:
     folder = tmp_path / "out"
 
-    status = run(["solve", str(hasty_pair), "-o", str(folder), "--duration", "0.5"])
+    status = run(["solve", str(hasty_pair), "-o", str(folder), "--duration", "0.1"])
 
     out = capsys.readouterr().out
     assert status == 1
@@ -87,7 +90,7 @@ def test_rejected_tables_are_kept_on_request(
 ) -> None:
     folder = tmp_path / "out"
 
-    status = run(["solve", str(hasty_pair), "-o", str(folder), "--duration", "0.5", "--keep-rejected"])
+    status = run(["solve", str(hasty_pair), "-o", str(folder), "--duration", "0.1", "--keep-rejected"])
 
     assert status == 1
     assert f"tables: {folder / 'rejected'}" in capsys.readouterr().out
