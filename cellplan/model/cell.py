@@ -4,9 +4,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Protocol
 
 import numpy as np
 
+from cellplan.errors import InputError
 from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
@@ -24,27 +26,43 @@ class Mode(StrEnum):
     PART_AT_REST = "part_at_rest"
 
 
+class CellSource(Protocol):
+    """The document that a cell was read from; a reader of files provides it, so that the model needs none."""
+
+    def with_values(self, cell: "Cell", values: Mapping[str, object]) -> "Cell":
+        """The cell of the document with other values; see ``Cell.with_values``."""
+
+
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where the words of a cell stand, so that a later finding can still name the line.
+    """The document of a cell: source lines for located errors, and what is needed to write or to change it.
 
     Attributes:
         file: File name as the user gave it.
-        lines: Line number, from 1, of each key path (``robots.kuka.start_deg``).
+        lines: Line number, from 1, of each key path (``robots.kuka.start_deg``) that the file gives.
         document: The file as plain values in the file's units, every default filled in: what a written copy is made of.
+        changes: Values set by ``Cell.with_values``, by address, in the order in which they were set.
+        changed: What to print for each changed key path: ``motion.duration_s = 2.5``.
+        source: Reads the document again with other values; None for a cell that was built in Python.
     """
 
     file: str = "<cell>"
     lines: Mapping[str, int] = field(default_factory=dict)
     document: Mapping[str, object] = field(default_factory=dict)
+    changes: Mapping[str, object] = field(default_factory=dict)
+    changed: Mapping[str, str] = field(default_factory=dict)
+    source: CellSource | None = None
 
     def at(self, key: str) -> str:
         """``file:line: key`` for a key path; the nearest enclosing key gives the line when the key is a default."""
         enclosing = key
-        while enclosing not in self.lines and "." in enclosing:
+        while enclosing not in self.lines and enclosing not in self.changed and "." in enclosing:
             enclosing = enclosing.rpartition(".")[0]
+        inside = (f"{key}.", f"{key}[")
+        changes = [text for path, text in self.changed.items() if path == enclosing or path.startswith(inside)]
         line = self.lines.get(enclosing)
-        return f"{self.file}:{line}: {key}" if line else f"{self.file}: {key}"
+        where = f"{self.file}:{line}" if line else self.file
+        return f"{where} with {', '.join(changes)}: {key}" if changes else f"{where}: {key}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -242,8 +260,8 @@ class Cell:
         obstacles: The environment.
         motion: Mode and clock.
         solver: Method and gains.
-        checks: Demands.
-        origin: Where the words stand in the file.
+        checks: Required clearance and tolerances.
+        origin: The document that the cell was read from.
         inputs: SHA-256 of every file that was read, by the path as written.
     """
 
@@ -257,6 +275,24 @@ class Cell:
     checks: CheckSettings
     origin: Origin
     inputs: Mapping[str, str]
+
+    def with_values(self, values: Mapping[str, object]) -> "Cell":
+        """The cell of the same document with other values, validated as if they stood in the file.
+
+        Addresses are key paths of the cell file: ``motion.duration_s``, ``robots.kuka.base.x_mm``,
+        ``tasks.seam.path.polyline.points_mm[2]``. Named entries are addressed by name, list elements by index; the
+        components of a pose may be given as ``x_mm``, ``y_mm``, ``z_mm``, ``roll_deg``, ``pitch_deg``, ``yaw_deg``.
+
+        Args:
+            values: Values in the units of the cell file, by address; None leaves a key out, so that its default holds.
+
+        Raises:
+            InvalidFileError: Everything that is wrong with the changed cell, one located line each.
+            InputError: The cell was not read from a file, or was changed in Python since.
+        """
+        if self.origin.source is None:
+            raise InputError(f"cell '{self.name}': expected a cell that was read from a file, got one built in Python")
+        return self.origin.source.with_values(self, values)
 
     def robot(self, name: str) -> Robot:
         """The robot of that name."""

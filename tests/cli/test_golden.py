@@ -5,6 +5,7 @@ review their difference before it is committed. Paths are shortened; numbers agr
 the arithmetic, which differs between processors.
 """
 
+import math
 import os
 import shutil
 from pathlib import Path
@@ -22,7 +23,7 @@ seed: 3
 trials: 1
 robots:
   right:
-    joint_offsets: {A_deg: 0.02}
+    joint_offsets_deg: {A: 0.02}
 """
 
 
@@ -33,6 +34,7 @@ def place(sound: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         shutil.copytree(sound / name, tmp_path / name)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr("cellplan.cli.progress.LINE_EVERY_S", math.inf)  # however slow the machine is
     return tmp_path
 
 
@@ -64,8 +66,8 @@ def test_the_help_of_every_command(place: Path, cells: Path, capsys: pytest.Capt
     [
         ("solve_passed", ["solve", "cell/small.yaml"]),
         ("solve_pairwise", ["solve", "cell/small.yaml", "--mode", "pairwise", "-o", "pairwise"]),
-        ("solve_failed", ["solve", "cell/small.yaml", "-o", "failed", "--duration", "0.1"]),
-        ("solve_kept", ["solve", "cell/small.yaml", "-o", "kept", "--duration", "0.1", "--keep-rejected"]),
+        ("solve_failed", ["solve", "cell/small.yaml", "-o", "failed", "--clearance-mm", "200"]),
+        ("solve_kept", ["solve", "cell/small.yaml", "-o", "kept", "--clearance-mm", "200", "--keep-rejected"]),
         ("solve_method", ["solve", "cell/small.yaml", "-o", "method", "--method", "quadratic_program"]),
         ("solve_unknown_task", ["solve", "cell/small.yaml", "--task", "pat"]),
         ("check_sound", ["check", "cell/small.yaml"]),

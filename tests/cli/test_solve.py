@@ -90,19 +90,28 @@ def test_rejected_tables_are_kept_on_request(
 @pytest.mark.parametrize(
     ("option", "value", "finding"),
     [
-        ("--mode", "pair", "error: --mode: expected one of simultaneous, pairwise, part_at_rest, got 'pair'"),
+        (
+            "--mode",
+            "pair",
+            "CELL with motion.mode = pair: motion.mode: expected simultaneous, pairwise or part_at_rest",
+        ),
         ("--task", "circel", "error: --task: expected one of circle, rhombus, rectangle, got 'circel'"),
-        ("--method", "magic", "error: --method: expected one of "),
-        ("--integrator", "rk4", "error: --integrator: expected one of accurate, euler, got 'rk4'"),
+        ("--method", "magic", "CELL with solver.method = magic: solver.method: expected weighted_pseudo_inverse, "),
+        (
+            "--integrator",
+            "rk4",
+            "CELL with solver.integrator = rk4: solver.integrator: expected auto, accurate or euler",
+        ),
+        ("--set", "solver.sed=3", "CELL with solver.sed = 3: solver.sed: unknown key, did you mean 'seed'?; allowed: "),
         (
             "--duration",
             "-4",
-            "error: --duration: expected a number of seconds from 0.005 (motion.step_s) to 1e+06, got -4",
+            "CELL with motion.duration_s = -4: motion.duration_s: expected a positive number of seconds, got -4",
         ),
         (
             "--duration",
             "nan",
-            "error: --duration: expected a number of seconds from 0.005 (motion.step_s) to 1e+06, got nan",
+            "error: CELL with motion.duration_s = nan: expected finite numbers, got nan",
         ),
     ],
 )
@@ -115,7 +124,7 @@ def test_a_wrong_choice_is_refused_before_anything_is_done(
 
     out, err = capsys.readouterr()
     assert (status, out) == (2, "")
-    assert err.startswith(finding)
+    assert err.startswith(finding.replace("CELL", str(coarse_cell)))
     assert err.count("\n") == 1
     assert not folder.exists()
 
@@ -145,8 +154,8 @@ def test_an_integrator_that_does_not_go_with_the_cell_names_its_line(
 
     assert status == 2
     assert capsys.readouterr().err == (
-        f"--integrator: expected euler, as {coarse_cell}:{line}: solver.weighting.load asks for joint weights "
-        "that change along the motion, got 'accurate'; remove them from the cell\n"
+        f"{coarse_cell}:{line} with solver.integrator = accurate: solver.weighting.load: expected 0 in the accurate "
+        "mode, got 1; remove it, or choose solver.integrator: euler\n"
     )
 
 

@@ -120,12 +120,12 @@ class _Finding:
 
     def _unknown_key(self) -> str:
         """What to say about a key that nobody knows."""
-        allowed = list(_fields(_annotation_at(self.model, self.location[:-1])))
+        allowed = list(fields_of(annotation_at(self.model, self.location[:-1])))
         return f"unknown key{did_you_mean(str(self.path[-1]), allowed)}; allowed: {listed(allowed)}"
 
     def _description(self) -> str:
         """What a missing key is for."""
-        fields = _fields(_annotation_at(self.model, self.location[:-1]))
+        fields = fields_of(annotation_at(self.model, self.location[:-1]))
         words = fields[str(self.location[-1])].description or "a value"
         first = words.rstrip(".")
         return first if first[:2].isupper() else first[:1].lower() + first[1:]
@@ -137,7 +137,7 @@ class _Finding:
             return self.text
         if TAG.fullmatch(branch) and self.kind in {"literal_error", "string_type"}:
             return branch[1:-1]
-        if self.kind in {"too_short", "too_long"} and not _is_fixed_list(_annotation_at(self.model, self.location)):
+        if self.kind in {"too_short", "too_long"} and not _is_fixed_list(annotation_at(self.model, self.location)):
             return self._count()
         if self.kind == "string_pattern_mismatch":
             return NAME_WORDS
@@ -171,7 +171,7 @@ class _Finding:
 
     def _expected(self, location: KeyPath) -> str:
         """What the format wants at a place."""
-        annotation = _annotation_at(self.model, location)
+        annotation = annotation_at(self.model, location)
         is_number = annotation is float
         return f"a number{self._unit()}" if is_number else _phrase(annotation)
 
@@ -181,7 +181,7 @@ def _words(expected: str) -> list[str]:
     return re.split(", | or ", re.split(" or a | or [{]", expected)[0])
 
 
-def _fields(annotation: Any) -> Mapping[str, Any]:
+def fields_of(annotation: Any) -> Mapping[str, Any]:
     """Fields of an entry; none of anything else."""
     return annotation.model_fields if isinstance(annotation, type) and issubclass(annotation, BaseModel) else {}
 
@@ -216,14 +216,14 @@ def _tagged_arms(annotation: Any) -> dict[str, Any]:
     return branches
 
 
-def _annotation_at(annotation: Any, location: KeyPath) -> Any:
+def annotation_at(annotation: Any, location: KeyPath) -> Any:
     """What the format says about a place."""
     for key in location:
         if TAG.fullmatch(str(key)):
             annotation = _tagged_arms(annotation).get(str(key))
             continue
         annotation = _bare(annotation)
-        if fields := _fields(annotation):
+        if fields := fields_of(annotation):
             annotation = fields[str(key)].annotation if str(key) in fields else None
         elif get_origin(annotation) is dict:
             annotation = get_args(annotation)[1]
@@ -247,7 +247,7 @@ def _phrase(annotation: Any) -> str:
         arms = get_args(annotation)
         items = {float: "numbers", str: "texts"}.get(_bare(arms[0]), "entries")
         return f"a list of {items}" if arms[-1] is Ellipsis else f"a list of {len(arms)} {items}"
-    if fields := _fields(annotation):
+    if fields := fields_of(annotation):
         return f"a mapping with keys out of {', '.join(fields)}"
     kinds = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
     return kinds.get(annotation, "a mapping")

@@ -147,12 +147,12 @@ class SolverEntry(Entry):
     method: MethodName = Field(
         default="weighted_pseudo_inverse", description='Resolution method; the guide "Which method when" compares them.'
     )
-    integrator: Literal["accurate", "euler"] | None = Field(
-        default=None,
-        description="How joint speeds become positions: accurate resolves the motion until the tool error between all "
-        "nodes is below accuracy_mm, euler steps along the clock and feeds the error back. accurate goes with "
-        "weighted_pseudo_inverse, without secondary goals, near_limits and load. When absent: accurate where it goes, "
-        "else euler; gain_per_s and damping do not count in this.",
+    integrator: Literal["auto", "accurate", "euler"] = Field(
+        default="auto",
+        description="How joint velocities become positions: accurate finds joint polynomials whose tool error between "
+        "all nodes is below accuracy_mm, euler steps along the clock and feeds the pose error back. accurate requires "
+        "weighted_pseudo_inverse without secondary goals, near_limits and load; gain_per_s and damping do not apply to "
+        "it. auto is accurate where that is possible, else euler.",
     )
     accuracy_mm: Annotated[float, Field(ge=1e-9, le=1.0)] = Field(
         default=1e-4,

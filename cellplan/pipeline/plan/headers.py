@@ -11,8 +11,8 @@ from cellplan.model.idle import not_in_program
 from cellplan.model.phase import NOT_IN_PROGRAM, Phase
 from cellplan.model.report import Report
 from cellplan.report.record.accelerations import table_line
-from cellplan.report.record.merging import merge_accelerations
 from cellplan.report.record.idle import missing_moves
+from cellplan.report.record.merging import merge_accelerations
 
 
 def table_headers(
