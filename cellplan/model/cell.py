@@ -117,6 +117,10 @@ class Robot:
     attachments: tuple[Body, ...] = ()
     pedestal: Pedestal | None = None
 
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return f"<Robot '{self.name}': {self.model.name}, {len(self.model.joints)} joints>"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Grasp:
@@ -176,6 +180,11 @@ class Part:
     X_WP: Array | None
     mass: float | None = None
     centre: Array | None = None
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        holders = ", ".join(grasp.robot for grasp in self.held_by)
+        return f"<Part: {type(self.shape).__name__}, {f'held by {holders}' if holders else 'fixed in the world'}>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -336,3 +345,8 @@ class Cell:
     def joint_count(self) -> int:
         """Length of the stacked joint vector."""
         return sum(len(robot.model.joints) for robot in self.robots)
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        robots, tasks = (", ".join(each.name for each in named) for named in (self.robots, self.tasks))
+        return f"<Cell '{self.name}': robots {robots}; tasks {tasks}; {self.motion.mode}>"
