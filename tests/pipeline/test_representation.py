@@ -25,7 +25,7 @@ def test_results_are_one_line(solution: Solution) -> None:
     assert repr(cell) == "<Cell 'small-pair': robots left, right, idle; tasks path; simultaneous>"
     assert repr(cell.robots[0]) == "<Robot 'left': left, 3 joints>"
     assert repr(cell.part) == "<Part: Box, held by left>"
-    assert repr(cell.tasks[0]) == "<Task 'path' of robot 'right': CsvPath, part>"
+    assert repr(cell.tasks[0]) == "<Task 'path' of robot 'right': SampledPath, part>"
     assert repr(toolpath) == "<Toolpath of 'path', 70.55 mm, open>"
 
 
