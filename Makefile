@@ -1,10 +1,11 @@
 # Every target works on a bare machine: Python 3.11 or newer with venv, make and a package index are all it takes.
 # PYTHON=/path/to/python picks the interpreter that `.venv` is made from; WORKERS=n picks the number of test processes.
 # ROUNDS=n says how often a benchmark runs; each has a number of its own otherwise.
+# CONSTRAINTS=constraints.txt installs the very versions that the project was last tested with.
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install test test-all lint format demo bench bench-methods reproduce clean FORCE
+.PHONY: help install constraints test test-all lint format demo bench bench-methods reproduce clean FORCE
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -21,6 +22,8 @@ help:
 	@echo "make test      formatter, linter, types, import rules, sizes and all quick tests"
 	@echo "make test-all  the same with the slow tests"
 	@echo "make lint      everything but the tests"
+	@echo "make install   only make .venv; with CONSTRAINTS=constraints.txt in the versions of that file"
+	@echo "make constraints  write the installed versions to constraints.txt"
 	@echo "make bench     measure speed, beside other libraries and brute force, and write docs/benchmarks.md"
 	@echo "make reproduce solve the cells of the three papers and write docs/reproduction.md, about six minutes"
 	@echo "make bench-methods  run every method on the same cells (a quarter of an hour); writes docs/guides/which-method.md"
@@ -48,11 +51,15 @@ $(STAMP): pyproject.toml
 	    "$$python" -m venv --clear $(VENV); \
 	fi; \
 	echo "installing cellplan and its tools into $(VENV)"; \
-	$(BIN)/python -m pip install --quiet --editable '.[dev]'; \
+	$(BIN)/python -m pip install --quiet $(if $(CONSTRAINTS),--constraint '$(CONSTRAINTS)') --editable '.[dev]'; \
 	$(BIN)/python -m compileall -q cellplan; \
 	printf '%s' '$(CURDIR)' >$@
 
 install: $(STAMP)
+
+constraints: $(STAMP)
+	@echo "# The versions that the project was last tested with; written by \`make constraints\`." >constraints.txt
+	$(BIN)/python -m pip freeze --exclude-editable >>constraints.txt
 
 lint: $(STAMP)
 	$(BIN)/python -m ruff format --check .

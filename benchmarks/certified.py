@@ -1,9 +1,9 @@
 """Certified clearance against brute force: ``python benchmarks/certified.py``, ``--cells 3`` for a quick look.
 
 Random cells of two arms each, which swing beside a part, a post, and a tube that one of them works in and that is not
-convex. The smallest distance of each class is certified, and looked for by another engine (coal): every pair at ten
-instants of every step, then ever closer round the smallest one found. A certified distance above what was found would
-be wrong; one below it by more than 0.1 mm would not be exact.
+convex. The smallest distance of each class is certified, and searched by another engine (coal): every pair at ten
+times in every step, then ever closer round the smallest one found. A certified distance above what was found would be
+wrong; one below it by more than 0.1 mm would not be exact.
 """
 
 import argparse
@@ -34,7 +34,7 @@ REAL: Final = ("kuka_kr16_2", "abb_irb1600_8_145", "staubli_rx160", "kuka_kr5_ar
 BUNDLED: Final = ("reis_rv20_16", "abb_irb1600", "staubli_rx90l", "kuka_kr6")
 STEPS: Final = 60  # [-] of each program, 10 ms apart
 SWING: Final = 0.2  # [rad] to either side
-FINE: Final = 10  # [-] instants of each step that brute force looks at
+FINE: Final = 10  # [-] times of each step at which brute force measures
 ROUNDS: Final = 6  # [-] ever closer looks round the smallest distance found, each five times as fine
 EXACT: Final = 1e-4  # [m] promised
 ROUNDING: Final = 1e-6  # [m] room for the other engine's own rounding
@@ -121,10 +121,10 @@ def compare(cell: Cell, q: Array) -> list[Compared]:
 
 
 def brute_force(scene: Scene, q: Array) -> dict[ClearanceClass, float]:
-    """Smallest distance of each class in [m], by another engine, at many instants; zero where bodies touch."""
+    """Smallest distance of each class in [m], by another engine, at many times; zero where bodies touch."""
     shapes = [_coal(body.shape) for body in scene.engine.bodies]
-    instants = np.linspace(0.0, len(q) - 1.0, FINE * (len(q) - 1) + 1)
-    poses = scene.body_poses(_between(q, instants))
+    times = np.linspace(0.0, len(q) - 1.0, FINE * (len(q) - 1) + 1)
+    poses = scene.body_poses(_between(q, times))
     smallest: dict[ClearanceClass, float] = {}
     for row, (first, second) in zip(scene.solid_rows.tolist(), scene.solid_pairs.tolist(), strict=True):
         pair = scene.pairs[row]
@@ -138,7 +138,7 @@ def brute_force(scene: Scene, q: Array) -> dict[ClearanceClass, float]:
                 break
             distance = _distance(shapes, poses, (first, second), k)
             if distance < known:
-                known = _closer(scene, q, shapes, (first, second), at=float(instants[k]), distance=distance)
+                known = _closer(scene, q, shapes, (first, second), at=float(times[k]), distance=distance)
         smallest[pair.clearance_class] = known
     return smallest
 
@@ -149,18 +149,18 @@ def _closer(
     """The smallest distance of a pair near an instant, by ever finer steps."""
     width = 1.0 / FINE
     for _ in range(ROUNDS):
-        instants = np.clip(at + width * np.linspace(-1.0, 1.0, 11), 0.0, len(q) - 1.0)
-        poses = scene.pair_poses(pair, _between(q, instants))
-        found = [_distance(shapes, poses, pair, k) for k in range(len(instants))]
+        times = np.clip(at + width * np.linspace(-1.0, 1.0, 11), 0.0, len(q) - 1.0)
+        poses = scene.pair_poses(pair, _between(q, times))
+        found = [_distance(shapes, poses, pair, k) for k in range(len(times))]
         best = int(np.argmin(found))
-        at, distance, width = float(instants[best]), min(distance, found[best]), 0.2 * width
+        at, distance, width = float(times[best]), min(distance, found[best]), 0.2 * width
     return distance
 
 
-def _between(q: Array, instants: Array) -> Array:
-    """Joint positions at instants counted in samples; joints move evenly between these."""
-    before = np.minimum(instants.astype(int), len(q) - 2)
-    share = (instants - before)[:, None]
+def _between(q: Array, times: Array) -> Array:
+    """Joint positions at times counted in samples; joints move evenly between these."""
+    before = np.minimum(times.astype(int), len(q) - 2)
+    share = (times - before)[:, None]
     positions: Array = (1.0 - share) * q[before] + share * q[before + 1]
     return positions
 

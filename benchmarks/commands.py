@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from asked import asked
+from options import benchmark_options
 from sections import Goal, Section, digits, table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -188,7 +188,9 @@ def goals(command: Command, cost: Cost) -> list[Goal]:
 
 def main() -> None:
     """Measure and print."""
-    options = asked("Time whole commands of cellplan as child processes.", what="runs of each command", rounds=3)
+    options = benchmark_options(
+        "Time whole commands of cellplan as child processes.", what="runs of each command", rounds=3
+    )
     if options.json:
         costs = measure((BASELINE, *COMMANDS), options.rounds)
         print(json.dumps({name: asdict(cost) for name, cost in costs.items()}, indent=1))

@@ -118,7 +118,7 @@ def _text(operators: int, starts: dict[str, str], clock: str) -> str:
 
 
 def _robot(k: int, angle: float, *, ring: float, top: float, start: str) -> list[str]:
-    """Lines of one operator, which looks at the middle of the plate."""
+    """Lines of one operator, which faces the middle of the plate."""
     arm = ARMS[k % len(ARMS)]
     place = ", ".join(_mm(value) for value in (ring * math.cos(angle), ring * math.sin(angle), top - arm.below))
     return [

@@ -41,7 +41,7 @@ class Job:
         holder: Index of the robot that holds the part.
         X_HP: The part in the tool frame of its holder, shape (4, 4).
         operators: Index of the robot of each task, shape (tasks,).
-        times: Instants in [s], evenly spaced, shape (N,).
+        times: Times of the samples in [s], evenly spaced, shape (N,).
         X_PT: Reference tool tips on the part, shape (N, tasks, 4, 4).
         start: Stacked start posture in [rad], shape (nq,).
     """
@@ -57,7 +57,7 @@ class Job:
 
     @property
     def step(self) -> float:
-        """Time between two instants in [s]."""
+        """Time between two samples in [s]."""
         return float(self.times[-1] / (len(self.times) - 1))
 
 

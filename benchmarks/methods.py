@@ -29,11 +29,12 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.solver import NULL_SPACE_METHODS, Integrator, MethodName
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.start.search import find_start
-from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.planning.start.search import choose_start
+from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.scene import Scene
 
 mpl.use("agg")
@@ -87,7 +88,7 @@ class Result:
         peak_rad_s: Largest joint speed after settling in [rad/s].
         peak_share: The same as a share of the joint's limit.
         keeps_limits: Whether positions, speeds and accelerations stay within the joints' limits.
-        iterations: Median and largest number of looks per step.
+        iterations: Median and largest number of evaluations per step.
     """
 
     position_mm: float
@@ -120,7 +121,7 @@ CASES = (
 
 
 def problem_of(case: Case) -> Problem:
-    """The cell with its toolpaths laid, its start posture found and its clock set, for Euler's steps."""
+    """The cell with its toolpaths on the part, its start posture found and its clock set, for Euler's steps."""
     cell = load_cell(ROOT / case.file)
     cell = replace(cell, solver=replace(cell.solver, integrator=Integrator.EULER))
     if case.step_s is not None:
@@ -128,7 +129,7 @@ def problem_of(case: Case) -> Problem:
         motion, solver = replace(cell.motion, step=case.step_s), replace(cell.solver, gain=gain)
         cell = replace(cell, motion=motion, solver=solver)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
-    start = find_start(Scene.from_cell(cell), toolpaths)
+    start = choose_start(Scene.from_cell(cell), clock_paths(cell, toolpaths.values())).start
     plan = plan_phases(cell).program[0]
     schedule = schedule_tasks(cell, [toolpaths[name] for name in plan.tasks])
     return Problem(cell=cell, schedule=schedule, start=start, moving=plan.moving)
@@ -169,7 +170,7 @@ def followed(problem: Problem, method: MethodName) -> Motion | str:
     """The motion, or why there is none."""
     cell = replace(problem.cell, solver=replace(problem.cell.solver, method=method))
     try:
-        return follow(cell, problem.schedule, start=problem.start, moving=problem.moving)
+        return integrate_schedule(MotionTask(cell, problem.schedule, problem.moving, problem.start))
     except CellplanError as error:
         return f"{type(error).__name__}: {error}"
 
@@ -194,14 +195,14 @@ def judged(problem: Problem, motion: Motion) -> Result:
         for robot in cell.robots
         for check in check_joints(robot, joint_uses(robot, times, q[robot.name]), times, q[robot.name])
     ]
-    looks = motion.iterations if motion.iterations is not None else np.ones(1)
+    evaluations = motion.iterations if motion.iterations is not None else np.ones(1)
     result = Result(
         position_mm=1e3 * position,
         orientation_deg=float(np.degrees(orientation)) if turned else None,
         peak_rad_s=float(speeds[settled[1:]].max()),
         peak_share=float((speeds / tops)[settled[1:]].max()),
         keeps_limits=all(check.passed for check in checks),
-        iterations=(float(np.median(looks)), float(looks.max())),
+        iterations=(float(np.median(evaluations)), float(evaluations.max())),
     )
     figures = [position, orientation, result.peak_rad_s, result.peak_share, *result.iterations]
     if not np.all(np.isfinite(figures)) or not np.all(np.isfinite(motion.q)):
@@ -212,7 +213,7 @@ def judged(problem: Problem, motion: Motion) -> Result:
 def table(rows: dict[str, list[Row]]) -> list[str]:
     """The table in Markdown."""
     lines = [
-        "| cell | method | largest error | cost per step | × pseudo-inverse | looks per step | fastest joint "
+        "| cell | method | largest error | cost per step | × pseudo-inverse | evaluations per step | fastest joint "
         "| limits kept | room for goals |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
@@ -221,11 +222,11 @@ def table(rows: dict[str, list[Row]]) -> list[str]:
             lead = f"| {title if index == 0 else ''} | `{row.method}` "
             cost = f"| {plain(row.step_cpu_s * 1e3, 1)} ms | {rounded(row.ratio)} "
             room = "yes" if row.method in NULL_SPACE_METHODS else "no"
-            lines.append(f"{lead}{told(row, cost)}| {room} |")
+            lines.append(f"{lead}{cells_of(row, cost)}| {room} |")
     return lines
 
 
-def told(row: Row, cost: str) -> str:
+def cells_of(row: Row, cost: str) -> str:
     """The cells of a row between its method and its last column."""
     result = row.result
     if result is None:
@@ -234,9 +235,9 @@ def told(row: Row, cost: str) -> str:
     if result.orientation_deg is not None:
         error += f", {plain(result.orientation_deg, 1)}°"
     median, most = result.iterations
-    looks = f"{median:g}" if median == most else f"{median:g}, at most {most:g}"
+    evaluations = f"{median:g}" if median == most else f"{median:g}, at most {most:g}"
     speed = f"{plain(result.peak_rad_s, 2)} rad/s ({plain(100 * result.peak_share, 2)} %)"
-    return f"| {error} {cost}| {looks} | {speed} | {'yes' if result.keeps_limits else '**no**'} "
+    return f"| {error} {cost}| {evaluations} | {speed} | {'yes' if result.keeps_limits else '**no**'} "
 
 
 def plain(value: float, digits: int) -> str:

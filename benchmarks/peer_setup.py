@@ -2,7 +2,7 @@
 
 What each needs stands as a dependency group in pyproject.toml. They are kept apart because they ask for different
 versions of the same libraries, and from `.venv` so that no test ever runs with what a peer brought along. A peer that
-cannot be installed is told in one line and left out.
+cannot be installed is reported in one line and left out.
 """
 
 import os

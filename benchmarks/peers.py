@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from asked import asked
 from engines import ENGINES, PEERS
 from job import Job
+from options import benchmark_options
 from reference_job import BETWEEN, Errors, Judge, reference_job
 from sections import Goal, Section, digits, table
 from workers import Worker
@@ -97,7 +97,7 @@ def section(rounds: int) -> Section:
             "(`cells/four_robots.yaml`). "
             "Every engine is given the start posture, the desired pose of each tool on the part at each sample, as its "
             "own types, and one model of all robots, all built beforehand; it gives back the joints at each sample. "
-            "Nobody looks at limits or collisions.",
+            "Limits and collisions are not considered.",
             "",
             *table(HEAD, [_row(name, result, results, steps=len(job.times) - 1) for name, result in results.items()]),
             "",
@@ -176,7 +176,9 @@ def _row(name: str, result: Result, results: Mapping[str, Result], *, steps: int
 
 def main() -> None:
     """Measure and print."""
-    options = asked("Resolve the reference job by cellplan and its peers.", what="runs of each engine", rounds=5)
+    options = benchmark_options(
+        "Resolve the reference job by cellplan and its peers.", what="runs of each engine", rounds=5
+    )
     if options.json:
         results, left_out = measure(reference_job(), options.rounds)
         found = {name: asdict(result) for name, result in results.items()}

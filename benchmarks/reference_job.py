@@ -16,12 +16,13 @@ from cellplan.checks.tools.tracking import errors_on_part, part_poses
 from cellplan.geometry.transforms import inverse
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.motion import Schedule
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.planning.tracking.motion_task import MotionTask
 
 CELL: Final = Path(__file__).resolve().parent.parent / "cells/four_robots.yaml"
-BETWEEN: Final = 4  # [-] places between two samples that are looked at
+BETWEEN: Final = 4  # [-] points between two samples that are evaluated
 FINE: Final = (4, 8)  # [-] steps per sample of the two runs that the true end is extrapolated from
 
 
@@ -79,10 +80,10 @@ def reference_job(path: Path = CELL) -> Job:
 
 
 class Judge:
-    """Looks at the joints of a run, with targets that are exact between the samples as well."""
+    """Evaluates the joints of a run, with references that are exact between the samples as well."""
 
     def __init__(self, job: Job) -> None:
-        """Lay the targets on a clock that ticks between the samples too, and find where the joints ought to end."""
+        """Sample the references on a finer clock, and find where the joints ought to end."""
         cell = load_cell(Path(job.cell))
         motion = replace(cell.motion, step=cell.motion.step / (BETWEEN + 1))
         self._cell, self._fine = cell, _schedule(replace(cell, motion=motion))
@@ -103,15 +104,15 @@ class Judge:
             end=float(np.abs(q[-1] - self._end).max()),
         )
 
-    def _largest(self, q: Array, instants: slice = slice(None)) -> tuple[float, float]:
-        """Largest position error in [m] and orientation error in [rad] of all tasks at instants of the fine clock."""
+    def _largest(self, q: Array, samples: slice = slice(None)) -> tuple[float, float]:
+        """Largest position error in [m] and orientation error in [rad] of all tasks at samples of the fine clock."""
         cell = self._cell
         of = {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots}
         X_PW = inverse(part_poses(cell, self._chains, of))
         found = []
         for task in self._fine.tasks:
             X_PT = X_PW @ self._chains[task.task.robot].tool_poses(of[task.task.robot])
-            error = errors_on_part(X_PT, task.X_PT[instants], task.task)
+            error = errors_on_part(X_PT, task.X_PT[samples], task.task)
             found.append([np.linalg.norm(part, axis=1).max() for part in (error[:, :3], error[:, 3:])])
         position, orientation = np.max(found, axis=0).tolist()
         return position, orientation
@@ -152,5 +153,7 @@ def _end(cell: Cell, steps: int, *, start: Array) -> Array:
     """Where the joints end by so many Euler steps per sample, with the feedback as strong in each, shape (nq,)."""
     motion = replace(cell.motion, step=cell.motion.step / steps)
     finer = replace(cell, motion=motion, solver=replace(cell.solver, gain=cell.solver.gain * steps))
-    end: Array = follow(finer, _schedule(finer), start=start, moving=[robot.name for robot in cell.robots]).q[-1]
+    end: Array = integrate_schedule(
+        MotionTask(finer, _schedule(finer), [robot.name for robot in cell.robots], start)
+    ).q[-1]
     return end

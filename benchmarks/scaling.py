@@ -16,14 +16,15 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from asked import asked
 from generated_cells import cell_with
+from options import benchmark_options
 from sections import Goal, Section, digits, table
 
 from cellplan import Cell, load_cell
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.plan_motion import resolve
-from cellplan.planning.timing.schedule import sample, time_tasks
+from cellplan.planning.plan_motion import plan_motion
+from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.planning.tracking.motion_task import MotionTask
 
 ROBOTS: Final = (4, 8, 16, 32)  # [-] the positioner among them
 MOST: Final = 10.0  # [-] goal: the cost per node of the largest cell, as a multiple of the smallest
@@ -36,7 +37,7 @@ class Cost:
     Attributes:
         robots: How many robots it has.
         joints: How many joints.
-        nodes: Instants at which its joints are solved for.
+        nodes: Times at which its joints are solved for.
         cpu_s: Median processor time in [s].
     """
 
@@ -78,13 +79,12 @@ def generated(robots: int) -> Cell:
 
 def prepared(cell: Cell) -> Callable[[], int]:
     """Set the clock; a run resolves the cell and says at how many nodes."""
-    timed = time_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
-    schedule = sample(timed)
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     moving = [robot.name for robot in cell.robots]
 
     def run() -> int:
-        resolution = resolve(cell, timed, schedule, start=start, moving=moving).resolution
+        resolution = plan_motion(MotionTask(cell, schedule, moving, start)).resolution
         if resolution is None or resolution.euler_from is not None:
             sys.exit(f"benchmark: {cell.name}: the accurate mode did not reach the end")
         return resolution.nodes
@@ -128,7 +128,9 @@ def section(costs: Sequence[Cost], rounds: int) -> Section:
 
 def main() -> None:
     """Measure and print."""
-    options = asked("Resolve generated cells with more and more robots.", what="runs of each cell", rounds=5)
+    options = benchmark_options(
+        "Resolve generated cells with more and more robots.", what="runs of each cell", rounds=5
+    )
     costs = measure(options.rounds)
     print(
         json.dumps([asdict(cost) for cost in costs], indent=1)

@@ -18,7 +18,7 @@ from multiprocessing import get_context
 from typing import Final
 
 import numpy as np
-from asked import asked
+from options import benchmark_options
 from reference_job import CELL
 from sections import Goal, Section, digits, table
 
@@ -26,7 +26,7 @@ from cellplan import Cell, load_cell
 from cellplan.geometry.transforms import rotation_about
 from cellplan.planning.layout_screening import AT_ONCE, Candidates, Screening, screen_layouts
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.schedule import time_tasks
+from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.planning.timing.timed_path import TimedTasks
 
 COUNT: Final = 256  # [-] candidates
@@ -84,7 +84,7 @@ def measure(rounds: int) -> Figures:
 def job() -> tuple[Cell, TimedTasks]:
     """The cell and its tasks on the clock, prepared once in each process."""
     cell = load_cell(CELL)
-    return cell, time_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    return cell, schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks]).desired
 
 
 def candidates_near(cell: Cell, count: int) -> Candidates:
@@ -153,7 +153,7 @@ def section(figures: Figures, rounds: int) -> Section:
 
 def main() -> None:
     """Measure and print."""
-    options = asked("Screen many candidate layouts of the reference cell.", what="screenings", rounds=5)
+    options = benchmark_options("Screen many candidate layouts of the reference cell.", what="screenings", rounds=5)
     figures = measure(options.rounds)
     print(json.dumps(asdict(figures), indent=1) if options.json else section(figures, options.rounds).text())
 

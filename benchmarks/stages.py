@@ -32,17 +32,17 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     "bodies, hulls and pairs": {"cellplan.scene.scene": ("Scene.from_cell",)},
     "paths and times of the tools": {
         "cellplan.planning.path.build": ("build_toolpath",),
-        "cellplan.planning.timing.schedule": ("time_tasks", "sample", "examine_times"),
+        "cellplan.planning.timing.schedule": ("time_tasks", "sample", "clock_paths"),
     },
     "start postures": {
         "cellplan.planning.start.given": ("examine_given_starts",),
-        "cellplan.planning.start.search": ("find_start",),
+        "cellplan.planning.start.search": ("choose_start",),
     },
-    "joint motion": {"cellplan.planning.plan_motion": ("resolve",)},
+    "joint motion": {"cellplan.planning.plan_motion": ("plan_motion",)},
     "writing and reading back the tables": {
         "cellplan.io.run.joint_tables": ("render_table", "parse_table", "replace_header")
     },
-    "verifying tools, joints, conditioning": {"cellplan.checks.verify": ("verify",)},
+    "verifying tools, joints, conditioning": {"cellplan.checks.verify": ("verify_motion", "with_clearance")},
     "certifying the clearance": {"cellplan.checks.clearance.check": ("check_clearance",)},
     "laying out the plots": {"cellplan.report.plots.run": ("motion_sheets", "clearance_sheets")},
     "waiting for the painted plots": {"concurrent.futures": ("Future.result",)},

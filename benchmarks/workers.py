@@ -74,7 +74,7 @@ class Worker:
         return q
 
     def end(self) -> None:
-        """Let it go: it ends when nobody can ask any more."""
+        """Close its input, which ends it."""
         if self._process is not None:
             self._process.communicate()
 

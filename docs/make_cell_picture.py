@@ -184,7 +184,7 @@ class Lamp:
     """What the lamp sees: everything farther from it lies in shadow."""
 
     def __init__(self, surface: Surface) -> None:
-        """Look at the surface from the lamp."""
+        """Brightness of the surface as seen from the lamp."""
         self._R = frame_from_axes(LAMP, np.array([0.0, 0.0, 1.0])).T
         seen = self._view(surface.corners)
         side = (SHADOW_SIDE, SHADOW_SIDE)

@@ -177,14 +177,14 @@ def link(axes: Axes, centre: Point, text: str, *, colour: str = INK) -> None:
     axes.text(*centre, text, ha="center", va="center", fontsize=8, zorder=4)
 
 
-def chain(axes: Axes, links: list[Point], names: list[str], *, colour: str, aside: Point, style: str = "-") -> None:
+def chain(axes: Axes, links: list[Point], names: list[str], *, colour: str, offset: Point, style: str = "-") -> None:
     """Edges of a coupling graph from link to link, with their names to one side."""
     for (x0, y0), (x1, y1), name in zip(links[:-1], links[1:], names, strict=True):
         dx, dy = x1 - x0, y1 - y0
         room = 0.2 / (dx * dx + dy * dy) ** 0.5
         start, end = (x0 + room * dx, y0 + room * dy), (x1 - room * dx, y1 - room * dy)
         arrow(axes, start, end, colour=colour, style=style)
-        middle = ((x0 + x1) / 2 + aside[0], (y0 + y1) / 2 + aside[1])
+        middle = ((x0 + x1) / 2 + offset[0], (y0 + y1) / 2 + offset[1])
         axes.text(*middle, name, ha="center", va="center", fontsize=9, color=colour)
 
 
@@ -193,13 +193,13 @@ def draw_coupling_graph() -> None:
     axes = canvas(8.2, 4.5)
     middle = 4.1
     held = [(middle, 0.45), (middle, 1.4), (middle, 2.35), (middle, 3.55)]
-    chain(axes, held, ["A", "B", "C"], colour=PART, aside=(0.2, 0.0))
+    chain(axes, held, ["A", "B", "C"], colour=PART, offset=(0.2, 0.0))
     for side, (number, letters) in zip((-1, 1), (("1", "DEF"), ("2", "GHI")), strict=True):
         arm_links = [(middle + side * x, y) for x, y in ((0.0, 0.45), (1.5, 0.55), (2.6, 1.05), (3.1, 2.35))]
         virtual = [(middle + side * x, y) for x, y in ((0.0, 3.55), (1.1, 3.95), (2.2, 3.8), (3.1, 2.35))]
-        chain(axes, arm_links, list(letters), colour=OPERATOR, aside=(side * 0.12, -0.2))
+        chain(axes, arm_links, list(letters), colour=OPERATOR, offset=(side * 0.12, -0.2))
         names = [rf"$p_x$, {number}", rf"$p_y$, {number}", rf"$r_z$, {number}"]
-        chain(axes, virtual, names, colour=GREY, aside=(side * 0.14, 0.22), style="--")
+        chain(axes, virtual, names, colour=GREY, offset=(side * 0.14, 0.22), style="--")
         for point, text in zip(arm_links[1:], ("1", "2", f"tool {number}"), strict=True):
             link(axes, point, text, colour=OPERATOR)
         for point in virtual[1:-1]:

@@ -95,7 +95,7 @@ def limits_of(triangles: list[Array], view: Array) -> Array:
 def draw_robot(model: RobotModel) -> None:
     """One picture: side, front and top view, at the reference configuration above and a working configuration below."""
     zero = (0.0,) * len(model.joints)
-    configurations = {"reference posture": zero, "working posture": WORKING_POSTURES[model.name]}
+    configurations = {"reference configuration": zero, "working configuration": WORKING_POSTURES[model.name]}
     bodies = {name: triangles_of(model, configuration) for name, configuration in configurations.items()}
     boxes = [limits_of([triangles for triangles, _ in bodies.values()], view) for view in VIEWS.values()]
     widths = [float(box[1, 0] - box[0, 0]) for box in boxes]

@@ -19,7 +19,7 @@ class Engine:
             empty for cellplan itself.
         package: The distribution whose version stands beside its name.
         choices: What it is and what was chosen for it, for the page.
-        options: What its module is told besides the job.
+        options: Options of its module besides the job.
         every: It is given every so many samples only; those between lie on a cubic through the four nearest.
         looks: How many steps it may take to each.
         goal_s: Processor time in [s] that it is to stay within.
@@ -43,7 +43,7 @@ CELLPLAN = (
         name="cellplan, to 0.001 mm",
         module="by_cellplan",
         options={"accuracy_m": 1e-6},
-        choices="its accurate mode: nodes as the error between them demands, sampled at the end; its look at every "
+        choices="its accurate mode: nodes as the error between them demands, sampled at the end; the error at every "
         "sample, 15 ms more in a solve, is left out",
         goal_s=0.050,
         goal_m=1e-6,
@@ -52,7 +52,7 @@ CELLPLAN = (
         name="cellplan, to 0.0001 mm",
         module="by_cellplan",
         options={"accuracy_m": 1e-7},
-        choices="the same with what `solver.accuracy_mm` is when nobody says otherwise",
+        choices="the same with the default of `solver.accuracy_mm`",
     ),
     Engine(
         name="cellplan, to 0.000001 mm",

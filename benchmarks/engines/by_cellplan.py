@@ -9,8 +9,9 @@ from job import Array, Job
 from cellplan import load_cell
 from cellplan.model.solver import Integrator
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.plan_motion import resolve
-from cellplan.planning.timing.schedule import sample, time_tasks
+from cellplan.planning.plan_motion import plan_motion
+from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.planning.tracking.motion_task import MotionTask
 
 
 def prepare(job: Job, *, accuracy_m: float) -> Callable[[], Array]:
@@ -21,11 +22,10 @@ def prepare(job: Job, *, accuracy_m: float) -> Callable[[], Array]:
     cell = load_cell(Path(job.cell))
     solver = replace(cell.solver, integrator=Integrator.ACCURATE, accuracy=accuracy_m)
     cell = replace(cell, solver=solver)
-    timed = time_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
-    schedule = sample(timed)
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
     moving = [robot.name for robot in cell.robots]
 
     def run() -> Array:
-        return resolve(cell, timed, schedule, start=job.start, moving=moving).q
+        return plan_motion(MotionTask(cell, schedule, moving, job.start)).q
 
     return run

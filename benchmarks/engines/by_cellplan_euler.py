@@ -6,9 +6,10 @@ from pathlib import Path
 from job import Array, Job
 
 from cellplan import load_cell
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.planning.tracking.motion_task import MotionTask
 
 
 def prepare(job: Job) -> Callable[[], Array]:
@@ -18,6 +19,6 @@ def prepare(job: Job) -> Callable[[], Array]:
     moving = [robot.name for robot in cell.robots]
 
     def run() -> Array:
-        return follow(cell, schedule, start=job.start, moving=moving).q
+        return integrate_schedule(MotionTask(cell, schedule, moving, job.start)).q
 
     return run

@@ -9,7 +9,7 @@ from job import Array, Job
 
 from engines.urdf import PART, joint_frames, joint_name, joint_names, numbers, tool_frame, tool_name
 
-INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'  # never looked at
+INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'  # not used
 
 
 def prepare(job: Job) -> Callable[[], Array]:

@@ -11,7 +11,7 @@ from job import Arm, Array, Job
 PART: Final = "part"  # name of the part's frame
 UPRIGHT: Final = 1e-9  # [-] cosine of a pitch below which roll and yaw turn about the same axis
 INERTIAL: Final = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-LIMIT: Final = '<limit lower="-100" upper="100" velocity="100" effort="100"/>'  # [rad], [rad/s]: nobody comes near
+LIMIT: Final = '<limit lower="-100" upper="100" velocity="100" effort="100"/>'  # [rad], [rad/s]: never reached
 
 
 def joint_name(arm: int, joint: int) -> str:

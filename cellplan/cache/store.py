@@ -126,8 +126,8 @@ def _read_own(path: Path) -> bytes | None:
     with os.fdopen(handle, "rb") as file:
         status = os.fstat(handle)
         is_mine = not hasattr(os, "getuid") or (
-            status.st_uid == os.getuid() and not status.st_mode & OTHERS_MAY_WRITE and status.st_nlink == 1
-        )
+            status.st_uid == os.getuid() and not status.st_mode & OTHERS_MAY_WRITE and status.st_nlink <= 1
+        )  # no link is left to an entry that another process replaced after it was opened here
         if not stat.S_ISREG(status.st_mode) or not is_mine or status.st_size > MAX_ENTRY:
             return None
         content = file.read(MAX_ENTRY + 1)

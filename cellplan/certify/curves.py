@@ -4,27 +4,25 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.certify.linear_motion import StraightMotion
-from cellplan.collision.continuous.found import Found
-from cellplan.collision.continuous.interval_search import SolidSearch
+from cellplan.certify.pair_search import SolidSearch
 from cellplan.collision.continuous.motion_bound import Pair
 from cellplan.collision.distance import TIGHT
 from cellplan.collision.engine import Engine
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Indices
 
-NEAR: Final = 0.05  # [-] a bound below the distance at the middle of its block by this share is drawn as it is
-ROOM: Final = 1e-3  # [m] likewise by this length
-
-Places = NDArray[np.intp]
+CURVE_FRACTION: Final = (
+    0.05  # [-] of the distance at the middle of its block: a bound this much below is drawn as it is
+)
+CURVE_TOL: Final = 1e-3  # [m] likewise by this length
 
 
 class CurveRefiner:
     """One class over a stretch of blocks."""
 
-    def __init__(self, engine: Engine, motion: StraightMotion, edges: Places) -> None:
-        """Take the stretch.
+    def __init__(self, engine: Engine, motion: StraightMotion, edges: Indices) -> None:
+        """Store the stretch.
 
         Args:
             engine: The bodies.
@@ -48,13 +46,13 @@ class CurveRefiner:
             while True:
                 row = int(np.argmin(low[:, block]))
                 pair = pairs[row]
-                is_near = low[row, block] >= (1.0 - NEAR) * ceiling[block] - ROOM
+                is_near = low[row, block] >= (1.0 - CURVE_FRACTION) * ceiling[block] - CURVE_TOL
                 if is_near or pair is None or row in measured or low[row, block] == 0.0:
                     break
                 measured.add(row)
                 search = searches.get(row)
                 if search is None:
-                    search = searches[row] = SolidSearch(self._engine, pair, self._motion, found=Found())
+                    search = searches[row] = SolidSearch(self._engine, pair, self._motion)
                 self._measure(search, block, ceiling)
                 bounds = np.minimum.reduceat(search.low, self._edges[:-1])
                 np.maximum(low[row], bounds, out=low[row])

@@ -1,99 +1,83 @@
-"""The work of a survey: stretch by stretch through the program, pair by pair, the nearest first."""
+"""Search of all pairs over a motion: stretch by stretch, pair by pair, the nearest first."""
 
 from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
+from cellplan.certify.bound import ROWS_AT_ONCE
 from cellplan.certify.curves import CurveRefiner
-from cellplan.certify.ground import GroundSearch
-from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.linear_motion import StraightMotion
-from cellplan.certify.survey import ROWS_AT_ONCE, Rows, Survey
-from cellplan.collision.continuous.at_surface import surface_span
-from cellplan.collision.continuous.interval_search import SolidSearch
+from cellplan.certify.pair_search import GroundSearch, Search, SolidSearch
+from cellplan.certify.survey import Survey
+from cellplan.collision.continuous.motion_bound import Motion, Pair
 from cellplan.collision.distance import Reading, measure
-from cellplan.geometry.transforms import Array
-from cellplan.model.progress import Progress, silent
+from cellplan.collision.engine import Engine
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.report import ClearanceClass
-from cellplan.scene.scene import Scene
 
-CHUNK_WORK: Final = 400_000  # [-] bodies times samples worked on at once: 40 MB of poses
-MOST_SAMPLES: Final = 16_384  # [-] samples worked on at once, however few bodies there are
-PAIR_WORK: Final = 2_000_000  # [-] pairs times blocks bounded at once: 100 MB
-FIRST_LOOKS: Final = 12  # [-] pairs of each class measured once before any search: a small distance saves much later
+PAIR_WORK: Final = 2_000_000  # pairs times blocks bounded at once: 100 MB
+FIRST_READINGS: Final = 12  # pairs of each class measured once before any search: a small distance saves much later
+SURFACE_TOL: Final = 1e-4  # [m] nearer than this counts as touching: tracking errors of a micrometre decide nothing
 
 
-def survey(scene: Scene, q: Array, *, progress: Progress = silent, stage: str = "") -> Survey:
-    """Search a program for contacts and for the smallest distances, at the samples and between them.
+class StretchSearch:
+    """Some blocks of the motion, few enough to be searched at once."""
 
-    Args:
-        scene: The scene.
-        q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2.
-        progress: Who wants to know how far it is.
-        stage: What it is told.
-    """
-    found = Survey(scene, q)
-    arms = LeverArms(scene, q)
-    for first, last in _stretches(found):
-        motion = StraightMotion.of_cell(scene, arms, q[found.edges[first] : found.edges[last] + 1])
-        stretch = _Stretch(found, motion, first, last)
-        stretch.search_all()
-        for kind in ClearanceClass:
-            stretch.raise_curve(kind)
-        stretch.note_work()
-        progress(stage, 0.9 * last / (len(found.edges) - 1))
-    return found
+    def __init__(self, survey: Survey, motion: StraightMotion, first: int, last: int) -> None:
+        """Bound all pairs over the stretch by the cheapest means.
 
-
-def _stretches(found: Survey) -> Iterator[tuple[int, int]]:
-    """Runs of blocks small enough to be worked on at once: the first block, and the first one after the last."""
-    most = min(MOST_SAMPLES, max(512, CHUNK_WORK // max(1, len(found.scene.engine.bodies))))
-    first = 0
-    while first < len(found.edges) - 1:
-        last = int(np.searchsorted(found.edges, found.edges[first] + most, side="right")) - 1
-        last = max(last, first + 1)
-        yield first, last
-        first = last
-
-
-class _Stretch:
-    """Some blocks of the program."""
-
-    def __init__(self, found: Survey, motion: StraightMotion, first: int, last: int) -> None:
-        """Bound all pairs over the stretch by the cheapest means."""
-        self._found, self._motion, self._first, self._last = found, motion, first, last
-        self._scene, self._solid = found.scene, found.solid_ends
-        self._edges = found.edges[first : last + 1] - found.edges[first]
+        Args:
+            survey: All pairs; what is found goes there.
+            motion: The motion over the stretch.
+            first: The first block.
+            last: The first block after the stretch.
+        """
+        self._survey, self._motion, self._first, self._last = survey, motion, first, last
+        self._scene = survey.scene
+        self._edges = survey.edges[first : last + 1] - survey.edges[first]
         self._bound_solids()
         self._grounds: dict[int, GroundSearch] = {}
         for row in self._scene.ground_rows.tolist():
-            begin = float(found.edges[first])
-            search = GroundSearch(self._scene.pairs[row], motion, found=found.found[row], begin=begin)
+            begin = float(survey.edges[first])
+            search = GroundSearch(self._scene.pairs[row], motion, state=survey.states[row], begin=begin)
             self._grounds[row] = search
-            found.lift(row, search, first)
+            survey.lift(row, search, first)
+
+    def prove_all(self) -> bool:
+        """Prove what is demanded of every pair, the nearest first; ends with the first pair that does not keep it."""
+        survey, lowest = self._survey, self._low().min(axis=1, initial=np.inf)
+        for row in np.argsort(lowest, kind="stable").tolist():
+            state = survey.states[row]
+            if lowest[row] < state.demand and (begun := self._begin(row, state.demand)) is not None:
+                search, block = begun
+                search.prove()
+                survey.lift(row, search, block)
+                if state.touches or self._low()[row].min() < state.demand:
+                    return False
+        return True
 
     def search_all(self) -> None:
-        """Search every pair as far as it matters."""
+        """Search every pair as far as it may be the nearest of its class or among the nearest of the cell."""
         lowest = self._low().min(axis=1, initial=np.inf)
-        looks = {row: look for kind in ClearanceClass for row, look in self._first_looks(kind, lowest)}
+        readings = {row: each for kind in ClearanceClass for row, each in self._first_readings(kind, lowest)}
         for row in np.argsort(lowest, kind="stable").tolist():
-            if lowest[row] >= self._found.largest_cutoff():
+            if lowest[row] >= self._survey.largest_cutoff():
                 break  # and so are all that follow
-            self._search(row, looks.get(row))
+            self._search(row, readings.get(row))
 
     def raise_curve(self, kind: ClearanceClass) -> None:
-        """Raise the bounds of a class in every block so far that the smallest of them says something."""
-        rows = self._found.rows(kind)
+        """Raise the bounds of a class in every block until the smallest of them is near the true distance."""
+        rows = self._survey.rows(kind)
         if not len(rows):
             return
         rows = self._may_be_nearest(rows)
         low = self._low()[rows]
         refiner = CurveRefiner(self._scene.engine, self._motion, self._edges)
-        refiner.raise_bounds(low, [self._solid.get(row) for row in rows.tolist()])
+        refiner.raise_bounds(low, [self._scene.pairs[row].solids for row in rows.tolist()])
         self._low()[rows] = low
 
-    def _may_be_nearest(self, rows: Rows) -> Rows:
+    def _may_be_nearest(self, rows: Indices) -> Indices:
         """Pairs that some block has a bound of that is no larger than a distance the pairs are known to come to there.
 
         That distance is the one at the beginning of the block, of the pair with the lowest bound: no larger than the
@@ -109,29 +93,28 @@ class _Stretch:
             lowest = piece[np.argmin(low[piece], axis=0)]
             np.minimum(reached, [self._reached(int(row), block) for block, row in enumerate(lowest)], out=reached)
         near = [np.any(low[rows[first : first + ROWS_AT_ONCE]] <= reached, axis=1) for first in pieces]
-        chosen: Rows = rows[np.concatenate(near)]
-        return chosen
+        return rows[np.concatenate(near)]
 
     def _reached(self, row: int, block: int) -> float:
         """A distance in [m] that a pair does not exceed at the beginning of a block; inf for one with a half-space."""
-        ends = self._solid.get(row)
+        ends = self._scene.pairs[row].solids
         if ends is None:
             return float(np.inf)
         first, second = (self._motion.centres[index][self._edges[block]] for index in ends)
         return float(np.linalg.norm(second - first) + self._scene.engine.radii[list(ends)].sum())
 
     def note_work(self) -> None:
-        """Write down from when to when tools at work are at the part, whatever breaks there are."""
-        begin, spans = int(self._found.edges[self._first]), self._found.at_surface
-        for row in self._found.at_work:
+        """Record the first and the last sample at which tools at work are at the part, whatever breaks there are."""
+        begin, spans = int(self._survey.edges[self._first]), self._survey.at_surface
+        for row in self._survey.at_work:
             pair = self._scene.pairs[row]
-            span = surface_span(self._scene.engine, (pair.first, pair.second), self._motion)
+            span = _surface_span(self._scene.engine, (pair.first, pair.second), self._motion)
             if span is not None:
                 spans[row] = spans.get(row, (begin + span[0], 0))[0], begin + span[1]
 
     def _low(self) -> Array:
         """The bounds of all pairs in the stretch, to be changed in place."""
-        return self._found.low[:, self._first : self._last]
+        return self._survey.low[:, self._first : self._last]
 
     def _bound_solids(self) -> None:
         """Bounds of pairs of solids by their spheres: half of the gaps at both edges less the way of both centres."""
@@ -150,48 +133,76 @@ class _Stretch:
             low = 0.5 * (gaps[:, 1:] + gaps[:, :-1] - ways[a] - ways[b])
             self._low()[self._scene.solid_rows[first : first + step]] = low
 
-    def _first_looks(self, kind: ClearanceClass, lowest: Array) -> Iterator[tuple[int, tuple[int, Reading]]]:
+    def _first_readings(self, kind: ClearanceClass, lowest: Array) -> Iterator[tuple[int, tuple[int, Reading]]]:
         """Measure the pairs of a class that seem nearest once, at an edge of the block where they do.
 
         Args:
             kind: The class.
             lowest: The lowest bound of each pair in the stretch in [m], shape (pairs,).
         """
-        found = self._found
-        rows = found.rows(kind)
+        survey = self._survey
+        rows = survey.rows(kind)
         rows = rows[np.isin(rows, self._scene.solid_rows, kind="table")]
-        for row in rows[np.argsort(lowest[rows], kind="stable")][:FIRST_LOOKS].tolist():
-            if lowest[row] >= found.best(kind):
+        for row in rows[np.argsort(lowest[rows], kind="stable")][:FIRST_READINGS].tolist():
+            if lowest[row] >= survey.best(kind):
                 break
             block = int(np.argmin(self._low()[row]))
             sample = int(self._edges[block])
-            reading = measure(self._scene.engine, self._solid[row], self._motion.poses, sample=sample)
-            if not reading.touches and reading.bound < found.found[row].distance:
-                found.found[row].distance = reading.bound
-                found.found[row].at = float(found.edges[self._first + block])
-                found.remember(row)
+            reading = measure(self._scene.engine, self._ends(row), self._motion.poses, sample=sample)
+            if not reading.touches:
+                survey.note_distance(row, reading.bound, float(survey.edges[self._first + block]))
             yield row, (sample, reading)
 
-    def _search(self, row: int, look: tuple[int, Reading] | None) -> None:
-        """Search one pair where it may matter."""
-        found, cutoff = self._found, self._found.cutoff(row)
+    def _search(self, row: int, known: tuple[int, Reading] | None) -> None:
+        """Search one pair where it may matter; ``known`` is a sample that has been measured."""
+        cutoff = self._survey.cutoff(row)
+        begun = self._begin(row, cutoff)
+        if begun is None:
+            return
+        search, block = begun
+        sample = int(self._edges[block - self._first])
+        if isinstance(search, SolidSearch) and known is not None and sample <= known[0] <= sample + len(search.low):
+            search.take(known[0] - sample, known[1], cutoff)
+        search.run(cutoff)
+        self._survey.lift(row, search, block)
+
+    def _begin(self, row: int, cutoff: float) -> tuple[Search, int] | None:
+        """The search of a pair over the blocks with bounds below a cutoff, and the first of them; None without any."""
         open_ = np.flatnonzero(self._low()[row] < cutoff)
         if not open_.size:
-            return
-        ground = self._grounds.get(row)
-        if ground is not None:
-            ground.run(cutoff)
-            found.lift(row, ground, self._first)
-            return
-        block, begin, end = self._first + int(open_[0]), int(self._edges[open_[0]]), int(self._edges[open_[-1] + 1])
-        search = SolidSearch(
-            self._scene.engine,
-            self._solid[row],
-            self._motion.part(self._solid[row], begin, end),
-            found=found.found[row],
-            begin=float(found.edges[block]),
-        )
-        if look is not None and begin <= look[0] <= end:
-            search.take(look[0] - begin, look[1], cutoff)
-        search.run(cutoff)
-        found.lift(row, search, block)
+            return None
+        if row in self._grounds:
+            return self._grounds[row], self._first
+        block, ends = self._first + int(open_[0]), self._ends(row)
+        motion = self._motion.part(ends, int(self._edges[open_[0]]), int(self._edges[open_[-1] + 1]))
+        begin, state = float(self._survey.edges[block]), self._survey.states[row]
+        return SolidSearch(self._scene.engine, ends, motion, state=state, begin=begin), block
+
+    def _ends(self, row: int) -> Pair:
+        """The engine's bodies of a pair of solids."""
+        ends = self._scene.pairs[row].solids
+        if ends is None:
+            raise ValueError("a pair without solids has no search by the engine")
+        return ends
+
+
+def _surface_span(engine: Engine, pair: Pair, motion: Motion) -> tuple[int, int] | None:
+    """First and last sample at which two bodies touch, or very nearly so; None when there is none."""
+    search = SolidSearch(engine, pair, motion)
+    first = _at_surface(search, backwards=False)
+    return None if first is None else (first, first if (last := _at_surface(search, backwards=True)) is None else last)
+
+
+def _at_surface(search: SolidSearch, *, backwards: bool) -> int | None:
+    """The first sample at the surface from one end; samples that are proved to be away from it are passed over."""
+    away = np.zeros(len(search.low) + 1, dtype=bool)
+    while True:
+        is_step_away = search.low > SURFACE_TOL
+        open_ = np.flatnonzero(~(away | np.append(False, is_step_away) | np.append(is_step_away, False)))
+        if not open_.size:
+            return None
+        sample = int(open_[-1] if backwards else open_[0])
+        reading = search.read(sample, 2.0 * SURFACE_TOL)
+        if reading.touches or reading.bound <= SURFACE_TOL:
+            return sample
+        away[sample] = True

@@ -21,8 +21,8 @@ NO_ANSWER: Final = "collision: the engine gave a distance that is not a number b
 
 
 @dataclass(slots=True)
-class Asked:
-    """How many contacts and how many distances were asked for."""
+class QueryCounts:
+    """Number of contact queries and of distance queries."""
 
     contacts: int = 0
     distances: int = 0
@@ -35,7 +35,7 @@ class Engine:
         bodies: The bodies.
         centres: Centres of their bounding spheres, each in the body's own frame in [m], shape (B, 3).
         radii: Radii of these spheres in [m], shape (B,).
-        asked: What was asked for so far, of pieces of the bodies too.
+        queries: Number of queries so far, those of pieces of the bodies included.
     """
 
     def __init__(self, bodies: Sequence[CollisionBody]) -> None:
@@ -43,7 +43,7 @@ class Engine:
         self.bodies = tuple(bodies)
         self.centres = np.array([body.centre for body in self.bodies]).reshape(-1, 3)
         self.radii = np.array([body.radius for body in self.bodies])
-        self.asked = Asked()
+        self.queries = QueryCounts()
         self._objects: dict[tuple[str, int], Any] = {}  # by kind and identity of the body
         self._pieces: dict[int, tuple[CollisionBody, ...]] = {}  # by identity of the whole
         self._parts: dict[tuple[int, int], Engine] = {}
@@ -60,7 +60,7 @@ class Engine:
         known = self._parts.get((other, whole))
         if known is None:
             known = self._parts[other, whole] = Engine((self.bodies[other], *self._pieces[key]))
-            known.asked, known._objects, known._pieces = self.asked, self._objects, self._pieces
+            known.queries, known._objects, known._pieces = self.queries, self._objects, self._pieces
         return known
 
     def sphere_centres(self, poses: BodyPoses, *, sample: int) -> Array:
@@ -70,13 +70,13 @@ class Engine:
 
     def touch(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> bool:
         """Say whether two bodies touch at a sample. A mesh is its surface here; what lies inside is asked elsewhere."""
-        self.asked.contacts += 1
+        self.queries.contacts += 1
         a, b = self._placed("solid", first, poses, sample), self._placed("solid", second, poses, sample)
         return bool(fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0)
 
     def proposed_direction(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[float, Array]:
         """FCL's distance in [m] between the hulls of two bodies and the direction from first to second: unproven."""
-        self.asked.distances += 1
+        self.queries.distances += 1
         a, b = self._placed("hull", first, poses, sample), self._placed("hull", second, poses, sample)
         result = fcl.DistanceResult()
         distance = fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
@@ -85,7 +85,7 @@ class Engine:
 
     def proposed_points(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[Array, Array]:
         """FCL's nearest points of the hulls of two bodies in the world, shape (3,) each: unproven."""
-        self.asked.distances += 1
+        self.queries.distances += 1
         a, b = self._placed("hull", first, poses, sample), self._placed("hull", second, poses, sample)
         result = fcl.DistanceResult()
         fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
@@ -97,7 +97,7 @@ class Engine:
 
         Exact but slow.
         """
-        self.asked.distances += 1
+        self.queries.distances += 1
         a, b = self._placed("core", first, poses, sample), self._placed("core", second, poses, sample)
         result = fcl.DistanceResult()
         distance = fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
@@ -114,7 +114,7 @@ class Engine:
         Raises:
             CellplanError: The engine's answer is not a number.
         """
-        self.asked.distances += 1
+        self.queries.distances += 1
         a, b = self._placed("core", first, poses, sample), self._placed("core", second, poses, sample)
         distance = float(fcl.distance(a, b, fcl.DistanceRequest(), fcl.DistanceResult()))
         if not np.isfinite(distance):

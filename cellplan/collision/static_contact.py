@@ -1,18 +1,15 @@
 """Which of many pairs of bodies touches first in a single configuration."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.collision.bodies import BodyPoses
 from cellplan.collision.distance import SURELY_APART, look
 from cellplan.collision.engine import Engine
 from cellplan.collision.overlap.containment import is_inside
-
-PairIndices = NDArray[np.intp]
-Flags = NDArray[np.bool_]
+from cellplan.geometry.arrays import Indices
 
 
-def first_touching(engine: Engine, pairs: PairIndices, poses: BodyPoses, *, sample: int) -> int | None:
+def first_touching(engine: Engine, pairs: Indices, poses: BodyPoses, *, sample: int) -> int | None:
     """Place of the first of the pairs, shape (P, 2), that touches at one sample, or None."""
     centres = engine.sphere_centres(poses, sample=sample)
     apart = centres[pairs[:, 0]] - centres[pairs[:, 1]]

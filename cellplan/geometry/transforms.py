@@ -3,9 +3,11 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from cellplan.geometry import arrays
+
+Array = arrays.Array
 
 SMALL_ANGLE: Final = 1e-6  # [rad] below this the series of sin and cos are exact to double precision
 HALF_TURN_ROOM: Final = 1e-4  # [rad] nearer to pi than this the skew part of R is too small to give the axis

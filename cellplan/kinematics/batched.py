@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array, skew
 from cellplan.model.cell import Cell, Robot
-from cellplan.model.robot import BASE, FollowerJoint, Joint
+from cellplan.model.robot import BASE
 
 IN_CACHE: Final = 512  # lanes whose arrays stay in the processor's cache: more at once are slower
 
@@ -82,7 +82,7 @@ class BatchChains:
 
     def __init__(self, cell: Cell) -> None:
         """Take the axes at the reference configuration; all link frames are parallel to the base there."""
-        chains = [_chain(robot) for robot in cell.robots]
+        chains = [robot.model.links_to_flange for robot in cell.robots]
         robots = len(chains)
         self.levels = max(1, *(len(chain) for chain in chains))
         self.joints = max(1, *(len(robot.model.joints) for robot in cell.robots))
@@ -157,41 +157,25 @@ class BatchChains:
             steps[:, :, 3] += self._slide * position[:, None]
         return steps
 
-    def _take(self, index: int, robot: Robot, chain: list[int], *, first: int) -> None:
+    def _take(self, index: int, robot: Robot, chain: tuple[int, ...], *, first: int) -> None:
         """Fill in one robot."""
         model = robot.model
-        every: tuple[Joint | FollowerJoint, ...] = (*model.joints, *model.followers)
         before = np.zeros(3)
         for level, link in enumerate(chain):
-            axis = every[link]
+            axis, drive = model.axes[link], model.drive(link)
             self._axis[level, :, index] = axis.axis_B
             self._step[level, :, index] = axis.point_B - before
             before = axis.point_B
-            leader, self._ratio[level, index] = link, 1.0
-            if isinstance(axis, FollowerJoint):
-                leader, self._ratio[level, index] = axis.leader, axis.ratio
-                self._offset[level, index] = axis.offset
-            self._leader[level, index] = first + leader
+            self._ratio[level, index], self._offset[level, index] = drive.ratio, drive.offset
+            self._leader[level, index] = first + drive.joint
             self.is_turning[level, index] = float(axis.is_revolute)
             self.is_sliding[level, index] = float(not axis.is_revolute)
-            self.to_joints[level, leader, index] = self._ratio[level, index]
+            self.to_joints[level, drive.joint, index] = self._ratio[level, index]
         self.columns[: len(model.joints), index] = first + np.arange(len(model.joints))
-
-
-def _chain(robot: Robot) -> list[int]:
-    """Links on the way from the base to the flange, in order."""
-    every: tuple[Joint | FollowerJoint, ...] = (*robot.model.joints, *robot.model.followers)
-    links: list[int] = []
-    link = robot.model.flange_link
-    while link != BASE:
-        links.append(link)
-        link = every[link].parent
-    return links[::-1]
 
 
 def _last_point(robot: Robot) -> Array:
     """The point of the axis that carries the flange, at zero joints, in B; the base origin without one."""
     if robot.model.flange_link == BASE:
         return np.zeros(3)
-    every: tuple[Joint | FollowerJoint, ...] = (*robot.model.joints, *robot.model.followers)
-    return every[robot.model.flange_link].point_B
+    return robot.model.axes[robot.model.flange_link].point_B

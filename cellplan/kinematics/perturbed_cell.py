@@ -110,11 +110,11 @@ def _with_offsets(model: RobotModel, offsets: Array) -> RobotModel:
     displaced by the offsets of the joints before them, ending in a flange displaced by all. A follower turns by its
     ratio of its leader's offset.
     """
-    axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
-    D = np.empty((len(axes) + 1, 4, 4))
+    D = np.empty((len(model.axes) + 1, 4, 4))
     D[0] = np.eye(4)
-    for index, axis in enumerate(axes):
-        offset = axis.ratio * offsets[axis.leader] if isinstance(axis, FollowerJoint) else offsets[index]
+    for index, axis in enumerate(model.axes):
+        drive = model.drive(index)
+        offset = drive.ratio * offsets[drive.joint]
         D[index + 1] = D[axis.parent + 1] @ screw_displacement(axis, np.array([offset]))[0]
     return _displaced(model, D, by_own=False)
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.cell import Cell, Robot
-from cellplan.model.robot import BASE, FollowerJoint, Joint
+from cellplan.model.robot import BASE
 
 MOST_AXES: Final = 48  # [-] of the robots that share a pinocchio model: 4 MB of its results; eight arms
 
@@ -61,8 +61,7 @@ class _Group:
     @property
     def screws(self) -> Array:
         """Columns of the axes as last computed, shape (6, axes); of a single one pinocchio gives a vector."""
-        screws: Array = self.data.J.copy().reshape(6, self.model.nv)
-        return screws
+        return self.data.J.copy().reshape(6, self.model.nv)
 
     def poses(self) -> list[Array]:
         """Poses of the joint frames as last computed, shape (4, 4) each."""
@@ -105,7 +104,7 @@ class CombinedModel:
         for group in self._groups:
             self.carries_link[group.axes, group.axes] = _carriers(group.model)
         self._X_JB = np.array([_at(-point) for point in self._points]).reshape(-1, 4, 4)
-        self._holder, self._X_TP = _part_carrier(cell)
+        self._carrier, self._X_CP = cell.carrier, cell.part.X_CP
 
     def state(self, q: Array) -> CellState:
         """Kinematics at the stacked joint vector ``q``, shape (nq,); the result owns its arrays."""
@@ -115,7 +114,7 @@ class CombinedModel:
         X_WT = self._X_WT.copy()
         for index, ((group, joint_id), X_JT) in enumerate(zip(self._flanges, self._X_JT, strict=True)):
             X_WT[index] = group.data.oMi[joint_id].homogeneous @ X_JT
-        X_WP = self._X_TP if self._holder is None else X_WT[self._holder] @ self._X_TP
+        X_WP = self._X_CP if self._carrier is None else X_WT[self._carrier] @ self._X_CP
         return CellState(screws, X_WT, X_WP)
 
     def links(self, q: Array) -> LinkState:
@@ -126,13 +125,11 @@ class CombinedModel:
 
     def along_joints(self, per_axis: Array) -> Array:
         """Sum what belongs to the axes over those that each driven joint turns, shape (..., links) to (..., nq)."""
-        summed: Array = per_axis @ self._spread
-        return summed
+        return per_axis @ self._spread
 
     def to_flange(self, per_joint: Array) -> Array:
         """Share of each axis on the way to a flange in what belongs to the joints, shape (..., nq) to (..., links)."""
-        shares: Array = per_joint @ self._spread_to_flange.T
-        return shares
+        return per_joint @ self._spread_to_flange.T
 
     def _compute(self, full: Array) -> None:
         """Let the engine place all axes at their positions, shape (links,)."""
@@ -154,7 +151,7 @@ class CombinedModel:
     def _add_robot(self, robot: Robot, columns: slice, carries: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> None:
         """Add one robot's joints; every joint frame is parallel to B at the reference configuration."""
         model = robot.model
-        axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
+        axes = model.axes
         ids: list[int] = []
         group = self._group_for(len(axes))
         self.first_link.append(len(self._leaders))
@@ -167,23 +164,17 @@ class CombinedModel:
             kind = pin.JointModelRevoluteUnaligned if axis.is_revolute else pin.JointModelPrismaticUnaligned
             placement = pin.SE3(X_parent[:3, :3], X_parent[:3, 3])
             ids.append(group.model.addJoint(parent_id, kind(axis.axis_B), placement, f"{robot.name}/{axis.name}"))
-            leader, ratio, offset = len(ids) - 1, 1.0, 0.0
-            if isinstance(axis, FollowerJoint):
-                leader, ratio, offset = axis.leader, axis.ratio, axis.offset
-            self._leaders.append(columns.start + leader)
-            self._ratios.append(ratio)
-            self._offsets.append(offset)
+            drive = model.drive(len(ids) - 1)
+            self._leaders.append(columns.start + drive.joint)
+            self._ratios.append(drive.ratio)
+            self._offsets.append(drive.offset)
         link = model.flange_link
         self._flanges.append((group, 0 if link == BASE else ids[link]))
         X_joint = inverse(robot.X_WB) if link == BASE else _at(axes[link].point_B)
         self._X_JT.append(inverse(X_joint) @ model.X_BF @ robot.tool.X_FT)
-        on_the_way = [False] * len(axes)
-        while link != BASE:
-            axis = axes[link]
-            on_the_way[link] = True
-            carries[columns.start + (axis.leader if isinstance(axis, FollowerJoint) else link)] = True
-            link = axis.parent
-        self._is_on_the_way += on_the_way
+        for moved in model.links_to_flange:
+            carries[columns.start + model.drive(moved).joint] = True
+        self._is_on_the_way += [moved in model.links_to_flange for moved in range(len(axes))]
 
 
 def _carriers(model: pin.Model) -> NDArray[np.bool_]:
@@ -201,14 +192,3 @@ def _at(point: Array) -> Array:
     X = np.eye(4)
     X[:3, 3] = point
     return X
-
-
-def _part_carrier(cell: Cell) -> tuple[int | None, Array]:
-    """Index of the robot that carries the part frame and the part in its tool frame; None and X_WP when fixed."""
-    if not cell.part.held_by:
-        if cell.part.X_WP is None:
-            raise ValueError("a part that nobody holds needs a pose in the world")
-        return None, cell.part.X_WP
-    grasp = cell.part.held_by[0]
-    names = [robot.name for robot in cell.robots]
-    return names.index(grasp.robot), inverse(grasp.X_PT)

@@ -36,8 +36,7 @@ def arm_reach(model: RobotModel) -> float:
     def distances(q: Array) -> Array:
         from_point = chain.flange_poses(q)[:, :3, 3] - first.point_B
         lever = np.cross(from_point, first.axis_B) if first.is_revolute else from_point
-        lengths: Array = np.sqrt(np.sum(lever**2, axis=1))
-        return lengths
+        return np.sqrt(np.sum(lever**2, axis=1))
 
     lower = np.where(np.isfinite(model.lower), model.lower, -0.5 * ENDLESS)
     upper = np.where(np.isfinite(model.upper), model.upper, 0.5 * ENDLESS)

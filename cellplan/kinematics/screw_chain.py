@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, pose_from, rotation_about
 from cellplan.model.cell import Robot
-from cellplan.model.robot import BASE, FollowerJoint, Joint
+from cellplan.model.robot import FollowerJoint, Joint
 
 
 class ScrewChain:
@@ -17,12 +17,12 @@ class ScrewChain:
     def __init__(self, robot: Robot) -> None:
         """Take the joint axes at the reference configuration, followers after driven joints."""
         model = robot.model
-        self._axes: tuple[Joint | FollowerJoint, ...] = (*model.joints, *model.followers)
-        self._flange_link = model.flange_link
+        self._axes = model.axes
+        self._drives = [model.drive(link) for link in range(len(self._axes))]
+        self._flange_link, self._links_to_flange = model.flange_link, model.links_to_flange
         self._X_WB = robot.X_WB
         self._X_BF = model.X_BF
         self._X_BT = model.X_BF @ robot.tool.X_FT
-        self._followers = model.followers
         self._n = len(model.joints)
 
     def link_displacements(self, q: Array) -> Array:
@@ -45,20 +45,17 @@ class ScrewChain:
 
     def flange_poses(self, q: Array) -> Array:
         """Flange in the world, shape (N, 4, 4)."""
-        poses: Array = self.link_displacements(q)[:, self._flange_link + 1] @ self._X_BF
-        return poses
+        return self.link_displacements(q)[:, self._flange_link + 1] @ self._X_BF
 
     def tool_poses(self, q: Array) -> Array:
         """Tool tip in the world, shape (N, 4, 4)."""
-        poses: Array = self.link_displacements(q)[:, self._flange_link + 1] @ self._X_BT
-        return poses
+        return self.link_displacements(q)[:, self._flange_link + 1] @ self._X_BT
 
     def axis_points(self, q: Array) -> Array:
         """The point that stands for each driven joint's axis, carried along, in the world, shape (N, n, 3)."""
         D = self.link_displacements(q)[:, 1 : self._n + 1]
         points = np.array([axis.point_B for axis in self._axes[: self._n]])
-        moved: Array = (D[..., :3, :3] @ points[..., None])[..., 0] + D[..., :3, 3]
-        return moved
+        return (D[..., :3, :3] @ points[..., None])[..., 0] + D[..., :3, 3]
 
     def flange_screws(self, q: Array) -> Array:
         r"""Twist that unit speed of each driven joint gives the flange, taken at the world origin.
@@ -79,18 +76,15 @@ class ScrewChain:
     def _screws(self, D: Array) -> Array:
         """Screws of the joints that carry the flange, from link displacements, shape (N, 6, n)."""
         screws = np.zeros((len(D), 6, self._n))
-        link = self._flange_link
-        while link != BASE:
-            axis = self._axes[link]
-            column, share = (axis.leader, axis.ratio) if isinstance(axis, FollowerJoint) else (link, 1.0)
-            screws[:, :, column] += share * _moved_screw(axis, D[:, axis.parent + 1])
-            link = axis.parent
+        for link in reversed(self._links_to_flange):
+            axis, drive = self._axes[link], self._drives[link]
+            screws[:, :, drive.joint] += drive.ratio * _moved_screw(axis, D[:, axis.parent + 1])
         return screws
 
     def _positions(self, q: Array) -> list[Array]:
         """Positions of all axes, followers included, shape (N,) each."""
         driven = list(q.T)
-        return driven + [follower.ratio * driven[follower.leader] + follower.offset for follower in self._followers]
+        return driven + [drive.ratio * driven[drive.joint] + drive.offset for drive in self._drives[self._n :]]
 
 
 def screw_displacement(axis: Joint | FollowerJoint, position: Array) -> Array:

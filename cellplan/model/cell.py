@@ -4,14 +4,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Shape, Solid
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
+from cellplan.model.joint_limits import JointLimits
 from cellplan.model.mounting import Pedestal
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
@@ -181,6 +183,20 @@ class Part:
     mass: float | None = None
     centre: Array | None = None
 
+    def __post_init__(self) -> None:
+        """Check that the place of the part is stated."""
+        if not self.held_by and self.X_WP is None:
+            raise ValueError("part: expected a holder or a pose in the world, got neither")
+
+    @property
+    def X_CP(self) -> Array:
+        """The part in the tool frame of its positioner, in W when nobody holds it, shape (4, 4)."""
+        if self.held_by:
+            return inverse(self.held_by[0].X_PT)
+        if self.X_WP is None:
+            raise ValueError("part: expected a pose in the world")
+        return self.X_WP
+
     def __repr__(self) -> str:
         """One line without arrays."""
         holders = ", ".join(grasp.robot for grasp in self.held_by)
@@ -257,7 +273,7 @@ class CheckSettings:
     adds_accuracy: bool = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Cell:
     """Robots, part, tasks and surroundings.
 
@@ -305,7 +321,21 @@ class Cell:
 
     def robot(self, name: str) -> Robot:
         """The robot of that name."""
-        return next(robot for robot in self.robots if robot.name == name)
+        return self.robots[self.index(name)]
+
+    def index(self, name: str) -> int:
+        """Place of the robot of that name among all robots."""
+        return next(index for index, robot in enumerate(self.robots) if robot.name == name)
+
+    @property
+    def carrier(self) -> int | None:
+        """Place of the positioner that carries the part frame among all robots; None for a part at a fixed pose."""
+        return self.index(self.part.held_by[0].robot) if self.part.held_by else None
+
+    @cached_property
+    def joint_limits(self) -> JointLimits:
+        """Limits of all joints in the order of the stacked joint vector."""
+        return JointLimits.of(joint for robot in self.robots for joint in robot.model.joints)
 
     def task(self, name: str) -> Task:
         """The task of that name."""

@@ -17,16 +17,16 @@ from cellplan.model.task import Task
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TaskSchedule:
-    """One task on the common clock of N instants.
+    """One task on the common clock of N samples.
 
     Attributes:
         task: The task.
-        X_PT: Reference tool tip in P at each instant, shape (N, 4, 4); held still before the start and after the end.
+        X_PT: Reference tool tip in P at each sample, shape (N, 4, 4); held still before the start and after the end.
         V_PT_P: Reference twist of the tool relative to the part in P, linear first, shape (N, 6).
         travelled: Length of path behind the tool in [m], shape (N,); it grows from cycle to cycle.
         length: Length of the path on the surface in [m], of one cycle.
-        end: Instant in [s] at which the path is done.
-        cycle_ends: Instants in [s] at which the tool has come back to the pose of its start, all constrained
+        end: Time in [s] at which the path is done.
+        cycle_ends: Times in [s] at which the tool has come back to the pose of its start, all constrained
             components together, one per cycle; none when it does not come back.
         stops: Times in [s] at which a stretch of the path with its own start and stop of the time law begins or ends.
     """
@@ -42,18 +42,18 @@ class TaskSchedule:
 
 
 class DesiredMotion(Protocol):
-    """Where every tool must be at any instant, not at those of the clock only."""
+    """Desired tool poses at any time, not at the samples only."""
 
     @property
     def times(self) -> Array:
-        """Instants of the clock in [s], shape (N,)."""
+        """Times of the samples in [s], shape (N,)."""
 
     @property
     def jumps(self) -> Array:
-        """Instants in [s], increasing, at which the speed of a tool may jump, or its rate."""
+        """Times in [s], increasing, at which the speed of a tool may jump, or its rate."""
 
     def poses(self, times: Array) -> tuple[Array, ...]:
-        """Reference tool tips in P of all tasks at instants in [s], shape (M,), shape (M, 4, 4) each."""
+        """Reference tool tips in P of all tasks at times in [s], shape (M,), shape (M, 4, 4) each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,10 +61,10 @@ class Schedule:
     """All tasks on one clock.
 
     Attributes:
-        times: Instants in [s], evenly spaced from 0, shape (N,).
+        times: Times of the samples in [s], evenly spaced from 0, shape (N,).
         tasks: The tasks that are worked on.
-        desired: Where their tools must be between these instants; None where nobody knows, and errors are looked at
-            at the instants of the clock only.
+        desired: Desired tool poses between these times; None where they are unknown, and errors are computed at the
+            samples only.
     """
 
     times: Array
@@ -73,7 +73,7 @@ class Schedule:
 
     @property
     def step(self) -> float:
-        """Time between two instants in [s]."""
+        """Time between two samples in [s]."""
         return float(self.times[-1] / (len(self.times) - 1))
 
 
@@ -107,15 +107,15 @@ class Resolution:
     """How finely a motion was resolved, and what that took.
 
     Attributes:
-        integrator: What carried the joints from the start on; ``euler_from`` tells where the accurate one gave up.
-        panels: Stretches of time on each of which all joints are one polynomial.
-        nodes: Instants at which the joints were solved for.
+        integrator: What integrated the joints from the start on; ``euler_from`` is where the accurate one failed.
+        panels: Intervals of time on each of which all joints are one polynomial.
+        nodes: Times at which the joints were solved for.
         sweeps: Passes over all nodes of a panel, added up.
         solves: Systems of equations that were solved.
-        error_between: Bound of the tool error at the nodes and between them, in [m] or [rad]; None when nobody looked,
+        error_between: Bound of the tool error at the nodes and between them, in [m] or [rad]; None when it is unknown,
             as with Euler's steps.
-        euler_from: Instant in [s] from which on Euler's steps had to be taken; None when they never had to.
-        lost: The robot that is nearest to a singular configuration at that instant; None when none is.
+        euler_from: Time in [s] from which on Euler's steps had to be taken; None when they never had to.
+        lost: The robot that is nearest to a singular configuration at that time; None when none is.
     """
 
     integrator: Integrator
@@ -128,7 +128,7 @@ class Resolution:
     lost: NearestSingular | None = None
 
     def __post_init__(self) -> None:
-        """Check at the door that every figure is one."""
+        """Check that every figure is one."""
         counts = (self.panels, self.nodes, self.sweeps, self.solves)
         if min(counts) < 0:
             raise ValueError(f"resolution: expected counts of at least 0, got {counts}")
@@ -146,10 +146,10 @@ class Motion:
         q: Stacked joint positions in [rad] or [m], shape (N, nq), in the order of ``Cell.robots``.
         sigma: Nominal time of each row in [s], shape (N,); the time itself where it is not given.
         plan: The phases of the program on its nominal time; without phases for the motion of a single one.
-        iterations: How often the method looked at the tasks for each step, shape (N - 1,); None when nobody counted.
-        slack: By how much each step leaves the tasks on purpose, as the norm of the twist that it gives up (metres
-            and radians per second as they come), shape (N - 1,); None when nobody measured it.
-        resolution: How finely it was resolved; None when nobody kept account.
+        iterations: Iterations of the method in each step, shape (N - 1,); None when they were not counted.
+        slack: Norm of the twist residual that each step accepts (mixed units: m/s and rad/s), shape (N - 1,); None when
+            it was not measured.
+        resolution: How finely it was resolved; None when that was not recorded.
     """
 
     times: Array
@@ -161,9 +161,9 @@ class Motion:
     resolution: Resolution | None = None
 
     def __post_init__(self) -> None:
-        """Check at the door that nothing is missing or not finite."""
+        """Check that nothing is missing or not finite."""
         if self.q.shape[:1] != self.times.shape:
-            raise ValueError(f"motion: {len(self.q)} rows for {len(self.times)} instants")
+            raise ValueError(f"motion: {len(self.q)} rows for {len(self.times)} times")
         if not np.all(np.isfinite(self.q)):
             raise ValueError("motion: a joint position is not finite")
         if not len(self.sigma):

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -96,6 +97,20 @@ class FollowerJoint:
         return self.kind == JointKind.REVOLUTE
 
 
+class Drive(NamedTuple):
+    """How a driven joint moves an axis: ``q_axis = ratio q_joint + offset``; a joint drives itself as it is.
+
+    Attributes:
+        joint: Index of the driven joint in ``RobotModel.joints``.
+        ratio: Motion of the axis per motion of the joint.
+        offset: Position of the axis in [rad] or [m] when the joint reads zero.
+    """
+
+    joint: int
+    ratio: float = 1.0
+    offset: float = 0.0
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Body:
     """A solid fixed to one link.
@@ -173,8 +188,7 @@ class RobotModel:
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""
-        axes: list[Joint | FollowerJoint] = [*self.joints, *self.followers]
-        for index, axis in enumerate(axes):
+        for index, axis in enumerate(self.axes):
             if not BASE <= axis.parent < index:
                 raise ValueError(f"robot '{self.name}': joint '{axis.name}' must come after the joint that carries it")
             if abs(np.linalg.norm(axis.axis_B) - 1.0) > 1e-9:  # rounding only: readers normalise
@@ -187,6 +201,27 @@ class RobotModel:
         if body.accuracy is not None or self.body_accuracy is None:
             return body.accuracy
         return self.body_accuracy.distance
+
+    @property
+    def axes(self) -> tuple[Joint | FollowerJoint, ...]:
+        """All axes by the number of the link that they move: driven joints, then followers."""
+        return (*self.joints, *self.followers)
+
+    def drive(self, link: int) -> Drive:
+        """What drives the axis that moves a link."""
+        if link < len(self.joints):
+            return Drive(link)
+        follower = self.followers[link - len(self.joints)]
+        return Drive(follower.leader, follower.ratio, follower.offset)
+
+    @property
+    def links_to_flange(self) -> tuple[int, ...]:
+        """Links from the base to the one that carries the flange, in order, the base left out."""
+        axes, links, link = self.axes, list[int](), self.flange_link
+        while link != BASE:
+            links.append(link)
+            link = axes[link].parent
+        return tuple(reversed(links))
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -59,7 +59,7 @@ class VerifiedRun:
     seal: InitVar[object]
 
     def __post_init__(self, seal: object) -> None:
-        """Refuse to be made by anybody but the gate, or of a run with a failed check."""
+        """Refuse to be made outside the gate, or of a run with a failed check."""
         if seal is not SEAL:
             raise TypeError("a verified run is made by cellplan.open_gate only")
         if not self.motions or not all(motion.report.passed for motion in self.motions):

@@ -18,7 +18,7 @@ from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.start.present_pairs import present_pairs
-from cellplan.planning.timing.schedule import examine_times
+from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.scene import Scene
 
 
@@ -57,9 +57,9 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
     """
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
-    examine_times(cell, tuple(toolpaths.values()))
+    paths = clock_paths(cell, toolpaths.values())
     examine_given_starts(cell, toolpaths)
-    choice = chosen_start(scene, toolpaths, progress=progress)
+    choice = chosen_start(scene, paths, progress=progress)
     start = choice.start
     pair = _touching_at_start(scene, start)
     found = tuple(robot.name for robot in cell.robots if robot.start is None)

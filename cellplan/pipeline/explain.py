@@ -14,13 +14,9 @@ from cellplan.model.cell import Cell, Relation
 from cellplan.model.phase import Phase
 from cellplan.model.task import Frame, PlaneName
 from cellplan.planning.modes import plan_phases
-from cellplan.planning.tracking.cooperation_jacobian import (
-    column_signs,
-    constraint_rows,
-    cooperation_jacobian,
-    reference_frames,
-)
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
+from cellplan.planning.tracking.motion_task import closures
+from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 
 RANK_TOL = 1e-10  # [-] singular values below this share of the largest one are zero: rounding of the matrix
 
@@ -109,7 +105,8 @@ def _plane(cell: Cell) -> PlaneName | None:
 def _matrix(cell: Cell, model: CombinedModel, phase: Phase) -> MatrixShape:
     """Blocks of one phase, and its singular values where all configurations that matter are known."""
     tasks: list[Relation] = [*(cell.task(name) for name in phase.tasks), *closures(cell, phase.moving)]
-    signs = column_signs(cell, model, tasks, phase.moving)
+    constraints = TaskConstraints.of(cell, tasks, phase.moving)
+    signs = constraints.column_signs(model.carries_flange)
     moves = np.any(signs != 0.0, axis=0)
     carriers = cell.positioners[:1] if any(task.relative_to is Frame.PART for task in tasks) else ()
     at_work = {*carriers, *(task.robot for task in tasks)}
@@ -119,24 +116,24 @@ def _matrix(cell: Cell, model: CombinedModel, phase: Phase) -> MatrixShape:
     return MatrixShape(
         phase=phase,
         blocks=tuple(task.name for task in tasks),
-        rows=tuple(len(constraint_rows(task, np.eye(4)[None])[0]) for task in tasks),
+        rows=tuple(int(count) for count in constraints.kept.sum(axis=1)),
         columns=tuple(int(moves[place].sum()) for place in places),
         signs=np.stack(blocks, axis=1),
         missing=missing,
-        singular_values=None if missing else _singular_values(cell, model, tasks, signs),
+        singular_values=None if missing else _singular_values(cell, model, constraints),
     )
 
 
-def _singular_values(cell: Cell, model: CombinedModel, tasks: list[Relation], signs: Array) -> Array:
+def _singular_values(cell: Cell, model: CombinedModel, constraints: TaskConstraints) -> Array:
     """Singular values of the constrained rows over the moving joints at the start; bystanders do not matter."""
     q = np.concatenate([np.zeros(len(r.model.joints)) if r.start is None else r.start for r in cell.robots])
     state = model.state(q)
-    names = [robot.name for robot in cell.robots]
-    X_WT = state.X_WT[[names.index(task.robot) for task in tasks]]
-    X_WR = reference_frames(state, tasks)
+    X_WT, X_WR = state.X_WT[constraints.operators], constraints.reference_frames(state.X_WP)
+    signs = constraints.column_signs(model.carries_flange)
     X_PT = inverse(X_WR) @ X_WT
     J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
-    picked = [constraint_rows(task, X[None])[0] @ block for task, X, block in zip(tasks, X_PT, J, strict=True)]
+    blocks = zip(constraints.tasks, X_PT, J, strict=True)
+    picked = [constraint_rows(task, X[None])[0] @ block for task, X, block in blocks]
     rows = np.concatenate(picked)
     values: Array = np.linalg.svd(rows[:, np.any(signs != 0.0, axis=0)], compute_uv=False)
     return values

@@ -58,7 +58,7 @@ def require_format(name: str) -> None:
 
 
 def default_folder(run: Path, form: str) -> Path:
-    """Where programs are written when nobody says where: inside the run folder."""
+    """Where programs are written by default: inside the run folder."""
     return run / PROGRAMS / form
 
 
@@ -88,7 +88,7 @@ def export_program(
         run: What the gate let through.
         folder: Where the files go; an older export there is replaced.
         form: Name of the format.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Returns:
         The paths of the programs in the folder.
@@ -127,13 +127,11 @@ def _verify_rounded(
 
 
 def _refuse_other_clock(motion: VerifiedMotion, tables: Mapping[str, JointTable], *, room: float) -> None:
-    """Make sure that rounding moved no instant by more than half a unit of the last decimal."""
+    """Make sure that rounding moved no time by more than half a unit of the last decimal."""
     for table in tables.values():
         late = np.abs(table.times - motion.schedule.times)
         if np.any(late > room + np.spacing(motion.schedule.times[-1])) or not np.all(np.diff(table.times) > 0.0):
-            raise InputError(
-                f"program of '{table.robot}': its instants cannot be written with the decimals of the format"
-            )
+            raise InputError(f"program of '{table.robot}': its times cannot be written with the decimals of the format")
 
 
 def _record(run: VerifiedRun, files: Mapping[str, str], *, form: str, decimals: int) -> str:

@@ -1,4 +1,4 @@
-"""Screen candidate layouts: the whole job of a cell in hundreds of them, before any is looked at more closely."""
+"""Screen candidate layouts: resolve the whole job of a cell in hundreds of them."""
 
 from functools import reduce
 
@@ -6,31 +6,30 @@ from cellplan.model.cell import Cell
 from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.schedule import examine_times, time_tasks
+from cellplan.planning.timing.schedule import clock_paths, time_tasks
 
 
 def screen(cell: Cell, candidates: Candidates, *, task: str | None = None, accuracy: float = 1e-5) -> Screening:
     """Resolve the job of a cell in many candidates for it; a job of several runs is as good as its worst.
 
-    Nothing is checked but what the figures say: no collision, no clearance. What passes is solved and verified
+    Only the figures of ``Screening`` are computed: no collision, no clearance. What passes is solved and verified
     afterwards, as any cell.
 
     Args:
         cell: The cell, as ``load_cell`` gives it.
         candidates: Cells that differ from it in base poses, tool tips and start postures.
         task: Name of the only task to work on; None for all.
-        accuracy: Largest tool error that is let pass, in [m] and [rad].
+        accuracy: Largest tool error that is accepted, in [m] and [rad].
 
     Raises:
         InputError: The cell cannot be worked with, or there is no such task.
         ValueError: The candidates are not cells of these robots.
     """
-    toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
-    examine_times(cell, tuple(toolpaths.values()))
+    paths = clock_paths(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
     runs = [
         screen_layouts(
             cell,
-            time_tasks(cell, [toolpaths[name] for name in phase.tasks]),
+            time_tasks(cell, [paths[name] for name in phase.tasks]),
             candidates,
             moving=phase.moving,
             accuracy=accuracy,

@@ -25,7 +25,7 @@ from cellplan.pipeline.solution import Run, Solution
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
-from cellplan.planning.timing.schedule import examine_times
+from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.scene import Scene
 
 
@@ -69,15 +69,15 @@ def _solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[
     refuse_clock_name(cell)
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
-    examine_times(cell, tuple(toolpaths.values()))
+    paths = clock_paths(cell, toolpaths.values())
     examine_given_starts(cell, toolpaths)
-    choice = chosen_start(scene, toolpaths, progress=progress)
+    choice = chosen_start(scene, paths, progress=progress)
     started = with_start(cell, choice.start)
     plan = plan_phases(cell, only=task)
-    planned = [plan_run(started, toolpaths, phase, progress=progress) for phase in plan.program]
+    planned = [plan_run(started, paths, phase, progress=progress) for phase in plan.program]
     solved = with_homes(started, find_homes(replace(scene, cell=started), planned, progress=progress), given=cell)
     if depends_on_homes(started, planned):
-        planned = [plan_run(solved, toolpaths, phase, progress=progress) for phase in plan.program]
+        planned = [plan_run(solved, paths, phase, progress=progress) for phase in plan.program]
     scene = replace(scene, cell=solved)
     motion, runs = _runs(scene, plan, planned, progress=progress)
     return scene, Solution(cell=solved, motion=motion, runs=runs, remark=choice.warning)

@@ -13,10 +13,10 @@ from cellplan.model.cell import Cell
 from cellplan.model.task import Frame
 from cellplan.planning.collocation.batch_targets import BatchTargets
 from cellplan.planning.collocation.batch_tasks import BatchTasks
-from cellplan.planning.collocation.solver import Collocation, Indices
+from cellplan.planning.collocation.solver import Collocation, Indices, Precision
 from cellplan.planning.collocation.windows import Window, windows_between
 from cellplan.planning.timing.timed_path import TimedTasks
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.motion_task import closures
 
 AT_ONCE: Final = 32  # candidates that are resolved together: enough for NumPy, and their arrays stay in the cache
 FIRST_DEGREE: Final = 12  # of the polynomials: enough for most windows at the accuracy of a screening
@@ -109,15 +109,13 @@ class Screening:
     @property
     def is_followed(self) -> NDArray[np.bool_]:
         """Which candidates did the whole job, shape (K,)."""
-        followed: NDArray[np.bool_] = self.lost_at == ALL_WAY
-        return followed
+        return self.lost_at == ALL_WAY
 
     @property
     def is_feasible(self) -> NDArray[np.bool_]:
         """Which did it within all joint limits and speeds, shape (K,); nothing is known of collisions yet."""
         within = np.all(self.margins >= 0.0, axis=1) & np.all(self.speed_ratios <= 1.0, axis=1)
-        feasible: NDArray[np.bool_] = self.is_followed & within
-        return feasible
+        return self.is_followed & within
 
 
 def screen_layouts(
@@ -155,16 +153,14 @@ class _Screen:
         """Prepare the tasks, the windows that all go through, and the limits."""
         grasps = closures(cell, moving)
         self._tasks = BatchTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
-        self._targets, self._accuracy, self._shortest = BatchTargets(timed, grasps), accuracy, cell.motion.step
+        self._targets, self._accuracy = BatchTargets(timed, grasps), accuracy
+        self._precision = Precision(accuracy=accuracy, shortest=cell.motion.step)
         breaks, jumps = timed.breaks, timed.jumps
         self._at_start = self._targets.at(breaks[:1], breaks[:1], breaks[1:2])
         self._windows = windows_between(jumps, whole=float(breaks[-1]), knots=breaks, highest=FIRST_DEGREE)
         at_rest = cell.positioners[:1] if all(path.task.relative_to is Frame.PART for path in timed.paths) else ()
         self._settling = np.concatenate([np.full(len(r.model.joints), r.name not in at_rest) for r in cell.robots])
-        joints = [joint for robot in cell.robots for joint in robot.model.joints]
-        self._lower = np.array([joint.lower for joint in joints])
-        self._upper = np.array([joint.upper for joint in joints])
-        self._fastest = np.array([joint.velocity for joint in joints])
+        self._limits = cell.joint_limits
 
     def of(self, X_WB: Array, X_FT: Array, start: Array) -> Screening:
         """Figures of one group of candidates; see `Candidates`."""
@@ -172,15 +168,15 @@ class _Screen:
         q, arrived = self._settled(start.T.copy(), placement)
         found = Screening.unknown(q.T.copy())
         found.lost_at[arrived] = 0.0
-        collocation = Collocation(self._tasks, self._targets, placement, accuracy=self._accuracy)
-        collocation.shortest = self._shortest
+        collocation = Collocation(self._tasks, self._targets, placement, self._precision)
 
         def record(window: Window, cells: Indices, nodes: Array, errors: Array) -> None:
             everywhere = np.concatenate([nodes, nodes @ window.between.T], axis=2)
             speeds = np.abs(nodes @ window.rates.T).max(axis=2).T
-            room = np.minimum(everywhere.min(axis=2).T - self._lower, self._upper - everywhere.max(axis=2).T)
+            lowest, highest = everywhere.min(axis=2).T, everywhere.max(axis=2).T
+            room = np.minimum(lowest - self._limits.lower, self._limits.upper - highest)
             found.margins[cells] = np.minimum(found.margins[cells], room)
-            found.speed_ratios[cells] = np.maximum(found.speed_ratios[cells], speeds / self._fastest)
+            found.speed_ratios[cells] = np.maximum(found.speed_ratios[cells], speeds / self._limits.velocity)
             found.error[cells] = np.maximum(found.error[cells], errors)
             found.lost_at[cells] = window.panels[-1].end
 

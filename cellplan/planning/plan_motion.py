@@ -1,69 +1,57 @@
-"""Resolve a run: from timed tasks to the motion of all joints, by the integrator that the cell asks for."""
+"""Plan a motion: from timed tasks to the motion of all joints, by the integrator that the cell names."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Motion, NearestSingular, Resolution, Schedule
+from cellplan.model.motion import Motion, NearestSingular, Resolution
 from cellplan.model.progress import Progress, silent
 from cellplan.model.solver import Integrator
 from cellplan.model.task import INSTANT_ROOM
 from cellplan.planning.collocation.cyclic import closed_path
-from cellplan.planning.collocation.joint_polynomials import JointPath
+from cellplan.planning.collocation.joint_polynomials import CollocatedPath
 from cellplan.planning.collocation.run import AccurateRun
-from cellplan.planning.euler.integrate import carry, follow
-from cellplan.planning.timing.timed_path import TimedTasks
+from cellplan.planning.euler.integrate import integrate, integrate_schedule
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import TrackingProblem
 from cellplan.planning.tracking.singularity import nearest_to_singular
 
 
-def resolve(
-    cell: Cell,
-    timed: TimedTasks,
-    schedule: Schedule,
-    *,
-    start: Array,
-    moving: Sequence[str],
-    progress: Progress = silent,
-) -> Motion:
+def plan_motion(task: MotionTask, *, progress: Progress = silent) -> Motion:
     """Motion of all joints that follows the tasks.
 
-    Where the accurate mode finds no way on, Euler's steps with damping and feedback go on to the end: the checks tell
-    what that costs.
+    Where collocation does not converge, Euler's steps with damping and feedback go on to the end; the checks then show
+    the tool errors that result.
 
     Args:
-        cell: The cell; its solver names the integrator.
-        timed: The tasks on the common clock.
-        schedule: The same, sampled at the instants of the clock.
-        start: Stacked start posture, shape (nq,), in [rad] or [m].
-        moving: Names of the robots that may move.
-        progress: Who wants to know how far it is.
+        task: The tasks, the robots that move and their start; the cell's solver names the integrator.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         DivergedError: A tool lost its path.
-        NoSolutionError: No way leads on, or no cycle closes.
+        NoSolutionError: The method found no step, or no cycle closes.
     """
-    if not cell.solver.is_accurate:
-        motion = follow(cell, schedule, start=start, moving=moving, progress=progress)
+    if not task.cell.solver.is_accurate:
+        motion = integrate_schedule(task, progress=progress)
         return replace(motion, resolution=_steps(len(motion.times) - 1))
-    run = AccurateRun(cell, timed, start=start, moving=moving, progress=progress)
-    if not cell.motion.cyclic:
-        path = run.path(start, begin=0.0, end=run.end)
-        return _sampled(run, path, lambda: TrackingProblem(cell, schedule, moving, start=start), timed.times, progress)
-    problem = TrackingProblem(cell, schedule, moving, start=start)
-    closed = closed_path(run, problem, schedule, start=start)
+    run = AccurateRun(task, progress=progress)
+    if not task.cell.motion.cyclic:
+        path = run.path(task.start, begin=0.0, end=run.end)
+        return _sampled(run, path, lambda: TrackingProblem(task), task.schedule.times, progress)
+    problem = TrackingProblem(task)
+    closed = closed_path(run, problem)
     if closed is None:
-        motion = follow(cell, schedule, start=start, moving=moving, progress=progress)
-        lost = nearest_to_singular(problem, 0, start)
-        return replace(motion, resolution=_resolution(run, JointPath(start, 0.0, (), ()), euler_from=0.0, lost=lost))
-    return _sampled(run, closed, lambda: problem, timed.times, progress)
+        motion = integrate_schedule(task, progress=progress)
+        lost = nearest_to_singular(problem, 0, task.start)
+        nothing = CollocatedPath(task.start, 0.0, (), ())
+        return replace(motion, resolution=_resolution(run, nothing, euler_from=0.0, lost=lost))
+    return _sampled(run, closed, lambda: problem, task.schedule.times, progress)
 
 
 def _sampled(
-    run: AccurateRun, path: JointPath, problem: Callable[[], TrackingProblem], times: Array, progress: Progress
+    run: AccurateRun, path: CollocatedPath, problem: Callable[[], TrackingProblem], times: Array, progress: Progress
 ) -> Motion:
     """The path at the instants of the clock; from where it ends, Euler's steps."""
     last = len(times) - 1
@@ -74,22 +62,22 @@ def _sampled(
     if reached < last:
         steps = problem()
         lost = nearest_to_singular(steps, reached, q[-1])
-        stepped = carry(steps, q[-1], first=reached, last=last, progress=progress)
+        stepped = integrate(steps, q[-1], first=reached, last=last, progress=progress)
         q = np.concatenate([q, stepped.q[reached + 1 :]])
     euler_from = float(times[reached]) if reached < last else None
     return Motion(times=times, q=q, resolution=_resolution(run, path, euler_from=euler_from, lost=lost))
 
 
 def _resolution(
-    run: AccurateRun, path: JointPath, *, euler_from: float | None, lost: NearestSingular | None
+    run: AccurateRun, path: CollocatedPath, *, euler_from: float | None, lost: NearestSingular | None
 ) -> Resolution:
     """What the run took in all, and the path that came of it."""
     return Resolution(
         integrator=Integrator.ACCURATE,
         panels=len(path.panels),
         nodes=path.node_count,
-        sweeps=run.collocation.sweeps,
-        solves=run.collocation.solves,
+        sweeps=run.sweeps,
+        solves=run.solves,
         error_between=path.worst if path.panels else None,
         euler_from=euler_from,
         lost=lost,

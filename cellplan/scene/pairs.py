@@ -7,15 +7,14 @@ from enum import StrEnum
 from itertools import combinations
 
 from cellplan.errors import InputError
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, CheckSettings
 from cellplan.model.left_out import LeftOutKind
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import BASE
 from cellplan.model.units import MM
-from cellplan.scene.bodies import Kind, SceneBody
+from cellplan.scene.bodies import Kind, SceneBody, is_ground
 from cellplan.scene.link_tree import NO_BODY, LinkTree
 from cellplan.scene.mounting import Mount, grasp_of, left_out_kind, mounted_pair
-from cellplan.scene.required_distance import demand
 
 MOUNTED = (Kind.ATTACHMENT, Kind.PEDESTAL)  # bodies that the user puts on or below a robot: nothing excuses them
 
@@ -36,6 +35,9 @@ class ScenePair:
     Attributes:
         first: Index of the one body of the scene.
         second: Index of the other; a half-space is always the second.
+        solids: The engine's bodies that must not touch: the two bodies themselves, or what lies outside a contact zone
+            and the part. None for a half-space, and where all of a tool lies inside its zone.
+        is_ground: Whether the second body is a half-space.
         clearance_class: What keeps its distance from what.
         rule: What is asked of them.
         reason: Why less than the full distance is asked; empty for the rule ``clearance``.
@@ -44,6 +46,8 @@ class ScenePair:
 
     first: int
     second: int
+    solids: tuple[int, int] | None
+    is_ground: bool
     clearance_class: ClearanceClass
     rule: Rule
     reason: str = ""
@@ -76,10 +80,23 @@ def sort_pairs(cell: Cell, bodies: Sequence[SceneBody]) -> tuple[list[ScenePair]
         elif mounting:
             excluded.append(Excluded(i, j, mounting, left_out_kind(bodies[i], bodies[j])))
         else:
-            kind = clearance_class(bodies[i], bodies[j])
-            asked = demand(cell.checks, bodies[i], bodies[j])
-            watched.append(ScenePair(first=i, second=j, clearance_class=kind, rule=Rule.CLEARANCE, demand=asked))
+            watched.append(_watched(cell.checks, bodies, i, j))
     return watched, excluded
+
+
+def _watched(checks: CheckSettings, bodies: Sequence[SceneBody], i: int, j: int) -> ScenePair:
+    """A pair that is to keep the clearance of the cell, and the accuracy of both bodies where it is added."""
+    first, second, on_ground = bodies[i], bodies[j], is_ground(bodies[j])
+    added = (first.accuracy or 0.0, second.accuracy or 0.0) if checks.adds_accuracy else (0.0, 0.0)
+    return ScenePair(
+        first=i,
+        second=j,
+        solids=None if on_ground else (i, j),
+        is_ground=on_ground,
+        clearance_class=clearance_class(first, second),
+        rule=Rule.CLEARANCE,
+        demand=checks.clearance + added[0] + added[1],
+    )
 
 
 def clearance_class(first: SceneBody, second: SceneBody) -> ClearanceClass:

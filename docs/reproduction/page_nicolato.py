@@ -118,7 +118,7 @@ def pose_rows(numbers: Numbers) -> list[Row]:
         claim("position error", "negligible", f"{shown(numbers['error_m'])} m", holds=numbers["error_m"] < 1e-8),
         claim("orientation error", "negligible", f"{shown(numbers['turn_rad'])} rad", holds=numbers["turn_rad"] < 1e-7),
         claim(
-            "posture at the end",
+            "configuration at the end",
             "(60, 60, 45, 135, 45, 120) deg",
             f"({', '.join(f'{angle:g}' for angle in numbers['end_deg'])}) deg",
             holds=numbers["end_deg"] == [60.0, 60.0, 45.0, 135.0, 45.0, 120.0],

@@ -21,7 +21,7 @@ class Curves:
     """One run of one arm's only task, in SI units.
 
     Attributes:
-        t: Instants, shape (N,).
+        t: Times, shape (N,).
         q: Joint positions, shape (N, n).
         desired: Reference place of the tool, shape (N, 3).
         actual: Actual place of the tool, shape (N, 3).
@@ -53,11 +53,11 @@ class Curves:
 
     @property
     def qdd(self) -> Array:
-        """Joint accelerations at the inner instants, shape (N - 2, n)."""
+        """Joint accelerations at the inner samples, shape (N - 2, n)."""
         return np.diff(self.qd, axis=0) / np.diff(self.between)[:, None]
 
     def after(self, instant: float) -> NDArray[np.bool_]:
-        """Which instants are not before the given one."""
+        """Which times are not before the given one."""
         return np.asarray(self.t >= instant - 1e-9)
 
 

@@ -43,7 +43,7 @@ class Sheet:
     """A grid of plots on one sheet."""
 
     def __init__(self, rows: int, columns: int) -> None:
-        """Lay out an empty grid."""
+        """Prepare an empty grid."""
         self._figure, grid = plt.subplots(
             rows, columns, figsize=(PANEL[0] * columns, PANEL[1] * rows), squeeze=False, layout="constrained"
         )

@@ -8,7 +8,8 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Cell
 from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
-from cellplan.planning.tracking.cooperation_jacobian import column_signs, cooperation_jacobian, reference_frames
+from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
+from cellplan.planning.tracking.task_constraints import TaskConstraints
 
 
 def planners_jacobian(cell: Cell, q: Array) -> Array:
@@ -17,8 +18,9 @@ def planners_jacobian(cell: Cell, q: Array) -> Array:
     state = model.state(q)
     names = [robot.name for robot in cell.robots]
     p_WT = state.X_WT[[names.index(relation.robot) for relation in cell.relations], :3, 3]
-    signs = column_signs(cell, model, cell.relations, names)
-    return cooperation_jacobian(state, p_WT, signs, X_WR=reference_frames(state, cell.relations))
+    constraints = TaskConstraints.of(cell, cell.relations, names)
+    signs = constraints.column_signs(model.carries_flange)
+    return cooperation_jacobian(state, p_WT, signs, X_WR=constraints.reference_frames(state.X_WP))
 
 
 def model_of(axes: list[tuple[str, tuple[float, float, float], tuple[float, float, float]]], X_BF: Array) -> RobotModel:

@@ -15,7 +15,8 @@ from cellplan.model.cell import Cell, CheckSettings, Mode, MotionSettings, Origi
 from cellplan.model.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
 from cellplan.model.solver import SearchSettings, SolverSettings
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
+from cellplan.planning.tracking.motion_task import MotionTask
 
 ANTHROPOMORPHIC = [(0.0, np.pi / 2, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0)]  # a, alpha, d: table 4.1
 FOUR_LINKS = [(0.2, 0.0, 0.0)] * 4  # section 4.2
@@ -116,7 +117,9 @@ def quintic(times: Array) -> Array:
 
 
 def followed(cell: Cell, schedule: Schedule, start) -> Motion:
-    return follow(cell, schedule, start=np.array(start, dtype=float), moving=[robot.name for robot in cell.robots])
+    return integrate_schedule(
+        MotionTask(cell, schedule, [robot.name for robot in cell.robots], np.array(start, dtype=float))
+    )
 
 
 def tool_poses(cell: Cell, q: Array) -> Array:

@@ -1,6 +1,6 @@
 """Timed tasks of shipped cells and of random ones, and what is independent of the planner to judge their motion by."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -16,13 +16,16 @@ from cellplan.model.cell import Cell, Grasp
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.solver import Integrator
 from cellplan.model.task import SpacePolylinePath
-from cellplan.planning.collocation.joint_polynomials import JointPath
+from cellplan.model.toolpath import Toolpath
+from cellplan.planning.collocation.joint_polynomials import CollocatedPath
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.plan_motion import resolve
-from cellplan.planning.timing.schedule import sample, time_tasks
-from cellplan.planning.timing.timed_path import TimedTasks, distinct
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.plan_motion import plan_motion
+from cellplan.planning.start.search import choose_start
+from cellplan.planning.timing.schedule import clock_paths, sample, time_tasks
+from cellplan.planning.timing.timed_path import TimedTasks, clock_path, distinct
+from cellplan.planning.tracking.motion_task import MotionTask, closures
+from cellplan.scene.scene import Scene
 
 SHIPPED = Path(__file__).parents[2] / "cells"
 
@@ -40,22 +43,28 @@ class Case:
     def schedule(self) -> Schedule:
         return sample(self.timed)
 
+    @property
+    def task(self) -> MotionTask:
+        return MotionTask(self.cell, self.schedule, self.moving, self.start)
+
     def resolved(self, **changes: Any) -> Motion:
         """The motion, with changed solver settings."""
         cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
-        return resolve(cell, self.timed, self.schedule, start=self.start, moving=self.moving)
+        return plan_motion(replace(self.task, cell=cell))
 
-    def path(self, **changes: Any) -> JointPath:
+    def path(self, **changes: Any) -> CollocatedPath:
         """The whole motion as polynomials."""
         cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
-        run = AccurateRun(cell, self.timed, start=self.start, moving=self.moving)
+        run = AccurateRun(replace(self.task, cell=cell))
         return run.path(self.start, begin=0.0, end=run.end)
 
 
 def case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | None = None) -> Case:
     """All tasks of a cell at once."""
     cell = replace(cell, solver=replace(cell.solver, integrator=Integrator.ACCURATE))
-    timed = time_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    timed = time_tasks(
+        cell, [clock_path(cell, task, build_toolpath(task, cell.part, cell.origin)) for task in cell.tasks]
+    )
     if start is None:
         start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     return Case(cell, timed, tuple(everyone(cell) if moving is None else moving), start)
@@ -67,6 +76,11 @@ def shipped(name: str) -> Cell:
     return load_cell(SHIPPED / f"{name}.yaml")
 
 
+def found_start(scene: Scene, toolpaths: Mapping[str, Toolpath]) -> Array:
+    """Stacked start configuration of the whole cell, its paths put on the clock."""
+    return choose_start(scene, clock_paths(scene.cell, toolpaths.values())).start
+
+
 def slowly_clocked(cell: Cell, step: float, **changes: Any) -> Cell:
     """The cell with another step of the clock and a feedback that goes with it."""
     return replace(
@@ -76,7 +90,7 @@ def slowly_clocked(cell: Cell, step: float, **changes: Any) -> Cell:
     )
 
 
-def largest_error(case: Case, path: JointPath, times: Array) -> float:
+def largest_error(case: Case, path: CollocatedPath, times: Array) -> float:
     """Largest distance in [m] or angle in [rad] of any tool from where it belongs, by successive screws.
 
     The times must increase and keep off the breaks, at which a target may have two values.
@@ -96,7 +110,7 @@ def largest_error(case: Case, path: JointPath, times: Array) -> float:
     return worst
 
 
-def between_samples(case: Case, path: JointPath, *, count: int = 10) -> Array:
+def between_samples(case: Case, path: CollocatedPath, *, count: int = 10) -> Array:
     """Instants strictly between all samples of the clock and the panels of a path, so many in each gap."""
     ends = distinct(np.concatenate([case.timed.times, case.timed.breaks, [panel.end for panel in path.panels]]))
     shares = (np.arange(count) + 0.5) / count

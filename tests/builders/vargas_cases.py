@@ -15,7 +15,8 @@ from cellplan.model.solver import (
     SingularityMeasure,
     SolverSettings,
 )
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
+from cellplan.planning.tracking.motion_task import MotionTask
 
 LENGTHS: Final = (2.0, 1.0, 1.0)
 DURATION: Final = 35.0
@@ -78,7 +79,7 @@ def vargas_run(name: str, method: MethodName, step: float) -> VargasRun:
     )
     cell = planar_cell(LENGTHS, solver, settle=DURATION)
     schedule = tip_schedule(cell, case.point, velocity=case.velocity, duration=DURATION, step=step)
-    motion = follow(cell, schedule, start=case.start, moving=["arm"])
+    motion = integrate_schedule(MotionTask(cell, schedule, ["arm"], case.start))
     J = tip_jacobians(LENGTHS, motion.q)
     return VargasRun(
         times=motion.times,

@@ -5,11 +5,11 @@ import pytest
 from builders.moving_cells import cell_with_bodies, program, relative
 from builders.scene_builders import floor, make_cell, placed, slide_model
 
-from cellplan.certify.ground import GroundSearch
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.linear_motion import StraightMotion
+from cellplan.certify.pair_search import GroundSearch
+from cellplan.certify.pair_state import PairState
 from cellplan.collision.bodies import CollisionBody
-from cellplan.collision.continuous.found import Found
 from cellplan.collision.continuous.motion_bound import PairMotion
 from cellplan.collision.distance import measure
 from cellplan.geometry.shapes import Box
@@ -152,7 +152,7 @@ def test_heights_above_the_floor_hold_between_the_samples() -> None:
     motion = StraightMotion.of_cell(scene, LeverArms(scene, q), q)
     for row in scene.ground_rows[:30]:
         pair = scene.pairs[row]
-        search = GroundSearch(pair, motion, found=Found())
+        search = GroundSearch(pair, motion, state=PairState())
         for step in range(7):
             heights = scene.ground_heights(pair, scene.pair_poses((pair.first, pair.first), within(q, step)))
             touches = min(heights[0], heights[-1]) <= 0.0  # then nothing but zero is said

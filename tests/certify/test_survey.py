@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from builders.moving_cells import cell_with_bodies
 
-from cellplan.certify import search
-from cellplan.certify import survey as ranks
-from cellplan.certify.survey import CLOSEST, SEARCH_ROOM, Survey, lowest_bounds
+from cellplan.certify import bound, search
+from cellplan.certify.certify import certify
+from cellplan.certify.pair_state import SEARCH_TOL
+from cellplan.certify.survey import CLOSEST_COUNT, Survey
 from cellplan.collision.distance import SURELY_APART
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import ClearanceClass
@@ -27,8 +28,8 @@ def cutoff_by_definition(known: Array, scene: Scene, row: int) -> float:
     if not kept[row]:
         return SURELY_APART
     others = np.sort(known[kept & (np.arange(len(known)) != row)])
-    last = others[CLOSEST - 1] if len(others) >= CLOSEST else np.inf
-    return max(SURELY_APART, max(known[kinds == kinds[row]].min(), last) - SEARCH_ROOM)
+    last = others[CLOSEST_COUNT - 1] if len(others) >= CLOSEST_COUNT else np.inf
+    return max(SURELY_APART, max(known[kinds == kinds[row]].min(), last) - SEARCH_TOL)
 
 
 def test_cutoffs_are_those_of_the_definition_whatever_is_found() -> None:
@@ -38,14 +39,14 @@ def test_cutoffs_are_those_of_the_definition_whatever_is_found() -> None:
     rng = np.random.default_rng(6)
 
     for row in rng.integers(len(scene.pairs), size=25).tolist():
-        seen.found[row].distance = float(min(seen.found[row].distance, rng.choice([0.01, 0.02, rng.uniform()])))
+        distance = float(rng.choice([0.01, 0.02, rng.uniform()]))
         if rng.uniform() < 0.05:
-            seen.found[row].touches.append(1.0)
-        seen.remember(row)
-        if seen.found[row].touches:
+            seen.states[row].note_touches([1.0])
+        seen.note_distance(row, distance, 0.0)
+        if seen.states[row].touches:
             known[row] = 0.0
         elif scene.pairs[row].rule is Rule.CLEARANCE:
-            known[row] = seen.found[row].distance
+            known[row] = seen.states[row].distance
         cutoffs = [seen.cutoff(each) for each in range(len(scene.pairs))]
         assert cutoffs == [cutoff_by_definition(known, scene, each) for each in range(len(scene.pairs))]
         assert seen.largest_cutoff() >= max(cutoffs)
@@ -55,14 +56,15 @@ def test_cutoffs_are_those_of_the_definition_whatever_is_found() -> None:
 def test_pairs_worked_on_few_at_a_time_give_the_same_bounds(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = Scene.from_cell(cell_with_bodies(seed))
     q = wandering(scene, 400)
-    at_once = search.survey(scene, q)
+    at_once = certify(scene, q)
 
-    for module in (ranks, search):
+    for module in (bound, search):
         monkeypatch.setattr(module, "ROWS_AT_ONCE", 7)
     monkeypatch.setattr(search, "PAIR_WORK", 600)
-    in_pieces = search.survey(scene, q)
+    in_pieces = certify(scene, q)
 
     assert np.array_equal(in_pieces.low, at_once.low)
     for kind in ClearanceClass:
-        rows = at_once.rows(kind)
-        assert np.array_equal(lowest_bounds(in_pieces, rows), at_once.low[rows].min(axis=0, initial=np.inf))
+        rows = [pair.row for pair in at_once.of_class(kind)]
+        lowest = in_pieces.lowest_bounds(in_pieces.of_class(kind))
+        assert np.array_equal(lowest, at_once.low[rows].min(axis=0, initial=np.inf))

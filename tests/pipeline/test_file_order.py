@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.timed_cells import found_start
 
 from cellplan import load_cell, solve
 from cellplan.geometry.transforms import Array
@@ -14,7 +15,6 @@ from cellplan.model.cell import Cell
 from cellplan.model.name_order import NameOrder
 from cellplan.pipeline.solution import Solution
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.start.search import find_start
 from cellplan.scene.scene import Scene
 
 THREE_PLANAR_ARMS = """
@@ -82,7 +82,7 @@ def test_starts_motion_and_verdict_are_the_same_to_the_last_digit(tmp_path: Path
 def start_by_robot(cell: Cell) -> Mapping[str, Array]:
     """The start that is found, by robot."""
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
-    q = find_start(Scene.from_cell(cell), toolpaths)
+    q = found_start(Scene.from_cell(cell), toolpaths)
     return {robot.name: q[cell.columns(robot.name)] for robot in cell.robots}
 
 

@@ -11,8 +11,10 @@ from cellplan.geometry.transforms import Array, pose
 from cellplan.io.cell.load import load_cell
 from cellplan.planning.layout_screening import AT_ONCE, Candidates, screen_layouts
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.plan_motion import resolve
+from cellplan.planning.plan_motion import plan_motion
 from cellplan.planning.timing.schedule import sample, time_tasks
+from cellplan.planning.timing.timed_path import clock_path
+from cellplan.planning.tracking.motion_task import MotionTask
 
 CELL = Path(__file__).resolve().parents[2] / "cells" / "four_robots.yaml"
 FAR = 20.0  # [m] out of reach of any arm
@@ -21,7 +23,9 @@ FAR = 20.0  # [m] out of reach of any arm
 @pytest.fixture(scope="module")
 def job() -> SimpleNamespace:
     cell = load_cell(CELL)
-    timed = time_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    timed = time_tasks(
+        cell, [clock_path(cell, task, build_toolpath(task, cell.part, cell.origin)) for task in cell.tasks]
+    )
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     return SimpleNamespace(cell=cell, timed=timed, start=start, moving=[robot.name for robot in cell.robots])
 
@@ -48,7 +52,7 @@ def test_a_candidate_has_the_figures_of_the_cell_resolved_alone(job: SimpleNames
     for k in range(3):
         robots = tuple(replace(robot, X_WB=X_WB) for robot, X_WB in zip(job.cell.robots, asked.X_WB[k], strict=True))
         cell = replace(job.cell, robots=robots)
-        motion = resolve(cell, job.timed, sample(job.timed), start=found.start[k], moving=job.moving)
+        motion = plan_motion(MotionTask(cell, sample(job.timed), job.moving, found.start[k]))
         joints = [joint for robot in robots for joint in robot.model.joints]
         room = np.minimum(
             motion.q.min(axis=0) - [joint.lower for joint in joints],

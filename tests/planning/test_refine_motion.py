@@ -38,7 +38,7 @@ class Dented:
 
 
 def closely(case: Case) -> Motion:
-    return plan_within_accuracy(case.cell, case.timed, sample(case.timed), start=case.start, moving=case.moving)
+    return plan_within_accuracy(case.task)
 
 
 def seen_by_the_checks(case: Case, q: Array) -> Array:
@@ -58,7 +58,7 @@ def test_errors_at_the_clock_s_instants_are_those_of_the_checks() -> None:
     case = case_of(shipped("four_robots"))
     q = closely(case).q + 1e-5 * np.random.default_rng(0).normal(size=(len(case.timed.times), case.cell.joint_count))
 
-    errors = AccurateRun(case.cell, case.timed, start=case.start, moving=case.moving).errors(sample(case.timed), q)
+    errors = AccurateRun(case.task).errors(sample(case.timed), q)
 
     np.testing.assert_allclose(errors, seen_by_the_checks(case, q), rtol=1e-6, atol=NOISE)
 
@@ -79,7 +79,7 @@ def test_an_instant_that_is_looked_at_becomes_an_end_of_panels() -> None:
     case = case_of(shipped("four_robots"))
     looked_at = 0.377  # [s] nothing happens there by itself
 
-    closer = replace(case, timed=replace(case.timed, looked_at=np.array([looked_at])))
+    closer = replace(case, timed=replace(case.timed, extra_breaks=np.array([looked_at])))
 
     assert looked_at not in [panel.end for panel in case.path().panels]
     assert looked_at in [panel.end for panel in closer.path().panels]

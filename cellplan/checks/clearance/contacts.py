@@ -1,106 +1,129 @@
-"""Contacts: what touches from when to when, what of it is allowed, and the verdict on each pair."""
+"""Contacts and demanded clearance: what touches from when to when, what of it is allowed, and the verdicts."""
 
 from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
-from cellplan.certify.survey import Survey
-from cellplan.geometry.transforms import Array
-from cellplan.model.report import Check, ClearanceClass, Contact
+from cellplan.certify.bound import Bound, PairBound
+from cellplan.collision.distance import TIGHT
+from cellplan.geometry.arrays import Array
+from cellplan.model.report import Check, ClearanceClass, ClearanceMinimum, Contact
 from cellplan.model.units import MM
 from cellplan.scene.pairs import Rule
 
-SAME_CONTACT: Final = 0.010  # [s] touches with shorter breaks between them are one contact
+LONGEST_BREAK: Final = 0.010  # [s] touches with shorter breaks between them are one contact
+EXACT_TOL: Final = 1e-4 - 2.0 * TIGHT  # [m] a bound this near to a measured distance is exact to 0.1 mm
 OUTSIDE_ZONE: Final = {
     Rule.PROCESS: "outside the contact zone of the tool at work",
     Rule.GRIP: "outside the contact zone of the grip",
 }
 
 
-def find_contacts(survey: Survey, times: Array) -> tuple[Contact, ...]:
+def find_contacts(bound: Bound, times: Array) -> tuple[Contact, ...]:
     """All contacts: forbidden ones first, then those of tools at work.
 
     Args:
-        survey: What was found.
-        times: Instants of the samples in [s], shape (N,).
+        bound: What is proved of all pairs.
+        times: Times of the samples in [s], shape (N,).
     """
-    touched = [row for row, found in enumerate(survey.found) if found.touches]
-    forbidden = [contact for row in touched for contact in _of_pair(survey, times, row)]
-    return (*forbidden, *_at_work(survey, times))
+    forbidden = [contact for pair in bound.pairs if pair.touches for contact in _of_pair(bound, times, pair)]
+    return (*forbidden, *_at_work(bound, times))
 
 
-def uncertified(survey: Survey) -> list[int]:
-    """Pairs that were not found to touch or to come nearer than demanded, and could not be proved not to."""
-    return [row for row in range(len(survey.found)) if _is_open(survey, row)]
+def time_of(times: Array, at: float) -> float:
+    """Time in [s] from one counted in samples."""
+    return float(np.interp(at, np.arange(len(times)), times))
 
 
-def seconds(times: Array, instants: Array) -> Array:
-    """Instants in [s] from instants counted in samples."""
-    found: Array = np.interp(instants, np.arange(len(times)), times)
-    return found
-
-
-def collision_checks(
-    survey: Survey, contacts: Sequence[Contact], times: Array, *, kind: ClearanceClass, open_rows: Sequence[int]
-) -> list[Check]:
+def collision_checks(bound: Bound, contacts: Sequence[Contact], times: Array, *, kind: ClearanceClass) -> list[Check]:
     """One failed check for each pair of a class that touches or is not certified; a passed one when none may touch."""
     own: dict[tuple[str, str], list[Contact]] = {}
     for contact in contacts:
         if contact.clearance_class is kind and not contact.is_allowed:
             own.setdefault(contact.pair, []).append(contact)
     checks = [_pair_collision(pair, found) for pair, found in own.items()]
-    own_rows = [row for row in open_rows if survey.scene.pairs[row].clearance_class is kind]
-    if not checks and all(survey.low[row].min() > 0.0 for row in own_rows):
+    open_pairs = [pair for pair in bound.of_class(kind) if pair.is_open]
+    if not checks and all(pair.lowest > 0.0 for pair in open_pairs):
         message = f"collision: none in class {kind}, certified between the samples"
         checks.append(_collision(str(kind), passed=True, length_s=0.0, at_s=None, message=message))
-    return checks + [_not_certified(survey, times, row) for row in own_rows]
+    return checks + [_not_certified(bound, times, pair) for pair in open_pairs]
 
 
-def _is_open(survey: Survey, row: int) -> bool:
-    """Whether something was left unproved of a pair that matters for the verdict."""
-    found = survey.found[row]
-    return bool(found.unproved and not found.touches and survey.low[row].min() < found.needed)
+def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, found: ClearanceMinimum) -> Check:
+    """Whether every pair of a class keeps the demanded clearance; the check names the pair with the smallest margin.
+
+    Where the accuracy of bodies is added to the demand, that is not always the pair that comes nearest.
+
+    Args:
+        bound: What is proved of all pairs.
+        times: Times of the samples in [s], shape (N,).
+        kind: The class.
+        found: Its smallest distance; zero where a pair touches.
+    """
+    checks, kept = bound.scene.cell.checks, [pair for pair in bound.of_class(kind) if pair.keeps_clearance]
+    names, at_s, distance = found.pair or ("", ""), found.at_s or 0.0, float(found.minimum or 0.0)
+    demand, reason, is_exact = checks.clearance, "", found.exact
+    if checks.adds_accuracy and distance > 0.0 and kept:
+        worst = min(kept, key=lambda pair: pair.proved - pair.pair.demand)
+        names, demand = bound.names(worst), worst.pair.demand
+        at_s, distance = time_of(times, worst.at), worst.proved
+        is_exact = worst.distance - distance <= EXACT_TOL
+        added = demand - checks.clearance
+        reason = f" ({MM * checks.clearance:.1f} mm, and {MM * added:.1f} mm for the accuracy of both bodies)"
+    shown = np.floor(10.0 * MM * distance) / 10.0  # rounded down: never more than there is
+    least = "" if is_exact else "at least "
+    return Check(
+        name="clearance",
+        subject=str(kind),
+        passed=bool(distance >= demand),
+        value=MM * distance,
+        limit=MM * demand,
+        unit="mm",
+        at_s=at_s,
+        message=f"clearance {kind}: {names[0]} to {names[1]} {least}{shown:.1f} mm at {at_s:.3f} s, "
+        f"required {MM * demand:.1f} mm{reason}",
+    )
 
 
-def _of_pair(survey: Survey, times: Array, row: int) -> list[Contact]:
+def _of_pair(bound: Bound, times: Array, pair: PairBound) -> list[Contact]:
     """Contacts of one pair in the order of time."""
-    pair = survey.scene.pairs[row]
-    reason = OUTSIDE_ZONE.get(pair.rule, "")
+    touches = np.interp(np.unique(pair.touches), np.arange(len(times)), times)
     return [
         Contact(
-            pair=survey.scene.names(pair),
-            clearance_class=pair.clearance_class,
+            pair=bound.names(pair),
+            clearance_class=pair.pair.clearance_class,
             first_s=first,
             last_s=last,
             is_allowed=False,
-            reason=reason,
+            reason=OUTSIDE_ZONE.get(pair.pair.rule, ""),
         )
-        for first, last in _spans(seconds(times, np.unique(survey.found[row].touches)), times)
+        for first, last in _spans(touches, times)
     ]
 
 
 def _spans(touches: Array, times: Array) -> list[tuple[float, float]]:
-    """First and last instant of each contact in [s], short breaks bridged."""
-    longest_break = max(SAME_CONTACT, 1.5 * float(times[-1]) / max(1, len(times) - 1))
+    """First and last time of each contact in [s], short breaks bridged."""
+    longest_break = max(LONGEST_BREAK, 1.5 * float(times[-1]) / max(1, len(times) - 1))
     ends = np.flatnonzero(np.diff(touches) > longest_break)
     first, last = np.append(0, ends + 1), np.append(ends, len(touches) - 1)
     return [(float(touches[a]), float(touches[b])) for a, b in zip(first, last, strict=True)]
 
 
-def _at_work(survey: Survey, times: Array) -> list[Contact]:
+def _at_work(bound: Bound, times: Array) -> list[Contact]:
     """Contacts of tools at work with the part: from the first touch to the last, whatever short breaks there are."""
-    scene = survey.scene
+    zone = MM * bound.scene.cell.checks.contact_zone
     return [
         Contact(
-            pair=scene.names(scene.pairs[row]),
-            clearance_class=scene.pairs[row].clearance_class,
-            first_s=float(times[first]),
-            last_s=float(times[last]),
+            pair=bound.names(pair),
+            clearance_class=pair.pair.clearance_class,
+            first_s=float(times[pair.at_surface[0]]),
+            last_s=float(times[pair.at_surface[1]]),
             is_allowed=True,
-            reason=f"at work, within {MM * scene.cell.checks.contact_zone:g} mm of the tool tip",
+            reason=f"at work, within {zone:g} mm of the tool tip",
         )
-        for row, (first, last) in sorted(survey.at_surface.items())
+        for pair in bound.pairs
+        if pair.at_surface is not None
     ]
 
 
@@ -121,15 +144,13 @@ def _pair_collision(pair: tuple[str, str], contacts: Sequence[Contact]) -> Check
     )
 
 
-def _not_certified(survey: Survey, times: Array, row: int) -> Check:
+def _not_certified(bound: Bound, times: Array, pair: PairBound) -> Check:
     """The failed check of a pair of which neither a contact was found nor the demanded distance proved."""
-    first, second = survey.scene.names(survey.scene.pairs[row])
-    found, proved = survey.found[row], MM * max(0.0, float(survey.low[row].min()))
-    at_s = float(seconds(times, np.array([min(found.unproved)]))[0])
-    others = len({int(at) for at in found.unproved}) - 1
+    first, second = bound.names(pair)
+    proved, required, at_s = MM * max(0.0, pair.lowest), MM * pair.demand, time_of(times, min(pair.unproved))
+    others = len({int(at) for at in pair.unproved}) - 1
     more = f" and in {others} more steps" if others else ""
-    required = MM * found.demand
-    smallest = f", the smallest distance found is {MM * found.distance:.2f} mm" if np.isfinite(found.distance) else ""
+    smallest = f", the smallest distance found is {MM * pair.distance:.2f} mm" if np.isfinite(pair.distance) else ""
     what = f"{np.floor(10.0 * proved) / 10.0:.1f} mm are proved, required {required:.1f} mm"
     if not proved > 0.0:
         what = "no contact was found and none could be ruled out"

@@ -1,4 +1,4 @@
-"""What belongs to a run folder, at any depth: everything else in it is somebody's own and is never removed."""
+"""What belongs to a run folder, at any depth: everything else in it belongs to the user and is never removed."""
 
 import json
 import re
@@ -16,7 +16,7 @@ PROGRAMS: Final = "programs"  # folder of exported programs, inside the run fold
 EXPORT: Final = "export.json"  # what was exported, in the folder that holds it
 MANIFEST: Final = "manifest.json"
 LEFT_ALONE: Final = ".DS_Store"  # put into every folder by the file manager of one system
-OWN_FOLDERS: Final = frozenset({PROGRAMS, "plots", "tables", "rejected"})  # what is in them is looked at file by file
+OWN_FOLDERS: Final = frozenset({PROGRAMS, "plots", "tables", "rejected"})  # their content is compared file by file
 USUAL: Final = re.compile(  # what a run, a rehearsal or a draft of them may hold that lists no files
     r"cell\.yaml|(manifest|series)\.json|view\.html|(report|rehearsal|export)\.(json|html)"
     r"|plots/[^/]+\.(svg|png)|(tables|rejected)/([^/]+/)?[^/]+\.csv"

@@ -1,7 +1,7 @@
 """Hidden folders beside a run: its draft and the older run, named after the process that works on them.
 
 A process that was killed leaves them behind. The next one removes a draft, and puts an older run back where there is no
-other in its place. Whether a process still lives is asked only of those of this very system: a folder may be shared.
+other in its place. Whether a process still lives is known only on the same system: a folder may be shared.
 """
 
 import hashlib
@@ -69,7 +69,7 @@ def _exists(process: int) -> bool:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # somebody else's
+    except (OSError, OverflowError):  # of another user
         return True
     return True
 

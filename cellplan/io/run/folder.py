@@ -112,7 +112,7 @@ class RunFolder:
     def _put_into_place(self) -> None:
         """Let the new run and the older one change places; undo it when the older one holds something foreign.
 
-        Where the system cannot do it in one step, the older run is renamed aside first.
+        Where the system cannot do it in one step, the older run is renamed first.
         """
         refuse_unless_replaceable(self.path)  # again: planning took a while
         for folder in (self._draft, *(path for path in self._draft.rglob("*") if path.is_dir())):
@@ -121,7 +121,7 @@ class RunFolder:
             self._draft.rename(self.path)
         elif exchange(self._draft, self.path):
             foreign = foreign_within(self._draft)
-            if foreign:  # somebody put it there since
+            if foreign:  # put there meanwhile
                 exchange(self._draft, self.path)
                 raise _holds_foreign(self.path, foreign)
         else:
@@ -129,7 +129,7 @@ class RunFolder:
         _sync_folder(self.path.parent)
 
     def _move_existing_first(self) -> None:
-        """Rename the older run aside and the new one into place; undo the first when the second fails."""
+        """Rename the older run, then the new one into its place; undo the first when the second fails."""
         try:
             self.path.rename(self._aside)
             foreign = foreign_within(self._aside)
@@ -206,7 +206,7 @@ def _remove_empty(folders: list[Path]) -> None:
     for folder in folders:
         try:
             folder.rmdir()
-        except OSError:  # somebody else put something there meanwhile: it stays
+        except OSError:  # something was put there meanwhile: it stays
             return
 
 

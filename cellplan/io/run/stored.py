@@ -1,4 +1,4 @@
-"""A run as it stands on disk: its folder read whole, each file as it was written, before anybody relies on it."""
+"""A run as it stands on disk: its folder read whole, each file as it was written, and compared with its manifest."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ OF_EVERY_RUN: Final = ("report.html", "report.json")
 SERIES: Final = "series.json"
 CELL: Final = "cell.yaml"
 CLOCK: Final = "clock"  # name of the table beside those of the robots: none of them may have it
-TABLE_LIMIT: Final = 500_000_000  # [bytes] of a table that is read only to say where it is spoilt
+TABLE_LIMIT: Final = 500_000_000  # [bytes] of a table that is read only to find where it was changed
 SERIES_ROOM: Final = 1e-6  # [-] series have seven digits
 
 Record = dict[str, Any]
@@ -119,7 +119,7 @@ def _manifest(folder: Path) -> tuple[Manifest, str]:
 
 
 def _content(folder: Path, name: str, manifest: Manifest) -> bytes:
-    """Content of a file that must be the one the manifest speaks of, even if somebody writes meanwhile."""
+    """Content of a file that must be the one of the manifest, even if it is written to meanwhile."""
     file, stored = str(folder / name), manifest.files.get(name)
     if stored is None:
         raise InputError(f"{file}: missing; the run was written without it")
@@ -220,7 +220,7 @@ def _spoilt_tables(folder: Path, changed: Iterable[str], manifest: Manifest) -> 
                 yield from _first_other_row(parse_table(text, str(path)), text, path, _series_of(folder, manifest))
         except InputError as error:
             yield error
-        except (AttributeError, KeyError, TypeError, ValueError):  # the report is spoilt too: nothing to compare with
+        except (AttributeError, KeyError, TypeError, ValueError):  # the report was changed too: nothing to compare with
             continue
 
 

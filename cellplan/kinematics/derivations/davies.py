@@ -14,7 +14,6 @@ from cellplan.kinematics.derivations.serial_chain import (
     chain_to_flange,
     checked_configuration,
     displacement,
-    fixed_part_pose,
     part_holder,
 )
 from cellplan.model.cell import Cell, Robot
@@ -202,7 +201,7 @@ def _unit_screws(cell: Cell, q: Array, graph: CouplingGraph) -> Array:
     """Unit screws of all joints of the graph in its order, linear part first, in P about its origin, shape (6, e)."""
     placed = {robot.name: _robot_screws(robot, q[cell.columns(robot.name)]) for robot in cell.robots}
     holder = part_holder(cell)
-    X_WP = fixed_part_pose(cell) if holder is None else placed[holder[0].name][1] @ holder[1]
+    X_WP = cell.part.X_CP if holder is None else placed[holder[0].name][1] @ holder[1]
     X_PW = inverse(X_WP)
     to_P = np.zeros((6, 6))
     to_P[:3, :3] = to_P[3:, 3:] = X_PW[:3, :3]
@@ -217,8 +216,7 @@ def _unit_screws(cell: Cell, q: Array, graph: CouplingGraph) -> Array:
             chain[:3, :3] = chain[3:, 3:] = X_PW[:3, :3]  # along the axes of W
         chain[:3, 3:] = skew(r) @ chain[3:, 3:]
         virtual.append(chain[:, [axis for axis in range(6) if virtual_joint(task, axis) in names]])
-    screws: Array = np.concatenate([*real, *virtual], axis=1)
-    return screws
+    return np.concatenate([*real, *virtual], axis=1)
 
 
 def _robot_screws(robot: Robot, q: Array) -> tuple[Array, Array]:

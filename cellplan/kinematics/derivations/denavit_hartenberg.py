@@ -11,7 +11,6 @@ from cellplan.kinematics.derivations.serial_chain import (
     axis_shares,
     chain_to_flange,
     checked_configuration,
-    fixed_part_pose,
     part_holder,
 )
 from cellplan.model.cell import Cell, Robot
@@ -84,8 +83,7 @@ class DHChain:
 
     def flange_pose(self, q: Array) -> Array:
         """Flange in B, shape (4, 4)."""
-        pose: Array = self.frames(q)[-1] @ self.X_DF
-        return pose
+        return self.frames(q)[-1] @ self.X_DF
 
 
 def dh_chain(model: RobotModel) -> DHChain:
@@ -145,12 +143,12 @@ def dh_cooperation_jacobian(cell: Cell, q: Array) -> Array:
         nq): the grasps of further holders follow the tasks (4.5). Of a task in the world, relative to and in W.
 
     Raises:
-        InputError: The configuration does not fit the cell, or a fixed part has no pose.
+        InputError: The configuration does not fit the cell.
     """
     q = checked_configuration(cell, q)
     holder = part_holder(cell)
     arms = {robot.name: _arm(robot, q[cell.columns(robot.name)]) for robot in cell.robots}
-    X_WP = fixed_part_pose(cell) if holder is None else arms[holder[0].name].X_WF @ holder[1]
+    X_WP = cell.part.X_CP if holder is None else arms[holder[0].name].X_WF @ holder[1]
     J = np.zeros((len(cell.relations), 6, cell.joint_count))
     for block, task in zip(J, cell.relations, strict=True):
         arm, X_FT = arms[task.robot], cell.robot(task.robot).tool.X_FT

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_about
+from cellplan.geometry.transforms import Array, pose_from, rotation_about
 from cellplan.model.cell import Cell, Robot
-from cellplan.model.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
+from cellplan.model.robot import JointKind, RobotModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,25 +40,21 @@ class ChainAxis:
 
 def chain_to_flange(model: RobotModel) -> tuple[ChainAxis, ...]:
     """Axes that carry the flange, from the base on; joints and followers beside the way are left out."""
-    axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
-    chain: list[ChainAxis] = []
-    link = model.flange_link
-    while link != BASE:
-        axis = axes[link]
-        drive = (axis.leader, axis.ratio, axis.offset) if isinstance(axis, FollowerJoint) else (link, 1.0, 0.0)
+    chain = []
+    for link in model.links_to_flange:
+        axis, drive = model.axes[link], model.drive(link)
         chain.append(
             ChainAxis(
                 name=axis.name,
                 kind=axis.kind,
                 axis_B=axis.axis_B,
                 point_B=axis.point_B,
-                leader=drive[0],
-                ratio=drive[1],
-                offset=drive[2],
+                leader=drive.joint,
+                ratio=drive.ratio,
+                offset=drive.offset,
             )
         )
-        link = axis.parent
-    return tuple(reversed(chain))
+    return tuple(chain)
 
 
 def axis_positions(chain: tuple[ChainAxis, ...], q: Array) -> Array:
@@ -90,26 +86,14 @@ def part_holder(cell: Cell) -> tuple[Robot, Array] | None:
 
     Where several robots hold the part, the first is the reference ([Ribeiro2010]_ 4.5).
     """
-    if not cell.part.held_by:
+    if cell.carrier is None:
         return None
-    grasp = cell.part.held_by[0]
-    robot = cell.robot(grasp.robot)
-    return robot, robot.tool.X_FT @ inverse(grasp.X_PT)
-
-
-def fixed_part_pose(cell: Cell) -> Array:
-    """Pose ``X_WP`` of a part that nobody holds.
-
-    Raises:
-        InputError: The cell gives none.
-    """
-    if cell.part.X_WP is None:
-        raise InputError("part: expected a pose in the world for a part that nobody holds, got none")
-    return cell.part.X_WP
+    robot = cell.robots[cell.carrier]
+    return robot, robot.tool.X_FT @ cell.part.X_CP
 
 
 def checked_configuration(cell: Cell, q: Array) -> Array:
-    """The stacked joint vector, shape (nq,), after a look at its length and its figures.
+    """The stacked joint vector, shape (nq,), its length and figures checked.
 
     Raises:
         InputError: The length is wrong, or a figure is not finite.

@@ -10,7 +10,6 @@ from cellplan.kinematics.derivations.serial_chain import (
     chain_to_flange,
     checked_configuration,
     displacement,
-    fixed_part_pose,
     part_holder,
 )
 from cellplan.model.cell import Cell, Robot
@@ -47,7 +46,7 @@ def walk_from_part(cell: Cell, q: Array, operator: str) -> tuple[list[Step], Arr
     holder = part_holder(cell)
     steps: list[Step] = []
     if holder is None:
-        X_PW = inverse(fixed_part_pose(cell))
+        X_PW = inverse(cell.part.X_CP)
     else:
         robot, X_FP = holder
         X_PB = inverse(robot.model.X_BF @ X_FP)

@@ -61,7 +61,7 @@ def other_pictures(stored: StoredRun, drawn: Drawings) -> Iterator[str]:
 
 
 def _foreign_pieces(stored: StoredRun, place: str, drawn: Mapping[str, bytes]) -> Iterator[str]:
-    """Pictures of one run that hold something that cellplan does not draw; those missing ones are told elsewhere."""
+    """Pictures of one run that hold something that cellplan does not draw; missing ones are reported elsewhere."""
     for name, picture in stored.drawings(place).items():
         if name in drawn:
             foreign = foreign_piece(picture.decode("utf-8", "replace"), drawn[name].decode())

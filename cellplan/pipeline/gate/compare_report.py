@@ -10,7 +10,7 @@ from cellplan.pipeline.gate.equal_text import NOISE, is_same
 
 Record = Mapping[str, Any]
 
-INSTANT: Final = "at_s"  # ends the names of instants
+INSTANT: Final = "at_s"  # ends the names of times
 WORDS: Final = frozenset({"message", "pair", "axis", "joint", "sliding_joint", "busiest_joint"})
 NOISE_BY_ENDING: Final[Mapping[str, float]] = {  # in printed units: differences over short times enlarge the noise
     "acceleration": 1e-5,

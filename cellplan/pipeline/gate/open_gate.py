@@ -47,7 +47,7 @@ def open_gate(
         folder: The run folder.
         cell: The cell file that was solved; None when it is not at hand.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The folder is not a whole, unchanged run, or an input has changed.
@@ -206,12 +206,12 @@ def _series_findings(stored: StoredRun, motion: VerifiedMotion, *, is_same: bool
 def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> tuple[str, ...]:
     """Refuse pages that say something else than was found; remarks about what may be rounding or another version."""
     if not _is_of_this_version(stored):
-        return ("the page and the words of the report were not compared: another version of cellplan wrote them",)
+        return ("the page and the texts of the report were not compared: another version of cellplan wrote them",)
     drawn = drawn_again(cell, motions)
     _refuse_because(stored, list(page_findings(stored, cell, motions, drawn)))
     other = list(other_pictures(stored, drawn))
-    told = f"drawn here, some pictures look different, by rounding or by hand: {listed(other)}"
-    return (told,) if other else ()
+    remark = f"drawn here, some pictures look different, by rounding or by hand: {listed(other)}"
+    return (remark,) if other else ()
 
 
 def _is_of_this_version(stored: StoredRun) -> bool:
@@ -220,13 +220,13 @@ def _is_of_this_version(stored: StoredRun) -> bool:
 
 
 def _refuse_because(stored: StoredRun, findings: Sequence[str]) -> None:
-    """Refuse a run when there are findings about its files, of which the first are told."""
+    """Refuse a run when there are findings about its files, of which the first are listed."""
     if findings:
         more = len(findings) - MOST_DIFFERENCES
-        told = list(findings[:MOST_DIFFERENCES]) + (
+        listed_first = list(findings[:MOST_DIFFERENCES]) + (
             [f"{stored.folder}: and {more} more differences"] if more > 0 else []
         )
-        raise InvalidFileError([InputError(finding) for finding in told])
+        raise InvalidFileError([InputError(finding) for finding in listed_first])
 
 
 def _other_versions(stored: StoredRun) -> Iterator[str]:

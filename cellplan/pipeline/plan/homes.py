@@ -27,9 +27,9 @@ from cellplan.planning.start.home_candidates import home_candidates
 from cellplan.scene.scene import Scene
 
 STAGE: Final = "searching homes of idle robots"
-INSTANTS: Final = 32  # of each run at which candidates are looked at before one is certified
+INSTANTS: Final = 32  # samples of each phase at which candidates are tried before one is certified
 ROOMS: Final = (0.05, 0.02, 0.0)  # [m] beyond the demanded clearance that the part and other robots are to leave a home
-MOST_CERTIFIED: Final = 24  # candidates per robot of which certification is tried; each failure adds its instant
+MOST_CERTIFIED: Final = 24  # candidates per robot of which certification is tried; each failure adds its sample
 
 
 def find_homes(scene: Scene, runs: Sequence[PlannedRun], *, progress: Progress = silent) -> Mapping[str, Array]:
@@ -42,7 +42,7 @@ def find_homes(scene: Scene, runs: Sequence[PlannedRun], *, progress: Progress =
     Args:
         scene: The scene of the cell, every start posture filled in.
         runs: The runs as they were planned.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         HomeNotFoundError: A robot has no such place.
@@ -125,7 +125,7 @@ class _Search:
         self._failed = Counter[str]()
 
     def home(self) -> Array | None:
-        """The candidate nearest to the start that is certified to be free, with room to spare if any is; or None."""
+        """The candidate nearest to the start certified to be free, with extra clearance if possible; or None."""
         robot = self._robot
         rng = generator(robot.name, self._cell.solver.seed)
         candidates = home_candidates(robot.model, self._chain, self._start(), rng)
@@ -151,7 +151,7 @@ class _Search:
         return q
 
     def why_nothing(self) -> str:
-        """One line on what stood in the way most often."""
+        """One line on what prevented a home most often."""
         name, cell = self._robot.name, self._cell
         tasks = [f"'{task}'" for run in self._runs for task in run.run.phase.tasks]
         while_worked = f"{listed(tasks)} {'is' if len(tasks) == 1 else 'are'} worked on"
@@ -175,7 +175,7 @@ class _Search:
         return start
 
     def _is_certified(self, home: Array) -> bool:
-        """Whether a configuration passes all checks of clearance; where one fails the trials learn the instant."""
+        """Whether a configuration passes all checks of clearance; where one fails its sample is added to the trials."""
         for place, idle in enumerate(self._runs):
             if not idle.scene.pairs:
                 continue
@@ -202,5 +202,5 @@ def _first_failed(checks: Sequence[Check]) -> Check | None:
 
 
 def _at(times: Array, q: Array, at_s: float) -> Array:
-    """Stacked configuration at an instant, every joint moving evenly from row to row, shape (nq,)."""
+    """Stacked configuration at a time, linear in time from row to row, shape (nq,)."""
     return np.array([np.interp(at_s, times, column) for column in q.T])

@@ -11,7 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.report import Check
 from cellplan.model.toolpath import Toolpath, Trajectory
 
-POSES: Final = 1001  # [-] poses of each path at which the depth of the tool's axis is looked at
+POSES: Final = 1001  # [-] poses of each path at which the depth of the tool's axis is computed
 
 
 def depths_on_paths(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> list[Check]:

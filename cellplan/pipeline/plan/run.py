@@ -9,10 +9,11 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.phase import Phase
 from cellplan.model.progress import Progress, silent
-from cellplan.model.toolpath import Toolpath
 from cellplan.planning.modes import standing
 from cellplan.planning.refine_motion import plan_within_accuracy
 from cellplan.planning.timing.schedule import sample, time_tasks
+from cellplan.planning.timing.timed_path import ClockedPath
+from cellplan.planning.tracking.motion_task import MotionTask
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,21 +31,20 @@ class PlannedRun:
     motion: Motion
 
 
-def plan_run(cell: Cell, toolpaths: Mapping[str, Toolpath], phase: Phase, *, progress: Progress = silent) -> PlannedRun:
+def plan_run(cell: Cell, paths: Mapping[str, ClockedPath], phase: Phase, *, progress: Progress = silent) -> PlannedRun:
     """Follow the tasks of one phase; idle robots stand at their homes, or at their starts while these are unknown.
 
     Args:
         cell: The cell, every start posture filled in.
-        toolpaths: Toolpath of every task, by task name.
+        paths: Path of every task on the common clock, by task name.
         phase: The phase.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         NoSolutionError: A tool lost its path.
     """
-    timed = time_tasks(cell, [toolpaths[name] for name in phase.tasks])
-    schedule = sample(timed)
+    schedule = sample(time_tasks(cell, [paths[name] for name in phase.tasks]))
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     at = standing(cell, phase, start)
-    motion = plan_within_accuracy(cell, timed, schedule, start=at, moving=phase.moving, progress=progress)
+    motion = plan_within_accuracy(MotionTask(cell, schedule, phase.moving, at), progress=progress)
     return PlannedRun(phase=phase, schedule=schedule, motion=motion)

@@ -13,13 +13,14 @@ from cellplan.model.report import Check
 from cellplan.model.toolpath import Toolpath
 from cellplan.pipeline.plan.path_depths import depths_on_paths
 from cellplan.planning.start.search import StartChoice, choose_start
+from cellplan.planning.timing.timed_path import ClockedPath
 from cellplan.scene.bodies import Kind
 from cellplan.scene.grips import closed_depth
 from cellplan.scene.mounting import Mount, MountedPair
 from cellplan.scene.scene import Scene
 
 
-def chosen_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: Progress = silent) -> StartChoice:
+def chosen_start(scene: Scene, paths: Mapping[str, ClockedPath], *, progress: Progress = silent) -> StartChoice:
     """Start configuration of the whole cell: see `choose_start`.
 
     A base deep in a floor, a part the wrong way round or a tool axis that comes through the part often leave a robot
@@ -29,9 +30,9 @@ def chosen_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: P
         StartNotFoundError: No configuration reaches all tasks within limits and without collision.
     """
     try:
-        return choose_start(scene, toolpaths, progress=progress)
+        return choose_start(scene, paths, progress=progress)
     except StartNotFoundError as error:
-        faults = list(_faults(scene, toolpaths))
+        faults = list(_faults(scene, {name: path.toolpath for name, path in paths.items()}))
         if not faults:
             raise
         raise StartNotFoundError(f"{'; '.join(faults)}; with that no start was found: {error}") from error

@@ -16,15 +16,16 @@ from cellplan.model.motion import Schedule
 from cellplan.model.rehearsal import Correction, Outcome, Round
 from cellplan.model.report import TaskAccuracy
 from cellplan.planning.collocation.at_samples import brought_onto_tasks
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.euler.measured_feedback import (
     corrected_references,
     integrate_measured,
     measured_start,
     settled_start,
 )
+from cellplan.planning.tracking.motion_task import MotionTask
 
-FAR_WITHIN: Final = 0.02  # [-] share of the tolerance below which a smaller error is of no use to anybody
+FAR_WITHIN: Final = 0.02  # [-] share of the tolerance below which errors are not reduced further
 PROGRESS: Final = 0.9  # [-] an error that is not below this share of the last one falls no more
 GROWN: Final = 2.0  # [-] an error above this multiple of the first one diverges
 
@@ -35,7 +36,7 @@ class Pass:
 
     Attributes:
         cell: The written cell, with its start postures.
-        schedule: What the tasks want.
+        schedule: Desired tool poses.
         moving: Names of the robots that may move.
         judged_from: First sample that is judged, by task.
         q: Joint positions of the program as it was solved, shape (N, nq).
@@ -49,19 +50,19 @@ class Pass:
 
     @property
     def operators(self) -> tuple[str, ...]:
-        """Robots whose tools are looked at, one per task."""
+        """Robots whose tools are measured, one per task."""
         return tuple(scheduled.task.robot for scheduled in self.schedule.tasks)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Attempt:
-    """One execution: what was told, what the joints did, what was measured, and how large the errors are."""
+    """One execution: the references, the commanded joint positions, the measured poses, and the errors."""
 
     references: Schedule
     q: Array
     measured: tuple[Array, ...]
     accuracy: tuple[TaskAccuracy, ...]
-    told: Round
+    figures: Round
 
 
 def correct_from_pass_to_pass(
@@ -71,7 +72,7 @@ def correct_from_pass_to_pass(
     *,
     rng: np.random.Generator,
     rounds: int,
-    tell: Callable[[int], None],
+    on_round: Callable[[int], None],
 ) -> Correction:
     """Repeat the program on the real cell until its error converges.
 
@@ -83,28 +84,28 @@ def correct_from_pass_to_pass(
         system: The measuring system.
         rng: Where its noise comes from.
         rounds: Most corrections that are made.
-        tell: Hears the number of each round that begins.
+        on_round: Called with the number of each round that begins.
     """
     executions = _Executions(job, real, system, rng)
     executions.add(job.schedule, job.q)
     outcome = _outcome(executions.rounds, rounds)
     while outcome is None:
         last = executions.all[-1]
-        tell(last.told.number + 1)
+        on_round(last.figures.number + 1)
         references = corrected_references(job.schedule, last.references, last.measured)
         try:
-            start = settled_start(job.cell, references, start=last.q[0], moving=job.moving)
+            start = settled_start(MotionTask(job.cell, references, job.moving, last.q[0]))
             q = _planned(job, references, start)
         except NoSolutionError:
             outcome = Outcome.DIVERGED
             break
         executions.add(references, q)
         outcome = _outcome(executions.rounds, rounds)
-    best = min(executions.all, key=lambda attempt: attempt.told.measured_share)
+    best = min(executions.all, key=lambda attempt: attempt.figures.measured_share)
     return Correction(
         outcome=outcome,
         rounds=executions.rounds,
-        best=best.told.number,
+        best=best.figures.number,
         accuracy=best.accuracy,
         references=best.references,
         q=best.q,
@@ -124,17 +125,19 @@ def correct_within_the_pass(
         return measured_poses(real.tool_poses(job.operators, q), system, rng)
 
     try:
-        start = measured_start(job.cell, job.schedule, start=job.q[0], moving=job.moving, measure=measure)
-        motion = integrate_measured(job.cell, job.schedule, start=start, moving=job.moving, measure=measure)
+        start = measured_start(MotionTask(job.cell, job.schedule, job.moving, job.q[0]), measure=measure)
+        motion = integrate_measured(MotionTask(job.cell, job.schedule, job.moving, start), measure=measure)
     except NoSolutionError:
         return None
     return real.accuracy(job.schedule, motion.q)
 
 
 def _planned(job: Pass, references: Schedule, start: Array) -> Array:
-    """Motion on new references, which are known at the instants of the clock only: by steps, then put right there."""
-    q = follow(job.cell, references, start=start, moving=job.moving).q
-    return brought_onto_tasks(job.cell, references, q, moving=job.moving) if job.cell.solver.is_accurate else q
+    """Motion on new references, which are known at the samples only: by steps, then corrected at the samples."""
+    q = integrate_schedule(MotionTask(job.cell, references, job.moving, start)).q
+    return (
+        brought_onto_tasks(MotionTask(job.cell, references, job.moving, q[0]), q) if job.cell.solver.is_accurate else q
+    )
 
 
 class _Executions:
@@ -148,10 +151,10 @@ class _Executions:
     @property
     def rounds(self) -> tuple[Round, ...]:
         """The errors of every execution."""
-        return tuple(attempt.told for attempt in self.all)
+        return tuple(attempt.figures for attempt in self.all)
 
     def add(self, references: Schedule, q: Array) -> None:
-        """Tell the real cell a motion and look at its tools."""
+        """Command a motion to the real cell and measure its tools."""
         job = self._job
         true = self._real.tool_poses(job.operators, q)
         measured = measured_poses(true, self._system, self._rng)
@@ -159,14 +162,14 @@ class _Executions:
             tuple(pose_accuracy(task, X_PT) for task, X_PT in zip(job.schedule.tasks, poses, strict=True))
             for poses in (true, measured)
         )
-        told = Round(
+        figures = Round(
             number=len(self.all),
             position={each.task: largest(each.position_error, job.judged_from[each.task]) for each in accuracy},
             orientation={each.task: largest(each.orientation_error, job.judged_from[each.task]) for each in accuracy},
             share=worst_share(job.cell, accuracy, job.judged_from),
             measured_share=worst_share(job.cell, seen, job.judged_from),
         )
-        self.all.append(_Attempt(references=references, q=q, measured=measured, accuracy=accuracy, told=told))
+        self.all.append(_Attempt(references=references, q=q, measured=measured, accuracy=accuracy, figures=figures))
 
 
 def _outcome(rounds: Sequence[Round], limit: int) -> Outcome | None:

@@ -63,9 +63,9 @@ def rehearse(
         cell: The cell, as ``load_cell`` gives it.
         errors: How real cells differ from it, as ``load_errors`` gives them.
         feedback: Correct from pass to pass.
-        in_pass: Also execute with the error measured at each instant fed back at the next.
+        in_pass: Also execute with the error measured at each sample fed back at the next.
         rounds: Most corrections from pass to pass.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The cell cannot be worked with, several robots hold the part, or there are more trials than can be
@@ -82,9 +82,10 @@ def rehearse(
     solution = solve(cell, progress=progress)
     trials = errors.trials if errors.is_random else 1
     _refuse_too_many(solution.runs, trials, errors)
-    wish = _Options(feedback=feedback, in_pass=in_pass, rounds=rounds)
+    options = _Options(feedback=feedback, in_pass=in_pass, rounds=rounds)
     runs = tuple(
-        _rehearse_run(solution.cell, run, errors, trials=trials, wish=wish, progress=progress) for run in solution.runs
+        _rehearse_run(solution.cell, run, errors, trials=trials, options=options, progress=progress)
+        for run in solution.runs
     )
     return Rehearsal(
         cell=solution.cell,
@@ -121,7 +122,7 @@ def _refuse_too_many(runs: Sequence[Run], trials: int, errors: CellErrors) -> No
 
 
 def _rehearse_run(
-    cell: Cell, run: Run, errors: CellErrors, *, trials: int, wish: _Options, progress: Progress
+    cell: Cell, run: Run, errors: CellErrors, *, trials: int, options: _Options, progress: Progress
 ) -> RunRehearsal:
     """Execute one run on every real cell."""
     job = Pass(
@@ -134,15 +135,15 @@ def _rehearse_run(
     made = []
     for number in range(trials):
         progress("rehearsing", number / trials)
-        made.append(_try(job, errors, number, wish=wish, progress=_within(progress, number, trials)))
-    corrected = _corrected(job, made[0], run.phase, progress) if trials == 1 and wish.feedback else None
+        made.append(_try(job, errors, number, options=options, progress=_within(progress, number, trials)))
+    corrected = _corrected(job, made[0], run.phase, progress) if trials == 1 and options.feedback else None
     return RunRehearsal(
         name=run.name,
         times=run.schedule.times,
         judged_from=job.judged_from,
         trials=tuple(made),
         before=_iso_figures(job, [trial.before for trial in made]),
-        after=_iso_figures(job, [trial.final for trial in made]) if wish.feedback else None,
+        after=_iso_figures(job, [trial.final for trial in made]) if options.feedback else None,
         corrected=corrected,
     )
 
@@ -152,23 +153,23 @@ def _within(progress: Progress, number: int, trials: int) -> Progress:
     return lambda stage, share: progress(stage, (number + share) / trials)
 
 
-def _try(job: Pass, errors: CellErrors, number: int, *, wish: _Options, progress: Progress) -> Trial:
+def _try(job: Pass, errors: CellErrors, number: int, *, options: _Options, progress: Progress) -> Trial:
     """One real cell."""
     draw = draw_errors(job.cell, errors, number)
     real = RealCell(perturbed_cell(job.cell, draw))
     system = Measurement(position_noise=errors.position_noise, orientation_noise=errors.orientation_noise)
     before = real.accuracy(job.schedule, job.q)
     correction, in_pass = None, None
-    if wish.feedback:
+    if options.feedback:
         correction = correct_from_pass_to_pass(
             job,
             real,
             system,
             rng=np.random.default_rng([errors.seed, number, MEASUREMENT_STREAM]),
-            rounds=wish.rounds,
-            tell=lambda made: progress(f"correcting, round {made}", made / (wish.rounds + 1)),
+            rounds=options.rounds,
+            on_round=lambda made: progress(f"correcting, round {made}", made / (options.rounds + 1)),
         )
-    if wish.in_pass:
+    if options.in_pass:
         progress("correcting within the pass", 1.0)
         rng = np.random.default_rng([errors.seed, number, IN_PASS_STREAM])
         in_pass = correct_within_the_pass(job, real, system, rng=rng)

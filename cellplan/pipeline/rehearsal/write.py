@@ -23,7 +23,7 @@ def write_rehearsal(rehearsal: Rehearsal, folder: Path, *, progress: Progress = 
     Args:
         rehearsal: What was rehearsed.
         folder: The folder; an older rehearsal there is replaced.
-        progress: Who wants to know how far it is.
+        progress: Called with the stage and the fraction done.
 
     Returns:
         The record in the ``rehearsal.json`` of the folder.

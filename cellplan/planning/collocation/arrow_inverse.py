@@ -62,8 +62,7 @@ class ArrowInverse:
 
     def twists(self, own: Array, shared: Array) -> Array:
         """Tool twists that joint speeds give, ``J q_dot``, shape (6, tasks, lanes)."""
-        twists: Array = np.einsum("intb,ntb->itb", self._A, own) + np.einsum("imtb,mb->itb", self._C, shared)
-        return twists
+        return np.einsum("intb,ntb->itb", self._A, own) + np.einsum("imtb,mb->itb", self._C, shared)
 
 
 def eliminated(M: Array, *beside: Array) -> Array:

@@ -1,24 +1,21 @@
 """Motions that are known at instants only, brought onto their tasks at each of these, all at once."""
 
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.batched import IN_CACHE
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Schedule
 from cellplan.planning.collocation.batch_targets import sampled
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.solver import largest
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.motion_task import MotionTask
 
 STEPS: Final = 2  # of Newton's method: from a thousandth of a millimetre the first one goes nearly all the way
 SMALL: Final = 1e-3  # [rad] and [m] of such a step: a larger one is no correction any more
 
 
-def brought_onto_tasks(cell: Cell, schedule: Schedule, q: Array, *, moving: Sequence[str]) -> Array:
+def brought_onto_tasks(motion: MotionTask, q: Array) -> Array:
     """Postures near given ones, shape (N, nq), with the tools on their tasks at every instant of the clock.
 
     Newton's method with the weighted pseudo-inverse moves the joints as little as it can. Where that is no small
@@ -26,15 +23,13 @@ def brought_onto_tasks(cell: Cell, schedule: Schedule, q: Array, *, moving: Sequ
     fail on the way (``motion.locked_joints``) leave everything as it is.
 
     Args:
-        cell: The cell.
-        schedule: Where the tools are desired.
-        q: Configurations at the instants of the clock, shape (N, nq).
-        moving: Names of the robots that may move.
+        motion: The tasks and the robots that move for them.
+        q: Configurations at the samples of the clock, shape (N, nq).
     """
+    cell, schedule, grasps = motion.cell, motion.schedule, motion.grasps
     if cell.motion.locked:
         return q
-    grasps = closures(cell, moving)
-    tasks = BatchTasks(cell, [*(each.task for each in schedule.tasks), *grasps], moving)
+    tasks = BatchTasks(cell, [*(each.task for each in schedule.tasks), *grasps], motion.moving)
     placement, everything = tasks.chains.placement(cell), np.ones(cell.joint_count)
     brought = q.copy()
     for first in range(0, len(q), IN_CACHE):

@@ -1,4 +1,4 @@
-"""Where all tools are desired, at the instants of windows, in lanes."""
+"""References of all tools at the times of windows, as a batch."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -15,16 +15,17 @@ from cellplan.planning.timing.timed_path import TimedTasks
 
 
 class BatchTargets:
-    """The tools of timed tasks, then those of further holders, whose grasps never change.
+    """The tools of timed tasks, then those of further holders, whose grasps never change."""
 
-    Attributes:
-        offset: How far the tools stand beside their paths at the start; None when they stand on them.
-    """
+    def __init__(self, timed: TimedTasks, grasps: Sequence[Grasp], offset: StartOffset | None = None) -> None:
+        """Take the desired motions of all tools.
 
-    def __init__(self, timed: TimedTasks, grasps: Sequence[Grasp]) -> None:
-        """Take what asks for a tool's motion."""
-        self._timed, self._grasps = timed, tuple(grasps)
-        self.offset: StartOffset | None = None
+        Args:
+            timed: The tasks on the common clock.
+            grasps: Grasps of the further holders that move.
+            offset: How far the tools stand beside their paths at the start; None when they stand on them.
+        """
+        self._timed, self._grasps, self._offset = timed, tuple(grasps), offset
 
     def in_windows(self, windows: Sequence[Window]) -> list[Reference]:
         """Targets at the instants of each window; each sees corners from inside its panels."""
@@ -48,9 +49,9 @@ class BatchTargets:
 
     def _from_start(self, times: Array, desired: Reference) -> Reference:
         """Targets moved so that they begin where the tools are."""
-        if self.offset is None:
+        if self._offset is None:
             return desired
-        return Reference(*self.offset.applied(times, desired.R, desired.p, desired.twists))
+        return Reference(*self._offset.applied(times, desired.R, desired.p, desired.twists))
 
 
 def sampled(schedule: Schedule, instants: slice, grasps: Sequence[Grasp]) -> Reference:

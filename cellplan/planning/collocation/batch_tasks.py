@@ -1,15 +1,15 @@
-"""All tasks of a run at many configurations at once: pose errors and the arrow-shaped cooperation Jacobian."""
+"""Batched linearisation: pose errors and the arrow-shaped cooperation Jacobian of all tasks at many configurations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from cellplan.geometry.transforms import SMALL_ANGLE, Array, inverse
+from cellplan.geometry.transforms import SMALL_ANGLE, Array
 from cellplan.kinematics.batched import BatchChains, BatchState, Placement
 from cellplan.model.cell import Cell, Relation
-from cellplan.model.task import Frame
 from cellplan.planning.collocation.arrow_inverse import ArrowInverse
+from cellplan.planning.tracking.task_constraints import TaskConstraints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,23 +64,18 @@ class BatchTasks:
 
     def __init__(self, cell: Cell, tasks: Sequence[Relation], moving: Sequence[str]) -> None:
         """Gather what stays the same from configuration to configuration."""
-        names, holders = [robot.name for robot in cell.robots], cell.positioners[:1]
         self.chains, self.joint_count = BatchChains(cell), cell.joint_count
-        self._robots = np.array([names.index(task.robot) for task in tasks], dtype=np.intp)
-        self._holder = names.index(holders[0]) if holders else None
-        self._X_TP = _part_in_carrier(cell)
-        self._is_on_part = np.array([task.relative_to is Frame.PART for task in tasks])
-        self._is_spin_free = np.array([task.is_spin_free for task in tasks])
-        self._kept = np.array([_kept(task) for task in tasks]).T[:, :, None]
-        self._is_whole = bool(np.all(self._kept == 1.0))
-        carries = np.isin([task.robot for task in tasks], holders)
-        self._own = np.where(carries, 0.0, 1.0)[:, None]
-        self._share = np.where(carries, 1.0, -1.0 * self._is_on_part)[:, None]
+        constraints = TaskConstraints.of(cell, tasks, moving)
+        self._robots, self._holder, self._X_CP = constraints.operators, constraints.carrier, cell.part.X_CP
+        self._is_on_part, self._is_spin_free = constraints.is_on_part, constraints.is_spin_free
+        self._kept = constraints.kept.T[:, :, None].astype(float)
+        self._is_whole = constraints.is_whole
+        self._own, self._share = constraints.operator_signs[:, None], constraints.carrier_signs[:, None]
         joints = 0 if self._holder is None else len(cell.robots[self._holder].model.joints)
         self._own_columns = self.chains.columns[:, self._robots]
         self._shared_columns = self.chains.columns[:joints, self._holder or 0]
         self._weights = np.concatenate([robot.weights for robot in cell.robots])
-        self._may_move = np.concatenate([np.full(len(r.model.joints), float(r.name in moving)) for r in cell.robots])
+        self._may_move = constraints.may_move
 
     def look(self, q: Array, desired: Reference, placement: Placement, *, mobile: Array) -> "Look":
         """The tasks at stacked joint vectors, shape (nq, lanes), to first order.
@@ -135,14 +130,14 @@ class BatchTasks:
     def _seen(self, state: BatchState) -> ToolPoses:
         """The tools as the tasks see them."""
         p_WT, R_WT = state.p_WT[:, self._robots], state.R_WT[:, :, self._robots]
-        R_TP, p_TP = self._X_TP[:3, :3], self._X_TP[:3, 3]
+        R_CP, p_CP = self._X_CP[:3, :3], self._X_CP[:3, 3]
         R_WR, p_WR = np.empty_like(R_WT), np.empty_like(p_WT)
         if self._holder is None:
-            R_WR[:], p_WR[:] = R_TP[..., None, None], p_TP[..., None, None]
+            R_WR[:], p_WR[:] = R_CP[..., None, None], p_CP[..., None, None]
         else:
-            R_WH = state.R_WT[:, :, self._holder]
-            R_WR[:] = np.einsum("ijb,jk->ikb", R_WH, R_TP)[:, :, None]
-            p_WR[:] = (state.p_WT[:, self._holder] + np.einsum("ijb,j->ib", R_WH, p_TP))[:, None]
+            R_WC = state.R_WT[:, :, self._holder]
+            R_WR[:] = np.einsum("ijb,jk->ikb", R_WC, R_CP)[:, :, None]
+            p_WR[:] = (state.p_WT[:, self._holder] + np.einsum("ijb,j->ib", R_WC, p_CP))[:, None]
         if not self._is_on_part.all():
             R_WR[:, :, ~self._is_on_part] = np.eye(3)[:, :, None, None]
             p_WR[:, ~self._is_on_part] = 0.0
@@ -252,24 +247,6 @@ class Look:
         np.einsum("ijtb,jtb->itb", self._rows, b[:3], out=turned[:3])
         np.einsum("ijtb,jtb->itb", self._rows, b[3:], out=turned[3:])
         return turned
-
-
-def _part_in_carrier(cell: Cell) -> Array:
-    """The part in the tool frame of the robot that carries the part frame, or in W where nobody holds it."""
-    if cell.part.held_by:
-        return inverse(cell.part.held_by[0].X_PT)
-    if cell.part.X_WP is None:
-        raise ValueError("a part that nobody holds needs a pose in the world")
-    return cell.part.X_WP
-
-
-def _kept(task: Relation) -> Array:
-    """1 for the components that a task keeps; with free spin the two rotations across the tool axis."""
-    kept = np.zeros(6)
-    kept[list(task.axes)] = 1.0
-    if task.is_spin_free:
-        kept[3:] = [1.0, 1.0, 0.0]
-    return kept
 
 
 def _rotation(sine_axis: Array, cosine: Array) -> Array:

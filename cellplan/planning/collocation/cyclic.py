@@ -9,7 +9,7 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.motion import Schedule
 from cellplan.model.task import INSTANT_ROOM
-from cellplan.planning.collocation.joint_polynomials import JointPath, joined
+from cellplan.planning.collocation.joint_polynomials import CollocatedPath, joined
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.euler.cycle_closing import SAME_POSE, closing_drift, not_back
 from cellplan.planning.timing.common_cycles import common_cycles
@@ -19,11 +19,11 @@ PERIODIC: Final = 3e-9  # [rad] or [m] by which joints may be off after a cycle 
 
 
 class _NoConvergenceError(NoSolutionError):
-    """The accurate mode finds no way through a cycle."""
+    """Collocation does not converge over a cycle."""
 
 
-def closed_path(run: AccurateRun, problem: TrackingProblem, schedule: Schedule, *, start: Array) -> JointPath | None:
-    """A path that closes in every cycle; None where the accurate mode finds no way.
+def closed_path(run: AccurateRun, problem: TrackingProblem) -> CollocatedPath | None:
+    """A path that closes in every cycle; None where collocation does not converge.
 
     Each cycle gets a drift of its own, in one direction and at rest at both ends. Where the targets of a cycle are
     those of the one before, it repeats its motion: a drift alone would let rounding grow from cycle to cycle, as the
@@ -33,19 +33,17 @@ def closed_path(run: AccurateRun, problem: TrackingProblem, schedule: Schedule, 
     Args:
         run: The run.
         problem: Its tasks.
-        schedule: Their schedule.
-        start: Stacked start posture, shape (nq,).
 
     Raises:
         InputError: A path is open.
         NoSolutionError: A cycle does not close.
     """
-    bounds = _bounds(run, schedule)
+    bounds, start = _bounds(run, problem.motion.schedule), problem.motion.start
     for begin, end in pairwise(bounds):
         _refuse_open(run, problem, begin, end)
     try:
         path = _whole(run, start, begin=0.0, end=bounds[0])
-        before: JointPath | None = None
+        before: CollocatedPath | None = None
         for begin, end in pairwise(bounds):
             again = None if before is None else run.repeated(before, begin=begin)
             cycle = _closing(run, problem, path.last, begin=begin, end=end) if again is None else again
@@ -70,23 +68,22 @@ def _refuse_open(run: AccurateRun, problem: TrackingProblem, begin: float, end: 
             raise InputError(not_back(problem.cell, task, end))
 
 
-def _closing(run: AccurateRun, problem: TrackingProblem, q: Array, *, begin: float, end: float) -> JointPath:
+def _closing(run: AccurateRun, problem: TrackingProblem, q: Array, *, begin: float, end: float) -> CollocatedPath:
     """Motion of one cycle that brings the joints back."""
-    found: list[JointPath] = []
+    found: list[CollocatedPath] = []
 
     def moved(drift: Array) -> Array:
         found[:] = [_whole(run, q, begin=begin, end=end, drift=drift)]
-        round_trip: Array = found[0].last - q
-        return round_trip
+        return found[0].last - q
 
     instant = int(np.argmin(np.abs(problem.times - begin)))
     closing_drift(problem, q, moved, duration=end - begin, instant=instant)
     return found[0]
 
 
-def _whole(run: AccurateRun, q: Array, *, begin: float, end: float, drift: Array | None = None) -> JointPath:
+def _whole(run: AccurateRun, q: Array, *, begin: float, end: float, drift: Array | None = None) -> CollocatedPath:
     """Motion up to an instant, not less far."""
     path = run.path(q, begin=begin, end=end, drift=drift)
     if path.end < end - INSTANT_ROOM:
-        raise _NoConvergenceError("no way leads through the cycle")
+        raise _NoConvergenceError("collocation did not converge over the first cycle")
     return path

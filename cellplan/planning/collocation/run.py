@@ -1,6 +1,5 @@
 """Accurate run: the joints of one cell as polynomials in time, by collocation."""
 
-from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Final
 
@@ -14,14 +13,14 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.task import INSTANT_ROOM
 from cellplan.planning.collocation.batch_targets import BatchTargets
 from cellplan.planning.collocation.batch_tasks import BatchTasks
-from cellplan.planning.collocation.joint_polynomials import JointPath
-from cellplan.planning.collocation.solver import Collocation, Indices, largest
+from cellplan.planning.collocation.joint_polynomials import CollocatedPath
+from cellplan.planning.collocation.solver import Collocation, Drift, Indices, Precision, largest
 from cellplan.planning.collocation.start_offset import start_offset
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
 from cellplan.planning.euler.cycle_closing import SAME_POSE, drift_pace
 from cellplan.planning.timing.timed_path import TimedTasks, distinct
 from cellplan.planning.tracking.locked_joints import locked_since
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.motion_task import MotionTask
 
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
 SHORTEST_SHARE: Final = 1.0 / 4096.0  # of the motion: panels may be that short where steps of the clock are longer
@@ -37,49 +36,46 @@ class AccurateRun:
 
     Attributes:
         end: End of the run in [s].
-        collocation: What resolves it, and counts how much that takes.
+        sweeps: Passes over windows so far.
+        solves: Systems of equations solved so far.
     """
 
-    def __init__(
-        self, cell: Cell, timed: TimedTasks, *, start: Array, moving: Sequence[str], progress: Progress = silent
-    ) -> None:
-        """Gather the tasks, and see how far the tools stand beside their paths at the start.
+    def __init__(self, motion: MotionTask, *, progress: Progress = silent) -> None:
+        """Gather the tasks, and measure how far the tools stand beside their paths at the start.
 
         Args:
-            cell: The cell.
-            timed: The tasks on the common clock.
-            start: Stacked start posture, shape (nq,).
-            moving: Names of the robots that may move.
-            progress: Who wants to know how far it is.
+            motion: The tasks, the robots that move and their start.
+            progress: Called with the stage and the fraction done.
         """
-        grasps = closures(cell, moving)
+        cell, timed, grasps = motion.cell, motion.timed, motion.grasps
         accuracy = min(cell.solver.accuracy, TO_CLOSE) if cell.motion.cyclic else cell.solver.accuracy
-        tasks = BatchTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
-        targets, placement = BatchTargets(timed, grasps), tasks.chains.placement(cell)
+        tasks = BatchTasks(cell, [*(path.task for path in timed.paths), *grasps], motion.moving)
+        placement, self.end = tasks.chains.placement(cell), float(timed.times[-1])
         breaks, jumps = timed.breaks, timed.jumps
         until, first = _settled(cell, timed, len(grasps)), breaks[:2]
-        desired = targets.at(first[:1], first[:1], first[1:])
-        targets.offset = start_offset(tasks, desired, placement, start=start, until=until, accuracy=accuracy)
-        self.collocation = Collocation(tasks, targets, placement, accuracy=accuracy)
-        self.end = float(timed.times[-1])
-        if cell.motion.cyclic:
-            self.collocation.configuration_room = STEADY
-        self.collocation.shortest = min(cell.motion.step, SHORTEST_SHARE * self.end)
-        self._tasks, self._targets, self._placement = tasks, targets, placement
+        desired = BatchTargets(timed, grasps).at(first[:1], first[:1], first[1:])
+        offset = start_offset(tasks, desired, placement, start=motion.start, until=until, accuracy=accuracy)
+        self._precision = Precision(
+            accuracy=accuracy,
+            configuration_tol=STEADY if cell.motion.cyclic else None,
+            shortest=min(cell.motion.step, SHORTEST_SHARE * self.end),
+        )
+        self.sweeps = self.solves = 0
+        self._tasks, self._targets, self._placement = tasks, BatchTargets(timed, grasps, offset), placement
         self._locked_since, self._progress = locked_since(cell), progress
-        inner = np.concatenate([jumps, self._locked_since, *([] if targets.offset is None else [until])])
+        inner = np.concatenate([jumps, self._locked_since, *([] if offset is None else [until])])
         self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
         self._knots = breaks
 
-    def path(self, q: Array, *, begin: float, end: float, drift: Array | None = None) -> JointPath:
-        """Motion from a configuration at ``begin``, shape (nq,), up to ``end``, or as far as a way leads.
+    def path(self, q: Array, *, begin: float, end: float, drift: Array | None = None) -> CollocatedPath:
+        """Motion from a configuration at ``begin``, shape (nq,), up to ``end``, or as far as collocation converges.
 
         Args:
             q: The configuration.
             begin: First instant in [s].
             end: Last instant in [s].
-            drift: Joint speeds that are asked for in the null space of the tasks, shape (nq,), on average: they begin
-                and end with rest.
+            drift: Mean joint velocities that are added in the null space of the tasks, shape (nq,); they begin and end
+                with rest.
         """
         panels: list[Panel] = []
         nodes: list[Array] = []
@@ -91,23 +87,26 @@ class AccurateRun:
             errors.append(float(worst[0]))
             self._progress("planning", window.panels[-1].end / self.end)
 
-        self.collocation.drift = None if drift is None else _paced(drift, begin, end)
+        paced = None if drift is None else _paced(drift, begin, end)
         at = q[:, None].copy()
         for breaks in self._stretches(begin, end):
-            self.collocation.mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
-            if not len(
-                self.collocation.carry(windows_between(breaks, whole=self.end, knots=self._knots), at, ONLY, record)
-            ):
+            mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
+            collocation = Collocation(
+                self._tasks, self._targets, self._placement, self._precision, mobile=mobile, drift=paced
+            )
+            windows = windows_between(breaks, whole=self.end, knots=self._knots)
+            arrived = collocation.carry(windows, at, ONLY, record)
+            self.sweeps, self.solves = self.sweeps + collocation.sweeps, self.solves + collocation.solves
+            if not len(arrived):
                 break
-        return JointPath(q, begin, panels, nodes, max(errors))
+        return CollocatedPath(q, begin, panels, nodes, max(errors))
 
     def gaps(self, begin: float, end: float) -> Array:
         """How far each tool is desired at one instant from where it is desired at a later one, in pose entries."""
         inside = np.array([begin, end - INSTANT_ROOM])
         desired = self._targets.on_path(np.array([begin, end]), inside, inside + INSTANT_ROOM)
         turned = np.abs(np.diff(desired.R))[..., 0].max(axis=(0, 1))
-        farthest: Array = np.maximum(turned, np.abs(np.diff(desired.p))[..., 0].max(axis=0))
-        return farthest
+        return np.maximum(turned, np.abs(np.diff(desired.p))[..., 0].max(axis=0))
 
     def errors(self, schedule: Schedule, q: Array) -> Array:
         """Largest tool errors in [m] or [rad] at the first N samples, at configurations of shape (N, nq)."""
@@ -118,7 +117,7 @@ class AccurateRun:
             worst[some] = largest(self._tasks.errors(q[some].T, desired, self._placement))
         return worst
 
-    def repeated(self, cycle: JointPath, *, begin: float) -> JointPath | None:
+    def repeated(self, cycle: CollocatedPath, *, begin: float) -> CollocatedPath | None:
         """The motion of a cycle once more from another instant on; None where its tasks ask for something else."""
         again = cycle.shifted(begin - cycle.begin)
         if np.any((self._locked_since > cycle.begin) & (self._locked_since < again.end)):
@@ -138,12 +137,11 @@ class AccurateRun:
         return [breaks[low : high + 1] for low, high in pairwise(cuts)]
 
 
-def _paced(drift: Array, begin: float, end: float) -> Callable[[Array], Array]:
+def _paced(drift: Array, begin: float, end: float) -> Drift:
     """Speeds at instants in [s] that begin and end with rest, for mean ones of shape (nq,)."""
 
     def speeds(instants: Array) -> Array:
-        at_instants: Array = drift[:, None] * drift_pace((instants - begin) / (end - begin))
-        return at_instants
+        return drift[:, None] * drift_pace((instants - begin) / (end - begin))
 
     return speeds
 
@@ -152,5 +150,4 @@ def _settled(cell: Cell, timed: TimedTasks, grasps: int) -> Array:
     """Instants in [s] until which each tool, and that of each further holder, may be on its way to where it belongs."""
     given = [path.task.start + path.task.settle if path.task.settle else 0.0 for path in timed.paths]
     soon = min(SETTLING_STEPS * cell.motion.step, 0.5 * float(timed.times[-1]))
-    until: Array = np.maximum(np.array(given + [0.0] * grasps), soon)
-    return until
+    return np.maximum(np.array(given + [0.0] * grasps), soon)

@@ -24,6 +24,7 @@ from cellplan.planning.collocation.batch_tasks import BatchTasks, Reference
 from cellplan.planning.collocation.windows import Window
 
 Indices = NDArray[np.intp]
+Drift = Callable[[Array], Array]  # times in [s], shape (K,), to joint velocities, shape (nq, K)
 Record = Callable[[Window, Indices, Array, Array], None]  # window, cells, q (nq, cells, nodes), bounds (cells,)
 
 AT_ONCE: Final = 200  # windows whose targets are looked up together: some 20 000 instants
@@ -33,7 +34,9 @@ FREE_PASSES: Final = 3  # before a pass is judged by that
 LONGEST_MOVE: Final = np.pi  # [rad] or [m]: a pass that moves a joint farther has lost its way
 OVERSHOOT: Final = 2.0  # largest error anywhere, of the largest that is looked at; see `_errors`
 TOOL_SHARE: Final = 0.25  # of the accuracy: tool errors at the nodes that passes may leave
-POSTURE_SHARE: Final = 10.0  # configurations may be this many times as far from their limit as tools, in [rad] for [m]
+CONFIGURATION_SHARE: Final = (
+    10.0  # configurations may be this many times as far from their limit as tools, in [rad] for [m]
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,33 +54,56 @@ class Attempt:
     errors: Array
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Precision:
+    """How exact a motion has to be, and how fine it may become.
+
+    Attributes:
+        accuracy: Largest tool error at the nodes and between them, in [m] and [rad].
+        configuration_tol: Distance of configurations from the limit of the passes, in [rad] and [m]; None for ten
+            times the accuracy.
+        shortest: Length in [s] below which no panel is made by halving.
+    """
+
+    accuracy: float
+    configuration_tol: float | None = None
+    shortest: float = 0.0
+
+
 class Collocation:
-    """Resolves one run of many cells that differ in bases, tools and start postures only.
+    """Resolves one run of many cells that differ in bases, tools and start configurations only.
 
     Attributes:
         sweeps: Passes over windows so far.
         solves: Systems of equations solved so far: nodes of all passes.
-        mobile: 1 for joints that are not locked, shape (nq,).
-        drift: Joint speeds that are asked for in the null space of the tasks at instants in [s], as a function of
-            shape (K,) to (nq, K); None for none.
-        configuration_room: How far configurations may be from the limit of the passes, in [rad] and [m].
-        shortest: Length in [s] below which no panel is made by halving.
     """
 
-    def __init__(self, tasks: BatchTasks, targets: BatchTargets, placement: Placement, *, accuracy: float) -> None:
-        """Begin with all joints free.
+    def __init__(
+        self,
+        tasks: BatchTasks,
+        targets: BatchTargets,
+        placement: Placement,
+        precision: Precision,
+        *,
+        mobile: Array | None = None,
+        drift: Drift | None = None,
+    ) -> None:
+        """Take tasks, robots and joints.
 
         Args:
             tasks: The tasks of the run.
-            targets: Where the tools are desired.
+            targets: References of the tools.
             placement: Where the robots of the cells stand; one for all, or one per cell.
-            accuracy: Largest tool error at the nodes and between them, in [m] and [rad].
+            precision: How exact the motion has to be.
+            mobile: 1 for joints that are not locked, 0 for those that are, shape (nq,); None for all free.
+            drift: Joint velocities that are added in the null space of the tasks; None for none.
         """
-        self._tasks, self._targets, self._placement, self._accuracy = tasks, targets, placement, accuracy
+        self._tasks, self._targets, self._placement = tasks, targets, placement
+        self._accuracy, self._shortest, tolerance = precision.accuracy, precision.shortest, precision.configuration_tol
+        self._configuration_tol = CONFIGURATION_SHARE * precision.accuracy if tolerance is None else tolerance
+        self._mobile = np.ones(tasks.joint_count) if mobile is None else mobile
+        self._drift = drift
         self.sweeps = self.solves = 0
-        self.mobile: Array = np.ones(tasks.joint_count)
-        self.drift: Callable[[Array], Array] | None = None
-        self.shortest, self.configuration_room = 0.0, POSTURE_SHARE * accuracy
 
     def carry(self, windows: tuple[Window, ...], q: Array, cells: Indices, record: Record) -> Indices:
         """Carry cells through windows, refined where that is needed; returns those that came to the end.
@@ -86,7 +112,7 @@ class Collocation:
             windows: Windows in order.
             q: Configurations of all cells, shape (nq, all cells); those of the cells are carried on in place.
             cells: Indices of the cells to carry.
-            record: Is told of every window that cells passed, in order for each of them.
+            record: Called with every window that cells passed, in order for each of them.
         """
         for first in range(0, len(windows), AT_ONCE):
             batch = windows[first : first + AT_ONCE]
@@ -105,10 +131,10 @@ class Collocation:
             q[:, through] = attempt.q[:, is_exact, -1]
             record(window, through, attempt.q[:, is_exact], attempt.errors[:, is_exact].max(axis=0))
         is_rough = attempt.is_settled & ~is_exact
-        finer = [(~attempt.is_settled, window.parts(shortest=self.shortest))]
+        finer = [(~attempt.is_settled, window.parts(shortest=self._shortest))]
         if is_rough.any():
             places = np.any(attempt.errors[:, is_rough] > self._accuracy, axis=1)
-            finer.append((is_rough, window.refined(places.tolist(), shortest=self.shortest)))
+            finer.append((is_rough, window.refined(places.tolist(), shortest=self._shortest)))
         arrived = [through]
         for which, windows in finer:
             if which.any() and windows:
@@ -130,7 +156,7 @@ class Collocation:
             ratio = change / before[going] if number else np.full(cells, SLOW)
             left = change * ratio / np.maximum(1.0 - ratio, 1.0 - SLOW)
             is_near = errors * ratio <= TOOL_SHARE * self._accuracy  # where blocks are nearly singular, Newton is slow
-            is_there = is_near & (left <= self.configuration_room)
+            is_there = is_near & (left <= self._configuration_tol)
             is_lost = ~(change < LONGEST_MOVE) | ((ratio > SLOW) & (number >= FREE_PASSES))
             is_settled[going[is_there]] = True
             before[going] = change
@@ -145,8 +171,8 @@ class Collocation:
         """Corrections of q at the nodes in one pass, (nq, cells, nodes), and tool errors before it, (cells,)."""
         self.sweeps += 1
         self.solves += q.shape[1] * q.shape[2]
-        look = self._tasks.look(q.reshape(len(q), -1), desired, placement, mobile=self.mobile)
-        drift = None if self.drift is None else np.tile(self.drift(window.instants[: window.count]), q.shape[1])
+        look = self._tasks.look(q.reshape(len(q), -1), desired, placement, mobile=self._mobile)
+        drift = None if self._drift is None else np.tile(self._drift(window.instants[: window.count]), q.shape[1])
         speeds = look.speeds(drift).reshape(q.shape)
         picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
         moved: Array = (picard + look.correction(picard)).reshape(q.shape)
@@ -171,5 +197,4 @@ class Collocation:
 def largest(errors: Array) -> Array:
     """Largest distance in [m] or angle in [rad] of all tasks, shape (6, tasks, lanes) to (lanes,)."""
     squares = np.maximum(np.sum(errors[:3] ** 2, axis=0), np.sum(errors[3:] ** 2, axis=0))
-    worst: Array = np.sqrt(squares.max(axis=0))
-    return worst
+    return np.sqrt(squares.max(axis=0))

@@ -19,56 +19,50 @@ SAME_POSE: Final = 1e-9  # largest difference of pose entries at both ends of a 
 SINGULAR: Final = 1e-9  # singular values below this share of the largest one are zero: rounding of the matrix
 
 
-def close(problem: TrackingProblem, schedule: Schedule, start: Array, carry: Callable[[int], Array]) -> None:
-    """Give the problem a drift with which the joint motion closes, cycle after cycle.
+def closed(problem: TrackingProblem, integrate: Callable[[TrackingProblem, int], Array]) -> TrackingProblem:
+    """The problem with a drift with which the joint motion closes, cycle after cycle.
 
     The first cycle gets a drift in one direction, at rest at both ends. What is left of the error would grow from cycle
-    to cycle where the map of one cycle onto the next is not a contraction, so every later cycle is drawn towards the
+    to cycle where the map of one cycle onto the next is not a contraction, so every later cycle is led back to the
     first one at the feedback gain.
 
     Args:
-        problem: The tasks; their drift is set.
-        schedule: Their schedule.
-        start: Stacked start posture, shape (nq,).
-        carry: Motion up to an instant under the drift that is set, shape (k + 1, nq).
+        problem: The tasks, without a drift.
+        integrate: Motion of a problem from its start to the sample k, shape (k + 1, nq).
 
     Raises:
         InputError: A path is open, or its cycle does not end on an instant of the clock.
         NoSolutionError: The cycle does not close.
     """
+    schedule, start = problem.motion.schedule, problem.motion.start
     begin, end = first_cycle(problem.cell, schedule)
     middles = (np.arange(end - begin) + 0.5) / (end - begin)
     pace = drift_pace(middles) / drift_pace(middles).mean()  # of each step of the cycle, as Euler takes it
 
     def drifting(k: int, mean: Array) -> Array:
-        speeds: Array = mean * pace[(k - begin) % (end - begin)] if k >= begin else np.zeros_like(mean)
-        return speeds
+        return mean * pace[(k - begin) % (end - begin)] if k >= begin else np.zeros_like(mean)
 
     def cycle(mean: Array) -> Array:
-        problem.drift = lambda k, _q: drifting(k, mean)
-        return carry(end)
+        return integrate(problem.with_drift(lambda k, _q: drifting(k, mean)), end)
 
     def gap(mean: Array) -> Array:
         q = cycle(mean)
-        moved: Array = q[-1] - q[begin]
-        return moved
+        return q[-1] - q[begin]
 
     mean = closing_drift(problem, start, gap, duration=float(schedule.times[end] - schedule.times[begin]))
     first = cycle(mean)
 
-    def held(k: int, q: Array) -> Array:
+    def feedback_drift(k: int, q: Array) -> Array:
         if k < end:
             return drifting(k, mean)
-        drawn: Array = drifting(k, mean) + problem.gain * (first[begin + (k - begin) % (end - begin)] - q)
-        return drawn
+        return drifting(k, mean) + problem.gain * (first[begin + (k - begin) % (end - begin)] - q)
 
-    problem.drift = held
+    return problem.with_drift(feedback_drift)
 
 
 def drift_pace(share: Array) -> Array:
     """Speed of a drift as a multiple of its mean, at shares 0..1 of the cycle: at rest at both ends, 1 on average."""
-    pace: Array = 30.0 * (share * (1.0 - share)) ** 2
-    return pace
+    return 30.0 * (share * (1.0 - share)) ** 2
 
 
 def closing_drift(
@@ -98,8 +92,7 @@ def closing_drift(
     B = np.eye(len(u)) / duration  # inverse of the derivative
 
     def gap(u: Array) -> Array:
-        gap: Array = N.T @ moved(N @ u)
-        return gap
+        return N.T @ moved(N @ u)
 
     drift = gap(u)
     for _ in range(ROUNDS):

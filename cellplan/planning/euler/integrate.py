@@ -1,6 +1,5 @@
-"""Follow the schedule: from instant to instant, so that every tool stays on its path on the moving part."""
+"""Euler's method: from sample to sample of the clock, with the pose error fed back."""
 
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -8,47 +7,45 @@ import numpy as np
 from cellplan.errors import DivergedError, NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
-from cellplan.model.motion import Motion, Schedule
+from cellplan.model.motion import Motion
 from cellplan.model.progress import Progress, silent
-from cellplan.planning.euler.cycle_closing import close
+from cellplan.planning.euler.cycle_closing import closed
 from cellplan.planning.methods import method_named
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
 from cellplan.planning.tracking.singularity import singular_words
 
-PROGRESS_EVERY: Final = 200  # [samples] between two words on progress
-LARGEST_STEP: Final = np.pi  # [rad] or [m]: a joint that goes farther in one step is not integrated any more
+PROGRESS_EVERY: Final = 200  # [samples]
+LARGEST_STEP: Final = np.pi  # [rad] or [m] of a joint in one step
 
 
-def follow(
-    cell: Cell, schedule: Schedule, *, start: Array, moving: Sequence[str], progress: Progress = silent
-) -> Motion:
-    """Let the cell's resolution method carry the joints from each instant of the clock to the next.
+def integrate_schedule(motion: MotionTask, *, progress: Progress = silent) -> Motion:
+    """Integrate the joint velocities of the cell's resolution method from each sample of the clock to the next.
 
     A cyclic motion gets a drift in the null space of the tasks that brings all joints back.
 
     Args:
-        cell: The cell.
-        schedule: Reference tool poses and twists on the common clock.
-        start: Stacked start posture, shape (nq,), in [rad] or [m].
-        moving: Names of the robots that may move.
-        progress: Who wants to know how far it is.
+        motion: The tasks, the robots that move and their start.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         DivergedError: A tool lost its path.
-        NoSolutionError: The method found no way on, or no cycle closes.
+        NoSolutionError: The method found no step, or no cycle closes.
     """
-    problem = TrackingProblem(cell, schedule, moving, start=start)
-    if cell.motion.cyclic:
-        close(problem, schedule, start, lambda last: carry(problem, start, last=last, progress=progress).q)
-    return carry(problem, start, last=len(schedule.times) - 1, progress=progress)
+    problem, start = TrackingProblem(motion), motion.start
+    if motion.cell.motion.cyclic:
+        problem = closed(problem, lambda drifting, last: integrate(drifting, start, last=last, progress=progress).q)
+    return integrate(problem, start, last=len(problem.times) - 1, progress=progress)
 
 
-def carry(problem: TrackingProblem, start: Array, *, first: int = 0, last: int, progress: Progress = silent) -> Motion:
-    """Motion from a start posture at the instant ``first`` to the instant ``last``; rows before it repeat the start.
+def integrate(
+    problem: TrackingProblem, start: Array, *, first: int = 0, last: int, progress: Progress = silent
+) -> Motion:
+    """Motion from a configuration at the sample ``first`` to the sample ``last``; rows before it repeat the start.
 
     Raises:
         DivergedError: A tool lost its path.
-        NoSolutionError: The method found no way on.
+        NoSolutionError: The method found no step.
     """
     cell = problem.cell
     advance = method_named(cell.solver.method)(problem)
@@ -57,7 +54,7 @@ def carry(problem: TrackingProblem, start: Array, *, first: int = 0, last: int, 
     for k in range(first, last):
         try:
             step = advance(k, q[k])
-            refuse_leap(cell, q[k], step)
+            refuse_long_step(cell, q[k], step)
         except NoSolutionError as error:
             singular = singular_words(problem, k, q[k])
             raise type(error)(f"{cell.origin.at('motion')}: at {problem.times[k]:.3f} s {error}{singular}") from None
@@ -67,8 +64,8 @@ def carry(problem: TrackingProblem, start: Array, *, first: int = 0, last: int, 
     return Motion(times=problem.times[: last + 1], q=q, iterations=iterations, slack=slack)
 
 
-def refuse_leap(cell: Cell, q: Array, step: Advance) -> None:
-    """Stop when a step is no number, or so long that the first order says nothing about it any more.
+def refuse_long_step(cell: Cell, q: Array, step: Advance) -> None:
+    """Stop when a step is not finite, or so long that the first order no longer holds.
 
     Raises:
         DivergedError: A joint would turn by half a turn, or slide as many metres, in one step.
@@ -77,6 +74,6 @@ def refuse_leap(cell: Cell, q: Array, step: Advance) -> None:
     if not float(np.max(moves, initial=0.0)) < LARGEST_STEP:  # also for what is not a number
         robot, joint = cell.joint_at(int(np.argmax(np.where(np.isfinite(moves), moves, np.inf))))
         raise DivergedError(
-            f"joint '{joint}' of '{robot}' would leap by half a turn or more in one step: shorten motion.step_s, lower "
+            f"joint '{joint}' of '{robot}' would move by half a turn or more in one step: shorten motion.step_s, lower "
             "the gain or allow damping (auto)"
         )

@@ -12,12 +12,12 @@ import numpy as np
 
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_exp, rotation_vector
-from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.task import Task
-from cellplan.planning.euler.integrate import follow, refuse_leap
+from cellplan.planning.euler.integrate import integrate_schedule, refuse_long_step
 from cellplan.planning.methods import method_named
-from cellplan.planning.tracking.cooperation_jacobian import pose_errors, reference_frames
+from cellplan.planning.tracking.cooperation_jacobian import pose_errors
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import TrackingProblem
 from cellplan.planning.tracking.singularity import singular_words
 
@@ -60,14 +60,15 @@ def displaced(task: Task, X_desired: Array, X_measured: Array, *, nominal: Array
     return pose_from(turn @ nominal[:, :3, :3], tip + error[:, :3] + lever)
 
 
-def settled_start(cell: Cell, references: Schedule, *, start: Array, moving: Sequence[str]) -> Array:
-    """The configuration near a start posture from which the model's tools stand on the first references, shape (nq,).
+def settled_start(motion: MotionTask) -> Array:
+    """The configuration near the start from which the model's tools stand on the first references, shape (nq,).
 
     Raises:
         NoSolutionError: The tools cannot be brought there.
     """
+    cell = motion.cell
     times: Array = cell.motion.step * np.arange(SETTLING_STEPS + 1, dtype=np.float64)
-    still = Schedule(times=times, tasks=tuple(_standing(task, len(times)) for task in references.tasks))
+    still = Schedule(times=times, tasks=tuple(_standing(task, len(times)) for task in motion.schedule.tasks))
     newton = replace(
         cell,
         solver=replace(
@@ -75,12 +76,11 @@ def settled_start(cell: Cell, references: Schedule, *, start: Array, moving: Seq
         ),
         motion=replace(cell.motion, cyclic=False),
     )
-    settled: Array = follow(newton, still, start=start, moving=moving).q[-1]
-    return settled
+    return integrate_schedule(replace(motion, cell=newton, schedule=still)).q[-1]
 
 
-def measured_start(cell: Cell, desired: Schedule, *, start: Array, moving: Sequence[str], measure: Measure) -> Array:
-    """Start posture from which the real tools stand on the first poses of their tasks, shape (nq,).
+def measured_start(motion: MotionTask, *, measure: Measure) -> Array:
+    """Configuration from which the real tools stand on the first poses of their tasks, shape (nq,).
 
     The standing tools are measured and put right several times: a pass that began with the whole error would begin with
     a jerk. The arguments are those of `integrate_measured`.
@@ -88,46 +88,43 @@ def measured_start(cell: Cell, desired: Schedule, *, start: Array, moving: Seque
     Raises:
         NoSolutionError: The tools cannot be brought there.
     """
+    desired = motion.schedule
     first = Schedule(times=desired.times[:1], tasks=tuple(_standing(task, 1) for task in desired.tasks))
-    references, q = first, start
+    references, q = first, motion.start
     for _ in range(START_MEASUREMENTS):
         references = corrected_references(first, references, measure(q[None]))
-        q = settled_start(cell, references, start=q, moving=moving)
+        q = settled_start(replace(motion, schedule=references, start=q))
     return q
 
 
-def integrate_measured(
-    cell: Cell, desired: Schedule, *, start: Array, moving: Sequence[str], measure: Measure
-) -> Motion:
+def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
     r"""Follow a schedule with the error measured at each instant fed back at once ([Nicolato2007]_ section 3.5).
 
     At instant k the method is told ``Delta(k) X_nominal(q_k)`` in place of the desired pose, with ``Delta`` of
     `corrected_references`, and for the next instant the displacement from what is measured now to what is desired then.
 
     Args:
-        cell: The written cell: what the method knows.
-        desired: What the tasks want.
-        start: Stacked start posture, shape (nq,), in [rad] or [m].
-        moving: Names of the robots that may move.
+        motion: The tasks in the written cell: what the method knows.
         measure: The measuring system.
 
     Raises:
         NoSolutionError: A tool lost its path, or the method found no way on.
     """
-    problem = TrackingProblem(cell, desired, moving)
+    cell, desired = motion.cell, motion.schedule
+    problem = TrackingProblem(motion)
     advance = method_named(cell.solver.method)(problem)
     targets = problem.desired.copy()
     q = np.empty((len(desired.times), cell.joint_count))
-    q[0] = start
+    q[0] = motion.start
     for k in range(len(q) - 1):
         state = problem.state(q[k])
-        nominal = inverse(reference_frames(state, problem.tasks)) @ state.X_WT[problem.operators]
+        nominal = inverse(problem.constraints.reference_frames(state.X_WP)) @ state.X_WT[problem.operators]
         for place, (scheduled, X_seen) in enumerate(zip(desired.tasks, measure(q[k : k + 1]), strict=True)):
             seen, told = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
             problem.desired[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=told)
         try:
             step = advance(k, q[k])
-            refuse_leap(cell, q[k], step)
+            refuse_long_step(cell, q[k], step)
         except NoSolutionError as error:
             singular = singular_words(problem, k, q[k])
             raise type(error)(f"{cell.origin.at('motion')}: at {desired.times[k]:.3f} s {error}{singular}") from None

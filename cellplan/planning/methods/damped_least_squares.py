@@ -7,9 +7,8 @@ from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.solver import DampedLeastSquaresSettings, SingularityMeasure
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
-from cellplan.planning.tracking.weighted_inverse import ROUNDING, WeightedInverse
+from cellplan.planning.tracking.weighted_inverse import LARGEST_DAMPING, ROUNDING, WeightedInverse
 
-LARGEST_DAMPING: Final = 0.02  # factor at a singularity when it is left to the program and w tells how near it is
 FULL_GAIN: Final = 4.0  # times the region: from here on the feedback has its whole gain (Nicolato Eq. 2.14)
 
 

@@ -14,7 +14,6 @@ def filtered_inverse_ii(problem: TrackingProblem) -> Callable[[int, Array], Adva
     """
 
     def law(theta: Array, J: Array) -> Array:
-        product: Array = theta @ (theta.T @ J.T)
-        return product
+        return theta @ (theta.T @ J.T)
 
     return FilteredMotion(problem, law).advance

@@ -8,7 +8,13 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
-from cellplan.planning.methods.support.configuration_search import Bounds, ConfigurationSearch, Pass, speed_bounds
+from cellplan.planning.methods.support.configuration_search import (
+    STALLED,
+    Bounds,
+    ConfigurationSearch,
+    Pass,
+    speed_bounds,
+)
 from cellplan.planning.methods.support.search_cost import NO_EFFECT, Look, SearchCost
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
@@ -18,7 +24,6 @@ ROUNDS_ON_A_LOOK: Final = (
 )
 SMALLEST_TRUST: Final = 1e-9  # [rad] or [m]: where even moves this small gain nothing there is nothing to gain
 AIM: Final = 0.25  # share of the allowed cost that the rounds are to leave to first order
-STALLED: Final = 1e-9  # share of the cost below which what a round gains counts as nothing
 
 Indices = NDArray[np.intp]
 
@@ -79,11 +84,10 @@ class _Rounds:
 
     def __init__(self, cell: Cell, sequence: Indices) -> None:
         """Take limits for the brakes and the tolerance."""
-        models = [robot.model for robot in cell.robots]
         self.shares = np.ones(len(sequence))
         self._sequence = sequence
-        self._lower = np.concatenate([model.lower for model in models])[sequence]
-        self._upper = np.concatenate([model.upper for model in models])[sequence]
+        self._lower = cell.joint_limits.lower[sequence]
+        self._upper = cell.joint_limits.upper[sequence]
         self._has_range = np.isfinite(self._upper - self._lower)
         self._has_brakes = cell.solver.search.brakes
         self._target = AIM * cell.solver.search.tolerance**2

@@ -6,10 +6,9 @@ from typing import Final
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
-from cellplan.planning.tracking.weighted_inverse import WeightedInverse
+from cellplan.planning.tracking.weighted_inverse import LARGEST_DAMPING, WeightedInverse
 
 SINGULAR_REGION: Final = 0.02  # smallest singular value below which damping sets in when it is left to the program
-LARGEST_DAMPING: Final = 0.02  # damping factor at the singularity when it is left to the program
 
 
 def weighted_pseudo_inverse(problem: TrackingProblem) -> Callable[[int, Array], Advance]:

@@ -1,4 +1,4 @@
-"""Toolpaths: from the words of a task to tool poses on the part."""
+"""Toolpaths: from a task as written to tool poses on the part."""
 
 from typing import Final
 
@@ -24,7 +24,7 @@ PROBES: Final = 257  # poses looked at before a toolpath is handed on
 
 
 def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
-    """Draw a task's path, lay it on the part, stand the tool on it and cut it at its stops.
+    """The toolpath of a task: its curve, projected onto the part, with the tool's orientation along it and its stops.
 
     Args:
         task: The task.
@@ -35,15 +35,14 @@ def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
         InputError: The path cannot be drawn, misses the part, runs over an edge, leaves the tool's turn open, or is to
             be gone through again and does not come back to its start.
     """
-    drawing = path_curve(task, origin)
-    laid = project_path(drawing, task, part, origin)
-    arc = measure(laid.tip)
-    refuse_unlikely_path(laid.tip, arc, task=task, part=part, where=origin.at(f"tasks.{task.name}.path"))
-    orientation = orient_tool(task, drawing, laid, origin)
+    curve = project_path(path_curve(task, origin), task, part, origin)
+    arc = measure(curve.curve)
+    refuse_unlikely_path(curve.curve, arc, task=task, part=part, where=origin.at(f"tasks.{task.name}.path"))
+    orientation = orient_tool(task, curve, origin)
     is_timed = isinstance(task.path, TimedPath)
     if not is_timed:
-        _refuse_standstill(laid.tip, arc, origin.at(f"tasks.{task.name}.path"))
-    is_closed = drawing.is_closed and _comes_back(laid.tip, orientation, drawing.stops)
+        _refuse_standstill(curve.curve, arc, origin.at(f"tasks.{task.name}.path"))
+    is_closed = curve.is_closed and _comes_back(curve.curve, orientation, curve.stops)
     if task.repeat > 1 and not is_closed:
         raise InputError(
             f"{origin.at(f'tasks.{task.name}.repeat')}: expected 1 for a path that does not end in the pose of its "
@@ -51,13 +50,13 @@ def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
         )
     toolpath = (Trajectory if is_timed else Toolpath)(
         name=task.name,
-        tip=laid.tip,
+        tip=curve.curve,
         orientation=orientation,
         arc=arc,
-        stops=drawing.stops,
+        stops=curve.stops,
         turn=task.turn,
         is_closed=is_closed,
-        runs_on=drawing.runs_on,
+        runs_on=curve.runs_on,
         stand_off=task.approach.distance if task.approach else 0.0,
     )
     if not is_rigid(_probe(toolpath)):

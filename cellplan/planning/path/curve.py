@@ -1,4 +1,4 @@
-"""PathCurve of a path as its task words it: a curve in the part frame with its stops, not yet laid on the part."""
+"""The curve of a task's path in the part frame, with its stops, before projection."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -17,6 +17,7 @@ from cellplan.geometry.curves.curve import (
     straight_sides,
 )
 from cellplan.geometry.curves.spline import spline_through
+from cellplan.geometry.curves.surface_patch import Patch
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Origin
 from cellplan.model.path_direction import outside_of, plane_axes
@@ -31,7 +32,7 @@ IN_PLANE: Final = np.sin(np.deg2rad(1.0))  # [-] a side seen at a flatter angle 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PathCurve:
-    """A curve in P before it is laid on the part.
+    """The curve of a tool tip in P: as its task states it, or projected onto the part.
 
     Attributes:
         curve: The curve.
@@ -39,6 +40,8 @@ class PathCurve:
         given: Parameters of the points as they were listed, shape (N,); a closed path ends with its start.
         is_closed: Whether the end is the start.
         runs_on: Whether a closed curve passes its start without a corner.
+        patch: The smooth patch of the part that the curve lies on; None on a mesh or where it is not projected.
+        inward: Inward normals of a mesh along the curve; None elsewhere.
     """
 
     curve: Curve
@@ -46,6 +49,8 @@ class PathCurve:
     given: Array
     is_closed: bool
     runs_on: bool = False
+    patch: Patch | None = None
+    inward: BezierCurve | None = None
 
 
 def path_curve(task: Task, origin: Origin) -> PathCurve:
@@ -206,8 +211,7 @@ def _turns(points: Array) -> Array:
     sides = np.diff(points, axis=0)
     t = sides / np.linalg.norm(sides, axis=1, keepdims=True)
     sine = np.linalg.norm(np.cross(t[:-1], t[1:]), axis=1)
-    angles: Array = np.arctan2(sine, np.sum(t[:-1] * t[1:], axis=1))
-    return angles
+    return np.arctan2(sine, np.sum(t[:-1] * t[1:], axis=1))
 
 
 def _corners_at(task: Task, origin: Origin) -> str:

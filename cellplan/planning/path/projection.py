@@ -1,6 +1,6 @@
-"""Laying of a drawn path on the part: in closed form on boxes, cylinders and spheres, by rays on meshes."""
+"""Projection of a path onto the part: in closed form on boxes, cylinders and spheres, by rays on meshes."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cellplan.errors import InputError
 from cellplan.geometry.curves.arc_length import measure
-from cellplan.geometry.curves.curve import BezierCurve, Curve, smooth_through
+from cellplan.geometry.curves.curve import Curve, smooth_through
 from cellplan.geometry.curves.surface_patch import Patch, ProjectedCurve, patches_facing
 from cellplan.geometry.mesh.load import corner_normals, ray_hits
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere, bounding_sphere, support
@@ -29,38 +29,23 @@ SHARPEST_EDGE: Final = np.deg2rad(30.0)  # [rad] normals of neighbouring rays th
 AXIS_ALIGNED: Final = 1e-9  # [-] a direction this near to an axis leaves the other two coordinates alone
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ProjectedPath:
-    """A path where the tool tip goes.
-
-    Attributes:
-        tip: The tip's curve in P.
-        patch: The smooth patch it lies on; None on a mesh or when the path is not laid on the part.
-        inward: Inward normals of a mesh along the curve; None elsewhere.
-    """
-
-    tip: Curve
-    patch: Patch | None = None
-    inward: BezierCurve | None = None
-
-
-def project_path(drawing: PathCurve, task: Task, part: Part, origin: Origin) -> ProjectedPath:
-    """Lay a drawn path on the part from the side its task names; a path without a side stays where it is.
+def project_path(path: PathCurve, task: Task, part: Part, origin: Origin) -> PathCurve:
+    """Project a path onto the part from the side its task names; a path without a side stays where it is.
 
     Raises:
         InputError: A point misses the part, or the path runs over an edge of it.
     """
     if task.project is None:
-        return ProjectedPath(tip=drawing.curve)
+        return path
     where = origin.at(f"tasks.{task.name}.path")
     match part.shape:
         case Mesh():
-            return _project_onto_mesh(drawing, task.project, part, where=where, mesh=part.shape)
+            return _project_onto_mesh(path, task.project, part, where=where, mesh=part.shape)
         case Capsule():
             raise InputError(f"{where}: expected a box, cylinder, sphere or mesh to lay the path on, got a capsule")
         case Box() | Cylinder() | Sphere():
             patches = patches_facing(part.shape, part.X_PS, task.project)
-            return _project_onto_patch(drawing, task.project, patches, part=part, where=where)
+            return _project_onto_patch(path, task.project, patches, part=part, where=where)
 
 
 def along(curve: Curve) -> Array:
@@ -77,10 +62,10 @@ def points_along(curve: Curve) -> Array:
 
 
 def _project_onto_patch(
-    drawing: PathCurve, direction: Array, patches: tuple[Patch, ...], *, part: Part, where: str
-) -> ProjectedPath:
-    """Lay a path on the one patch that holds all of it."""
-    points = points_along(drawing.curve)
+    path: PathCurve, direction: Array, patches: tuple[Patch, ...], *, part: Part, where: str
+) -> PathCurve:
+    """Project a path onto the one patch that holds all of it."""
+    points = points_along(path.curve)
     hits = [patch.hits(points, direction) for patch in patches]
     held = np.array([patch.covers(on_patch) for patch, on_patch in zip(patches, hits, strict=True)])
     if not np.all(held.any(axis=0)):
@@ -89,22 +74,21 @@ def _project_onto_patch(
         _refuse_edge(where, _last_before_edge(held, hits))
     chosen = int(np.argmax(held.all(axis=1)))
     _refuse_flat_view(hits[chosen], patches[chosen].normals(hits[chosen]), direction, where=where)
-    tip = ProjectedCurve(curve=drawing.curve, patch=patches[chosen], direction=direction)
-    return ProjectedPath(tip=tip, patch=patches[chosen])
+    tip = ProjectedCurve(curve=path.curve, patch=patches[chosen], direction=direction)
+    return replace(path, curve=tip, patch=patches[chosen])
 
 
 def _last_before_edge(held: Array, hits: list[Array]) -> Array:
     """Last point of a path before it leaves the patch that holds its beginning for longest."""
     counts = np.argmin(held, axis=1)
     patch = int(np.argmax(counts))
-    last: Array = hits[patch][max(int(counts[patch]) - 1, 0)]
-    return last
+    return hits[patch][max(int(counts[patch]) - 1, 0)]
 
 
-def _project_onto_mesh(drawing: PathCurve, direction: Array, part: Part, *, where: str, mesh: Mesh) -> ProjectedPath:
-    """Lay a path on a mesh: a smooth curve through the hits of close rays, broken at the stops only."""
-    u = _ray_parameters(drawing)
-    points, _ = drawing.curve.evaluate(u, (u[0], u[-1]))
+def _project_onto_mesh(path: PathCurve, direction: Array, part: Part, *, where: str, mesh: Mesh) -> PathCurve:
+    """Project a path onto a mesh: a smooth curve through the hits of close rays, broken at the stops only."""
+    u = _ray_parameters(path)
+    points, _ = path.curve.evaluate(u, (u[0], u[-1]))
     centre, radius = bounding_sphere(mesh)
     away = (transform_points(part.X_PS, centre[None])[0] - points) @ direction + 2.0 * radius
     X_SP = inverse(part.X_PS)
@@ -116,15 +100,16 @@ def _project_onto_mesh(drawing: PathCurve, direction: Array, part: Part, *, wher
     normals = _mesh_normals(mesh, hits.points, hits.faces) @ part.X_PS[:3, :3].T
     _refuse_flat_view(p, normals, direction, where=where)
     _refuse_creases(p, normals, where)
-    breaks = np.isin(u, drawing.stops)
-    return ProjectedPath(tip=smooth_through(u, p, breaks=breaks), inward=smooth_through(u, -normals, breaks=breaks))
+    breaks = np.isin(u, path.stops)
+    tip, inward = smooth_through(u, p, breaks=breaks), smooth_through(u, -normals, breaks=breaks)
+    return replace(path, curve=tip, inward=inward)
 
 
-def _ray_parameters(drawing: PathCurve) -> Array:
+def _ray_parameters(path: PathCurve) -> Array:
     """Parameters of the rays: even between two stops, the stops included."""
-    arc = measure(drawing.curve)
+    arc = measure(path.curve)
     step = max(min(RAY_STEP, arc.total / FEWEST_RAYS), arc.total / MOST_RAYS)
-    stops = drawing.stops
+    stops = path.stops
     lengths = np.diff(arc.behind_knots(stops))
     counts = np.maximum(RAYS_OF_PIECE, np.ceil(lengths / step).astype(int))
     pieces = [
@@ -143,8 +128,7 @@ def _mesh_normals(mesh: Mesh, points: Array, faces: NDArray[np.int64]) -> Array:
     weight_c = np.sum(np.cross(b - a, points - a) * across, axis=1) / square
     weights = np.stack([1.0 - weight_b - weight_c, weight_b, weight_c], axis=1)
     blended = np.einsum("ni,nij->nj", weights, corner_normals(mesh)[faces])
-    normals: Array = blended / np.linalg.norm(blended, axis=1, keepdims=True)
-    return normals
+    return blended / np.linalg.norm(blended, axis=1, keepdims=True)
 
 
 def _refuse_flat_view(p: Array, normals: Array, direction: Array, *, where: str) -> None:

@@ -13,7 +13,7 @@ from cellplan.model.cell import Origin
 from cellplan.model.task import SampledPath, Task, TimedPath
 from cellplan.planning.path.curve import PathCurve
 from cellplan.planning.path.formatting import direction_name, in_mm
-from cellplan.planning.path.projection import ProjectedPath, along
+from cellplan.planning.path.projection import along
 
 PARALLEL: Final = 1e-3  # [rad] tool_x and tool axis nearer than this leave the turn about the axis to rounding
 WIDEST_TURN: Final = np.deg2rad(170.0)  # [rad] between neighbouring orientations: beyond it the way round is not clear
@@ -23,8 +23,8 @@ UNIT: Final = 1e-6  # [-] room for axes and rotations that were computed elsewhe
 _CHOICES: Final = tuple(sign * axis for axis in np.eye(3) for sign in (1.0, -1.0))
 
 
-def orient_tool(task: Task, drawing: PathCurve, laid: ProjectedPath, origin: Origin) -> Orientation:
-    """Tool frames along a laid path: z is the tool axis, x leans to the task's ``tool_x``.
+def orient_tool(task: Task, curve: PathCurve, origin: Origin) -> Orientation:
+    """Tool frames along a path: z is the tool axis, x leans to the task's ``tool_x``.
 
     Rotations of a file are taken as they are. Between points of a file, axes and rotations are interpolated with
     continuous rates; at stops each side is interpolated on its own.
@@ -42,18 +42,18 @@ def orient_tool(task: Task, drawing: PathCurve, laid: ProjectedPath, origin: Ori
                 f"{origin.at(f'tasks.{task.name}.{other}')}: {path.source} gives the tool's orientation already; "
                 f"leave {other.removeprefix('path.')} out, or the columns of the orientation"
             )
-        return _from_file(path, task, drawing, origin=origin)
+        return _from_file(path, task, curve, origin=origin)
     if task.tool_axis is not None:
         _refuse_parallel(task.tool_axis[None], np.zeros((1, 3)), task, origin)
         return FixedFrame(R=frame_from_axes(task.tool_axis, task.tool_x))
-    u = along(laid.tip)
-    p, _ = laid.tip.evaluate(u, (u[0], u[-1]))
-    if laid.patch is not None:
-        _refuse_parallel(-laid.patch.normals(p), p, task, origin)
-        return NormalFrame(patch=laid.patch, x_hint=task.tool_x)
-    if laid.inward is not None:
-        _refuse_parallel(_unit(laid.inward.evaluate(u, (u[0], u[-1]))[0]), p, task, origin)
-        return AxisFrame(axes=laid.inward, x_hint=task.tool_x)
+    u = along(curve.curve)
+    p, _ = curve.curve.evaluate(u, (u[0], u[-1]))
+    if curve.patch is not None:
+        _refuse_parallel(-curve.patch.normals(p), p, task, origin)
+        return NormalFrame(patch=curve.patch, x_hint=task.tool_x)
+    if curve.inward is not None:
+        _refuse_parallel(_unit(curve.inward.evaluate(u, (u[0], u[-1]))[0]), p, task, origin)
+        return AxisFrame(axes=curve.inward, x_hint=task.tool_x)
     raise InputError(
         f"{where}: 'normal' needs a surface: expected a path with project, a file with axes or rotations, or a "
         "direction such as -z"
@@ -105,8 +105,7 @@ def _refuse_wide(angles: Array, widest: float, path: SampledPath | TimedPath, *,
 
 def _unit(axes: Array) -> Array:
     """Vectors of length one along others, shape (N, 3)."""
-    unit: Array = axes / np.linalg.norm(axes, axis=1, keepdims=True)
-    return unit
+    return axes / np.linalg.norm(axes, axis=1, keepdims=True)
 
 
 def _room(z: Array, direction: Array) -> Array:
@@ -117,8 +116,7 @@ def _room(z: Array, direction: Array) -> Array:
     d = direction / np.linalg.norm(direction)
     lean = np.arcsin(np.clip(np.linalg.norm(np.cross(z, d), axis=1), 0.0, 1.0))
     moved = np.append(np.linalg.norm(np.diff(z, axis=0), axis=1), 0.0)
-    room: Array = np.minimum(lean, np.append(lean[1:], lean[-1:])) - 0.5 * moved
-    return room
+    return np.minimum(lean, np.append(lean[1:], lean[-1:])) - 0.5 * moved
 
 
 def _refuse_parallel(z: Array, p: Array, task: Task, origin: Origin) -> None:

@@ -10,7 +10,6 @@ from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.task import Frame, Task
-from cellplan.model.toolpath import Toolpath
 from cellplan.planning.start.failures import Failures, Goal
 from cellplan.planning.start.given import is_off, part_pose, tool_distance
 from cellplan.planning.start.inverse_kinematics import (
@@ -23,6 +22,7 @@ from cellplan.planning.start.inverse_kinematics import (
 )
 from cellplan.planning.start.near_ties import best_first
 from cellplan.planning.start.trial_motion import StartTrials
+from cellplan.planning.timing.timed_path import ClockedPath
 
 SEEDS: Final = 48  # random starts of the inverse kinematics per robot and place; finds all 8 branches of a 6-axis arm
 SEEDS_PER_HOLDER: Final = 16  # the same when many configurations of the positioner are to be tried
@@ -44,7 +44,7 @@ class StartSearch:
     Attributes:
         cell: The cell in the order of names.
         chains: Kinematic chain of each robot, by name.
-        toolpaths: Toolpath of every task, by task name.
+        paths: Path of every task on the common clock, by task name.
         trials: The coarse clock on which motions are tried, and the bodies.
         random: Random numbers of each robot, by name.
         failures: Why configurations were dropped.
@@ -52,7 +52,7 @@ class StartSearch:
 
     cell: Cell
     chains: Mapping[str, ScrewChain]
-    toolpaths: Mapping[str, Toolpath]
+    paths: Mapping[str, ClockedPath]
     trials: StartTrials
     random: Mapping[str, np.random.Generator]
     failures: Failures
@@ -64,7 +64,7 @@ class StartSearch:
 
     def X_PT_start(self, relation: Relation) -> Array:
         """Where a tool is to be at the start: on its task, or on its grasp."""
-        return relation.X_PT if isinstance(relation, Grasp) else self.toolpaths[relation.name].X_PT_start
+        return relation.X_PT if isinstance(relation, Grasp) else self.paths[relation.name].toolpath.X_PT_start
 
     def random_configurations(self, robot: Robot, count: int) -> Array:
         """Configurations of a robot drawn from its own random numbers, shape (count, n)."""
@@ -194,7 +194,7 @@ def _promising_configurations(search: StartSearch, holder: Robot) -> Array:
     lower, upper = finite_limits(holder.model)
     middle = 0.5 * (lower + upper)
     q = middle + HOLDER_RANGE * (search.random_configurations(holder, HOLDER_DRAWS) - middle)
-    X_WP = search.chains[holder.name].tool_poses(q) @ inverse(cell.part.held_by[0].X_PT)
+    X_WP = search.chains[holder.name].tool_poses(q) @ cell.part.X_CP
     awkwardness = np.zeros(len(q))
     for relation in cell.relations:
         operator = cell.robot(relation.robot)
@@ -203,8 +203,7 @@ def _promising_configurations(search: StartSearch, holder: Robot) -> Array:
         base = operator.X_WB[:3, 3]
         awkwardness = np.maximum(awkwardness, _awkwardness(goal, usual, base))
     order = best_first(np.column_stack([-awkwardness, q]))
-    chosen: Array = q[order[:HOLDER_POSTURES]]
-    return chosen
+    return q[order[:HOLDER_POSTURES]]
 
 
 def _awkwardness(goal: Array, usual: Array, base: Array) -> Array:
@@ -217,8 +216,7 @@ def _awkwardness(goal: Array, usual: Array, base: Array) -> Array:
     distance, usual_distance = np.linalg.norm(away, axis=1), np.linalg.norm(usual_away, axis=1)
     spread = max(float(usual_distance.std()), 1e-6)  # a robot that cannot move has none
     outward = np.sum(goal[:, :3, 2] * away, axis=1) / np.maximum(distance, 1e-9)
-    measure: Array = np.abs(distance - np.median(usual_distance)) / spread + (1.0 - outward)
-    return measure
+    return np.abs(distance - np.median(usual_distance)) / spread + (1.0 - outward)
 
 
 def _configurations_meeting(search: StartSearch, relation: Relation, operator_start: Array) -> Array:
@@ -240,5 +238,4 @@ def _configurations_at(search: StartSearch, holder: Robot, relation: Relation, X
         search.failures.unreached(holder.name, goal, beyond=found)
         return inside
     order = best_first(np.column_stack([np.sort(joint_margin_shares(holder.model, inside), axis=1), inside]))
-    chosen: Array = inside[order]
-    return chosen
+    return inside[order]

@@ -97,8 +97,7 @@ def _own_pairs(trials: StartTrials, cell: Cell, robot: Robot) -> Flags:
 
     pairs = [(trials.bodies[pair.first], trials.bodies[pair.second]) for pair in trials.pairs]
     own = [(is_own(a) and is_settled(b)) or (is_own(b) and is_settled(a)) for a, b in pairs]
-    among: Flags = np.array(own, dtype=bool) & trials.open_pairs
-    return among
+    return np.array(own, dtype=bool) & trials.open_pairs
 
 
 def _placed(cell: Cell, robot: Robot, q: Array, holder_configuration: Array | None) -> Array:

@@ -18,7 +18,8 @@ from cellplan.model.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.robot import Joint
 from cellplan.model.task import Frame, Task
 from cellplan.model.toolpath import Toolpath
-from cellplan.planning.tracking.cooperation_jacobian import constraint_rows, pose_errors
+from cellplan.planning.tracking.cooperation_jacobian import pose_errors
+from cellplan.planning.tracking.task_constraints import constraint_rows
 
 
 def start_place(cell: Cell, robot: Robot) -> str:
@@ -64,14 +65,11 @@ def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
 
 def part_pose(cell: Cell, holder_start: Array | None) -> Array | None:
     """The part at the start; None while its holder's configuration is still to be found."""
-    if not cell.part.held_by:
-        return cell.part.X_WP
+    if cell.carrier is None:
+        return cell.part.X_CP
     if holder_start is None:
         return None
-    grasp = cell.part.held_by[0]
-    X_WT = ScrewChain(cell.robot(grasp.robot)).tool_poses(holder_start[None])[0]
-    pose: Array = X_WT @ inverse(grasp.X_PT)
-    return pose
+    return ScrewChain(cell.robots[cell.carrier]).tool_poses(holder_start[None])[0] @ cell.part.X_CP
 
 
 def tool_distance(

@@ -48,14 +48,12 @@ def home_candidates(model: RobotModel, chain: ScrewChain, start: Array, rng: np.
     ]
     q = np.clip(np.array(found), lower, upper)
     rank = np.round(displacements(model, inside, q) / SAME)
-    ordered: Array = q[np.argsort(rank, kind="stable")]
-    return ordered
+    return q[np.argsort(rank, kind="stable")]
 
 
 def displacements(model: RobotModel, start: Array, q: Array) -> Array:
     """Time in [s] that the slowest joint needs from the start to each configuration at top speed, shape (K,)."""
-    slowest: Array = (np.abs(q - start) / model.velocity).max(axis=-1)
-    return slowest
+    return (np.abs(q - start) / model.velocity).max(axis=-1)
 
 
 def _retreats(chain: ScrewChain, start: Array) -> Iterator[Array]:

@@ -8,7 +8,8 @@ from cellplan.geometry.transforms import Array, inverse, skew
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Relation
 from cellplan.model.robot import RobotModel
-from cellplan.planning.tracking.cooperation_jacobian import constraint_rows, pose_errors
+from cellplan.planning.tracking.cooperation_jacobian import pose_errors
+from cellplan.planning.tracking.task_constraints import constraint_rows
 
 CLOSED: Final = 1e-12  # [m, rad] a configuration counts as found when the tool is this near its goal: rounding is 1e-15
 SAME_POSTURE: Final = 1e-3  # [rad, m] solutions nearer to each other are one branch
@@ -69,8 +70,7 @@ def _damped_move(J: Array, error: Array) -> Array:
     normal = J @ J_T + DAMPING**2 * np.eye(J.shape[1])
     move = (J_T @ np.linalg.solve(normal, error[:, :, None]))[:, :, 0]
     longest = np.abs(move).max(axis=1, keepdims=True)
-    shortened: Array = move * np.minimum(1.0, LONGEST_MOVE / np.maximum(longest, LONGEST_MOVE))
-    return shortened
+    return move * np.minimum(1.0, LONGEST_MOVE / np.maximum(longest, LONGEST_MOVE))
 
 
 def within_limits(model: RobotModel, q: Array) -> Array:
@@ -86,14 +86,12 @@ def on_nearest_turns(model: RobotModel, q: Array) -> Array:
     lower, upper = finite_limits(model)
     turning = np.array([joint.is_revolute for joint in model.joints])
     middle = 0.5 * (lower + upper)
-    turned: Array = q - 2 * np.pi * np.where(turning, np.round((q - middle) / (2 * np.pi)), 0.0)
-    return turned
+    return q - 2 * np.pi * np.where(turning, np.round((q - middle) / (2 * np.pi)), 0.0)
 
 
 def margin_shares(model: RobotModel, q: Array) -> Array:
     """Smallest distance to a joint limit as share of half the range, shape (...): 1 in the middle, 0 on a limit."""
-    shares: Array = joint_margin_shares(model, q).min(axis=-1)
-    return shares
+    return joint_margin_shares(model, q).min(axis=-1)
 
 
 def joint_margin_shares(model: RobotModel, q: Array) -> Array:
@@ -109,15 +107,13 @@ def smallest_singular_values(chain: ScrewChain, task: Relation, X_PT: Array, q: 
     R_PW = X_PT[:3, :3] @ np.swapaxes(X_WT[:, :3, :3], 1, 2)
     rows = constraint_rows(task, X_PT[None])[0]
     J = rows @ tip_jacobian(chain.flange_screws(q), X_WT[:, :3, 3], R_PW)
-    values: Array = np.linalg.svd(J, compute_uv=False)[:, -1]
-    return values
+    return np.linalg.svd(J, compute_uv=False)[:, -1]
 
 
 def tip_jacobian(screws_W: Array, p_WT: Array, R_PW: Array) -> Array:
     """Jacobians of tool tips in axes parallel to P from screws at the world origin, shape (B, 6, n)."""
     linear = screws_W[:, :3] - skew(p_WT) @ screws_W[:, 3:]
-    jacobians: Array = np.concatenate([R_PW @ linear, R_PW @ screws_W[:, 3:]], axis=1)
-    return jacobians
+    return np.concatenate([R_PW @ linear, R_PW @ screws_W[:, 3:]], axis=1)
 
 
 def _distinct(q: Array) -> Array:

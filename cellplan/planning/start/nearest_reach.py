@@ -9,7 +9,8 @@ from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Relation, Robot
 from cellplan.planning.start.inverse_kinematics import finite_limits, tip_jacobian
-from cellplan.planning.tracking.cooperation_jacobian import constraint_rows, pose_errors
+from cellplan.planning.tracking.cooperation_jacobian import pose_errors
+from cellplan.planning.tracking.task_constraints import constraint_rows
 
 Flags = NDArray[np.bool_]
 
@@ -78,5 +79,4 @@ def _move(J: Array, error: Array, squared_damping: Array, *, at: tuple[Flags, Fl
     damping = np.maximum(squared_damping, 1e-12)[:, None, None] * np.eye(J.shape[1])
     move = (J_T @ np.linalg.solve(J @ J_T + damping, error[:, :, None]))[:, :, 0]
     longest = np.abs(move).max(axis=1, keepdims=True)
-    shortened: Array = move * np.minimum(1.0, LONGEST_MOVE / np.maximum(longest, LONGEST_MOVE))
-    return shortened
+    return move * np.minimum(1.0, LONGEST_MOVE / np.maximum(longest, LONGEST_MOVE))

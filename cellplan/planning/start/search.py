@@ -13,13 +13,13 @@ from cellplan.model.cell import Cell
 from cellplan.model.name_order import NameOrder
 from cellplan.model.progress import Progress, silent
 from cellplan.model.seeds import generator
-from cellplan.model.toolpath import Toolpath
 from cellplan.planning.start.branches import Branch, StartSearch, branches_of, holder_configurations
 from cellplan.planning.start.combinations import Picks, best_combinations
 from cellplan.planning.start.failures import Failures
 from cellplan.planning.start.near_ties import best_first, levels
 from cellplan.planning.start.reasons import why_nothing
 from cellplan.planning.start.trial_motion import StartTrials, Trial
+from cellplan.planning.timing.timed_path import ClockedPath
 from cellplan.scene.scene import Scene
 
 CANDIDATES: Final = 10  # configurations of the whole cell that are tried out at first
@@ -59,12 +59,7 @@ class StartChoice:
         return None if self.trial is None or self.trial.is_sound else self.words
 
 
-def find_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: Progress = silent) -> Array:
-    """Stacked start configuration of the whole cell: see `choose_start`."""
-    return choose_start(scene, toolpaths, progress=progress).start
-
-
-def choose_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: Progress = silent) -> StartChoice:
+def choose_start(scene: Scene, paths: Mapping[str, ClockedPath], *, progress: Progress = silent) -> StartChoice:
     """Start configuration of the whole cell; given ones are kept, the others chosen.
 
     Candidates put every tool on the start of its task, within limits and without collision. They are ranked by joint
@@ -77,8 +72,8 @@ def choose_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: P
 
     Args:
         scene: The cell made computable.
-        toolpaths: Toolpath of every task, by task name.
-        progress: Who wants to know how far it is.
+        paths: Path of every task on the common clock, by task name.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         StartNotFoundError: No configuration reaches all tasks within limits and without collision.
@@ -90,8 +85,8 @@ def choose_start(scene: Scene, toolpaths: Mapping[str, Toolpath], *, progress: P
     search = StartSearch(
         cell=order.cell,
         chains=scene.chains,
-        toolpaths=toolpaths,
-        trials=StartTrials(scene, toolpaths),
+        paths=paths,
+        trials=StartTrials(scene, paths),
         random={robot.name: generator(robot.name, cell.solver.seed) for robot in cell.robots},
         failures=Failures(),
     )

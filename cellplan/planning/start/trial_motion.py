@@ -12,17 +12,19 @@ from cellplan.certify.depths import mounted_depths
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
+from cellplan.model.motion import Schedule
 from cellplan.model.name_order import NameOrder
 from cellplan.model.phase import Phase
 from cellplan.model.task import Task
-from cellplan.model.toolpath import Toolpath
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.start.near_ties import ALIKE
 from cellplan.planning.start.present_pairs import present_pairs
-from cellplan.planning.timing.schedule import schedule_tasks, time_tasks
+from cellplan.planning.timing.schedule import sample, time_tasks
+from cellplan.planning.timing.timed_path import ClockedPath, clock_path
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.mounting import Mount
 from cellplan.scene.scene import Scene
 
@@ -56,8 +58,7 @@ class Trial:
     @property
     def shares(self) -> Array:
         """All shares, the worst first, shape (2 nq,)."""
-        shares: Array = np.sort(np.concatenate([self.ranges, self.speeds]))
-        return shares
+        return np.sort(np.concatenate([self.ranges, self.speeds]))
 
     @property
     def is_sound(self) -> bool:
@@ -87,15 +88,17 @@ class StartTrials:
             given configurations make collide is for the report to say.
     """
 
-    def __init__(self, scene: Scene, toolpaths: Mapping[str, Toolpath]) -> None:
+    def __init__(self, scene: Scene, paths: Mapping[str, ClockedPath]) -> None:
         """Choose a step that makes few samples of the whole motion, of which every path is gone through once."""
         self._order = NameOrder.of(scene.cell)
         once = self._order.cell
         tasks = tuple(_first_cycle(task, once.motion.duration) for task in once.tasks)
         self._once = replace(once, tasks=tasks, motion=replace(once.motion, duration=None))
-        self._scene, self._toolpaths = scene, toolpaths
-        schedule = schedule_tasks(self._once, self._paths(self._once))
-        self._step = float(max(once.motion.step, schedule.times[-1] / SAMPLES))
+        self._scene = scene
+        self._paths = {task.name: _once_through(self._once, task, paths[task.name]) for task in tasks}
+        end = time_tasks(self._once, self._paths_of([task.name for task in tasks])).times[-1]
+        self._step = float(max(once.motion.step, end / SAMPLES))
+        self._schedules: dict[tuple[str, ...], Schedule] = {}
         # which joint fails is not known beforehand
         motion = replace(once.motion, step=self._step, locked=(), cyclic=False)
         solver = replace(once.solver, gain=GAIN / self._step, method=TRIED_WITH)
@@ -147,7 +150,7 @@ class StartTrials:
         cell = self._once
         if len(trials) < 2 or not cell.solver.is_accurate:
             return list(trials)
-        timed = [time_tasks(cell, self._paths(cell, run.tasks)) for run in self._phases]
+        timed = [time_tasks(cell, self._paths_of(run.tasks)) for run in self._phases]
         if max(len(each.breaks) for each in timed) > MOST_BREAKS:
             return list(trials)
         candidates = Candidates.of([cell] * len(trials), np.array([trial.start for trial in trials]))
@@ -201,9 +204,17 @@ class StartTrials:
             return True
         return any(self._scene.touching(each, among=among) is not None for each in placed)
 
-    def _paths(self, cell: Cell, names: Sequence[str] | None = None) -> list[Toolpath]:
-        """Toolpaths of some tasks of a cell, or of all, in its order."""
-        return [self._toolpaths[task.name] for task in cell.tasks if names is None or task.name in names]
+    def _paths_of(self, names: Sequence[str]) -> list[ClockedPath]:
+        """Paths of some tasks, gone through once, in the order of the cell."""
+        return [path for name, path in self._paths.items() if name in names]
+
+    def _schedule(self, names: Sequence[str]) -> Schedule:
+        """Some tasks on the coarse clock, sampled once for all trials."""
+        paths = self._paths_of(names)
+        key = tuple(path.task.name for path in paths)
+        if key not in self._schedules:
+            self._schedules[key] = sample(time_tasks(self._cell, paths))
+        return self._schedules[key]
 
     def _cell_alone(self, robot: str) -> Cell:
         """The cell with the first holder and one operator; all robots stay where goals may look at them."""
@@ -222,8 +233,8 @@ class StartTrials:
         """Joint positions of each run on the coarse clock, shape (N, nq) each."""
         motions = []
         for phase in phases:
-            schedule = schedule_tasks(cell, self._paths(cell, phase.tasks))
-            motions.append(follow(cell, schedule, start=start, moving=phase.moving).q)
+            schedule = self._schedule(phase.tasks)
+            motions.append(integrate_schedule(MotionTask(cell, schedule, phase.moving, start)).q)
         return motions
 
 
@@ -231,6 +242,11 @@ def _first_cycle(task: Task, clock: float | None) -> Task:
     """A task that goes through its path once, as fast as it does on the whole."""
     duration = task.time_for_path(clock)
     return replace(task, repeat=1, duration=None if duration is None else duration / task.repeat)
+
+
+def _once_through(cell: Cell, task: Task, path: ClockedPath) -> ClockedPath:
+    """A path gone through once: the same times, unless it is repeated."""
+    return path if path.task.repeat == 1 else clock_path(cell, task, path.toolpath)
 
 
 def _open_pairs(scene: Scene) -> NDArray[np.bool_]:
@@ -261,17 +277,13 @@ def _whole_turns(cell: Cell, q: Array) -> Array:
 
 def _shares_left_free(cell: Cell, q: Array, step: float) -> tuple[Array, Array]:
     """Shares of half its range and of its speed limit that each joint leaves free in a motion, shape (nq,) each."""
-    lower, upper, velocity = (
-        np.concatenate([getattr(robot.model, name) for robot in cell.robots]) for name in ("lower", "upper", "velocity")
-    )
-    ranges = _range_shares(cell, np.minimum(q.min(axis=0) - lower, upper - q.max(axis=0)))
-    speeds: Array = 1.0 - np.abs(np.diff(q, axis=0)).max(axis=0, initial=0.0) / step / velocity
-    return ranges, speeds
+    limits = cell.joint_limits
+    ranges = _range_shares(cell, np.minimum(q.min(axis=0) - limits.lower, limits.upper - q.max(axis=0)))
+    return ranges, 1.0 - np.abs(np.diff(q, axis=0)).max(axis=0, initial=0.0) / step / limits.velocity
 
 
 def _range_shares(cell: Cell, margins: Array) -> Array:
     """Distances of joints from their limits as shares of half their ranges, 1 without limits, shape (..., nq)."""
-    half = np.concatenate([0.5 * (robot.model.upper - robot.model.lower) for robot in cell.robots])
+    half = 0.5 * (cell.joint_limits.upper - cell.joint_limits.lower)
     half = np.where(np.isfinite(half), half, np.pi)
-    shares: Array = np.minimum(margins / np.where(half > 0.0, half, 1.0), 1.0)
-    return shares
+    return np.minimum(margins / np.where(half > 0.0, half, 1.0), 1.0)

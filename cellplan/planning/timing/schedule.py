@@ -1,6 +1,6 @@
 """Schedule: all toolpaths on one common clock."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 import numpy as np
@@ -24,12 +24,12 @@ TIME_DECIMALS: Final = 12  # decimals kept of k * step, so that 0.001 * 3 reads 
 
 
 def schedule_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> Schedule:
-    """Put toolpaths on the common clock and look at them at its instants: see `time_tasks` and `sample`."""
-    return sample(time_tasks(cell, toolpaths))
+    """Put toolpaths on the common clock and sample them: see `time_tasks` and `sample`."""
+    return sample(time_tasks(cell, [clock_path(cell, cell.task(toolpath.name), toolpath) for toolpath in toolpaths]))
 
 
-def time_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> TimedTasks:
-    """Put toolpaths on the common clock ``t = k step``, k = 0..n, which is as long as the cell says.
+def time_tasks(cell: Cell, paths: Sequence[ClockedPath]) -> TimedTasks:
+    """Clocked paths with their common clock ``t = k step``, k = 0..n, which is as long as the cell says.
 
     A cell that gives no duration has a clock that ends with its last task.
 
@@ -40,30 +40,35 @@ def time_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> TimedTasks:
 
     Args:
         cell: The cell; its tasks give times and laws, its motion the step and the length of the clock.
-        toolpaths: The paths to work on, named after their tasks.
+        paths: The paths to work on.
 
     Raises:
         InputError: A task does not fit the clock, or the clock would have more than two million instants.
     """
-    paths = tuple(clock_path(cell, cell.task(toolpath.name), toolpath) for toolpath in toolpaths)
     times = np.round(np.arange(_step_count(cell, paths) + 1) * cell.motion.step, TIME_DECIMALS)
-    return TimedTasks(times=times, paths=paths)
+    return TimedTasks(times=times, paths=tuple(paths))
 
 
 def sample(timed: TimedTasks) -> Schedule:
-    """Look at all tasks at the instants of their clock."""
+    """Sample all tasks at the times of their clock."""
     tasks = tuple(_on_clock(timed.times, path) for path in timed.paths)
     return Schedule(times=timed.times, tasks=tasks, desired=timed)
 
 
-def examine_times(cell: Cell, toolpaths: Sequence[Toolpath]) -> None:
-    """See that the tasks fit a clock that shows enough of each, without making it.
+def clock_paths(cell: Cell, toolpaths: Iterable[Toolpath]) -> dict[str, ClockedPath]:
+    """Put toolpaths on the common clock, and check that it shows enough of each; by the names of their tasks.
 
     Raises:
-        InputError: As `schedule_tasks` does, a task has so few samples that nobody can judge its motion by them, or it
-            settles for as long as it lasts.
+        InputError: As `schedule_tasks` does, a task has too few samples to judge its motion by, or it settles for as
+            long as it lasts.
     """
-    paths = [clock_path(cell, cell.task(toolpath.name), toolpath) for toolpath in toolpaths]
+    found = {each.name: clock_path(cell, cell.task(each.name), each) for each in toolpaths}
+    _refuse_poor_sampling(cell, tuple(found.values()))
+    return found
+
+
+def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
+    """Refuse tasks that have too few samples, and joints that fail after the end."""
     end = _step_count(cell, paths) * cell.motion.step
     for index, lock in enumerate(cell.motion.locked):
         if lock.since >= end:

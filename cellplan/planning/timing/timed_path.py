@@ -115,8 +115,7 @@ class ClockedPath:
     def stretches(self, times: Array) -> NDArray[np.intp]:
         """Number of the stretch that instants in [s] fall into, shape (N,); the nearest before and after all."""
         stretch = np.searchsorted(self.corners, times, side="right") - 1
-        numbers: NDArray[np.intp] = np.clip(stretch, 0, len(self.corners) - 2)
-        return numbers
+        return np.clip(stretch, 0, len(self.corners) - 2)
 
     def targets(self, times: Array, stretch: NDArray[np.intp]) -> tuple[Array, Array, Array]:
         """Poses, twists and lengths behind the tool while it follows its path, without approach and retreat.
@@ -171,16 +170,14 @@ class ClockedPath:
         """Parameters of the path at which its tip or its orientation is joined, the ends included, shape (K,)."""
         path = self.toolpath
         knots: Array = np.unique(np.concatenate([path.tip.knots, path.orientation.knots, path.stops]))
-        inside: Array = knots[(knots >= path.stops[0]) & (knots <= path.stops[-1])]
-        return inside
+        return knots[(knots >= path.stops[0]) & (knots <= path.stops[-1])]
 
     def _instants(self, knots: Array) -> Array:
         """Instants in [s] at which the path passes its knots, of all cycles, shape (N,)."""
         path, law = self.toolpath, self.task.time_law
         cycles = np.arange(self.task.repeat)[:, None]
         if isinstance(path, Trajectory):
-            own: Array = (self.corners[:-1, None] + knots).ravel()
-            return own
+            return (self.corners[:-1, None] + knots).ravel()
         pieces = len(self.behind) - 1
         s = path.arc.lengths(knots)
         piece = np.clip(np.searchsorted(self.behind, s, side="right") - 1, 0, pieces - 1)
@@ -189,12 +186,10 @@ class ClockedPath:
         s, piece = s[is_inside], piece[is_inside]
         if path.runs_on:
             share = (cycles + np.append(0.0, s / self.behind[-1])).ravel() / self.task.repeat
-            whole: Array = self.start + (self.end - self.start) * reached_at(law, share)
-            return whole
+            return self.start + (self.end - self.start) * reached_at(law, share)
         tau = reached_at(law, (s - self.behind[piece]) / np.diff(self.behind)[piece])
         stretch = cycles * pieces + piece
-        instants: Array = (self.corners[stretch] + np.diff(self.corners)[stretch] * tau).ravel()
-        return instants
+        return (self.corners[stretch] + np.diff(self.corners)[stretch] * tau).ravel()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -204,12 +199,12 @@ class TimedTasks:
     Attributes:
         times: Instants of the clock in [s], evenly spaced from 0, shape (N,).
         paths: The paths of the tasks that are worked on.
-        looked_at: Further instants in [s] that count as jumps, because somebody wants a closer look, shape (K,).
+        extra_breaks: Further times in [s] that count as jumps: ends of panels where errors were too large, shape (K,).
     """
 
     times: Array
     paths: tuple[ClockedPath, ...]
-    looked_at: Array = field(default_factory=lambda: np.zeros(0))
+    extra_breaks: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def breaks(self) -> Array:
@@ -233,7 +228,7 @@ class TimedTasks:
     def _within(self, found: Sequence[Array]) -> Array:
         """Instants of all paths within the clock, and its ends."""
         end = float(self.times[-1])
-        every = np.concatenate([self.looked_at, *found])
+        every = np.concatenate([self.extra_breaks, *found])
         inner = distinct(every[(every > INSTANT_ROOM) & (every < end - INSTANT_ROOM)])
         return np.concatenate([[0.0], inner, [end]])
 
@@ -263,12 +258,10 @@ def clock_path(cell: Cell, task: Task, toolpath: Toolpath) -> ClockedPath:
 def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
     """Instants in [s] at which the stretches of a path begin, and the one at which the last ends."""
     if isinstance(toolpath, Trajectory):
-        own: Array = task.start + toolpath.duration * np.arange(task.repeat + 1.0)
-        return own
+        return task.start + toolpath.duration * np.arange(task.repeat + 1.0)
     behind = _stops(cell, task, toolpath)
     if task.feed is not None:
-        fastest: Array = task.start + peak_rate(task.time_law) / task.feed * behind
-        return fastest
+        return task.start + peak_rate(task.time_law) / task.feed * behind
     duration = task.time_for_path(cell.motion.duration)
     if duration is None:
         raise InputError(
@@ -280,8 +273,7 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
             f"{cell.origin.at(f'tasks.{task.name}.start_s')}: expected a start before the end of the clock at "
             f"{cell.motion.duration:g} s, got {task.start:g}; make motion.duration_s longer"
         )
-    corners: Array = task.start + duration * (behind / behind[-1])
-    return corners
+    return task.start + duration * (behind / behind[-1])
 
 
 def _stops(cell: Cell, task: Task, toolpath: Toolpath) -> Array:

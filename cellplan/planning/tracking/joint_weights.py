@@ -20,12 +20,10 @@ class JointWeights:
 
     def __init__(self, cell: Cell, model: CombinedModel) -> None:
         """Take the constant weights, the limits and the masses of all robots."""
-        joints = [joint for robot in cell.robots for joint in robot.model.joints]
         self._constant = np.concatenate([robot.weights for robot in cell.robots])
         self._near_limits, self._load = cell.solver.weighting.near_limits, cell.solver.weighting.load
-        self._lower = np.array([joint.lower for joint in joints])
-        self._upper = np.array([joint.upper for joint in joints])
-        self._turning = TURNING * np.array([joint.velocity for joint in joints])
+        self._lower, self._upper = cell.joint_limits.lower, cell.joint_limits.upper
+        self._turning = TURNING * cell.joint_limits.velocity
         self._carries = model.carries_flange.astype(float)
         self._tools = np.array([robot.tool.mass or 0.0 for robot in cell.robots])
         self._shares = np.array([_part_share(cell, robot.name) for robot in cell.robots])
@@ -63,8 +61,7 @@ class JointWeights:
             factors *= 1.0 + self._near_limits * np.abs(slope) * towards
         if self._load > 0.0:
             factors *= 1.0 + self._load * self.load(state)
-        weights: Array = self._constant * np.minimum(factors, LARGEST_FACTOR)
-        return weights
+        return self._constant * np.minimum(factors, LARGEST_FACTOR)
 
     def load(self, state: CellState) -> Array:
         r"""Torque or force with which each joint holds the masses it carries, as a share of a reference.
@@ -88,8 +85,7 @@ class JointWeights:
         moments = self._tools[:, None] * _rising(state.screws_W, tips) + self._shares[:, None] * _rising(
             state.screws_W, np.broadcast_to(p_WS, tips.shape)
         )
-        loads: Array = np.abs((self._carries * moments).sum(axis=0)) / heaviest
-        return loads
+        return np.abs((self._carries * moments).sum(axis=0)) / heaviest
 
 
 def limit_slope(q: Array, lower: Array, upper: Array) -> Array:
@@ -121,5 +117,4 @@ def _part_share(cell: Cell, robot: str) -> float:
 def _rising(screws_W: Array, points: Array) -> Array:
     """Speed at which points rise per unit speed of each joint, shape (n, nq), for points in W of shape (n, 3)."""
     linear, angular = screws_W[:3], screws_W[3:]
-    speeds: Array = linear[2] + np.outer(points[:, 1], angular[0]) - np.outer(points[:, 0], angular[1])
-    return speeds
+    return linear[2] + np.outer(points[:, 1], angular[0]) - np.outer(points[:, 0], angular[1])

@@ -63,8 +63,7 @@ class ManipulabilityGradient:
         tips = linear + np.cross(angular[None], p[:, :, None], axis=1)
         on_screws = np.concatenate([force, torque + np.cross(p[:, :, None], force, axis=1)], axis=1) * signs[:, None]
         by_tips = np.sum(np.einsum("ti,tij->tj", shifting, tips) * self._moves_tool, axis=0)
-        gradient: Array = self._by_screws(q, on_screws.sum(axis=0)) + by_tips - self._moves_part * (turning @ angular)
-        return gradient
+        return self._by_screws(q, on_screws.sum(axis=0)) + by_tips - self._moves_part * (turning @ angular)
 
     def _by_screws(self, q: Array, g: Array) -> Array:
         r"""What the motion of the screws adds: gradient of ``sum_j g_j . $_j`` for fixed ``g``, shape (nq,).

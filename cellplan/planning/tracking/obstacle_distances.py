@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.collision.bodies import BodyPoses, checked_poses
 from cellplan.collision.nearest_points import NearestPoints, nearest_points, point_above
-from cellplan.collision.static_contact import Flags, PairIndices
+from cellplan.geometry.arrays import Flags, Indices
 from cellplan.geometry.shapes import bounding_box
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.pinocchio_model import CombinedModel, LinkState
@@ -55,8 +55,8 @@ class ClosestPairs:
         self._scene, self._model = scene, CombinedModel(scene.cell)
         chosen = np.array([pair.rule is Rule.CLEARANCE and pair.clearance_class in classes for pair in scene.pairs])
         among_solids = chosen[scene.solid_rows] if len(chosen) else np.zeros(0, dtype=bool)
-        self._rows: PairIndices = scene.solid_rows[among_solids]
-        self._pairs: PairIndices = scene.solid_pairs[among_solids]
+        self._rows: Indices = scene.solid_rows[among_solids]
+        self._pairs: Indices = scene.solid_pairs[among_solids]
         self._ground_rows = [int(row) for row in scene.ground_rows if chosen[row]]
         self._over_ground = np.array([scene.pairs[row].first for row in self._ground_rows], dtype=np.intp)
         self._X_ground = np.array([scene.bodies[scene.pairs[row].second].X_BS for row in self._ground_rows])
@@ -92,7 +92,7 @@ class ClosestPairs:
         """Names of the two bodies of a pair."""
         return self._scene.names(self._scene.pairs[pair.row])
 
-    def _carriers(self) -> tuple[PairIndices, Array]:
+    def _carriers(self) -> tuple[Indices, Array]:
         """Link that carries each solid, -1 when it never moves, and the solid's pose there or in the world."""
         cell = self._scene.cell
         first_link = {robot.name: self._model.first_link[k] for k, robot in enumerate(cell.robots)}
@@ -139,8 +139,7 @@ class ClosestPairs:
     def _centres(self, poses: BodyPoses) -> Array:
         """Centres of the bounding spheres of all solids in the world, shape (B, 3)."""
         own = self._scene.engine.centres[: len(poses.p), :, None]
-        centres: Array = (poses.R[:, 0] @ own)[..., 0] + poses.p[:, 0]
-        return centres
+        return (poses.R[:, 0] @ own)[..., 0] + poses.p[:, 0]
 
     def _gradients(self, pairs: list[ScenePair], near: list[NearestPoints], links: LinkState) -> Array:
         """Change of each distance per joint, shape (pairs, nq)."""
@@ -157,5 +156,4 @@ class ClosestPairs:
         at_rest = np.zeros((1, links.D.shape[0]), dtype=bool)
         carries = np.concatenate([self._model.carries_link, at_rest])
         carrier = [self._carrier[body] if body < len(self._carrier) else -1 for body in bodies]
-        rates: Array = (wrench @ links.screws_W) * carries[carrier]
-        return rates
+        return (wrench @ links.screws_W) * carries[carrier]

@@ -1,29 +1,25 @@
-"""Tracking problem: what a resolution method is asked at every instant, and what it may ask back."""
+"""Tracking problem: reference poses and twists of all tasks, linearised at any sample and configuration."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.errors import DivergedError
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.pinocchio_model import CellState, CombinedModel
 from cellplan.model.cell import Cell, Grasp, Relation
 from cellplan.model.motion import Schedule
-from cellplan.model.task import Frame
 from cellplan.planning.timing.common_cycles import common_cycles
-from cellplan.planning.tracking.cooperation_jacobian import (
-    column_signs,
-    constraint_rows,
-    cooperation_jacobian,
-    pose_errors,
-    reference_frames,
-)
+from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
 from cellplan.planning.tracking.joint_weights import JointWeights
 from cellplan.planning.tracking.locked_joints import locked_since
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, share_within
-from cellplan.planning.tracking.targets import targets
+from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 
 Drift = Callable[[int, Array], Array]
 
@@ -86,10 +82,11 @@ class TrackingProblem:
     """All tasks of one run on the common clock, and the joints that may move for them.
 
     Attributes:
+        motion: The tasks and the robots that move for them.
         cell: The cell.
-        times: Instants in [s], shape (N,).
+        times: Samples of the clock in [s], shape (N,).
         tasks: The tasks, then the grasps of further holders, one block row each.
-        operators: Index of each one's robot in the cell.
+        constraints: What they constrain, in which frames and by which joints.
         desired: Reference tool poses X_PT, shape (N, tasks, 4, 4).
         twists: Reference tool twists in P, linear first, shape (N, tasks, 6).
         signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
@@ -99,37 +96,35 @@ class TrackingProblem:
             closes a cycle.
     """
 
-    def __init__(self, cell: Cell, schedule: Schedule, moving: Sequence[str], *, start: Array | None = None) -> None:
+    def __init__(self, motion: MotionTask, drift: Drift | None = None) -> None:
         """Gather what stays the same from step to step.
 
         Args:
-            cell: The cell.
-            schedule: Reference tool poses and twists on the common clock.
-            moving: Names of the robots that may move.
-            start: Stacked start posture, shape (nq,), which goals may lead back to; needed with goals only.
+            motion: The tasks and the robots that move for them; goals may lead back to its start.
+            drift: Joint velocities in the null space of the tasks that close a cycle; None for none.
         """
-        asked = targets(cell, schedule, moving)
-        tasks = tuple(target.relation for target in asked)
-        names = [robot.name for robot in cell.robots]
+        cell, schedule = motion.cell, motion.schedule
+        tasks, (self.desired, self.twists) = motion.relations, motion.references()
         self._model = CombinedModel(cell)
-        self._rows = [constraint_rows(target.relation, target.X_PT) for target in asked]
-        self._is_whole = all(len(task.axes) == 6 and not task.is_spin_free for task in tasks)
-        self._is_spin_free = [task.is_spin_free for task in tasks]
-        self._is_on_part = all(task.relative_to is Frame.PART for task in tasks)
-        self._is_linear = np.array([[float(axis in task.axes) for axis in range(3)] for task in tasks])
-        self._lost = np.array([max(LOST_DISTANCE, 2.0 * target.tolerance) for target in asked])
-        self._settled = np.array([target.settled for target in asked])
+        self._rows = [
+            constraint_rows(task, X_RT) for task, X_RT in zip(tasks, self.desired.swapaxes(0, 1), strict=True)
+        ]
+        self.constraints = TaskConstraints.of(cell, tasks, motion.moving)
+        self._is_on_part = bool(self.constraints.is_on_part.all())
+        self._lost = np.array([max(LOST_DISTANCE, 2.0 * _tolerance(cell, task)) for task in tasks])
+        self._settled = np.array([_settled_from(task) for task in tasks])
         self._weights = JointWeights(cell, self._model)
         self.cell, self.times, self.tasks = cell, schedule.times, tasks
-        self.operators = [names.index(task.robot) for task in tasks]
-        self.desired = np.stack([target.X_PT for target in asked], axis=1)
-        self.twists = np.stack([target.V_PT_P for target in asked], axis=1)
-        self.signs = column_signs(cell, self._model, tasks, moving)
+        self.signs = self.constraints.column_signs(self._model.carries_flange)
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
-        self.drift: Drift | None = None
-        self._goals = self._secondary_goals(start, _rests(cell, schedule)) if cell.solver.goals else None
+        self.motion, self.drift = motion, drift
+        self._goals = self._secondary_goals() if cell.solver.goals else None
         self._locked_since = locked_since(cell)
-        self._may_move = np.isin(_owners(cell), moving)
+
+    @property
+    def operators(self) -> NDArray[np.intp]:
+        """Index of the robot of each task and grasp in the cell, shape (tasks,)."""
+        return self.constraints.operators
 
     def step(self, k: int) -> float:
         """Time from instant k to the next in [s]."""
@@ -141,13 +136,12 @@ class TrackingProblem:
 
     def mobile(self, k: int) -> Array:
         """1 for joints that may move at instant k, 0 for those that stand still or are locked, shape (nq,)."""
-        mobile: Array = (self._may_move & (self.times[k] < self._locked_since)).astype(float)
-        return mobile
+        return self.constraints.may_move * (self.times[k] < self._locked_since)
 
     def rows(self, k: int, q: Array) -> list[Array]:
         """Rows of the cooperation Jacobian for each task at sample k and configuration q, shape (m, nq) each."""
         state = self.state(q)
-        X_WT, X_WR = state.X_WT[self.operators], reference_frames(state, self.tasks)
+        X_WT, X_WR = state.X_WT[self.operators], self.constraints.reference_frames(state.X_WP)
         J = cooperation_jacobian(state, X_WT[:, :3, 3], self.signs * self.mobile(k), X_WR=X_WR)
         return [rows[k] @ block for rows, block in zip(self._rows, J, strict=True)]
 
@@ -160,10 +154,10 @@ class TrackingProblem:
         state = self.state(q)
         signs = self.signs * self.mobile(k)
         X_WT = state.X_WT[self.operators]
-        X_WR = None if self._is_on_part else reference_frames(state, self.tasks)
+        X_WR = None if self._is_on_part else self.constraints.reference_frames(state.X_WP)
         J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
         X_RT = inverse(state.X_WP if X_WR is None else X_WR) @ X_WT
-        error = pose_errors(self.desired[k], X_RT, self._is_spin_free)
+        error = pose_errors(self.desired[k], X_RT, self.constraints.is_spin_free)
         self._refuse_lost_path(k, error)
         rows, twist, errors = self._constrained(k, J, error)
         drift = self._drift(k, q)
@@ -172,7 +166,7 @@ class TrackingProblem:
 
     def _constrained(self, k: int, J: Array, error: Array) -> tuple[Array, Array, Array]:
         """Rows, desired twists and errors of the components that the tasks and grasps constrain."""
-        if self._is_whole:
+        if self.constraints.is_whole:
             return J.reshape(-1, J.shape[2]), self.twists[k].reshape(-1), error.reshape(-1)
         picks = [rows[k] for rows in self._rows]
         return (
@@ -181,18 +175,29 @@ class TrackingProblem:
             np.concatenate([pick @ part for pick, part in zip(picks, error, strict=True)]),
         )
 
-    def _secondary_goals(self, start: Array | None, rests: Array) -> SecondaryGoals:
+    def with_drift(self, drift: Drift | None) -> "TrackingProblem":
+        """The same problem with another drift."""
+        other = copy(self)
+        other.drift = drift
+        return other
+
+    def _secondary_goals(self) -> SecondaryGoals:
         """The goals of the cell, which may lead back to the start posture."""
-        if start is None:
-            raise ValueError("secondary goals need the start posture of the motion")
-        return SecondaryGoals(self.cell, self._model, tasks=self.tasks, times=self.times, start=start, rests=rests)
+        motion = self.motion
+        return SecondaryGoals(
+            self.cell,
+            self._model,
+            tasks=self.tasks,
+            times=self.times,
+            start=motion.start,
+            rests=_rests(motion.cell, motion.schedule),
+        )
 
     def _drift(self, k: int, q: Array) -> Array | None:
         """Joint speeds that are asked for to close a cycle, of those joints that may move."""
         if self.drift is None:
             return None
-        speeds: Array = self.drift(k, q) * self.mobile(k)
-        return speeds
+        return self.drift(k, q) * self.mobile(k)
 
     def _with_goals(self, k: int, q: Array, state: CellState, first: FirstOrder, *, signs: Array) -> FirstOrder:
         """The tasks, with what the secondary goals ask for besides."""
@@ -217,7 +222,7 @@ class TrackingProblem:
         A tool that is still on its way to the path is not lost. With a joint that fails the report is to say how far
         the others get.
         """
-        distances = np.linalg.norm(error[:, :3] * self._is_linear, axis=1)
+        distances = np.linalg.norm(error[:, :3] * self.constraints.kept[:, :3], axis=1)
         is_lost = (distances >= self._lost) & (self.times[k] >= self._settled) & (not self.cell.motion.locked)
         if not is_lost.any() and np.isfinite(error.sum()):
             return
@@ -234,9 +239,14 @@ def _place(task: Relation) -> str:
     return "its grasp on the part" if isinstance(task, Grasp) else f"task '{task.name}'"
 
 
-def _owners(cell: Cell) -> list[str]:
-    """Name of the robot of each joint."""
-    return [robot.name for robot in cell.robots for _ in robot.model.joints]
+def _tolerance(cell: Cell, task: Relation) -> float:
+    """Allowed distance of a tool from its path or its grasp in [m]."""
+    return cell.checks.closure_position if isinstance(task, Grasp) else task.tolerance.position
+
+
+def _settled_from(task: Relation) -> float:
+    """Time in [s] until which a tool may come to its path; -inf when it is there from the start."""
+    return task.start + task.settle if not isinstance(task, Grasp) and task.settle else -np.inf
 
 
 def _rests(cell: Cell, schedule: Schedule) -> Array:

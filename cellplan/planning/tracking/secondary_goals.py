@@ -86,9 +86,8 @@ class SecondaryGoals:
             rests: Instants in [s] at which the goals ask for nothing: the ends of the motion and of cycles to close.
         """
         self._pulls = [(goal.gain, _pull(goal, cell, model, tasks=tasks, start=start)) for goal in cell.solver.goals]
-        self._lower = np.concatenate([robot.model.lower for robot in cell.robots])
-        self._upper = np.concatenate([robot.model.upper for robot in cell.robots])
-        self._limits = SPEED_SHARE * np.concatenate([robot.model.velocity for robot in cell.robots])
+        limits = cell.joint_limits
+        self._lower, self._upper, self._limits = limits.lower, limits.upper, SPEED_SHARE * limits.velocity
         self._step = float(times[1] - times[0]) if len(times) > 1 else cell.motion.step
         self._fade = _fade(times, rests)
 
@@ -108,8 +107,7 @@ class SecondaryGoals:
             slope = pull(stance)
             speeds = gain / (1.0 + gain * self._step * slope.curvature) * slope.gradient * stance.mobility
             asked += speeds / max(1.0, float(np.max(np.abs(speeds) / self._limits, initial=0.0)))
-        desired: Array = self._fade[k] * asked
-        return desired
+        return self._fade[k] * asked
 
     def bounds(self, q: Array) -> tuple[Array, Array]:
         """Lowest and highest joint speeds that a goal may lead to at a configuration, shape (nq,) each."""
@@ -140,8 +138,7 @@ def _fade(times: Array, rests: Array) -> Array:
     length = float(np.diff(rests).max())
     away = np.min(np.abs(times[:, None] - rests), axis=1)
     x = np.clip(away / max(min(FADE, FADE_SHARE * length), np.finfo(float).tiny), 0.0, 1.0)
-    share: Array = x * x * (3.0 - 2.0 * x)
-    return share
+    return x * x * (3.0 - 2.0 * x)
 
 
 def _pull(goal: SecondaryGoal, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], start: Array) -> Pull:
@@ -164,11 +161,9 @@ def _manipulability(cell: Cell, model: CombinedModel, tasks: Sequence[Relation])
     there are nor on the units of the rows. Its direction is that of the gradient of D.45. The curvature is that of
     ``log sin q``, to which the manipulability of an elbow or a wrist is proportional, one for each task.
     """
-    names = [robot.name for robot in cell.robots]
-    holder = names.index(cell.positioners[0]) if cell.positioners else None
-    operators = [names.index(task.robot) for task in tasks]
+    operators = [cell.index(task.robot) for task in tasks]
     on_part = np.array([float(task.relative_to is Frame.PART) for task in tasks])
-    gradients = ManipulabilityGradient(model, operators, holder, on_part=on_part)
+    gradients = ManipulabilityGradient(model, operators, cell.carrier, on_part=on_part)
 
     def pull(stance: Stance) -> Slope:
         gradient = gradients.at(stance.q, stance.state, J=stance.J, picks=stance.picks, signs=stance.signs)

@@ -6,6 +6,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 
+LARGEST_DAMPING: Final = 0.02  # [-] damping factor at a singularity where the cell states none
 ROUNDING: Final = 1e-12  # eigenvalues of J W^-1 J^T below this share of the largest are rounding: rank is lost
 
 
@@ -46,8 +47,7 @@ class WeightedInverse:
         Returns:
             Speeds in [rad/s] or [m/s], shape (nq,).
         """
-        speeds: Array = self._JW.T @ (self._U @ ((self._U.T @ xdot) / (self._s_squared + lambda_squared)))
-        return speeds
+        return self._JW.T @ (self._U @ ((self._U.T @ xdot) / (self._s_squared + lambda_squared)))
 
     def null_space_projection(self, speeds: Array) -> Array:
         r"""What of given joint speeds moves no task ([Ribeiro2010]_ Eq. D.43), projected in the metric of W.
@@ -61,5 +61,4 @@ class WeightedInverse:
         """
         kept = self._s_squared > ROUNDING * self._s_squared[-1]
         U = self._U[:, kept]
-        rest: Array = speeds - self._JW.T @ (U @ ((U.T @ (self._J @ speeds)) / self._s_squared[kept]))
-        return rest
+        return speeds - self._JW.T @ (U @ ((U.T @ (self._J @ speeds)) / self._s_squared[kept]))

@@ -5,8 +5,8 @@ import pytest
 from builders.concave_shapes import tube
 from builders.scene_builders import joint, make_cell, placed, schedule, thing
 
+from cellplan.certify import pair_state as budget
 from cellplan.checks.clearance.check import check_clearance
-from cellplan.collision.continuous import found as budget
 from cellplan.geometry.shapes import Capsule
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, CheckSettings
@@ -55,7 +55,7 @@ def test_a_rod_that_turns_in_a_tube_passes_with_the_distance_it_keeps() -> None:
 def test_when_the_work_ends_a_lower_bound_is_reported_and_the_check_still_passes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(budget, "MOST_READINGS", 12)
+    monkeypatch.setattr(budget, "MAX_READINGS", 12)
 
     report, checks = checked(turning_rod(), spinning())
 
@@ -71,7 +71,7 @@ def test_when_the_work_ends_a_lower_bound_is_reported_and_the_check_still_passes
 def test_a_demand_that_cannot_be_proved_is_not_certified_and_never_called_a_collision(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(budget.Found, "may_cut", property(lambda _: False))
+    monkeypatch.setattr(budget.PairState, "may_cut", property(lambda _: False))
 
     report, checks = checked(turning_rod(clearance=0.0842), spinning(1.2))
 

@@ -160,7 +160,7 @@ def test_long_motions_are_worked_through_in_pieces_with_the_same_result(monkeypa
     scene, q = Scene.from_cell(two_arms()), swinging(2, 300)
     whole, _ = check_clearance(scene, schedule(300), q)
 
-    monkeypatch.setattr("cellplan.certify.search.MOST_SAMPLES", 64)
+    monkeypatch.setattr("cellplan.certify.certify.MAX_SAMPLES", 64)
     pieces, _ = check_clearance(scene, schedule(300), q)
 
     assert pieces.contacts == whole.contacts

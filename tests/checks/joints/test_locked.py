@@ -11,7 +11,8 @@ from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accu
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import LockedJoint
 from cellplan.model.robot import JointKind
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
+from cellplan.planning.tracking.motion_task import MotionTask
 
 TIMES = np.linspace(0.0, 4.0, 4001)
 
@@ -69,7 +70,7 @@ def accuracy_checks(*locks, jump_at=None):
     """Checks of the arm on its circle; ``jump_at`` takes the path away, which no joint is to blame for."""
     cell = locked_cell(*locks)
     schedule = circle_schedule(cell)
-    motion = follow(cell, schedule, start=START, moving=["arm"])
+    motion = integrate_schedule(MotionTask(cell, schedule, ["arm"], START))
     scheduled = schedule.tasks[0]
     if jump_at is not None:
         X = scheduled.X_PT.copy()

@@ -10,7 +10,8 @@ from cellplan.checks.tools.tracking import part_poses
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.planning.tracking.cooperation_jacobian import column_signs, constraint_rows, cooperation_jacobian
+from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
+from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 
 N = 5
 
@@ -19,7 +20,7 @@ def planners_values(cell, schedule, q, moving):
     model = CombinedModel(cell)
     names = [r.name for r in cell.robots]
     tasks = [scheduled.task for scheduled in schedule.tasks]
-    signs = column_signs(cell, model, tasks, moving)
+    signs = TaskConstraints.of(cell, tasks, moving).column_signs(model.carries_flange)
     values = []
     for k in range(N):
         state = model.state(q[k])

@@ -6,9 +6,9 @@ from builders.scene_builders import arm_model, make_cell, placed, random_pose, t
 
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.linear_motion import StraightMotion
+from cellplan.certify.pair_search import SolidSearch
+from cellplan.certify.pair_state import PairState
 from cellplan.collision.bodies import checked_poses, prepare
-from cellplan.collision.continuous.found import Found
-from cellplan.collision.continuous.interval_search import SolidSearch
 from cellplan.collision.continuous.pieces import can_be_split, read_piece, split
 from cellplan.collision.distance import Reading, measure
 from cellplan.collision.engine import Engine
@@ -115,15 +115,15 @@ def test_a_search_by_pieces_finds_the_smallest_distance_with_few_questions() -> 
     scene, q, pair = stirring()
     poses = scene.body_poses(q)
     brute = [measure(scene.engine, pair, poses, sample=k) for k in range(len(q))]
-    asked = scene.engine.asked.distances
+    before = scene.engine.queries.distances
 
-    search = SolidSearch(scene.engine, pair, StraightMotion.of_cell(scene, LeverArms(scene, q), q), found=Found())
+    search = SolidSearch(scene.engine, pair, StraightMotion.of_cell(scene, LeverArms(scene, q), q), state=PairState())
     search.run(np.inf)
 
     smallest = min(reading.bound for reading in brute)
-    assert not search.found.touches
-    assert not search.found.unproved
+    assert not search.state.touches
+    assert not search.state.unproved
     assert smallest > 0.01
     assert search.low.min() <= smallest + EXACT / 2
     assert smallest - EXACT <= search.low.min()  # the steps are short
-    assert scene.engine.asked.distances - asked < len(q)
+    assert scene.engine.queries.distances - before < len(q)

@@ -118,12 +118,3 @@ def test_a_posture_that_does_not_fit_is_refused(way):
         way(cell, np.zeros(9))
     with pytest.raises(InputError, match=r"^q: expected finite joint positions, got nan$"):
         way(cell, np.full(10, np.nan))
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_a_fixed_part_without_a_pose_is_refused(way):
-    cell = random_cell(125, operators=1, joints=5, held=False)
-    with pytest.raises(
-        InputError, match=r"^part: expected a pose in the world for a part that nobody holds, got none$"
-    ):
-        way(replace(cell, part=replace(cell.part, X_WP=None)), np.zeros(10))

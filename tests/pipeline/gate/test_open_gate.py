@@ -119,7 +119,7 @@ def test_a_report_of_another_version_of_cellplan_may_have_other_keys(copy: Path)
     remarks = open_gate(copy / "run", cell=copy / "cell" / "small.yaml").remarks
     assert remarks[0].startswith("made with cellplan 0.0.1, verified with cellplan ")
     assert remarks[1:] == (
-        "the page and the words of the report were not compared: another version of cellplan wrote them",
+        "the page and the texts of the report were not compared: another version of cellplan wrote them",
     )
 
 

@@ -11,12 +11,13 @@ from cellplan.model.motion import Schedule
 from cellplan.model.solver import Integrator
 from cellplan.planning.collocation.at_samples import brought_onto_tasks
 from cellplan.planning.collocation.run import AccurateRun
+from cellplan.planning.tracking.motion_task import MotionTask
 
 EULER = Integrator.EULER
 
 
 def errors(case: Case, schedule: Schedule, q: Array) -> Array:
-    return AccurateRun(case.cell, case.timed, start=case.start, moving=case.moving).errors(schedule, q)
+    return AccurateRun(case.task).errors(schedule, q)
 
 
 def stepped() -> tuple[Case, Array]:
@@ -27,7 +28,7 @@ def stepped() -> tuple[Case, Array]:
 def test_what_steps_leave_is_taken_away() -> None:
     case, q = stepped()
 
-    brought = brought_onto_tasks(case.cell, case.schedule, q, moving=case.moving)
+    brought = brought_onto_tasks(case.task, q)
 
     assert errors(case, case.schedule, q).max() > 1e-6
     assert errors(case, case.schedule, brought).max() <= 1e-12  # [m] and [rad] rounding
@@ -37,9 +38,9 @@ def test_what_steps_leave_is_taken_away() -> None:
 def test_joints_move_as_little_as_they_can() -> None:
     """The correction has no part in the null space of the tasks: what is done twice changes nothing."""
     case, q = stepped()
-    brought = brought_onto_tasks(case.cell, case.schedule, q, moving=case.moving)
+    brought = brought_onto_tasks(case.task, q)
 
-    again = brought_onto_tasks(case.cell, case.schedule, brought, moving=case.moving)
+    again = brought_onto_tasks(case.task, brought)
 
     assert np.abs(again - brought).max() <= 1e-12
 
@@ -48,7 +49,7 @@ def test_what_is_far_away_stays_where_it_is() -> None:
     case, q = stepped()
     far = tuple(replace(task, X_PT=pose((0.0, 0.0, 0.1)) @ task.X_PT) for task in case.schedule.tasks)
 
-    brought = brought_onto_tasks(case.cell, replace(case.schedule, tasks=far), q, moving=case.moving)
+    brought = brought_onto_tasks(MotionTask(case.cell, replace(case.schedule, tasks=far), case.moving, q[0]), q)
 
     assert np.array_equal(brought, q)
 
@@ -58,4 +59,4 @@ def test_a_joint_that_fails_leaves_everything_as_it_is() -> None:
     lock = LockedJoint(robot="kuka", joint="A2", since=0.5)
     cell = replace(case.cell, motion=replace(case.cell.motion, locked=(lock,)))
 
-    assert brought_onto_tasks(cell, case.schedule, q, moving=case.moving) is q
+    assert brought_onto_tasks(MotionTask(cell, case.schedule, case.moving, q[0]), q) is q

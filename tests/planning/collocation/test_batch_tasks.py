@@ -11,13 +11,8 @@ from cellplan.geometry.transforms import Array, inverse, rotation_exp, rotation_
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Cell
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Look, Reference
-from cellplan.planning.tracking.cooperation_jacobian import (
-    column_signs,
-    constraint_rows,
-    cooperation_jacobian,
-    pose_errors,
-    reference_frames,
-)
+from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
+from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
 
 LANES = 3
@@ -31,10 +26,9 @@ class Dense:
     def __init__(self, cell: Cell, q: Array, X: Array, twists: Array, *, moving: list[str], mobile: Array) -> None:
         tasks, model = relations(cell), CombinedModel(cell)
         state = model.state(q)
-        names = everyone(cell)
-        X_WT = state.X_WT[[names.index(task.robot) for task in tasks]]
-        X_WR = reference_frames(state, tasks)
-        signs = column_signs(cell, model, tasks, moving) * mobile
+        constraints = TaskConstraints.of(cell, tasks, moving)
+        X_WT, X_WR = state.X_WT[constraints.operators], constraints.reference_frames(state.X_WP)
+        signs = constraints.column_signs(model.carries_flange) * mobile
         J = cooperation_jacobian(state, X_WT[:, :3, 3], signs, X_WR=X_WR)
         error = pose_errors(X, inverse(X_WR) @ X_WT, [task.is_spin_free for task in tasks])
         picks = [constraint_rows(task, X[None, index])[0] for index, task in enumerate(tasks)]

@@ -194,7 +194,7 @@ def test_stretches_are_cut_where_joints_fail() -> None:
 
 def test_a_motion_goes_on_from_anywhere() -> None:
     case = triangles(CELLS["mixed"])
-    run = AccurateRun(case.cell, case.timed, start=case.start, moving=case.moving)
+    run = AccurateRun(case.task)
     whole = run.path(case.start, begin=0.0, end=1.0)
     first = run.path(case.start, begin=0.0, end=0.37)
     rest = run.path(first.last, begin=0.37, end=1.0)
@@ -204,9 +204,7 @@ def test_a_motion_goes_on_from_anywhere() -> None:
 
 def test_progress_is_told_from_zero_to_one() -> None:
     case, told = triangles(CELLS["single"]), []
-    run = AccurateRun(
-        case.cell, case.timed, start=case.start, moving=case.moving, progress=lambda _stage, share: told.append(share)
-    )
+    run = AccurateRun(case.task, progress=lambda _stage, share: told.append(share))
     run.path(case.start, begin=0.0, end=1.0)
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1.0)

@@ -13,19 +13,27 @@ from cellplan.kinematics.batched import Placement
 from cellplan.model.cell import Cell
 from cellplan.planning.collocation.batch_targets import BatchTargets
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Reference
-from cellplan.planning.collocation.solver import Collocation
+from cellplan.planning.collocation.solver import Collocation, Precision
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
-from cellplan.planning.tracking.targets import closures
+from cellplan.planning.tracking.motion_task import closures
 
 ACCURACY = 1e-7
 CELL = triangles(CELLS["mixed"])
 
 
-def collocation(case: Case, placement: Placement | None = None, *, accuracy: float = ACCURACY) -> Collocation:
+def collocation(
+    case: Case,
+    placement: Placement | None = None,
+    *,
+    accuracy: float = ACCURACY,
+    shortest: float = 0.0,
+    mobile: Array | None = None,
+) -> Collocation:
     grasps = closures(case.cell, case.moving)
     tasks = BatchTasks(case.cell, [*case.cell.tasks, *grasps], case.moving)
     placed = tasks.chains.placement(case.cell) if placement is None else placement
-    return Collocation(tasks, BatchTargets(case.timed, grasps), placed, accuracy=accuracy)
+    precision = Precision(accuracy=accuracy, shortest=shortest)
+    return Collocation(tasks, BatchTargets(case.timed, grasps), placed, precision, mobile=mobile)
 
 
 def moved_bases(cell: Cell, count: int) -> list[Cell]:
@@ -82,8 +90,7 @@ def test_one_that_is_lost_leaves_the_others_alone() -> None:
     ]
     cells.insert(1, replace(CELL.cell, robots=tuple(far)))
     q = np.repeat(CELL.start[:, None], 3, axis=1)
-    found = collocation(CELL, placement_of(cells))
-    found.shortest = 0.02
+    found = collocation(CELL, placement_of(cells), shortest=0.02)
 
     last, arrived, passed = carried_through(found, CELL, q, np.arange(3))
 
@@ -107,8 +114,7 @@ def test_panels_come_in_order_without_gaps() -> None:
 
 def test_an_attempt_that_does_not_settle_says_so_in_silence() -> None:
     """Even where no robot may move and the tools are desired elsewhere; no warning is let out."""
-    found = collocation(CELL)
-    found.mobile = np.zeros(CELL.cell.joint_count)
+    found = collocation(CELL, mobile=np.zeros(CELL.cell.joint_count))
     window = Window((Panel(0.0, 1.0 / 3.0, 12),))
     times, (begins, ends) = window.instants, window.stretches
     desired = BatchTargets(CELL.timed, ()).at(times, begins, ends)

@@ -10,9 +10,10 @@ from cellplan.errors import InputError
 from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.planning.tracking.motion_task import MotionTask
 
 FOLDER = Path(__file__).parents[3] / "cells"
 
@@ -20,7 +21,7 @@ FOLDER = Path(__file__).parents[3] / "cells"
 def planned(cell: Cell, start: np.ndarray) -> tuple[Schedule, Motion]:
     schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
     moving = tuple(robot.name for robot in cell.robots)
-    return schedule, follow(cell, schedule, start=start, moving=moving)
+    return schedule, integrate_schedule(MotionTask(cell, schedule, moving, start))
 
 
 def four_robots(*, cyclic: bool) -> tuple[Cell, np.ndarray]:
@@ -69,7 +70,7 @@ def test_a_path_that_does_not_come_back_is_refused_by_name() -> None:
     )
 
     with pytest.raises(InputError, match=r"motion\.cyclic: expected closed paths .* task 'circle' is not back at its"):
-        follow(cell, cut, start=start, moving=tuple(robot.name for robot in cell.robots))
+        integrate_schedule(MotionTask(cell, cut, tuple(robot.name for robot in cell.robots), start))
 
 
 def tool_error(cell: Cell, schedule: Schedule, motion: Motion) -> float:

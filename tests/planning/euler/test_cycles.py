@@ -11,7 +11,7 @@ from cellplan.model.cell import Origin
 from cellplan.model.motion import TaskSchedule
 from cellplan.model.task import PolygonPath, SpacePolylinePath, Task, TimeLaw, TimeLawKind
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.schedule import examine_times, schedule_tasks
+from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
 from cellplan.planning.timing.time_law import advance, reached_at
 
 ORIGIN = Origin(file="cell.yaml", lines={"tasks.ring.repeat": 12, "tasks.ring.settle_s": 13})
@@ -150,11 +150,11 @@ def test_cycles_too_short_and_stops_too_many_are_refused() -> None:
     short = replace(ON_ROLLER["circle"], repeat=100)
     many = replace(ON_ROLLER["circle"], path=many_sided(), project=None, tool_axis=DOWN, repeat=10_000)
     with pytest.raises(InputError, match=r"expected a cycle of at least 0.1 s .*, got 0.04 s; slow the task down"):
-        examine_times(clocked(short, step=0.01), [build_toolpath(short, ROLLER, ORIGIN)])
+        clock_paths(clocked(short, step=0.01), [build_toolpath(short, ROLLER, ORIGIN)])
     with pytest.raises(
         InputError, match=r"cell.yaml:12: tasks.ring.repeat: expected at most 6644 cycles of a path with"
     ):
-        examine_times(replace(clocked(many), origin=ORIGIN), [build_toolpath(many, ROLLER, ORIGIN)])
+        clock_paths(replace(clocked(many), origin=ORIGIN), [build_toolpath(many, ROLLER, ORIGIN)])
 
 
 def many_sided() -> SpacePolylinePath:
@@ -166,11 +166,11 @@ def test_a_time_to_settle_that_leaves_nothing_to_judge_is_refused() -> None:
     task = replace(ON_ROLLER["circle"], settle=3.95)
     cell = replace(clocked(task, step=0.01), origin=ORIGIN)
     with pytest.raises(InputError) as caught:
-        examine_times(cell, [build_toolpath(task, ROLLER, ORIGIN)])
+        clock_paths(cell, [build_toolpath(task, ROLLER, ORIGIN)])
 
     assert str(caught.value) == (
         "cell.yaml:13: tasks.ring.settle_s: expected a time that leaves at least 0.1 s (10 times motion.step_s) of the "
         "task's 4 s to be judged, got 3.95"
     )
     shorter = replace(task, settle=3.9)
-    examine_times(clocked(shorter, step=0.01), [build_toolpath(shorter, ROLLER, ORIGIN)])
+    clock_paths(clocked(shorter, step=0.01), [build_toolpath(shorter, ROLLER, ORIGIN)])

@@ -10,7 +10,8 @@ from cellplan.errors import DivergedError, NoSolutionError
 from cellplan.geometry.transforms import inverse, pose_from, rotation_exp
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
+from cellplan.planning.tracking.motion_task import MotionTask
 
 DURATION = 0.5  # [s]
 
@@ -61,7 +62,7 @@ def solved(step, *, gain_times_step=0.5, moving=None, cell=None):
     start = np.random.default_rng(0).uniform(-1, 1, cell.joint_count)
     schedule = lissajous_schedule(cell, start, step)
     everyone = [robot.name for robot in cell.robots]
-    return cell, schedule, follow(cell, schedule, start=start, moving=moving or everyone)
+    return cell, schedule, integrate_schedule(MotionTask(cell, schedule, moving or everyone, start))
 
 
 def test_error_is_of_second_order_when_gain_times_step_is_kept():
@@ -89,7 +90,7 @@ def test_feedback_removes_a_start_error_at_the_rate_of_the_gain():
     still = TaskSchedule(task=task, X_PT=X, V_PT_P=np.zeros((41, 6)), travelled=np.zeros(41), length=1.0, end=0.0)
     schedule = Schedule(times=np.arange(41) * step, tasks=(still,))
 
-    motion = follow(cell, schedule, start=start, moving=["holder", "op0"])
+    motion = integrate_schedule(MotionTask(cell, schedule, ["holder", "op0"], start))
 
     error = np.linalg.norm(X[:, :3, 3] - relative_pose(cell, task, motion.q)[:, :3, 3], axis=1)
     np.testing.assert_allclose(error[1:] / error[:-1], 1 - share, rtol=5e-3)  # curvature of the arms over 0.2 mm
@@ -105,7 +106,7 @@ def test_equal_motion_of_positioner_and_operators_is_never_needed():
         replace(s, X_PT=np.broadcast_to(s.X_PT[0], s.X_PT.shape), V_PT_P=np.zeros_like(s.V_PT_P))
         for s in schedule.tasks
     )
-    motion = follow(cell, replace(schedule, tasks=still), start=start, moving=[r.name for r in cell.robots])
+    motion = integrate_schedule(MotionTask(cell, replace(schedule, tasks=still), [r.name for r in cell.robots], start))
     assert np.abs(motion.q - start).max() < 1e-12
 
 
@@ -117,7 +118,7 @@ def test_lost_path_is_named_with_its_instant():
     X[100:, 0, 3] += 5.0
     broken = replace(schedule, tasks=(schedule.tasks[0], replace(schedule.tasks[1], X_PT=X)))
     with pytest.raises(DivergedError, match=r"at 0\.200 s the tool of 'op1' is \d+ mm from task 'task_op1'"):
-        follow(cell, broken, start=start, moving=[r.name for r in cell.robots])
+        integrate_schedule(MotionTask(cell, broken, [r.name for r in cell.robots], start))
 
 
 def test_task_that_nobody_may_move_for_is_refused_without_damping():
@@ -126,4 +127,4 @@ def test_task_that_nobody_may_move_for_is_refused_without_damping():
     start = np.random.default_rng(0).uniform(-1, 1, cell.joint_count)
     schedule = lissajous_schedule(cell, start, 2e-3)
     with pytest.raises(NoSolutionError, match="singular"):
-        follow(cell, schedule, start=start, moving=[])
+        integrate_schedule(MotionTask(cell, schedule, [], start))

@@ -12,7 +12,8 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.io.run.joint_tables import parse_table
 from cellplan.model.solver import MethodName
 from cellplan.pipeline.solve import render_program
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.scene import Scene
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
@@ -28,7 +29,7 @@ def test_finite_joints_honestly_judged_or_a_refusal_that_names_the_cause(name, m
     cell = replace(situation.cell, solver=replace(situation.cell.solver, method=method))
     refusal, motion = "", None
     try:
-        motion = follow(cell, situation.schedule, start=situation.start, moving=situation.moving)
+        motion = integrate_schedule(MotionTask(cell, situation.schedule, situation.moving, situation.start))
     except (NoSolutionError, InputError) as error:
         refusal = str(error)
     if motion is None:

@@ -17,6 +17,7 @@ from cellplan.planning.methods.damped_least_squares import (
     nearness,
     squared_damping,
 )
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import TrackingProblem
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
 
@@ -44,8 +45,9 @@ def one_step(q, *, settings=BY_VALUE, damping=None, weights=(1.0, 1.0, 1.0), dri
         duration=5 * STEP,
         step=STEP,
     )
-    problem = TrackingProblem(cell, schedule, ["arm"])
-    problem.drift = None if drift is None else lambda _k, _q: drift
+    problem = TrackingProblem(MotionTask(cell, schedule, ["arm"], np.zeros(cell.joint_count)))
+    if drift is not None:
+        problem = problem.with_drift(lambda _k, _q: drift)
     speeds = (damped_least_squares(problem)(0, np.array(q)).q - q) / STEP
     return tip_jacobians(LENGTHS, np.array([q]))[0], VELOCITY + GAIN * offset, speeds
 

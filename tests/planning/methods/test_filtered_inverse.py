@@ -14,6 +14,7 @@ from cellplan.model.cell import LockedJoint
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.solver import FilteredInverseSettings, SolverSettings
 from cellplan.planning.methods import method_named
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import TrackingProblem
 
 METHODS = ("damped_least_squares", "filtered_inverse", "filtered_inverse_ii")
@@ -91,7 +92,7 @@ def arm_problem(q, *, filter_gain, gain=5.0, weights=(1.0, 1.0, 1.0), zero=False
         duration=20 * STEP,
         step=STEP,
     )
-    return TrackingProblem(cell, schedule, ["arm"])
+    return TrackingProblem(MotionTask(cell, schedule, ["arm"], np.zeros(cell.joint_count)))
 
 
 @pytest.mark.parametrize("method", METHODS[1:])
@@ -115,8 +116,7 @@ def test_secondary_motion_stays_unnoticed_while_the_filter_lags(method):
     q, drift = np.array([0.2, 0.9, -1.4]), np.array([0.3, -0.2, 0.5])
     speeds = []
     for desired in (None, lambda _k, _q: drift):
-        problem = arm_problem(q, filter_gain=3.0, zero=True)
-        problem.drift = desired
+        problem = arm_problem(q, filter_gain=3.0, zero=True).with_drift(desired)
         speeds.append((method_named(method)(problem)(0, q).q - q) / STEP)
     change = speeds[1] - speeds[0]
     assert np.linalg.norm(change) > 0.01
@@ -156,7 +156,9 @@ def test_locked_and_idle_joints_stand_exactly_still(method):
     locked = LockedJoint(robot="op0", joint="j3", since=0.095)
     cell = replace(cell, solver=solver, motion=replace(cell.motion, locked=(locked,)))
     q = np.random.default_rng(4).uniform(-1, 1, cell.joint_count)
-    problem = TrackingProblem(cell, _drifting_schedule(cell, q), ["holder", "op0"])
+    problem = TrackingProblem(
+        MotionTask(cell, _drifting_schedule(cell, q), ["holder", "op0"], np.zeros(cell.joint_count))
+    )
     advance = method_named(method)(problem)
     path = [q]
     for k in range(20):
@@ -169,7 +171,7 @@ def test_locked_and_idle_joints_stand_exactly_still(method):
 
 def _drifting_schedule(cell, q):
     """Every tool is to leave its place at a constant velocity."""
-    model = TrackingProblem(cell, _held(cell, np.tile(np.eye(4), (21, 1, 1))), ["holder"]).state(q)
+    model = TrackingProblem(MotionTask(cell, _held(cell, np.tile(np.eye(4), (21, 1, 1))), ["holder"], q)).state(q)
     X_PW = np.linalg.inv(model.X_WP)
     names = [robot.name for robot in cell.robots]
     tasks = []

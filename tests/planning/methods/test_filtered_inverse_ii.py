@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from cellplan.model.solver import FilteredInverseSettings, SolverSettings
 from cellplan.planning.methods.filtered_inverse_ii import filtered_inverse_ii
 from cellplan.planning.methods.support.filtered_jacobian import FilteredMotion
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import TrackingProblem
 
 LENGTHS = (2.0, 1.0, 1.0)
@@ -32,7 +33,7 @@ def resting_problem(q):
         duration=1e-3,
         step=1e-4,
     )
-    return TrackingProblem(cell, schedule, ["arm"])
+    return TrackingProblem(MotionTask(cell, schedule, ["arm"], np.zeros(cell.joint_count)))
 
 
 @given(q=st.tuples(ANGLE, ANGLE, ANGLE), seed=st.integers(0, 2**32 - 1))

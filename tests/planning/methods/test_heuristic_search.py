@@ -25,7 +25,8 @@ from cellplan.geometry.transforms import inverse, pose_from, rotation_exp
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import LockedJoint, Origin
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
+from cellplan.planning.tracking.motion_task import MotionTask
 
 BIG = 2 * np.cos(np.pi / 6)  # [m] the published 1.7320: reach of the arm at its start
 BOTH = ["heuristic_search", "recursive_search"]
@@ -65,7 +66,7 @@ def test_line_of_singular_points_only_is_followed():
 
 @pytest.mark.parametrize("method", BOTH)
 @pytest.mark.parametrize(
-    ("posture", "goal"), [([0, 0, 0, 0], 0.799), ([0, 0, 0, 0], 0.75), ([0.4] * 1 + [0] * 3, 0.79)]
+    ("configuration", "goal"), [([0, 0, 0, 0], 0.799), ([0, 0, 0, 0], 0.75), ([0.4] * 1 + [0] * 3, 0.79)]
 )
 def test_stretched_arm_gets_away_towards_a_goal_on_its_own_line(method, configuration, goal):
     """The only singular situation (3.2.2): no joint alone can gain anything."""
@@ -181,7 +182,7 @@ def test_all_tools_of_a_cell_are_brought_to_their_place_on_the_part(cell, compon
     start = np.random.default_rng(3).uniform(-0.5, 0.5, cell.joint_count)
     schedule = wave_schedule(cell, start)
 
-    motion = follow(cell, schedule, start=start, moving=[robot.name for robot in cell.robots])
+    motion = integrate_schedule(MotionTask(cell, schedule, [robot.name for robot in cell.robots], start))
 
     for scheduled in schedule.tasks:
         actual = relative(cell, scheduled.task, motion.q)[1:]
@@ -254,7 +255,7 @@ def test_same_input_gives_the_same_motion():
     cell = replace(cell, solver=replace(cell.solver, method="heuristic_search"))
     start = np.random.default_rng(3).uniform(-0.5, 0.5, cell.joint_count)
     schedule = wave_schedule(cell, start)
-    first, second = (follow(cell, schedule, start=start, moving=["op0"]) for _ in range(2))
+    first, second = (integrate_schedule(MotionTask(cell, schedule, ["op0"], start)) for _ in range(2))
     np.testing.assert_array_equal(first.q, second.q)
 
 

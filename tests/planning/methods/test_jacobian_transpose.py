@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from cellplan.model.cell import LockedJoint
 from cellplan.model.solver import SolverSettings
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.methods.jacobian_transpose import (
     LEFT_OPEN,
     LONGEST_MOVE,
@@ -19,6 +19,7 @@ from cellplan.planning.methods.jacobian_transpose import (
     jacobian_transpose,
     pulled,
 )
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import TrackingProblem
 
 LENGTHS = (1.0, 0.8, 0.6)
@@ -90,7 +91,7 @@ def test_the_tool_lags_behind_in_proportion_to_its_speed(speed):
     """``e = (1 / K - dt) v``, as no velocity is fed forward."""
     cell = arm(20.0)
     schedule = line(cell, np.array([-speed, 0.0]))
-    motion = follow(cell, schedule, start=START, moving=["arm"])
+    motion = integrate_schedule(MotionTask(cell, schedule, ["arm"], START))
     # curvature of the arm and a thousandth left open per step
     assert errors(schedule, motion)[-1] == pytest.approx((1 / 20.0 - STEP) * speed, rel=0.02)
 
@@ -98,7 +99,7 @@ def test_the_tool_lags_behind_in_proportion_to_its_speed(speed):
 def test_a_gain_of_one_per_step_leaves_no_lag():
     cell = arm(1.0 / STEP)
     schedule = line(cell, np.array([-0.1, 0.05]))
-    motion = follow(cell, schedule, start=START, moving=["arm"])
+    motion = integrate_schedule(MotionTask(cell, schedule, ["arm"], START))
     assert errors(schedule, motion).max() < 2e-6  # a thousandth of 1.1 mm per step, and the arm's curvature over it
 
 
@@ -107,7 +108,7 @@ def test_a_gain_of_one_per_step_leaves_no_lag():
 def test_far_and_unreachable_points_are_approached_without_leaps(gain, offset):
     cell = arm(gain)
     schedule = line(cell, np.zeros(2), offset=offset, duration=0.4)
-    motion = follow(cell, schedule, start=START, moving=["arm"])
+    motion = integrate_schedule(MotionTask(cell, schedule, ["arm"], START))
     error = errors(schedule, motion)
     assert np.abs(np.diff(motion.q, axis=0)).max() <= LONGEST_MOVE * MOST_LOOKS + 1e-12  # rounding of the sum
     assert error[-1] < error[0]
@@ -117,7 +118,7 @@ def test_far_and_unreachable_points_are_approached_without_leaps(gain, offset):
 def test_a_joint_that_fails_stands_still_and_the_others_take_over():
     cell = arm(1.0 / STEP, locked=(LockedJoint(robot="arm", joint="j1", since=0.995),))
     schedule = line(cell, np.array([-0.1, 0.05]))
-    motion = follow(cell, schedule, start=START, moving=["arm"])
+    motion = integrate_schedule(MotionTask(cell, schedule, ["arm"], START))
     assert np.all(np.diff(motion.q[101:, 1]) == 0.0)
     assert np.abs(np.diff(motion.q[:98, 1])).min() > 0.0
     assert errors(schedule, motion).max() < 1e-4
@@ -125,5 +126,7 @@ def test_a_joint_that_fails_stands_still_and_the_others_take_over():
 
 def test_steps_are_counted():
     cell = arm(50.0)
-    step = jacobian_transpose(TrackingProblem(cell, line(cell, np.array([0.1, 0.0])), ["arm"]))(0, START)
+    step = jacobian_transpose(
+        TrackingProblem(MotionTask(cell, line(cell, np.array([0.1, 0.0])), ["arm"], np.zeros(cell.joint_count)))
+    )(0, START)
     assert step.iterations > 1

@@ -14,9 +14,10 @@ from cellplan.errors import DivergedError, StartOutsideLimitsError
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import LockedJoint
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.methods.quadratic_program import bounded_speeds
 from cellplan.planning.methods.support.speed_bounds import SpeedBounds
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import FirstOrder
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
 
@@ -116,7 +117,7 @@ def test_extreme_weights_and_lost_rows_are_solved(rho, limit):
 def arm_motion(**limits):
     cell = planar_arm_cell(limits=limits)
     schedule = circle_schedule(cell)
-    return schedule, follow(cell, schedule, start=START, moving=["arm"])
+    return schedule, integrate_schedule(MotionTask(cell, schedule, ["arm"], START))
 
 
 def test_position_limit_is_kept_within_the_redundancy():
@@ -134,7 +135,7 @@ def test_position_limit_is_kept_within_the_redundancy():
 def test_speed_and_acceleration_limits_are_kept_within_the_redundancy():
     schedule = circle_schedule(planar_arm_cell(), smooth=True)
     cell = planar_arm_cell(limits={"q4": {"velocity": 0.5, "acceleration": 4.0}})
-    motion = follow(cell, schedule, start=START, moving=["arm"])
+    motion = integrate_schedule(MotionTask(cell, schedule, ["arm"], START))
 
     speeds = np.diff(motion.q[:, 3]) / 1e-3
     assert np.abs(speeds).max() == pytest.approx(0.5, rel=1e-6)
@@ -160,7 +161,7 @@ def test_a_locked_joint_stands_still_and_others_do_its_share():
     cell = planar_arm_cell()
     cell = replace(cell, motion=replace(cell.motion, locked=(LockedJoint(robot="arm", joint="q2", since=0.3),)))
     schedule = circle_schedule(cell)
-    motion = follow(cell, schedule, start=START, moving=["arm"])
+    motion = integrate_schedule(MotionTask(cell, schedule, ["arm"], START))
     assert np.ptp(motion.q[300:, 1]) == 0.0
     assert largest_error(schedule, motion.q) < 2e-5
 
@@ -202,7 +203,9 @@ def test_no_limit_is_ever_broken(seed):
     times = np.arange(101) * 2e-3
     scheduled = TaskSchedule(task=cell.tasks[0], X_PT=X, V_PT_P=V, travelled=times, length=1.0, end=0.2)
     try:
-        motion = follow(cell, Schedule(times=times, tasks=(scheduled,)), start=start, moving=["holder", "op0"])
+        motion = integrate_schedule(
+            MotionTask(cell, Schedule(times=times, tasks=(scheduled,)), ["holder", "op0"], start)
+        )
     except DivergedError:  # the tool could not follow; what it did until then is not returned
         return
     speeds = np.diff(motion.q, axis=0) / np.diff(times)[:, None]

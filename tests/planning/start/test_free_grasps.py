@@ -8,6 +8,7 @@ from cellplan.geometry.transforms import inverse
 from cellplan.io.cell.load import load_cell
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.search import choose_start
+from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.scene import Scene
 
 CELL = """
@@ -44,7 +45,9 @@ def test_the_tool_stands_on_the_part_as_the_grasp_says(tmp_path: Path) -> None:
     cell = load_cell(file)
     scene = Scene.from_cell(cell)
 
-    choice = choose_start(scene, {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks})
+    choice = choose_start(
+        scene, clock_paths(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    )
 
     X_WT = {name: chain.tool_poses(choice.start[None, cell.columns(name)])[0] for name, chain in scene.chains.items()}
     first, further = cell.part.held_by

@@ -9,6 +9,7 @@ from cellplan import load_cell
 from cellplan.errors import StartNotFoundError
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.search import choose_start
+from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.scene import Scene
 
 ONE_ARM = """
@@ -32,7 +33,7 @@ def choice_of(folder: Path, *, place: float = 1100.0, seconds: float = 4.0, more
     path.write_text(text, encoding="utf-8")
     cell = load_cell(path)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
-    return choose_start(Scene.from_cell(cell), toolpaths)
+    return choose_start(Scene.from_cell(cell), clock_paths(cell, toolpaths.values()))
 
 
 def reason(folder: Path, **changes) -> str:
@@ -104,7 +105,7 @@ def test_a_column_through_one_arm_comes_before_the_arms_that_touch_each_other_ev
         cell = load_cell(path)
         toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
         with pytest.raises(StartNotFoundError) as caught:
-            choose_start(Scene.from_cell(cell), toolpaths)
+            choose_start(Scene.from_cell(cell), clock_paths(cell, toolpaths.values()))
         texts.append(str(caught.value))
 
     assert "move the bases" in texts[0]
@@ -153,6 +154,6 @@ def test_a_second_given_start_that_no_configuration_of_the_positioner_suits_says
     cell = load_cell(path)
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
     with pytest.raises(StartNotFoundError, match=r"start_deg: the tool of 'upper' is at best \d+\.\d+ mm and \d") as e:
-        choose_start(Scene.from_cell(cell), toolpaths)
+        choose_start(Scene.from_cell(cell), clock_paths(cell, toolpaths.values()))
     assert "from the start of task 'line', allowed are" in str(e.value)
     assert not np.isinf(float(str(e.value).split("at best ")[1].split(" mm")[0]))

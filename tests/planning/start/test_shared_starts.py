@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.timed_cells import found_start
 
 from cellplan import load_cell
 from cellplan.errors import StartNotFoundError, StartOffGraspError, StartOffTaskError
@@ -11,7 +12,6 @@ from cellplan.geometry.transforms import inverse, pose
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
-from cellplan.planning.start.search import find_start
 from cellplan.scene.scene import Scene
 
 
@@ -48,7 +48,7 @@ def assert_loops_are_closed(cell, q):
 
 @pytest.fixture(scope="module")
 def found(shared):
-    return find_start(Scene.from_cell(shared), toolpaths_of(shared))
+    return found_start(Scene.from_cell(shared), toolpaths_of(shared))
 
 
 def test_found_starts_close_the_loop_reach_the_task_and_touch_nothing(shared, found):
@@ -66,14 +66,14 @@ def test_found_starts_close_the_loop_reach_the_task_and_touch_nothing(shared, fo
 def test_the_others_are_found_round_a_robot_that_stands(shared, found, given):
     cell = with_starts(shared, found, given)
 
-    q = find_start(Scene.from_cell(cell), toolpaths_of(cell))
+    q = found_start(Scene.from_cell(cell), toolpaths_of(cell))
 
     np.testing.assert_array_equal(q[cell.columns(given)], found[cell.columns(given)])
     assert_loops_are_closed(cell, q)
 
 
 def test_planar_holders_are_found_where_the_path_in_the_world_begins(planar):
-    q = find_start(Scene.from_cell(planar), toolpaths_of(planar))
+    q = found_start(Scene.from_cell(planar), toolpaths_of(planar))
     assert_loops_are_closed(planar, q)
     np.testing.assert_allclose(tools_in_world(planar, q)["left"][:2, 3], [0.75, 0.0], atol=1e-9)
 
@@ -83,7 +83,7 @@ def test_given_starts_that_close_the_loop_are_accepted(shared, found):
 
 
 def test_a_holder_off_its_grasp_is_named_with_line_distance_and_cure(planar):
-    q = find_start(Scene.from_cell(planar), toolpaths_of(planar))
+    q = found_start(Scene.from_cell(planar), toolpaths_of(planar))
     cell = with_starts(planar, q, "left", "right")
     turned = replace(cell.robot("right"), start=q[cell.columns("right")] + np.array([0.0, 0.0, np.radians(1.0)]))
     cell = replace(cell, robots=(cell.robots[0], turned))
@@ -111,4 +111,4 @@ def test_a_grasp_out_of_reach_is_named(planar):
     with pytest.raises(
         StartNotFoundError, match=r"robots\.right\..* brings the tool of 'right' to its grasp on the part"
     ):
-        find_start(Scene.from_cell(far), toolpaths_of(far))
+        found_start(Scene.from_cell(far), toolpaths_of(far))

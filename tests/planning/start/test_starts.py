@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.timed_cells import found_start
 
 from cellplan import load_cell
 from cellplan.errors import InvalidFileError, StartNotFoundError, StartOffTaskError, StartOutsideLimitsError
@@ -12,7 +13,7 @@ from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import inverse, pose
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Obstacle
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.start.inverse_kinematics import (
@@ -21,8 +22,8 @@ from cellplan.planning.start.inverse_kinematics import (
     reaching_configurations,
     within_limits,
 )
-from cellplan.planning.start.search import find_start
 from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.scene import Scene
 
 
@@ -88,7 +89,7 @@ def test_found_starts_reach_their_tasks_within_limits_and_free(cell, missing):
         open_cell = with_start(open_cell, name, None)
     scene = Scene.from_cell(open_cell)
 
-    q = find_start(scene, toolpaths_of(cell))
+    q = found_start(scene, toolpaths_of(cell))
 
     for robot in cell.robots:
         own = q[cell.columns(robot.name)]
@@ -102,7 +103,7 @@ def test_found_starts_reach_their_tasks_within_limits_and_free(cell, missing):
 
 def test_search_gives_the_same_posture_again_and_another_with_another_seed(cell):
     open_cell = with_start(with_start(cell, "kuka", None), "abb", None)
-    first, again = (find_start(Scene.from_cell(open_cell), toolpaths_of(cell)) for _ in range(2))
+    first, again = (found_start(Scene.from_cell(open_cell), toolpaths_of(cell)) for _ in range(2))
     np.testing.assert_array_equal(first, again)
 
 
@@ -110,7 +111,7 @@ def test_all_postures_of_the_positioner_may_be_open_as_well(cells):
     cell = load_cell(cells / "mesh_part_csv.yaml")
     assert any(robot.start is None for robot in cell.robots)
     scene = Scene.from_cell(cell)
-    q = find_start(scene, toolpaths_of(cell))
+    q = found_start(scene, toolpaths_of(cell))
     assert scene.touching(q) is None
 
 
@@ -132,10 +133,10 @@ def test_a_wrist_that_turns_round_begins_where_a_whole_turn_has_room(tmp_path):
     cell = load_cell(tmp_path / "cell.yaml")
     toolpaths = toolpaths_of(cell)
 
-    start = find_start(Scene.from_cell(cell), toolpaths)
+    start = found_start(Scene.from_cell(cell), toolpaths)
 
     schedule = schedule_tasks(cell, list(toolpaths.values()))
-    q = follow(cell, schedule, start=start, moving=["kuka"]).q
+    q = integrate_schedule(MotionTask(cell, schedule, ["kuka"], start)).q
     assert abs(q[-1, 3] - q[0, 3]) == pytest.approx(2 * np.pi, abs=1e-2)  # the tracking error at the end of the path
     assert margin_shares(cell.robot("kuka").model, q).min() > 0.0
 
@@ -162,7 +163,7 @@ def test_arms_that_cannot_help_do_not_multiply_a_search_without_hope(tmp_path):
 
     began = time.process_time()
     with pytest.raises(StartNotFoundError, match=r"robots\.r0.*: 'r0/.*' touches 'wall' in all .* of task 't0'"):
-        find_start(scene, toolpaths)
+        found_start(scene, toolpaths)
 
     assert time.process_time() - began < 20.0  # some 3 s; looking at every combination takes minutes
 
@@ -175,7 +176,7 @@ def test_what_given_postures_make_collide_is_left_to_the_report(cell):
     blocked = with_start(replace(cell, obstacles=(*cell.obstacles, post)), "kuka", None)
     scene = Scene.from_cell(blocked)
 
-    q = find_start(scene, toolpaths_of(cell))
+    q = found_start(scene, toolpaths_of(cell))
 
     first, second = scene.touching(q)
     assert (first.split("/")[0], second) == ("reis", "post")
@@ -195,7 +196,7 @@ def test_base_out_of_reach_is_named(cell):
         StartNotFoundError,
         match=r"robots\.kuka\.start_deg: no configuration within the joint limits brings the tool of 'kuka' to",
     ) as e:
-        find_start(Scene.from_cell(far), toolpaths_of(cell))
+        found_start(Scene.from_cell(far), toolpaths_of(cell))
     assert "(48 attempts of the inverse kinematics)" in str(e.value)  # the configuration of the positioner is given
 
 

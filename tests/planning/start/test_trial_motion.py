@@ -14,6 +14,7 @@ from cellplan.pipeline.overrides import with_overrides
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.near_ties import best_first
 from cellplan.planning.start.trial_motion import StartTrials
+from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.scene import Scene
 
 
@@ -24,7 +25,7 @@ def cell(cells):
 
 def trials_of(cell):
     toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
-    return StartTrials(Scene.from_cell(cell), toolpaths)
+    return StartTrials(Scene.from_cell(cell), clock_paths(cell, toolpaths.values()))
 
 
 def start_of(cell):

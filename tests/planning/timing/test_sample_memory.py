@@ -11,7 +11,7 @@ from cellplan.errors import InputError
 from cellplan.model.cell import Cell
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.sample_memory import MOST_VALUES, require_room
-from cellplan.planning.timing.schedule import examine_times
+from cellplan.planning.timing.schedule import clock_paths
 
 SHIPPED = Path(__file__).parents[3] / "cells" / "planar_pair.yaml"  # two arms of three joints, 12 s
 
@@ -34,11 +34,11 @@ def test_a_clock_that_is_too_fine_is_refused_before_it_is_made_and_the_cure_help
     paths = [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks]
 
     with pytest.raises(InputError) as caught:
-        examine_times(with_step(cell, 6.5e-6), paths)
+        clock_paths(with_step(cell, 6.5e-6), paths)
 
     message = str(caught.value)
     assert re.match(
         rf"{re.escape(str(SHIPPED))}:\d+: motion\.step_s: expected at most 10000000 samples times joints", message
     )
     assert "got 1846155 x 6, which take about 6.6 GB of memory; make the step at least 7.3e-06 s" in message
-    examine_times(with_step(cell, 7.3e-6), paths)
+    clock_paths(with_step(cell, 7.3e-6), paths)

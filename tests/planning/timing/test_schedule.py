@@ -24,7 +24,7 @@ from cellplan.model.task import (
     Tolerance,
 )
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.schedule import examine_times, schedule_tasks
+from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
 
 ROLLER = Part(shape=Cylinder(0.25, 0.5), X_PS=pose(rpy=[0.0, np.pi / 2.0, 0.0]), held_by=(), X_WP=np.eye(4))
 ORIGIN = Origin(file="cell.yaml", lines={"tasks.a": 7, "motion.step_s": 20})
@@ -241,7 +241,7 @@ def test_a_task_too_short_to_be_judged_by_its_samples_is_refused(words: Any, got
     one = on_roller(**words)
 
     with pytest.raises(InputError) as caught:
-        examine_times(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])
+        clock_paths(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])
 
     told = str(caught.value)
     desired = "expected a task of at least 0.01 s (10 times motion.step_s), got "
@@ -252,4 +252,4 @@ def test_a_task_too_short_to_be_judged_by_its_samples_is_refused(words: Any, got
 def test_ten_steps_are_enough() -> None:
     one = on_roller(duration=0.01)
 
-    examine_times(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])
+    clock_paths(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])

@@ -13,7 +13,7 @@ from cellplan.model.motion import TaskSchedule
 from cellplan.model.task import Task, TimedPath
 from cellplan.model.toolpath import Trajectory
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.schedule import examine_times, schedule_tasks
+from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
 
 ORIGIN = Origin(file="cell.yaml", lines={"tasks.ring.repeat": 12, "tasks.ring.settle_s": 13, "tasks.ring.path": 14})
 DOWN = -np.eye(3)[2]
@@ -164,7 +164,7 @@ def test_a_trajectory_needs_ten_steps_and_some_time_to_be_judged() -> None:
     short, settling = task_on(ellipse(), tool_axis=DOWN), task_on(ellipse(), tool_axis=DOWN, settle=PERIOD)
     for task, step, key in ((short, 0.3, "path"), (settling, 0.01, "settle_s")):
         with pytest.raises(InputError, match=f"tasks.ring.{key}: expected a t"):
-            examine_times(clocked(task, step=step), [build_toolpath(task, ROLLER, ORIGIN)])
+            clock_paths(clocked(task, step=step), [build_toolpath(task, ROLLER, ORIGIN)])
 
 
 @pytest.mark.parametrize("times", [[0.1, 0.2], [0.0, 0.0], [0.0, np.nan], [0.0]])

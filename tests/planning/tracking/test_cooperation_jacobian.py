@@ -10,12 +10,8 @@ from cellplan.geometry.transforms import inverse, pose, pose_from, rotation_abou
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.robot import JointKind
-from cellplan.planning.tracking.cooperation_jacobian import (
-    column_signs,
-    constraint_rows,
-    cooperation_jacobian,
-    pose_errors,
-)
+from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
+from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 
 SOME_POSE = pose([1.0, -2.0, 0.5], [0.3, -0.8, 2.0])
 DERIVATIVE_TOL = 1e-6  # relative; central differences with h = 1e-5 leave h^2 and eps / h, both near 1e-10
@@ -34,7 +30,9 @@ def planners_jacobian(cell, q, moving):
     state = model.state(q)
     names = [r.name for r in cell.robots]
     p_WT = state.X_WT[[names.index(t.robot) for t in cell.tasks], :3, 3]
-    return cooperation_jacobian(state, p_WT, column_signs(cell, model, cell.tasks, moving))
+    return cooperation_jacobian(
+        state, p_WT, TaskConstraints.of(cell, cell.tasks, moving).column_signs(model.carries_flange)
+    )
 
 
 def central_differences(cell, q, moving):

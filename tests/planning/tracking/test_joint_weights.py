@@ -10,8 +10,9 @@ from builders.random_cells import random_cell
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Grasp, Part
 from cellplan.model.solver import WeightingSettings
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.joint_weights import LARGEST_FACTOR, JointWeights, limit_slope
+from cellplan.planning.tracking.motion_task import MotionTask
 
 LOWER, UPPER = np.array([-2.0, 0.1, -np.inf]), np.array([1.0, 3.1, np.inf])
 
@@ -129,7 +130,7 @@ def test_a_joint_near_its_limit_moves_less_and_the_task_is_kept(method):
     schedule = circle_schedule(cell)
 
     def solved(strength):
-        return follow(weighted(cell, near_limits=strength), schedule, start=START, moving=["arm"]).q
+        return integrate_schedule(MotionTask(weighted(cell, near_limits=strength), schedule, ["arm"], START)).q
 
     constant, varying = solved(0.0), solved(0.5)
 

@@ -9,13 +9,9 @@ from builders.random_cells import random_cell
 from cellplan.geometry.transforms import pose_from, rotation_exp
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.task import Frame
-from cellplan.planning.tracking.cooperation_jacobian import (
-    column_signs,
-    constraint_rows,
-    cooperation_jacobian,
-    reference_frames,
-)
+from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
 from cellplan.planning.tracking.manipulability import ManipulabilityGradient
+from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 
 H = 1e-5  # [rad] or [m]: central differences leave H^2 and eps / H times the condition, both below 1e-7
 
@@ -27,7 +23,8 @@ class Tasks:
         self.tasks = cell.tasks
         self.model, names = CombinedModel(cell), [robot.name for robot in cell.robots]
         self.operators = [names.index(task.robot) for task in cell.tasks]
-        self.signs = column_signs(cell, self.model, cell.tasks, moving or names)
+        self.constraints = TaskConstraints.of(cell, cell.tasks, moving or names)
+        self.signs = self.constraints.column_signs(self.model.carries_flange)
         X_PT = pose_from(rotation_exp(np.array([[0.3, -0.5, 0.9]])), np.zeros((1, 3)))  # where free spin looks along
         self.picks = [constraint_rows(task, X_PT)[0] for task in cell.tasks]
         on_part = np.array([float(task.relative_to is Frame.PART) for task in cell.tasks])
@@ -35,7 +32,7 @@ class Tasks:
 
     def rows(self, q):
         state = self.model.state(q)
-        X_WR = reference_frames(state, self.tasks)
+        X_WR = self.constraints.reference_frames(state.X_WP)
         blocks = cooperation_jacobian(state, state.X_WT[self.operators, :3, 3], self.signs, X_WR=X_WR)
         return np.concatenate([pick @ block for pick, block in zip(self.picks, blocks, strict=True)])
 

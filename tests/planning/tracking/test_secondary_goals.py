@@ -12,9 +12,10 @@ from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Cell, LockedJoint
 from cellplan.model.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.solver import GoalKind, SecondaryGoal
-from cellplan.planning.euler.integrate import follow
+from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.obstacle_distances import ClosestPairs
 from cellplan.planning.tracking.problem import TrackingProblem
 from cellplan.planning.tracking.secondary_goals import share_within
@@ -56,7 +57,7 @@ def planar_pair() -> tuple[Cell, np.ndarray]:
 
 def planned(cell: Cell, start: np.ndarray) -> tuple[Schedule, Motion]:
     schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
-    return schedule, follow(cell, schedule, start=start, moving=names(cell))
+    return schedule, integrate_schedule(MotionTask(cell, schedule, names(cell), start))
 
 
 def at_rest(cell: Cell, q: np.ndarray) -> Schedule:
@@ -80,7 +81,7 @@ def at_rest(cell: Cell, q: np.ndarray) -> Schedule:
 
 def problem_at_rest(cell: Cell, q: np.ndarray, *, moving: tuple[str, ...] | None = None) -> TrackingProblem:
     """Tools that are to stay where they are; instant 10 is the middle of the motion, away from its ends."""
-    return TrackingProblem(cell, at_rest(cell, q), moving or names(cell), start=q)
+    return TrackingProblem(MotionTask(cell, at_rest(cell, q), moving or names(cell), q))
 
 
 def random_problem(
@@ -271,16 +272,11 @@ def test_without_goals_nothing_is_asked_for() -> None:
     assert tasks.bounds is None
 
 
-def test_goals_without_a_start_posture_are_refused() -> None:
-    problem, q = random_problem(9)
-    cell = with_goals(problem.cell, GOALS[GoalKind.POSTURE])
-    with pytest.raises(ValueError, match="start posture"):
-        TrackingProblem(cell, at_rest(cell, q), names(cell))
-
-
 def tracking_errors(cell: Cell, schedule: Schedule, motion: Motion) -> np.ndarray:
     """Position errors of all tools in [m], shape (N, tasks)."""
-    problem = TrackingProblem(with_goals(cell), schedule, names(cell))
+    problem = TrackingProblem(
+        MotionTask(with_goals(cell), schedule, names(cell), np.zeros(with_goals(cell).joint_count))
+    )
     axes = [3 if 2 in task.axes else 2 for task in problem.tasks]
     errors = [problem.first_order(k, q).error for k, q in enumerate(motion.q)]
     parts = np.cumsum([len(task.axes) for task in problem.tasks])[:-1]
@@ -298,7 +294,7 @@ def test_each_goal_improves_along_a_whole_motion_of_four_robots(kind: GoalKind) 
     samples = range(0, len(plain.q), 20)
 
     if kind is GoalKind.MANIPULABILITY:
-        problem = TrackingProblem(cell, schedule, names(cell))
+        problem = TrackingProblem(MotionTask(cell, schedule, names(cell), np.zeros(cell.joint_count)))
         before, after = ([log_manipulability(problem, m.q[k], k) for k in samples] for m in (plain, helped))
     elif kind is GoalKind.JOINT_LIMITS:
         before, after = ([limit_measure(cell, m.q[k]) for k in samples] for m in (plain, helped))
@@ -321,7 +317,7 @@ def test_no_step_of_a_whole_motion_is_noticed_by_a_task(kind: GoalKind) -> None:
     cell, start = planar_pair()
     cell = with_goals(cell, GOALS[kind])
     schedule, motion = planned(cell, start)
-    problem = TrackingProblem(cell, schedule, names(cell), start=start)
+    problem = TrackingProblem(MotionTask(cell, schedule, names(cell), start))
     largest = 0.0
     for k in range(0, len(motion.q), 5):
         tasks = problem.first_order(k, motion.q[k])

@@ -10,9 +10,9 @@ from cellplan.geometry.transforms import Array
 from cellplan.planning.methods.support.search_cost import Look, SearchCost
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
 
-POSITION_ROOM: Final = 1e-11  # [rad] or [m] that a search stays inside a limit: rounding of the written tables
+POSITION_MARGIN: Final = 1e-11  # [rad] or [m] that a search stays inside a limit: rounding of the written tables
 SPEED_ROOM: Final = 1e-7  # share of a top speed that is left: rounding of the written tables over one step
-STALLED: Final = 1e-9  # share of the cost below which what a pass gains counts as nothing
+STALLED: Final = 1e-9  # share of the cost below which what a pass or a round gains counts as nothing
 SLOW: Final = 0.01  # share of the cost that a pass leaves at least when it counts as slow
 WAYS: Final = 6  # passes that are carried on together
 DEPENDENT: Final = 1e-6  # share of the largest singular value below which two passes led the tools the same way
@@ -104,8 +104,7 @@ class ConfigurationSearch:
     def _nudge(self, k: int) -> Array:
         """A disturbance that no two joints share, of those that may move."""
         mobile = self._problem.mobile(k) * np.any(self._problem.signs != 0.0, axis=0)
-        nudge: Array = NUDGE * np.cos(1.0 + 2.4 * np.arange(len(mobile))) * mobile
-        return nudge
+        return NUDGE * np.cos(1.0 + 2.4 * np.arange(len(mobile))) * mobile
 
 
 def cheaper(one: Look, other: Look) -> Look:
@@ -121,8 +120,7 @@ def _scaled(look: Look, way: Array) -> Array:
     shift = look.a @ way
     square = float(shift @ shift)
     share = float(look.e @ shift) / square if square > 0.0 else 0.0
-    scaled: Array = min(max(share, 0.0), 1.0) * way
-    return scaled
+    return min(max(share, 0.0), 1.0) * way
 
 
 def _carried_on(look: Look, ways: Array) -> Array:
@@ -130,21 +128,17 @@ def _carried_on(look: Look, ways: Array) -> Array:
     shares = np.linalg.lstsq(look.a @ ways, look.e, rcond=DEPENDENT)[0]
     move = ways @ shares
     longest, most = float(np.max(np.abs(move))), FARTHEST * float(np.max(np.abs(ways)))
-    carried: Array = move if longest <= most else move * (most / longest)
-    return carried
+    return move if longest <= most else move * (most / longest)
 
 
 def position_bounds(problem: TrackingProblem, q: Array) -> Bounds:
     """The joints' limits; a joint that is outside may only come back."""
-    models = [robot.model for robot in problem.cell.robots]
-    lower = np.concatenate([model.lower for model in models]) + POSITION_ROOM
-    upper = np.concatenate([model.upper for model in models]) - POSITION_ROOM
-    return Bounds(np.minimum(lower, q), np.maximum(upper, q))
+    limits = problem.cell.joint_limits
+    return Bounds(np.minimum(limits.lower + POSITION_MARGIN, q), np.maximum(limits.upper - POSITION_MARGIN, q))
 
 
 def speed_bounds(problem: TrackingProblem, k: int, q: Array) -> Bounds:
     """The joints' limits, and how far their top speeds take them in the step after k ([Nicolato2007]_ Eq. 3.28)."""
     positions = position_bounds(problem, q)
-    top = np.concatenate([robot.model.velocity for robot in problem.cell.robots])
-    reach = (1.0 - SPEED_ROOM) * top * problem.step(k)
+    reach = (1.0 - SPEED_ROOM) * problem.cell.joint_limits.velocity * problem.step(k)
     return Bounds(np.maximum(positions.lowest, q - reach), np.minimum(positions.highest, q + reach))

@@ -43,22 +43,19 @@ class Relaxation:
         X = (self._Vt @ theta @ self._U) * np.exp(-gain_time * self._rates)
         diagonal = np.arange(len(self._s))
         X[diagonal, diagonal] += 2.0 * gain_time * self._s * _mean_decay(2.0 * gain_time * self._s**2)
-        settled: Array = self._Vt.T @ X @ self._U.T
-        return settled
+        return self._Vt.T @ X @ self._U.T
 
     def inverse(self) -> Array:
         """Moore-Penrose inverse, shape (nq, m), held finite in a singularity."""
         rank = len(self._s)
         gains = self._s / np.maximum(self._s, LEAST_AT_START) ** 2
-        inverse: Array = (self._Vt[:rank].T * gains) @ self._U[:, :rank].T
-        return inverse
+        return (self._Vt[:rank].T * gains) @ self._U[:, :rank].T
 
 
 def _mean_decay(x: Array) -> Array:
     """``(1 - exp(-x)) / x`` for x of at least 0, and 1 where x is 0."""
     safe = np.where(x > 0.0, x, 1.0)
-    mean: Array = np.where(x > 0.0, -np.expm1(-safe) / safe, 1.0)
-    return mean
+    return np.where(x > 0.0, -np.expm1(-safe) / safe, 1.0)
 
 
 class FilteredMotion:

@@ -48,8 +48,7 @@ class JointLines:
         turns = self.turns
         s = np.where(turns, np.sin(theta), theta)
         d = np.where(turns, 2.0 * np.sin(0.5 * theta) ** 2, 0.0)
-        gain: Array = 2.0 * (s * self.ae + d * self.ne) - s * s * self.aa - d * d * self.nn - 2.0 * s * d * self.an
-        return gain
+        return 2.0 * (s * self.ae + d * self.ne) - s * s * self.aa - d * d * self.nn - 2.0 * s * d * self.an
 
     def best(self, lowest: Array, highest: Array) -> Array:
         r"""Moves that make the cost least along each joint alone, within bounds that include 0.

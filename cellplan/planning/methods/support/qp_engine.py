@@ -50,5 +50,4 @@ def nearest_to_origin(A: Array, *, lower: Array, upper: Array) -> Array:
     size = np.linalg.norm(A, axis=1) * (1.0 + np.linalg.norm(y))
     if not np.all(excess <= PROOF_TOLERANCE * size):  # also for what is not a number
         raise NoSolutionError("the quadratic program was not solved: its answer breaks the bounds")
-    nearest: Array = np.asarray(y)
-    return nearest
+    return np.asarray(y)

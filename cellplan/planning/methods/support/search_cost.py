@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, rotation_about, skew
 from cellplan.model.cell import Cell, Grasp, Relation, Robot
-from cellplan.model.robot import BASE, FollowerJoint, Joint
-from cellplan.planning.tracking.cooperation_jacobian import reference_frames
 from cellplan.planning.tracking.problem import TrackingProblem
 
 PARALLEL: Final = 1e-9  # sine of the angle below which two axes count as parallel: rounding of axis tables
@@ -106,7 +104,7 @@ class SearchCost:
     def look(self, q: Array) -> Look:
         """The cost at a configuration, and what each joint does to it."""
         state = self._problem.state(q)
-        X_WR = reference_frames(state, self._problem.tasks)
+        X_WR = self._problem.constraints.reference_frames(state.X_WP)
         R, p = np.swapaxes(X_WR[:, :3, :3], 1, 2), X_WR[:, :3, 3]
         w = R @ state.screws_W[3:]
         v = R @ (state.screws_W[:3] - skew(p) @ state.screws_W[3:])  # of the point at the origin of P
@@ -133,7 +131,7 @@ class SearchCost:
             return
         self._is_examined = True
         state = self._problem.state(q)
-        X_WR = reference_frames(state, self._problem.tasks)
+        X_WR = self._problem.constraints.reference_frames(state.X_WP)
         for task, kind, signs, frame in zip(self._problem.tasks, self._kinds, self._signs, X_WR, strict=True):
             if kind == "turn":
                 axes_P = frame[:3, :3].T @ state.screws_W[3:]
@@ -150,7 +148,7 @@ class SearchCost:
         """
         desired = desired.copy()
         state = self._problem.state(q)
-        X_WR = reference_frames(state, self._problem.tasks)
+        X_WR = self._problem.constraints.reference_frames(state.X_WP)
         for index, (task, kind) in enumerate(zip(self._problem.tasks, self._kinds, strict=True)):
             if kind == "turn":
                 rotations = [axis - 3 for axis in task.axes if axis >= 3]
@@ -161,7 +159,7 @@ class SearchCost:
 
 def turning_joints(cell: Cell) -> NDArray[np.bool_]:
     """Whether a joint turns and drives no other joint on the way to its robot's flange, shape (nq,)."""
-    turning = np.array([joint.is_revolute for robot in cell.robots for joint in robot.model.joints], dtype=bool)
+    turning = cell.joint_limits.is_revolute.copy()
     for robot in cell.robots:
         turning[cell.columns(robot.name).start + np.array(_leaders(robot), dtype=int)] = False
     return turning
@@ -170,13 +168,7 @@ def turning_joints(cell: Cell) -> NDArray[np.bool_]:
 def _leaders(robot: Robot) -> list[int]:
     """Joints of a robot that drive others between base and flange."""
     model = robot.model
-    axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
-    leaders, link = [], model.flange_link
-    while link != BASE:
-        if link >= len(model.joints):
-            leaders.append(model.followers[link - len(model.joints)].leader)
-        link = axes[link].parent
-    return leaders
+    return [model.drive(link).joint for link in model.links_to_flange if link >= len(model.joints)]
 
 
 def _kind(task: Relation) -> str:

@@ -10,7 +10,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 
 READ_BACK: Final = 2e-14  # [rad] or [m] by which a position may change when it is written and read back
-POSITION_ROOM: Final = 1e-12  # [rad] or [m] kept from position limits: what many steps add up to in rounding
+ROUNDING_MARGIN: Final = 1e-12  # [rad] or [m] kept from position limits: what many steps add up to in rounding
 BRAKING_ROOM: Final = 1e-6  # [-] of the acceleration that planned braking leaves unused: the clock's steps are rounded
 
 
@@ -30,16 +30,13 @@ class JointBounds:
 
     def __init__(self, cell: Cell) -> None:
         """Take the limits of all joints; an acceleration may follow from ``solver.quadratic_program.ramp_s``."""
-        joints = [joint for robot in cell.robots for joint in robot.model.joints]
+        limits = cell.joint_limits
         ramp = cell.solver.quadratic_program.ramp
         self._names = [f"{robot.name}/{joint.name}" for robot in cell.robots for joint in robot.model.joints]
-        self._turns = [joint.is_revolute for joint in joints]
-        self._lower = np.array([joint.lower for joint in joints])
-        self._upper = np.array([joint.upper for joint in joints])
-        self._velocity = np.array([joint.velocity for joint in joints])
-        by_ramp = np.full(len(joints), np.inf) if ramp is None else self._velocity / ramp
-        known = [np.nan if joint.acceleration is None else joint.acceleration for joint in joints]
-        self._acceleration = np.where(np.isnan(known), by_ramp, known)
+        self._is_revolute = limits.is_revolute
+        self._lower, self._upper, self._velocity = limits.lower, limits.upper, limits.velocity
+        by_ramp = np.inf if ramp is None else limits.velocity / ramp
+        self._acceleration = np.where(np.isinf(limits.acceleration), by_ramp, limits.acceleration)
 
     def refuse_outside(self, q: Array) -> None:
         """Refuse a configuration from which no bounded speed is right.
@@ -53,7 +50,7 @@ class JointBounds:
         for index, (name, position) in enumerate(zip(self._names, q, strict=True)):
             lower, upper = self._lower[index], self._upper[index]
             if not lower <= position <= upper:
-                scale, unit = (np.degrees(1.0), "deg") if self._turns[index] else (1e3, "mm")
+                scale, unit = (np.degrees(1.0), "deg") if self._is_revolute[index] else (1e3, "mm")
                 raise StartOutsideLimitsError(
                     f"joint '{name}' starts at {scale * position:g} {unit}, outside its limits "
                     f"{scale * lower:g} .. {scale * upper:g} {unit}: quadratic_program needs a start within them"
@@ -74,8 +71,8 @@ class JointBounds:
         top = _less(self._velocity, 2.0 * READ_BACK / dt)
         acceleration = _less(self._acceleration, 4.0 * READ_BACK / dt**2)
         planned = (1.0 - BRAKING_ROOM) * acceleration
-        above = np.maximum(self._upper - POSITION_ROOM - q, 0.0)
-        below = np.maximum(q - self._lower - POSITION_ROOM, 0.0)
+        above = np.maximum(self._upper - ROUNDING_MARGIN - q, 0.0)
+        below = np.maximum(q - self._lower - ROUNDING_MARGIN, 0.0)
         highest = np.minimum(top, braking_speed(above, planned, dt))
         lowest = -np.minimum(top, braking_speed(below, planned, dt))
         return SpeedBounds(
@@ -101,11 +98,9 @@ def braking_speed(room: Array, acceleration: Array, dt: float) -> Array:
     brakes = np.isfinite(room) & np.isfinite(acceleration)
     a, d = np.where(brakes, acceleration, 1.0), np.where(brakes, room, 0.0)
     n = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * d / (a * dt**2)) - 1.0))
-    speeds: Array = np.where(brakes, d / ((n + 1.0) * dt) + 0.5 * n * a * dt, room / dt)
-    return speeds
+    return np.where(brakes, d / ((n + 1.0) * dt) + 0.5 * n * a * dt, room / dt)
 
 
 def _less(limits: Array, room: float) -> Array:
     """Limits with room for rounding, half of them at least."""
-    less: Array = np.maximum(limits - room, 0.5 * limits)
-    return less
+    return np.maximum(limits - room, 0.5 * limits)

@@ -11,6 +11,7 @@ from cellplan.geometry.transforms import pose_from, rotation_exp
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.planning.methods.support.joint_line import joint_lines
 from cellplan.planning.methods.support.search_cost import SearchCost
+from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import TrackingProblem
 
 GRID = np.linspace(-np.pi, np.pi, 2001)  # [rad]
@@ -30,7 +31,9 @@ def far_goals(cell, rng):
 
 def cost_of(cell, seed):
     rng = np.random.default_rng(seed)
-    problem = TrackingProblem(cell, far_goals(cell, rng), [robot.name for robot in cell.robots])
+    problem = TrackingProblem(
+        MotionTask(cell, far_goals(cell, rng), [robot.name for robot in cell.robots], np.zeros(cell.joint_count))
+    )
     cost = SearchCost(problem)
     q = rng.uniform(-1, 1, cell.joint_count)
     cost.aim(1, q)

@@ -1,15 +1,15 @@
-"""What is asked of a benchmark on the command line."""
+"""Command-line options that the benchmarks share."""
 
 import argparse
 
 
-def asked(description: str, *, what: str, rounds: int) -> argparse.Namespace:
+def benchmark_options(description: str, *, what: str, rounds: int) -> argparse.Namespace:
     """Options of a benchmark: ``rounds``, at least 1, and ``json``.
 
     Args:
         description: What the benchmark does.
         what: What is run in every round.
-        rounds: How often, when nobody says otherwise.
+        rounds: Default number of rounds.
     """
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--rounds", type=int, default=rounds, help=f"{what}; medians are shown (default: {rounds})")

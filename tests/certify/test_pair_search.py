@@ -8,8 +8,8 @@ from builders.scene_builders import fixed_part, make_cell, placed, slide_model, 
 
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.linear_motion import StraightMotion
-from cellplan.collision.continuous.found import Found
-from cellplan.collision.continuous.interval_search import SolidSearch
+from cellplan.certify.pair_search import SolidSearch
+from cellplan.certify.pair_state import PairState
 from cellplan.collision.distance import SURELY_APART, measure
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Sphere
@@ -53,7 +53,7 @@ def turned(model: RobotModel, X: Array) -> RobotModel:
 
 
 def search(scene: Scene, q: Array, pair: tuple[int, int], cutoff: float = SURELY_APART) -> SolidSearch:
-    found = SolidSearch(scene.engine, pair, StraightMotion.of_cell(scene, LeverArms(scene, q), q), found=Found())
+    found = SolidSearch(scene.engine, pair, StraightMotion.of_cell(scene, LeverArms(scene, q), q), state=PairState())
     found.run(cutoff)
     return found
 
@@ -70,7 +70,7 @@ def test_a_needle_that_flies_through_a_wire_between_samples_is_always_found() ->
         touched = [measure(scene.engine, pair, poses, sample=k).touches for k in range(SAMPLES)]
         missed_by_sampling += not any(touched)
 
-        found = search(scene, q, pair).found
+        found = search(scene, q, pair).state
 
         assert found.touches
         there = scene.body_poses(np.array([[STEP * found.touches[0]]]))
@@ -87,8 +87,8 @@ def test_a_needle_that_passes_a_wire_is_certified_with_the_distance_it_keeps() -
 
     found = search(scene, STEP * np.arange(SAMPLES)[:, None], (index["needle/block"], index["wire"]), np.inf)
 
-    assert not found.found.touches
-    assert not found.found.unproved
+    assert not found.state.touches
+    assert not found.state.unproved
     assert gap - 1e-4 < found.low.min() <= gap + 1e-9
     assert found.low.min() > 0.0
 
@@ -100,7 +100,7 @@ def test_a_body_that_dives_into_a_closed_mesh_touches_until_it_comes_out() -> No
     index = {body.name: place for place, body in enumerate(scene.bodies)}
     x = np.linspace(-1.0, 1.0, 401)
 
-    touches = set(search(scene, x[:, None], (index["ball/block"], index["tank"])).found.touches)
+    touches = set(search(scene, x[:, None], (index["ball/block"], index["tank"])).state.touches)
 
     clear = np.abs(np.abs(x) - 0.55) > 1e-6  # at the very border both answers are right
     assert {k for k in touches if k == int(k) and clear[int(k)]} == set(np.flatnonzero((np.abs(x) < 0.55) & clear))
@@ -115,7 +115,7 @@ def test_a_leap_into_or_over_a_closed_mesh_is_a_contact(leap: float) -> None:
     index = {body.name: place for place, body in enumerate(scene.bodies)}
     q = np.array([[-leap], [0.0 if leap < 1.0 else leap], [0.0 if leap < 1.0 else leap]])
 
-    found = search(scene, q, (index["ball/block"], index["shell"])).found
+    found = search(scene, q, (index["ball/block"], index["shell"])).state
 
     assert found.touches
     assert min(found.touches) == pytest.approx((leap - 0.12) / (leap if leap < 1.0 else 2 * leap), abs=0.15)
@@ -128,6 +128,6 @@ def test_a_pair_without_end_of_open_steps_is_given_up_and_not_called_free() -> N
     scene = Scene.from_cell(make_cell(low, things=(high,)))
     index = {body.name: place for place, body in enumerate(scene.bodies)}
 
-    found = search(scene, np.linspace(0.0, 0.1, 60)[:, None], (index["low/block"], index["high"])).found
+    found = search(scene, np.linspace(0.0, 0.1, 60)[:, None], (index["low/block"], index["high"])).state
 
     assert found.unproved or found.touches

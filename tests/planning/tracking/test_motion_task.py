@@ -1,4 +1,4 @@
-"""Closures against the derivative of an independent kinematics, and what they ask for in each mode."""
+"""References of a motion task; closures against the derivative of an independent kinematics, in each mode."""
 
 from dataclasses import replace
 
@@ -14,8 +14,8 @@ from cellplan.model.cell import Grasp, Mode
 from cellplan.model.motion import Schedule
 from cellplan.model.task import Frame
 from cellplan.planning.modes import plan_phases
+from cellplan.planning.tracking.motion_task import MotionTask, closures
 from cellplan.planning.tracking.problem import TrackingProblem
-from cellplan.planning.tracking.targets import targets
 
 DERIVATIVE_TOL = 1e-6  # relative; central differences with h = 1e-5 leave h^2 and eps / h, both near 1e-10
 H = 1e-5
@@ -66,21 +66,24 @@ def test_moving_the_whole_cell_changes_no_row_of_a_closure():
     np.testing.assert_allclose(planners_jacobian(elsewhere, q), planners_jacobian(cell, q), atol=1e-12)
 
 
-def test_a_closure_wants_the_grasp_at_all_times_and_no_twist():
+def test_the_reference_of_a_closure_is_its_grasp_at_all_times_without_twist():
     cell = sharing(random_cell(42, operators=2), 1, axes=(0, 1, 5))
 
-    (target,) = targets(cell, STILL, ("holder", "op1"))
+    motion = MotionTask(cell, STILL, ("holder", "op1"), np.zeros(cell.joint_count))
+    (relation,), (X_PT, V_PT_P) = motion.relations, motion.references()
 
-    assert isinstance(target.relation, Grasp)
-    assert target.relation.axes == (0, 1, 5)
-    assert not target.V_PT_P.any()
-    np.testing.assert_array_equal(target.X_PT, np.broadcast_to(cell.part.held_by[1].X_PT, (4, 4, 4)))
+    assert isinstance(relation, Grasp)
+    assert relation.axes == (0, 1, 5)
+    assert not V_PT_P.any()
+    np.testing.assert_array_equal(X_PT[:, 0], np.broadcast_to(cell.part.held_by[1].X_PT, (4, 4, 4)))
 
 
 def test_only_the_kept_components_of_a_closure_become_rows():
     cell = sharing(random_cell(43, operators=2), 2, axes=(0, 1, 5))
     q = np.random.default_rng(4).uniform(-1.5, 1.5, cell.joint_count)
-    problem = TrackingProblem(cell, STILL, tuple(robot.name for robot in cell.robots))
+    problem = TrackingProblem(
+        MotionTask(cell, STILL, tuple(robot.name for robot in cell.robots), np.zeros(cell.joint_count))
+    )
 
     with pytest.raises(DivergedError, match="from its grasp on the part"):
         problem.first_order(0, q)
@@ -105,14 +108,14 @@ def in_mode(cell, mode):
 def test_all_holders_move_in_every_run(mode, moving):
     cell = in_mode(carried(sharing(random_cell(44, operators=3), 2)), mode)
     assert [set(run.moving) for run in plan_phases(cell).program] == moving
-    assert all(len(targets(cell, STILL, run.moving)) == 2 for run in plan_phases(cell).program)
+    assert all(len(closures(cell, run.moving)) == 2 for run in plan_phases(cell).program)
 
 
 def test_no_holder_moves_with_the_part_at_rest():
     cell = in_mode(sharing(random_cell(45, operators=3), 2), Mode.PART_AT_REST)
     (run,) = plan_phases(cell).program
     assert run.moving == ("op0",)
-    assert targets(cell, STILL, run.moving) == ()
+    assert closures(cell, run.moving) == ()
 
 
 def test_the_part_cannot_be_carried_while_it_is_to_rest():

@@ -1,11 +1,12 @@
-"""Whether two bodies stay apart at every instant of a motion, and how near they come: proved, not sampled.
+"""Search of one pair: whether two bodies stay apart throughout a motion, and how near they come, proved, not sampled.
 
-Each step of the motion has a lower bound of the distance that holds at all its instants. Bounding spheres give the
+Each step of the motion has a lower bound of the distance that holds throughout the step. Bounding spheres give the
 first. A search then measures the pair at one sample after the other, where the bound is lowest; each reading raises the
-bounds of its neighbours (``travel``). A step that stays open with both ends measured is cut into finer steps.
+bounds of its neighbours (``collision.continuous.motion_bound``). A step that stays open with both ends measured is cut
+into finer steps.
 
-What must be known comes first: that the bodies do not touch, then that they keep the distance that is demanded. Where
-the steps become as fine as ``RESOLUTION``, or too many have been cut, and this is still not proved, the answer is "not
+The verdict comes first: that the bodies do not touch, then that they keep the distance that is demanded. Where the
+steps become as fine as ``RESOLUTION``, or too many have been cut, and this is still not proved, the answer is "not
 certified", never "free". Then the bounds are raised, the lowest first, until the smallest distance is known exactly;
 this ends earlier when it takes too much work, and what is proved by then remains true.
 """
@@ -14,21 +15,22 @@ from abc import ABC, abstractmethod
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.collision.continuous.found import Flags, Found, StepBounds
+from cellplan.certify.linear_motion import StraightMotion
+from cellplan.certify.pair_state import PairState, StepBounds
 from cellplan.collision.continuous.motion_bound import Motion, Pair, PairMotion
 from cellplan.collision.continuous.pieces import PieceMotion, can_be_split, read_piece, split
 from cellplan.collision.distance import SURELY_APART, TIGHT, Reading, look, sharpen
 from cellplan.collision.engine import Engine
 from cellplan.collision.overlap.containment import is_inside
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.scene.pairs import ScenePair
 
 RESOLUTION: Final = 1e-6  # [m] steps in which nothing travels farther than this are not cut any more
-PARTS: Final = 8  # [-] finer steps that an open step is cut into
-MOST_LOOSE: Final = 4  # [-] distances beyond those of the hulls that are measured before a body is taken apart
-MOST_LOOSE_BOTH: Final = 16  # [-] likewise where both bodies are not convex: pieces of the one meet those of the other
-ROUGH: Final = 2e-4  # [m] a search for the smallest distance goes half the way to it at a time, until so near
+PART_COUNT: Final = 8  # finer steps that an open step is cut into
+MAX_LOOSE: Final = 4  # distances beyond those of the hulls that are measured before a body is taken apart
+MAX_LOOSE_BOTH: Final = 16  # likewise where neither body is convex: pieces of the one meet those of the other
+BISECTION_TOL: Final = 2e-4  # [m] a search for the smallest distance bisects its gap until it is this small
 
 
 class Search(ABC):
@@ -36,19 +38,19 @@ class Search(ABC):
 
     Attributes:
         bounds: What is proved of each step.
-        found: What has been found.
+        state: What has been found; the finer searches of its steps write to the same one.
     """
 
-    def __init__(self, low: Array, found: Found, *, begin: float, width: float) -> None:
+    def __init__(self, low: Array, state: PairState, *, begin: float, width: float) -> None:
         """Start from the first bounds.
 
         Args:
             low: Lower bounds by the cheapest means in [m], shape (n - 1,).
-            found: Where to write what is found.
-            begin: Instant of the first sample.
+            state: State of the search of the pair.
+            begin: Time of the first sample.
             width: Length of a step, in samples of the program.
         """
-        self.bounds, self.found = StepBounds(low), found
+        self.bounds, self.state = StepBounds(low), state
         self._begin, self._width = begin, width
         self._is_read: Flags = np.zeros(len(low) + 1, dtype=bool)
         self._touches: Flags = np.zeros(len(low) + 1, dtype=bool)
@@ -61,65 +63,74 @@ class Search(ABC):
 
     def run(self, cutoff: float) -> None:
         """Search until no step can be below a cutoff in [m] and nearer than the nearest found, or touches."""
-        found = self.found
-        found.is_needed = True
-        for level in (SURELY_APART, found.demand):
-            self.raise_to(level, cutoff)
-        found.is_needed = False
-        while not found.is_spent and (lowest := self.bounds.lowest()[1]) < (goal := found.goal(cutoff)):
-            self.raise_to(goal if goal - lowest <= ROUGH else 0.5 * (lowest + goal), cutoff)
+        self._prove(cutoff)
+        state = self.state
+        state.is_verdict_open = False
+        while not state.is_spent and (lowest := self.bounds.lowest()[1]) < (goal := state.goal(cutoff)):
+            self.raise_to(goal if goal - lowest <= BISECTION_TOL else 0.5 * (lowest + goal), cutoff)
         self._finish()
+
+    def prove(self) -> None:
+        """Search only until it is known whether the pair touches or comes nearer than the demand."""
+        self._prove(self.state.demand)
+        self._finish()
+
+    def _prove(self, cutoff: float) -> None:
+        """Prove that nothing touches, then that the demand is kept, where bounds are below a cutoff in [m]."""
+        self.state.is_verdict_open = True
+        for level in (SURELY_APART, self.state.demand):
+            self.raise_to(level, cutoff)
 
     def raise_to(self, level: float, cutoff: float) -> None:
         """Raise all bounds to a level in [m], as far as they are below a cutoff and what may be nearest."""
-        while not self.found.is_spent:
+        while not self.state.is_spent:
             step, lowest = self.bounds.lowest()
-            if lowest >= min(level, self.found.goal(cutoff)):
+            if lowest >= min(level, self.state.goal(cutoff)):
                 break
             if self._takes_apart(level, cutoff):
                 continue
             unread = [sample for sample in (step, step + 1) if not self._is_read[sample]]
             if unread:
-                self._read(unread[len(unread) // 2], self.found.goal(cutoff))
+                self._read(unread[len(unread) // 2], self.state.goal(cutoff))
             else:
                 self._cut(step, level, cutoff)
 
-    def _instant(self, place: float) -> float:
-        """Instant of a place among the samples."""
+    def _time(self, place: float) -> float:
+        """Time of a place among the samples, in samples of the program."""
         return self._begin + self._width * place
 
     def _note(self, sample: int, distance: float, *, touches: bool, is_exact: bool) -> None:
-        """Write down what was read at a sample."""
+        """Record what was read at a sample."""
         self._is_read[sample] = True
         if touches:
             self._touches[sample] = True
-            self.found.touches.append(self._instant(sample))
+            self.state.note_touches([self._time(sample)])
             self.bounds.close(slice(max(0, sample - 1), sample + 1))
-        elif is_exact and distance < self.found.distance:
-            self.found.distance, self.found.at = distance, self._instant(sample)
+        elif is_exact:
+            self.state.note_distance(distance, self._time(sample))
 
     def _cut(self, step: int, level: float, cutoff: float) -> None:
-        """Look at one step in finer steps; give it up where it cannot be cut any more."""
+        """Search one step in finer steps; give it up where it cannot be cut any more."""
         fine, bounds = self._fine.get(step), self.bounds
         if fine is None:
-            if self._travel(step) <= RESOLUTION or not self.found.may_cut:
+            if self._travel(step) <= RESOLUTION or not self.state.may_cut:
                 bounds.is_given_up[step] = True
-                if bounds.low[step] < self.found.needed:
-                    self.found.unproved.append(self._instant(step))
+                if bounds.low[step] < self.state.needed:
+                    self.state.note_unproved(self._time(step))
                 return
-            self.found.count_cut()
+            self.state.count_cut()
             fine = self._fine[step] = self._finer(step)
-        before = len(self.found.touches)
+        before = len(self.state.touches)
         fine.raise_to(level, cutoff)
         fine._finish()
-        if len(self.found.touches) != before:
+        if len(self.state.touches) != before:
             bounds.close(slice(step, step + 1))
             return
         bounds.low[step] = max(bounds.low[step], float(fine.low.min()))
-        bounds.is_given_up[step] = bool(bounds.low[step] < min(level, self.found.goal(cutoff)))
+        bounds.is_given_up[step] = bool(bounds.low[step] < min(level, self.state.goal(cutoff)))
 
     def _takes_apart(self, level: float, cutoff: float) -> bool:  # noqa: ARG002 - for those that have pieces
-        """Search piece by piece where that is quicker; say whether it was done."""
+        """Search piece by piece where that is quicker; returns whether it was done."""
         return False
 
     @abstractmethod
@@ -136,14 +147,14 @@ class Search(ABC):
 
     @abstractmethod
     def _finish(self) -> None:
-        """Look after what no distance tells."""
+        """Find contacts that distances do not show."""
 
 
 class SolidSearch(Search):
     """The search for two solids."""
 
     _finds_enclosures = True
-    _patience = MOST_LOOSE
+    _patience = MAX_LOOSE
 
     def __init__(
         self,
@@ -151,7 +162,7 @@ class SolidSearch(Search):
         pair: Pair,
         motion: Motion,
         *,
-        found: Found | None = None,
+        state: PairState | None = None,
         begin: float = 0.0,
         width: float = 1.0,
     ) -> None:
@@ -161,18 +172,18 @@ class SolidSearch(Search):
             engine: The bodies.
             pair: Which two.
             motion: How they move.
-            found: Where to write what is found; new when None.
-            begin: Instant of the first sample.
+            state: State of the search of the pair; a new one when None.
+            begin: Time of the first sample.
             width: Length of a step, in samples of the program.
         """
-        super().__init__(motion.sphere_bounds(pair), found or Found(), begin=begin, width=width)
+        super().__init__(motion.sphere_bounds(pair), state or PairState(), begin=begin, width=width)
         self._engine, self._pair, self._motion = engine, pair, motion
         self._are_spheres_apart = self.low > SURELY_APART
         self._relative: PairMotion | None = None
         self._readings: dict[int, Reading] = {}
         self._loose = 0
         self._split_bodies = sum(can_be_split(engine.bodies[index]) for index in pair)
-        self._most_loose = MOST_LOOSE_BOTH if self._split_bodies == len(pair) else self._patience
+        self._most_loose = MAX_LOOSE_BOTH if self._split_bodies == len(pair) else self._patience
         self._pieces: list[PieceSearch] = []
 
     @property
@@ -187,12 +198,12 @@ class SolidSearch(Search):
         reading = self._readings.get(sample)
         if reading is None:
             reading = self._measured(sample, goal)
-            self.found.spare_readings += not self.found.is_needed
+            self.state.count_reading()
             self.take(sample, reading, goal)
         return reading
 
     def _measured(self, sample: int, goal: float) -> Reading:
-        """What the engine says of a sample."""
+        """Reading of the engine at a sample."""
         poses = self._motion.poses
         reading = look(self._engine, self._pair, poses, sample=sample)
         if reading.is_exact or reading.bound >= goal:
@@ -202,7 +213,7 @@ class SolidSearch(Search):
         return sharp
 
     def take(self, sample: int, reading: Reading, goal: float) -> None:
-        """Make use of a reading."""
+        """Use a reading."""
         self._readings[sample] = reading
         self._note(sample, reading.bound, touches=reading.touches, is_exact=reading.is_exact)
         if reading.touches:
@@ -237,16 +248,16 @@ class SolidSearch(Search):
             self._touches |= piece._touches
             bounds.close(bounds.is_closed | piece.bounds.is_closed)
         bounds.lift(lowest)
-        bounds.is_given_up |= bounds.low < min(level, self.found.goal(cutoff))
+        bounds.is_given_up |= bounds.low < min(level, self.state.goal(cutoff))
         return True
 
     def _split(self) -> list["PieceSearch"]:
         """A search for each piece of a body that is not convex, the nearest first."""
         engine, is_first_split = split(self._engine, self._pair)
         motion = PieceMotion.of(self._motion, self._pair, engine, is_first_split=is_first_split)
-        found, begin, width = self.found, self._begin, self._width
+        state, begin, width = self.state, self._begin, self._width
         pairs = [motion.piece_pair(piece) for piece in range(len(engine.bodies) - 1)]
-        pieces = [PieceSearch(engine, pair, motion, found=found, begin=begin, width=width) for pair in pairs]
+        pieces = [PieceSearch(engine, pair, motion, state=state, begin=begin, width=width) for pair in pairs]
         pieces.sort(key=lambda piece: float(piece.low.min()))
         for piece in pieces:
             piece.bounds.is_closed |= self.bounds.is_closed
@@ -257,12 +268,12 @@ class SolidSearch(Search):
         fine = type(self)(
             self._engine,
             self._pair,
-            self._motion.finer(self._pair, step, parts=PARTS),
-            found=self.found,
-            begin=self._instant(step),
-            width=self._width / PARTS,
+            self._motion.finer(self._pair, step, parts=PART_COUNT),
+            state=self.state,
+            begin=self._time(step),
+            width=self._width / PART_COUNT,
         )
-        for end, sample in ((0, step), (PARTS, step + 1)):
+        for end, sample in ((0, step), (PART_COUNT, step + 1)):
             fine.take(end, self._readings[sample], np.inf)
         return fine
 
@@ -274,10 +285,10 @@ class SolidSearch(Search):
         if self._finds_enclosures and self._width == 1.0:
             for stretch in _free_stretches(self._touches, self.bounds.is_closed):
                 if self._is_enclosed(stretch):
-                    self.found.touches += [self._instant(int(sample)) for sample in stretch]
+                    self.state.note_touches(self._time(int(sample)) for sample in stretch)
                     self.bounds.close(slice(max(0, stretch[0] - 1), stretch[-1] + 1))
 
-    def _is_enclosed(self, stretch: NDArray[np.intp]) -> bool:
+    def _is_enclosed(self, stretch: Indices) -> bool:
         """Whether one body lies inside the other throughout a stretch: one proof that it does not is enough."""
         first, last = int(stretch[0]), int(stretch[-1])
         if self._are_spheres_apart[max(0, first - 1) : last + 1].any():
@@ -286,6 +297,53 @@ class SolidSearch(Search):
         if any(self._readings[sample].direction is not None for sample in known):
             return False
         return is_inside(self._engine, self._pair, self._motion.poses, sample=known[0] if known else first)
+
+
+class GroundSearch(Search):
+    """The search for a solid and a half-space: by arithmetic, without the engine.
+
+    The height is the smallest over the points of the solid, each of which stays within M/8 of its chords; so the height
+    in a step is no less than the smaller one of its ends less M/8.
+    """
+
+    def __init__(
+        self, pair: ScenePair, motion: StraightMotion, *, state: PairState, begin: float = 0.0, width: float = 1.0
+    ) -> None:
+        """Work out the heights at all samples.
+
+        Args:
+            pair: The solid and the half-space.
+            motion: How the solid moves.
+            state: State of the search of the pair.
+            begin: Time of the first sample.
+            width: Length of a step, in samples of the program.
+        """
+        self._pair, self._motion = pair, motion
+        heights = motion.scene.ground_heights(pair, motion.poses)
+        self._strays: Array = motion.bend[pair.first] / 8.0
+        super().__init__(np.minimum(heights[1:], heights[:-1]) - self._strays, state, begin=begin, width=width)
+        self._is_read[:] = True
+        self._touches[:] = heights <= 0.0
+        for sample in np.flatnonzero(self._touches):
+            self._note(int(sample), 0.0, touches=True, is_exact=True)
+        lowest = int(np.argmin(np.where(self._touches, np.inf, heights)))
+        if not self._touches[lowest]:
+            self._note(lowest, float(heights[lowest]), touches=False, is_exact=True)
+
+    def _travel(self, step: int) -> float:
+        return float(self._strays[step])
+
+    def _finer(self, step: int) -> Search:
+        solid = self._pair.first
+        fine = self._motion.finer((solid, solid), step, parts=PART_COUNT)
+        width = self._width / PART_COUNT
+        return GroundSearch(self._pair, fine, state=self.state, begin=self._time(step), width=width)
+
+    def _read(self, sample: int, goal: float) -> None:
+        """All samples are read from the start."""
+
+    def _finish(self) -> None:
+        """A height shows every contact."""
 
 
 class PieceSearch(SolidSearch):
@@ -300,7 +358,7 @@ class PieceSearch(SolidSearch):
         return reading
 
 
-def _free_stretches(touches: Flags, is_closed: Flags) -> list[NDArray[np.intp]]:
+def _free_stretches(touches: Flags, is_closed: Flags) -> list[Indices]:
     """Runs of samples, shape (n,), that do not touch, with no step, shape (n - 1,), between them that was given up."""
     free = np.flatnonzero(~touches)
     ends = np.flatnonzero((np.diff(free) > 1) | is_closed[free[:-1]]) + 1

@@ -1,0 +1,157 @@
+"""Result of the certificate: lower bounds of the distance of every pair of bodies over a motion."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.pair_state import PairState
+from cellplan.collision.nearest_points import nearest_points, point_above
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.model.report import ClearanceClass
+from cellplan.scene.pairs import Rule, ScenePair
+from cellplan.scene.scene import Scene
+
+ROWS_AT_ONCE: Final = 10_000  # pairs whose bounds are copied at once: 16 MB
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PairBound:
+    """What is known of one pair over a motion; times are counted in samples, with fractions between them.
+
+    Attributes:
+        row: Index of the pair in ``Scene.pairs``.
+        pair: The pair.
+        low: No distance is below this in a block of the motion, in [m], shape (K,); zero where the bodies touch; inf
+            where all of a tool lies inside its contact zone. Negative where nothing is proved.
+        lowest: Smallest one of them.
+        distance: Smallest distance measured in [m], never above the truth; inf where none was.
+        at: Its time.
+        touches: Times at which the bodies touch.
+        unproved: Times at which steps begin in which the necessary distance could not be proved.
+        demand: Distance in [m] that is demanded; where only contact is forbidden, more than rounding.
+        needed: Distance in [m] that had to be proved: less than the demand once a smaller distance was measured.
+        cuts: Number of steps that were searched in finer steps.
+        at_surface: First and last sample at which a tool at work is at the surface of the part; None if it never is.
+    """
+
+    row: int
+    pair: ScenePair
+    low: Array
+    lowest: float
+    distance: float
+    at: float
+    touches: tuple[float, ...]
+    unproved: tuple[float, ...]
+    demand: float
+    needed: float
+    cuts: int
+    at_surface: tuple[int, int] | None = None
+
+    @classmethod
+    def of(
+        cls, row: int, pair: ScenePair, state: PairState, *, low: Array, lowest: float, span: tuple[int, int] | None
+    ) -> "PairBound":
+        """The result of a search that has ended."""
+        return cls(
+            row=row,
+            pair=pair,
+            low=low,
+            lowest=lowest,
+            distance=state.distance,
+            at=state.at,
+            touches=tuple(state.touches),
+            unproved=tuple(state.unproved),
+            demand=state.demand,
+            needed=state.needed,
+            cuts=state.cuts,
+            at_surface=span,
+        )
+
+    @property
+    def keeps_clearance(self) -> bool:
+        """Whether the pair is to keep the clearance of the cell, not only to be free of contact."""
+        return self.pair.rule is Rule.CLEARANCE
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the pair was neither found to touch or to come too near, nor proved not to."""
+        return bool(self.unproved and not self.touches and self.lowest < self.needed)
+
+    @property
+    def nearest(self) -> float:
+        """Smallest distance found in [m]: zero when the pair touches, inf when it was not measured."""
+        return 0.0 if self.touches else self.distance
+
+    @property
+    def proved(self) -> float:
+        """Distance in [m] that the pair is proved to keep over the whole motion; zero when it touches."""
+        return max(0.0, min(self.nearest, self.lowest))
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the demand is proved: the clearance of the pair, or that it does not touch."""
+        if self.keeps_clearance:
+            return not self.touches and self.proved >= self.demand
+        return not self.touches and not self.is_open
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Bound:
+    """What is proved of all pairs over a motion.
+
+    Attributes:
+        scene: The scene.
+        q: Stacked joint positions in [rad] or [m], shape (N, nq).
+        edges: Samples at which blocks begin and end, ascending from 0 to N - 1, shape (K + 1,).
+        low: ``PairBound.low`` of all pairs, shape (pairs, K).
+        pairs: All pairs, in the order of the scene.
+    """
+
+    scene: Scene
+    q: Array
+    edges: Indices
+    low: Array
+    pairs: tuple[PairBound, ...]
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether every pair is proved to keep what is demanded of it."""
+        return all(pair.is_kept for pair in self.pairs)
+
+    @property
+    def minimum(self) -> float:
+        """Distance in [m] that all pairs are proved to keep that are to keep the clearance; inf without such pairs."""
+        return min((pair.proved for pair in self.pairs if pair.keeps_clearance), default=np.inf)
+
+    def of_class(self, kind: ClearanceClass) -> list[PairBound]:
+        """All pairs of a class: none of them may touch."""
+        return [pair for pair in self.pairs if pair.pair.clearance_class is kind]
+
+    def names(self, pair: PairBound) -> tuple[str, str]:
+        """Names of the two bodies of a pair."""
+        return self.scene.names(pair.pair)
+
+    def lowest_bounds(self, pairs: Sequence[PairBound]) -> Array:
+        """Smallest bound of some pairs in each block in [m], shape (K,)."""
+        rows, lowest = np.array([pair.row for pair in pairs], dtype=np.intp), np.full(self.low.shape[1], np.inf)
+        for first in range(0, len(rows), ROWS_AT_ONCE):
+            np.minimum(lowest, self.low[rows[first : first + ROWS_AT_ONCE]].min(axis=0), out=lowest)
+        return lowest
+
+    def nearest_points(self, pair: PairBound) -> tuple[Array, Array] | None:
+        """Points of a pair where it is nearest, in the world in [m]; None when it touches or was not measured."""
+        if pair.touches or not np.isfinite(pair.distance):
+            return None
+        before = min(int(pair.at), len(self.q) - 2)
+        share = pair.at - before
+        q = (1.0 - share) * self.q[before] + share * self.q[before + 1]
+        scene, ends = self.scene, pair.pair.solids
+        if ends is None:
+            solid, ground = pair.pair.first, scene.bodies[pair.pair.second]
+            poses = scene.pair_poses((solid, solid), q[None])
+            points = point_above(scene.engine, solid, poses, X_WS=ground.X_BS, sample=0)
+        else:
+            points = nearest_points(scene.engine, ends, scene.pair_poses(ends, q[None]), sample=0)
+        return points.first, points.second

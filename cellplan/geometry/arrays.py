@@ -1,0 +1,8 @@
+"""Types of arrays: numbers, indices and flags."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Flags = NDArray[np.bool_]

@@ -1,0 +1,69 @@
+"""Motion task: what one call of the planner resolves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell, Grasp, Relation
+from cellplan.model.motion import Schedule
+from cellplan.planning.timing.timed_path import TimedTasks
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionTask:
+    """The coupled motion of one phase: the tasks that are worked on together and the robots that move for them.
+
+    Attributes:
+        cell: The cell; its solver names method and integrator.
+        schedule: The tasks, sampled at the times of the clock, and where that is known their desired motion between
+            these times.
+        moving: Names of the robots that carry the part or work on it; all others stand still.
+        start: Stacked configuration at the first sample, shape (nq,), in [rad] or [m].
+    """
+
+    cell: Cell
+    schedule: Schedule
+    moving: Sequence[str]
+    start: Array
+
+    @property
+    def timed(self) -> TimedTasks:
+        """The desired motion at any time.
+
+        Raises:
+            TypeError: It is known at the samples only.
+        """
+        desired = self.schedule.desired
+        if not isinstance(desired, TimedTasks):
+            raise TypeError("motion task: expected a desired motion between samples, got none")
+        return desired
+
+    @property
+    def grasps(self) -> tuple[Grasp, ...]:
+        """Grasps of the further holders that move: their tools keep their poses on the part."""
+        return closures(self.cell, self.moving)
+
+    @property
+    def relations(self) -> tuple[Relation, ...]:
+        """The tasks, then the grasps of the further holders that move ([Ribeiro2010]_ 4.5), one block row each."""
+        return (*(each.task for each in self.schedule.tasks), *self.grasps)
+
+    def references(self) -> tuple[Array, Array]:
+        """Reference poses X_PT and twists V_PT_P of all relations at the samples.
+
+        A grasp is a task that never changes: its pose is where the holder took hold of the part, its twist is zero.
+
+        Returns:
+            Poses, shape (N, relations, 4, 4), and twists, linear first, shape (N, relations, 6).
+        """
+        tasks, grasps, count = self.schedule.tasks, self.grasps, len(self.schedule.times)
+        X_PT = [each.X_PT for each in tasks] + [np.broadcast_to(grasp.X_PT, (count, 4, 4)) for grasp in grasps]
+        V_PT_P = [each.V_PT_P for each in tasks] + [np.zeros((count, 6))] * len(grasps)
+        return np.stack(X_PT, axis=1), np.stack(V_PT_P, axis=1)
+
+
+def closures(cell: Cell, moving: Sequence[str]) -> tuple[Grasp, ...]:
+    """Grasps of the further holders that move; where the part stands still, so do all its holders."""
+    return tuple(grasp for grasp in cell.closures if grasp.robot in moving)

@@ -1,0 +1,143 @@
+"""All pairs of bodies of a cell: which are watched and for what, which are left out, and how deep some may be."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from cellplan.collision.bodies import CollisionBody, prepare
+from cellplan.collision.engine import Engine
+from cellplan.collision.overlap.contact_zone import outside_zone
+from cellplan.geometry.shapes import HalfSpace, Solid
+from cellplan.geometry.transforms import inverse
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Cell
+from cellplan.model.left_out import LeftOut, LeftOutKind
+from cellplan.model.task import Frame
+from cellplan.model.units import MM
+from cellplan.scene.bodies import Kind, SceneBody
+from cellplan.scene.grips import grip_watch
+from cellplan.scene.left_out import left_out
+from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair
+from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
+from cellplan.scene.permanent_contacts import apply_design
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CollisionPairs:
+    """The pairs of a cell.
+
+    Attributes:
+        watched: Pairs that are watched.
+        exclusions: Pairs that are not, as (first, second, reason).
+        mounted: Pairs that may touch and of which the depth is judged.
+        left_out: What is not judged in full, but for two links of one robot's file.
+        outside: What of tools and holders lies outside their contact zones; the engine has them after its solids.
+        cut_from: The body that each of these is cut from, by its index.
+    """
+
+    watched: tuple[ScenePair, ...]
+    exclusions: tuple[tuple[str, str, str], ...]
+    mounted: tuple[MountedPair, ...]
+    left_out: tuple[LeftOut, ...]
+    outside: tuple[CollisionBody, ...]
+    cut_from: tuple[int, ...]
+
+    @classmethod
+    def of(
+        cls, cell: Cell, bodies: Sequence[SceneBody], *, engine: Engine, chains: Mapping[str, ScrewChain]
+    ) -> "CollisionPairs":
+        """Sort all pairs of bodies.
+
+        Args:
+            cell: The cell.
+            bodies: All solids, half-spaces last.
+            engine: The bodies that are no half-spaces.
+            chains: Kinematic chain of each robot.
+
+        Raises:
+            InputError: An exclusion names something that is no body; the mounting of a body cannot be meant.
+        """
+        kept, excluded = sort_pairs(cell, bodies)
+        design = apply_design(cell, bodies, kept, engine=engine, chains=chains)
+        excluded += design.excluded
+        zones = _ContactZones(cell, bodies, first_index=len(engine.bodies))
+        watched = tuple(zones.watched(pair) for pair in design.kept)
+        ordered = sorted(excluded, key=lambda pair: (pair.first, pair.second))
+        return cls(
+            watched=watched,
+            exclusions=tuple((bodies[pair.first].name, bodies[pair.second].name, pair.reason) for pair in ordered),
+            mounted=(*_mounted(cell, bodies, excluded, watched), *design.mounted),
+            left_out=left_out(cell, bodies, watched, excluded, engine=engine),
+            outside=tuple(zones.outside),
+            cut_from=tuple(zones.cut_from),
+        )
+
+
+class _ContactZones:
+    """Pairs of a tool at work, or of a further holder, and the part: contact is allowed inside a zone only.
+
+    Attributes:
+        outside: What lies outside the zones.
+        cut_from: The body that each of these is cut from.
+    """
+
+    def __init__(self, cell: Cell, bodies: Sequence[SceneBody], *, first_index: int) -> None:
+        """Start without any cut; the first cut body will have ``first_index`` in the engine."""
+        self.outside: list[CollisionBody] = []
+        self.cut_from: list[int] = []
+        self._cell, self._bodies, self._first_index = cell, bodies, first_index
+        self._at_work = {task.robot for task in cell.tasks if task.relative_to is Frame.PART}
+        self._known: dict[tuple[Solid, bytes], tuple[CollisionBody | None, bool]] = {}
+
+    def watched(self, pair: ScenePair) -> ScenePair:
+        """The pair with the rule of its zone, if it has one."""
+        other, part = sorted((pair.first, pair.second), key=lambda index: self._bodies[index].kind is Kind.PART)
+        tool = self._bodies[other]
+        if self._bodies[part].kind is Kind.PART and tool.kind is Kind.TOOL and tool.robot in self._at_work:
+            return self._at_tip(pair, other, part)
+        if (grasp := grasp_of(self._bodies[pair.first], self._bodies[pair.second], self._cell)) is None:
+            return pair
+        grip = grip_watch(self._cell, tool, grasp)
+        solids = (other, part) if grip.is_whole else self._cut(other, part, grip.outside)
+        return replace(pair, rule=grip.rule, reason=grip.reason, solids=solids)
+
+    def _at_tip(self, pair: ScenePair, tool: int, part: int) -> ScenePair:
+        """A tool at work; a tool body that does not reach into its zone is like any other."""
+        outside, is_in_zone = self._outside_zone(self._bodies[tool])
+        if not is_in_zone:
+            return replace(pair, solids=(tool, part))
+        zone = MM * self._cell.checks.contact_zone
+        reason = f"at work: may touch within {zone:g} mm of the tool tip; checked for contact outside it"
+        return replace(pair, rule=Rule.PROCESS, reason=reason, solids=self._cut(tool, part, outside))
+
+    def _cut(self, body: int, part: int, outside: CollisionBody | None) -> tuple[int, int] | None:
+        """Engine indices of what lies outside the zone and of the part; None where nothing does."""
+        if outside is None:
+            return None
+        self.outside.append(outside)
+        self.cut_from.append(body)
+        return self._first_index + len(self.outside) - 1, part
+
+    def _outside_zone(self, body: SceneBody) -> tuple[CollisionBody | None, bool]:
+        """What of a tool lies outside its contact zone, and whether any lies inside; equal tools are cut once."""
+        if isinstance(body.shape, HalfSpace):
+            return None, False
+        robot = self._cell.robot(str(body.robot))
+        tip = (inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT)[:3, 3]
+        key = (body.shape, tip.tobytes())
+        if key not in self._known:
+            surface, is_in_zone = outside_zone(body.shape, tip, self._cell.checks.contact_zone)
+            cut = prepare(body.name, surface) if is_in_zone and surface is not None else None
+            self._known[key] = cut, is_in_zone
+        outside, is_in_zone = self._known[key]
+        return (None if outside is None else replace(outside, name=body.name)), is_in_zone
+
+
+def _mounted(
+    cell: Cell, bodies: Sequence[SceneBody], excluded: Sequence[Excluded], watched: Sequence[ScenePair]
+) -> list[MountedPair]:
+    """Pairs of which the depth is judged: grips and what stands, unless the user left them out."""
+    kinds = (LeftOutKind.GRIP, LeftOutKind.STANDING)
+    ends = [(pair.first, pair.second) for pair in excluded if pair.kind in kinds]
+    ends += [(pair.first, pair.second) for pair in watched if pair.rule in {Rule.GRIP, Rule.CONTACT}]
+    found = (mounted_pair(bodies[first], bodies[second], (first, second), cell) for first, second in sorted(ends))
+    return [pair for pair in found if pair is not None]
