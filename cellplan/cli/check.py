@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -49,7 +48,7 @@ def check(
 
 
 def _record(result: CellCheck) -> dict[str, Any]:
-    """What was found, in printed units."""
+    """The result in printed units."""
     from cellplan.report.record.clearance import left_out_record
     from cellplan.report.record.common import check_record, number
     from cellplan.report.record.open_surfaces import open_surfaces_record
@@ -73,21 +72,19 @@ def _record(result: CellCheck) -> dict[str, Any]:
 
 
 def _start(robot: Robot) -> dict[str, float | None]:
-    """Start posture by joint with its unit, as the column names of the tables have it."""
+    """Start posture by joint and unit, under the column names of the tables."""
     from cellplan.report.record.common import number
 
     if robot.start is None:
         return {}
     return {
-        f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}": number(
-            position * (math.degrees(1.0) if joint.is_revolute else 1e3)
-        )
+        f"{joint.name}_{joint.display_unit.name}": number(joint.display_unit.scale * position)
         for joint, position in zip(robot.model.joints, robot.start, strict=True)
     }
 
 
 def _lines(record: dict[str, Any]) -> list[str]:
-    """What was found, for people."""
+    """The result as lines of text."""
     from cellplan.report.record.tasks import direction_text
     from cellplan.report.text.run import left_out_lines
 

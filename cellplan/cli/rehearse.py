@@ -1,4 +1,4 @@
-"""``cellplan rehearse``: execute a solved program on cells with errors, and correct it from measurements."""
+"""``cellplan rehearse``: execute a solved program on cells with errors and correct it from measurements."""
 
 from pathlib import Path
 from typing import Annotated
@@ -13,13 +13,13 @@ from cellplan.errors import ExitStatus
 SCHEMA = "cellplan.rehearse/1"
 
 ErrorsFile = Annotated[
-    Path, typer.Option("--errors", metavar="FILE", help="How the real cell differs (YAML).", show_default=False)
+    Path, typer.Option("--errors", metavar="FILE", help="Errors of the real cell (YAML).", show_default=False)
 ]
 Feedback = Annotated[
     bool, typer.Option("--feedback", help="Correct the references from pass to pass until the true error converges.")
 ]
 InPass = Annotated[
-    bool, typer.Option("--in-pass", help="Also execute with the measured error fed back from instant to instant.")
+    bool, typer.Option("--in-pass", help="Also execute with the measured error fed back from sample to sample.")
 ]
 Rounds = Annotated[int, typer.Option("--rounds", metavar="N", help="Maximum number of corrections.")]
 Trials = Annotated[
@@ -47,8 +47,8 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
 ) -> None:
     """Execute the solved program on perturbed cells and report the true errors of the tools on the part.
 
-    Exit status: 0 the true errors are within tolerance (after feedback when asked), 1 they are not, 2 bad input,
-    3 no solution, 4 internal error.
+    Exit status: 0 the true errors are within tolerance (with --feedback: after correction), 1 they are not,
+    2 bad input, 3 no solution, 4 internal error.
     """
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.io.cell.load import load_cell

@@ -119,6 +119,10 @@ class Robot:
     attachments: tuple[Body, ...] = ()
     pedestal: Pedestal | None = None
 
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return f"<Robot '{self.name}': {self.model.name}, {len(self.model.joints)} joints>"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Grasp:
@@ -192,6 +196,11 @@ class Part:
         if self.X_WP is None:
             raise ValueError("part: expected a pose in the world")
         return self.X_WP
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        holders = ", ".join(grasp.robot for grasp in self.held_by)
+        return f"<Part: {type(self.shape).__name__}, {f'held by {holders}' if holders else 'fixed in the world'}>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -366,3 +375,8 @@ class Cell:
     def joint_count(self) -> int:
         """Length of the stacked joint vector."""
         return sum(len(robot.model.joints) for robot in self.robots)
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        robots, tasks = (", ".join(each.name for each in named) for named in (self.robots, self.tasks))
+        return f"<Cell '{self.name}': robots {robots}; tasks {tasks}; {self.motion.mode}>"

@@ -62,6 +62,10 @@ class Check:
     at_s: float | None
     message: str
 
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return f"<Check {self.name} of '{self.subject}' {'passed' if self.passed else 'failed'}: {self.message}>"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TaskAccuracy:
@@ -384,3 +388,9 @@ class Report:
     def cycle_time(self) -> float:
         """Length of the common clock in [s]."""
         return float(self.times[-1])
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        failed = sum(not check.passed for check in self.checks)
+        verdict = f"failed: {failed} of {len(self.checks)} checks" if failed else f"passed: {len(self.checks)} checks"
+        return f"<Report of '{self.cell}', {self.mode}, {len(self.times)} samples, {verdict}>"

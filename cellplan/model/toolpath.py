@@ -40,6 +40,10 @@ class Toolpath:
     runs_on: bool = False
     stand_off: float = 0.0
 
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return f"<Toolpath of '{self.name}', {1e3 * self.length:.4g} mm, {'closed' if self.is_closed else 'open'}>"
+
     @property
     def length(self) -> float:
         """Length of the whole path on the surface in [m]."""

@@ -42,7 +42,7 @@ def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequen
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
 
     Raises:
-        InputError: An input has changed or cannot be found; the resolved copy is not made from the cell file.
+        InputError: An input has changed or cannot be looked for; the resolved copy is not made from the cell file.
     """
     if cell is None:
         return _without_file(stored)
