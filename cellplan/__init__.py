@@ -1,7 +1,16 @@
 """cellplan: offline programming and cell layout for cooperative robots that work on one moving part.
 
-The names below are the public interface; anything else may change without notice. They are imported when first used,
-so that ``import cellplan`` and the command line's help stay instant.
+The public interface; everything else may change without notice:
+
+- read: ``load_cell``, ``load_errors``
+- compute: ``solve``, ``screen``, ``rehearse``
+- verify: ``verify``, ``open_gate``
+- write: ``write_run``, ``write_rehearsal``, ``export_program``
+- inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``
+- results: ``Solution``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``
+- errors: ``CellplanError``
+
+Names are imported at first use, so that ``import cellplan`` and the help of the command line are fast.
 """
 
 import os

@@ -17,6 +17,10 @@ INTRODUCTION = """\
 This page is made from the format itself by `docs/make_reference.py`; do not edit it by hand. `cellplan schema` prints
 the same as a JSON Schema for editors.
 
+- **The version is promised**: `cellplan: 1` is frozen at the first release. From then on keys are only added, each with
+  a default that changes nothing for files without it; no key, value, unit or default changes its meaning. Anything else
+  gets another number, and a file with another number is refused. The same holds for robot tables, which have no number
+  of their own.
 - **Units are in the keys**: `_mm`, `_deg`, `_s`, `_mm_s`, `_deg_s`, `_per_s`. Everything else is a plain number.
 - **Poses** are `{xyz_mm: [x, y, z], rpy_deg: [roll, pitch, yaw]}` with angles about fixed axes, as in URDF.
 - **Names** have 1 to 40 letters, digits, `_` or `-` and do not start with `-`.
@@ -47,7 +51,8 @@ of the links as well.
 ERRORS_INTRODUCTION = """\
 # The errors file
 
-This page is made from the format itself by `docs/make_reference.py`; do not edit it by hand.
+This page is made from the format itself by `docs/make_reference.py`; do not edit it by hand. Its version,
+`cellplan_errors: 1`, is promised as that of [the cell file](cell-file.md) is.
 
 An errors file says how a real cell differs from the written one. `cellplan rehearse CELL --errors FILE` reads it; the
 guide is [Rehearse with errors](../guides/rehearse-with-errors.md). It is read as strictly as the cell file, and its
@@ -56,8 +61,7 @@ robots and joints must be those of the cell.
 - **A number is fixed**: the same in every trial. `{normal: S}` is drawn for every trial from a normal distribution with
   mean zero and standard deviation S, `{uniform: H}` evenly between -H and H.
 - **Poses** are those of the real frame seen from the written one: the real base in the place of the written base, the
-  real tool tip in the place of the written tip, the real part in the place where the written part
-  sits.
+  real tool tip in the place of the written tip, the real part in the place where the written part sits.
 - **A longer link**: the vector from the axis point of the joint before to that of the named joint, at the reference
   configuration, is lengthened; the named joint and all that it carries move along. Where the two points are one, there
   is no direction, and the entry is refused. Before the first joint stands the origin of the base frame. What lies

@@ -1,4 +1,4 @@
-"""Where entries are kept: a folder of the user's own, which nobody else may write to; or nowhere."""
+"""Location of the cache: a private directory of the user, or none."""
 
 import os
 import stat
@@ -44,7 +44,7 @@ def _usual() -> Path:
 
 
 def _is_own(folder: Path) -> bool:
-    """Whether the folder belongs to the user, and nobody else may put entries into it."""
+    """Whether the folder belongs to the user, and no other user may write to it."""
     status = folder.stat()
     if not hasattr(os, "getuid"):  # another system, with other rules
         return stat.S_ISDIR(status.st_mode)

@@ -2,8 +2,8 @@
 
 An entry is never more than a saving of time. It is used only when it is a regular file of the user's own and whole, by
 a digest of its own; whatever is wrong with it, or with the folder, the work is done as if there were none. Nothing that
-was refused is kept, so a refused file is read and refused again. The digest tells accidents, not forgery: commands that
-prove something do without the folder (see ``use``).
+was refused is kept, so a refused file is read and refused again. The digest detects accidents, not forgery: commands
+that prove something do without the folder (see ``use``).
 """
 
 import hashlib
@@ -57,7 +57,7 @@ _recent: OrderedDict[Key, Held] = OrderedDict()
 
 
 def key_of(kind: str, *contents: bytes) -> Key | None:
-    """Key of what is made from some contents; None when it cannot be told which code makes it."""
+    """Key of what is made from some contents; None when the code that makes it is unknown."""
     code = _code()
     if code is None:
         return None

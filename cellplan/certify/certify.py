@@ -35,7 +35,7 @@ def certify(
     nothing touches and that every pair keeps what is demanded of it. The smallest distances are searched for after it.
 
     Args:
-        scene: The scene; what is asked of its pairs may depend on the run, see ``scene_of_run``.
+        scene: The scene; the rules of its pairs may depend on the run, see ``scene_of_run``.
         q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2.
         demand: Distance in [m] that pairs with the rule ``clearance`` are to keep; that of the scene when None.
         with_minimum: Whether the smallest distances are searched for too. Otherwise the search ends with the first pair

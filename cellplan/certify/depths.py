@@ -12,9 +12,7 @@ from cellplan.scene.bodies import is_ground
 from cellplan.scene.mounting import MountedPair
 from cellplan.scene.scene import Scene
 
-MOST_ROWS: Final = (
-    61  # [-] configurations of a motion at which two solids that move are measured: each takes about 1 ms
-)
+MAX_ROWS: Final = 61  # [-] configurations of a motion at which two solids that move are measured: each takes about 1 ms
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +35,7 @@ def mounted_depths(scene: Scene, q: Array) -> tuple[FoundDepth, ...]:
 
     Pairs that do not move against each other are measured once. For a further holder that grips in all components this
     holds as far as its grasp is closed, which is a check of its own. Of pairs that do move, a half-space is measured at
-    every configuration, two solids at up to ``MOST_ROWS`` of them, the first and the last among them.
+    every configuration, two solids at up to ``MAX_ROWS`` of them, the first and the last among them.
 
     Args:
         scene: The scene.
@@ -55,7 +53,7 @@ def _at_rest(scene: Scene, pair: MountedPair, poses: BodyPoses) -> FoundDepth:
 def _moving(scene: Scene, pair: MountedPair, q: Array) -> FoundDepth:
     """Greatest depth of a pair over a motion."""
     has_ground = is_ground(scene.bodies[pair.second])
-    count = len(q) if has_ground else min(MOST_ROWS, len(q))
+    count = len(q) if has_ground else min(MAX_ROWS, len(q))
     rows = np.unique(np.linspace(0, len(q) - 1, count).round().astype(np.intp))
     ends = (pair.first, pair.first if has_ground else pair.second)
     depths = _depths(scene, pair, scene.pair_poses(ends, q[rows]))

@@ -54,18 +54,15 @@ class Chain:
         """
         moved = steps[:, self.axes]
         turned = moved * self.turns
-        bend: Array = (moved * self.levers * (2.0 * np.cumsum(turned, axis=1) - turned)).sum(axis=1)
-        return bend
+        return (moved * self.levers * (2.0 * np.cumsum(turned, axis=1) - turned)).sum(axis=1)
 
     def turn_bend(self, steps: Array) -> Array:
         """Largest second derivative of a unit vector that turns with the second body, likewise, shape (n - 1,)."""
-        bend: Array = (steps[:, self.axes] @ self.turns) ** 2
-        return bend
+        return (steps[:, self.axes] @ self.turns) ** 2
 
     def reach(self, steps: Array) -> Array:
         """How far a point of the second body travels at most in each step, seen from the first, in [m]."""
-        reach: Array = steps[:, self.axes] @ self.levers
-        return reach
+        return steps[:, self.axes] @ self.levers
 
 
 class LeverArms:
@@ -92,8 +89,7 @@ class LeverArms:
 
     def steps(self, q: Array) -> Array:
         """By how much each axis moves from row to row, without its sign, in [rad] or [m], shape (n - 1, axes)."""
-        moved: Array = np.abs(np.diff(q[:, self._columns], axis=0) * self._ratios)
-        return moved
+        return np.abs(np.diff(q[:, self._columns], axis=0) * self._ratios)
 
     def chain(self, first: int | None, second: int) -> Chain:
         """The joints between two of the engine's bodies; ``first`` is None for the ground."""
@@ -181,8 +177,7 @@ class _PlacedAxis:
 
     def foot(self, points: Array) -> Array:
         """The points of the axis that are nearest to some points, shape (..., 3)."""
-        nearest: Array = self.point_W + ((points - self.point_W) @ self.axis_W)[..., None] * self.axis_W
-        return nearest
+        return self.point_W + ((points - self.point_W) @ self.axis_W)[..., None] * self.axis_W
 
 
 def _placed(robot: Robot, start: int) -> list[_PlacedAxis]:
@@ -221,5 +216,4 @@ def _link(body: SceneBody) -> tuple[str | None, int]:
 
 def _moved(X: Array, points: Array) -> Array:
     """Displaced points, shape (..., 3)."""
-    moved: Array = points @ X[:3, :3].T + X[:3, 3]
-    return moved
+    return points @ X[:3, :3].T + X[:3, 3]

@@ -1,4 +1,4 @@
-"""A motion of the whole cell in which every joint moves evenly from each sample to the next, and how much it bends."""
+"""Motion of the whole cell, linear in the joints from each sample to the next, with bounds on its curvature."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from cellplan.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StraightMotion:
-    """A stretch of a program; see ``collision.travel.Motion``.
+    """A stretch of a program; see ``collision.continuous.motion_bound.Motion``.
 
     Attributes:
         scene: The scene.

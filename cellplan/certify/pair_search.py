@@ -20,7 +20,7 @@ from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.pair_state import PairState, StepBounds
 from cellplan.collision.continuous.motion_bound import Motion, Pair, PairMotion
 from cellplan.collision.continuous.pieces import PieceMotion, can_be_split, read_piece, split
-from cellplan.collision.distance import SURELY_APART, TIGHT, Reading, look, sharpen
+from cellplan.collision.distance import SURELY_APART, TIGHT, Reading, exact_reading, quick_reading
 from cellplan.collision.engine import Engine
 from cellplan.collision.overlap.containment import is_inside
 from cellplan.geometry.arrays import Array, Flags, Indices
@@ -61,25 +61,21 @@ class Search(ABC):
         """No distance in the step is below this, in [m], shape (n - 1,); zero where the bodies touch."""
         return self.bounds.low
 
-    def run(self, cutoff: float) -> None:
-        """Search until no step can be below a cutoff in [m] and nearer than the nearest found, or touches."""
-        self._prove(cutoff)
+    def run(self, cutoff: float, *, with_minimum: bool = True) -> None:
+        """Search until no step can be below a cutoff in [m] and nearer than the nearest found, or touches.
+
+        That nothing touches is proved first, then that the demand is kept; without the minimum the search ends there.
+        """
         state = self.state
+        state.is_verdict_open = True
+        for level in (SURELY_APART, state.demand):
+            self.raise_to(level, cutoff)
         state.is_verdict_open = False
-        while not state.is_spent and (lowest := self.bounds.lowest()[1]) < (goal := state.goal(cutoff)):
+        while (
+            with_minimum and not state.is_spent and (lowest := self.bounds.lowest()[1]) < (goal := state.goal(cutoff))
+        ):
             self.raise_to(goal if goal - lowest <= BISECTION_TOL else 0.5 * (lowest + goal), cutoff)
         self._finish()
-
-    def prove(self) -> None:
-        """Search only until it is known whether the pair touches or comes nearer than the demand."""
-        self._prove(self.state.demand)
-        self._finish()
-
-    def _prove(self, cutoff: float) -> None:
-        """Prove that nothing touches, then that the demand is kept, where bounds are below a cutoff in [m]."""
-        self.state.is_verdict_open = True
-        for level in (SURELY_APART, self.state.demand):
-            self.raise_to(level, cutoff)
 
     def raise_to(self, level: float, cutoff: float) -> None:
         """Raise all bounds to a level in [m], as far as they are below a cutoff and what may be nearest."""
@@ -143,7 +139,7 @@ class Search(ABC):
 
     @abstractmethod
     def _read(self, sample: int, goal: float) -> None:
-        """Measure at a sample, finely enough to tell whether the distance reaches a goal."""
+        """Measure at a sample, finely enough to decide whether the distance reaches a goal."""
 
     @abstractmethod
     def _finish(self) -> None:
@@ -205,10 +201,10 @@ class SolidSearch(Search):
     def _measured(self, sample: int, goal: float) -> Reading:
         """Reading of the engine at a sample."""
         poses = self._motion.poses
-        reading = look(self._engine, self._pair, poses, sample=sample)
+        reading = quick_reading(self._engine, self._pair, poses, sample=sample)
         if reading.is_exact or reading.bound >= goal:
             return reading
-        sharp = sharpen(self._engine, self._pair, poses, sample=sample, reading=reading)
+        sharp = exact_reading(self._engine, self._pair, poses, sample=sample, reading=reading)
         self._loose += sharp.bound > reading.bound + TIGHT
         return sharp
 

@@ -1,4 +1,4 @@
-"""The scene of one run: what is asked of a pair depends on who works, and some questions concern a few pairs only."""
+"""The scene of one run: the rule of a pair depends on which robots work, and some searches need a few pairs only."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace

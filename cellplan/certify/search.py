@@ -15,6 +15,7 @@ from cellplan.collision.distance import Reading, measure
 from cellplan.collision.engine import Engine
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.report import ClearanceClass
+from cellplan.scene.pairs import ScenePair
 
 PAIR_WORK: Final = 2_000_000  # pairs times blocks bounded at once: 100 MB
 FIRST_READINGS: Final = 12  # pairs of each class measured once before any search: a small distance saves much later
@@ -51,7 +52,7 @@ class StretchSearch:
             state = survey.states[row]
             if lowest[row] < state.demand and (begun := self._begin(row, state.demand)) is not None:
                 search, block = begun
-                search.prove()
+                search.run(state.demand, with_minimum=False)
                 survey.lift(row, search, block)
                 if state.touches or self._low()[row].min() < state.demand:
                     return False
@@ -148,7 +149,7 @@ class StretchSearch:
                 break
             block = int(np.argmin(self._low()[row]))
             sample = int(self._edges[block])
-            reading = measure(self._scene.engine, self._ends(row), self._motion.poses, sample=sample)
+            reading = measure(self._scene.engine, _ends(self._scene.pairs[row]), self._motion.poses, sample=sample)
             if not reading.touches:
                 survey.note_distance(row, reading.bound, float(survey.edges[self._first + block]))
             yield row, (sample, reading)
@@ -173,17 +174,17 @@ class StretchSearch:
             return None
         if row in self._grounds:
             return self._grounds[row], self._first
-        block, ends = self._first + int(open_[0]), self._ends(row)
+        block, ends = self._first + int(open_[0]), _ends(self._scene.pairs[row])
         motion = self._motion.part(ends, int(self._edges[open_[0]]), int(self._edges[open_[-1] + 1]))
         begin, state = float(self._survey.edges[block]), self._survey.states[row]
         return SolidSearch(self._scene.engine, ends, motion, state=state, begin=begin), block
 
-    def _ends(self, row: int) -> Pair:
-        """The engine's bodies of a pair of solids."""
-        ends = self._scene.pairs[row].solids
-        if ends is None:
-            raise ValueError("a pair without solids has no search by the engine")
-        return ends
+
+def _ends(pair: ScenePair) -> Pair:
+    """The engine's bodies of a pair of solids."""
+    if pair.solids is None:
+        raise ValueError("a pair without solids has no search by the engine")
+    return pair.solids
 
 
 def _surface_span(engine: Engine, pair: Pair, motion: Motion) -> tuple[int, int] | None:

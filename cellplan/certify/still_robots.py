@@ -1,4 +1,4 @@
-"""Home trials: whether a robot that stands still is surely too near to something, seen at a few instants of the runs.
+"""Home trials: whether a robot at rest is certainly too near to something, at a few samples of the runs.
 
 What passes here is only likely to be free; what is refused is too near for certain. All other bodies are placed once,
 so that hundreds of configurations can be tried.
@@ -12,7 +12,7 @@ import numpy as np
 
 from cellplan.collision.bodies import BodyPoses
 from cellplan.collision.continuous.motion_bound import Pair
-from cellplan.collision.distance import SURELY_APART, look, sharpen
+from cellplan.collision.distance import SURELY_APART, exact_reading, quick_reading
 from cellplan.collision.overlap.containment import is_inside
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import ClearanceClass
@@ -21,8 +21,8 @@ from cellplan.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Instants:
-    """Some instants of one run.
+class RunSamples:
+    """Some samples of one run.
 
     Attributes:
         scene: The scene of the run, with those pairs only that the configuration of the robot matters to.
@@ -34,32 +34,32 @@ class Instants:
 
 
 class HomeTrials:
-    """One robot among what moves and stands at some instants.
+    """One robot at rest among all other bodies, at some samples of the runs.
 
     Attributes:
         refused: How often each pair was too near, by the names of its bodies.
     """
 
-    def __init__(self, robot: str, runs: Sequence[Instants]) -> None:
+    def __init__(self, robot: str, runs: Sequence[RunSamples]) -> None:
         """Place everything else.
 
         Args:
             robot: Name of the robot that is to stand somewhere.
-            runs: Instants of the runs in which it is idle.
+            runs: Samples of the runs in which it is idle.
         """
         self.refused: Counter[tuple[str, str]] = Counter()
         self._tables = [_Table(robot, run) for run in runs]
 
     def add(self, run: int, q: Array) -> None:
-        """Look at another instant of a run from now on, at the stacked configuration of shape (nq,)."""
+        """Include another sample of a run from now on, at the stacked configuration of shape (nq,)."""
         self._tables[run].add(q)
 
     def is_refused(self, q: Array, *, room: float = 0.0) -> bool:
-        """Whether a configuration is too near to something at one of the instants.
+        """Whether a configuration is too near to something at one of the samples.
 
         Args:
             q: The configuration in [rad] or [m], shape (n,).
-            room: Distance in [m] beyond the demanded one that is asked from the part and from other robots.
+            room: Distance in [m] beyond the demanded one that is required from the part and from other robots.
         """
         own = self._tables[0].placed(q)
         pair = self._tables[0].too_near_alone(own, room)  # what stands still is the same in every run
@@ -72,9 +72,9 @@ class HomeTrials:
 
 
 class _Table:
-    """The instants of one run."""
+    """The samples of one run."""
 
-    def __init__(self, robot: str, run: Instants) -> None:
+    def __init__(self, robot: str, run: RunSamples) -> None:
         """Sort the pairs of the robot into those that no other robot changes and the others."""
         self._scene, self._robot = run.scene, robot
         self._own = [index for index, body in enumerate(_solids(self._scene)) if body == robot]
@@ -86,7 +86,7 @@ class _Table:
         self._is_roomy, self._limits = ~is_alone | is_part, self._demanded
         self._q = run.q
         self._poses = self._scene.body_poses(run.q)
-        self._order = list(range(len(run.q)))  # instants that refused something lately come first
+        self._order = list(range(len(run.q)))  # samples that refused something lately come first
 
     def add(self, q: Array) -> None:
         self._q = np.concatenate([self._q, q[None]])
@@ -108,7 +108,7 @@ class _Table:
         return None if row is None else self._scene.names(self._scene.pairs[row])
 
     def too_near_others(self, own: BodyPoses, room: float) -> tuple[str, str] | None:
-        """The same of the other pairs, at all instants."""
+        """The same of the other pairs, at all samples."""
         self._limits = self._demanded + room * self._is_roomy
         self._poses.R[self._own], self._poses.p[self._own] = own.R[self._own], own.p[self._own]
         for place, sample in enumerate(self._order):
@@ -144,12 +144,12 @@ class _Table:
     def _is_too_near(self, pair: Pair, poses: BodyPoses, sample: int, limit: float) -> bool:
         """Whether two bodies touch, or are nearer than they may be."""
         engine = self._scene.engine
-        reading = look(engine, pair, poses, sample=sample)
+        reading = quick_reading(engine, pair, poses, sample=sample)
         if reading.touches or reading.bound >= limit:
             return reading.touches
         if reading.bound <= SURELY_APART and is_inside(engine, pair, poses, sample=sample):
             return True
-        return sharpen(engine, pair, poses, sample=sample, reading=reading).bound < limit
+        return exact_reading(engine, pair, poses, sample=sample, reading=reading).bound < limit
 
 
 def _solids(scene: Scene) -> list[str | None]:

@@ -12,7 +12,7 @@ from cellplan.checks.clearance.tool_depth import check_depths, tool_depths
 from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
 from cellplan.checks.joints.drift import check_joint_drift, repeatability
 from cellplan.checks.joints.limits import check_joints, joint_uses
-from cellplan.checks.joints.locked import check_locked, told_with_failures
+from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.joints.payload import check_payload, load_uses
 from cellplan.checks.tools.between_checks import check_closures_between, check_task_between, look_between, with_between
 from cellplan.checks.tools.closure import check_closure, closure_accuracy
@@ -135,7 +135,7 @@ def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccu
         tolerance = scheduled.task.tolerance
         at_rows = check_accuracy(schedule, errors, scheduled.task)
         own = with_between(at_rows, check_task_between(errors, tolerance))
-        checks += told_with_failures(own, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
+        checks += with_locked_joints(own, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
     return checks
 
 

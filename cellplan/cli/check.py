@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -19,7 +18,13 @@ if TYPE_CHECKING:
 SCHEMA = "cellplan.check/1"
 
 
-def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_dir: AllowDirs = None) -> None:
+def check(
+    cell: CellFile,
+    settings: Settings = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    allow_dir: AllowDirs = None,
+) -> None:
     """Read and validate everything without solving: files, robots, paths, reach and collisions at the start.
 
     Exit status: 0 sound, 1 a collision at the start, 2 bad input, 3 no start posture found, 4 internal error.
@@ -27,9 +32,12 @@ def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_d
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.io.cell.load import load_cell
         from cellplan.pipeline.check import check as check_cell
+        from cellplan.pipeline.overrides import with_overrides
 
         with progress_listener(quiet=quiet) as progress:
-            result = check_cell(load_cell(cell, allow_dirs=allow_dir or ()), progress=progress)
+            result = check_cell(
+                with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), settings or ()), progress=progress
+            )
     status = ExitStatus.PASSED if result.passed else ExitStatus.CHECK_FAILED
     record = _record(result)
     if as_json:
@@ -40,7 +48,7 @@ def check(cell: CellFile, as_json: AsJson = False, quiet: Quiet = False, allow_d
 
 
 def _record(result: CellCheck) -> dict[str, Any]:
-    """What was found, in printed units."""
+    """The result in printed units."""
     from cellplan.report.record.clearance import left_out_record
     from cellplan.report.record.common import check_record, number
     from cellplan.report.record.open_surfaces import open_surfaces_record
@@ -64,21 +72,19 @@ def _record(result: CellCheck) -> dict[str, Any]:
 
 
 def _start(robot: Robot) -> dict[str, float | None]:
-    """Start posture by joint with its unit, as the column names of the tables have it."""
+    """Start posture by joint and unit, under the column names of the tables."""
     from cellplan.report.record.common import number
 
     if robot.start is None:
         return {}
     return {
-        f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}": number(
-            position * (math.degrees(1.0) if joint.is_revolute else 1e3)
-        )
+        f"{joint.name}_{joint.display_unit.name}": number(joint.display_unit.scale * position)
         for joint, position in zip(robot.model.joints, robot.start, strict=True)
     }
 
 
 def _lines(record: dict[str, Any]) -> list[str]:
-    """What was found, for people."""
+    """The result as lines of text."""
     from cellplan.report.record.tasks import direction_text
     from cellplan.report.text.run import left_out_lines
 

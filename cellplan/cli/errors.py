@@ -1,4 +1,4 @@
-"""How a command ends when it cannot do its work: plain lines on the error stream and one exit status."""
+"""Failure of a command: plain lines on the error stream and one exit status."""
 
 import contextlib
 import os
@@ -9,11 +9,11 @@ import traceback
 from cellplan.errors import CellplanError, ExitStatus, InvalidFileError, NotVerifiedError
 
 DEBUG_VARIABLE = "CELLPLAN_DEBUG"  # set to 1 to see the traceback of an internal error
-LOCATED = re.compile(r".+?:\d+: ")  # a message that begins with file and line needs no other opening
+LOCATED = re.compile(r".+?:\d+: ")  # a message that begins with file and line needs no prefix
 
 
 class OutputError(CellplanError):
-    """What a command had to say could not be written to its standard output."""
+    """The result of a command could not be written to its standard output."""
 
 
 def exit_status(error: BaseException) -> ExitStatus:
@@ -24,7 +24,7 @@ def exit_status(error: BaseException) -> ExitStatus:
 
 
 def error_lines(error: BaseException) -> list[str]:
-    """What went wrong, one finding per line; a finding about a line of a file begins with ``FILE:LINE:``."""
+    """The findings, one per line; a finding about a line of a file begins with ``FILE:LINE:``."""
     if isinstance(error, KeyboardInterrupt):
         return ["interrupted: no half-written run is left behind"]
     if isinstance(error, InvalidFileError | NotVerifiedError):
@@ -32,19 +32,19 @@ def error_lines(error: BaseException) -> list[str]:
     if isinstance(error, CellplanError):
         line = _one_line(str(error))
         return [line if LOCATED.match(line) else f"error: {line}"]
-    what = _one_line(str(error)) or "no further words"
+    what = _one_line(str(error)) or "no message"
     return [f"internal error: {type(error).__name__}: {what} (set {DEBUG_VARIABLE}=1 to see where)"]
 
 
 def tell(line: str) -> None:
-    """Write one line to the error stream; nobody is left to hear of it when that stream is closed."""
+    """Write one line to the error stream; nothing happens if that stream is closed."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         sys.stderr.write(f"{line}\n")
         sys.stderr.flush()
 
 
 def report_failure(error: BaseException) -> ExitStatus:
-    """Tell the user why the command ends, and give the exit status."""
+    """Print why the command ends; returns the exit status."""
     if not isinstance(error, CellplanError | KeyboardInterrupt) and os.environ.get(DEBUG_VARIABLE) == "1":
         tell("".join(traceback.format_exception(error)).rstrip())
     for line in error_lines(error):

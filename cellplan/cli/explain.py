@@ -1,6 +1,6 @@
-"""``cellplan explain``: how a cell hangs together: robots, joints, circuits, graph, matrix blocks, redundancy."""
+"""``cellplan explain``: structure of a cell: robots, joints, circuits, graph, matrix blocks, redundancy."""
 
-from cellplan.cli.options import AllowDirs, AsJson, CellFile
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Settings
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.errors import ExitStatus
 from cellplan.report.record.structure import structure_record
@@ -9,16 +9,19 @@ from cellplan.report.text.structure import structure_lines
 SCHEMA = "cellplan.explain/1"
 
 
-def explain(cell: CellFile, as_json: AsJson = False, allow_dir: AllowDirs = None) -> None:
-    """Show how a cell hangs together, without solving it: robots, joints, circuits, graph, matrix, redundancy.
+def explain(cell: CellFile, settings: Settings = None, as_json: AsJson = False, allow_dir: AllowDirs = None) -> None:
+    """Show the structure of a cell without solving it: robots, joints, circuits, graph, matrix, redundancy.
 
     Exit status: 0 shown, 2 bad input, 4 internal error.
     """
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.io.cell.load import load_cell
         from cellplan.pipeline.explain import explain as explain_cell
+        from cellplan.pipeline.overrides import with_overrides
 
-        record = structure_record(explain_cell(load_cell(cell, allow_dirs=allow_dir or ())))
+        record = structure_record(
+            explain_cell(with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), settings or ()))
+        )
     if as_json:
         say_json({"schema": SCHEMA, "status": "passed", "exit": int(ExitStatus.PASSED), **record})
     else:

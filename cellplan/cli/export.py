@@ -1,4 +1,4 @@
-"""``cellplan export``: controller programs from a run that is verified once more."""
+"""``cellplan export``: controller programs from a verified run."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,13 +12,13 @@ from cellplan.errors import ExitStatus, InputError
 
 SCHEMA = "cellplan.exported/1"
 
-Format = Annotated[str, typer.Option("--format", metavar="NAME", help="What to write: csv.", show_default=False)]
+Format = Annotated[str, typer.Option("--format", metavar="NAME", help="Format: csv.", show_default=False)]
 Output = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder (default: RUN/programs/<format>).")
 ]
 WithoutCell = Annotated[
     bool,
-    typer.Option("--without-cell", help="Rest on the run's own copy of the cell; nothing tells whether that is yours."),
+    typer.Option("--without-cell", help="Use the run's own copy of the cell, without comparison with the original."),
 ]
 
 
@@ -58,15 +58,15 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
 
 
 def _require_choice(cell: Path | None, *, without_cell: bool) -> None:
-    """Refuse to guess whether a run is to be compared with the cell file that was solved.
+    """Require exactly one of the cell file that was solved and ``--without-cell``.
 
     Raises:
-        InputError: Neither or both were asked for.
+        InputError: Neither or both were given.
     """
     if cell is None and not without_cell:
         raise InputError(
             "--cell: expected the cell file that was solved, so that it and its files are compared with the run, got "
-            "none; say --without-cell to rest on the run's own copy of it"
+            "none; say --without-cell to use the run's own copy of it"
         )
     if cell is not None and without_cell:
         raise InputError("--without-cell: unexpected option beside --cell")

@@ -24,5 +24,37 @@ AllowDirs = Annotated[
         file_okay=False,
     ),
 ]
+Mode = Annotated[
+    str | None,
+    typer.Option("--mode", metavar="MODE", help="Robots that move: simultaneous, pairwise or part_at_rest."),
+]
+Method = Annotated[
+    str | None,
+    typer.Option(
+        "--method",
+        metavar="NAME",
+        help="Resolution method: weighted_pseudo_inverse, damped_least_squares, jacobian_transpose, filtered_inverse, "
+        "filtered_inverse_ii, heuristic_search, recursive_search or quadratic_program.",
+    ),
+]
+Integrator = Annotated[
+    str | None,
+    typer.Option("--integrator", metavar="NAME", help="From joint velocities to positions: auto, accurate or euler."),
+]
+Duration = Annotated[
+    float | None, typer.Option("--duration", metavar="S", help="Length of the common clock in seconds.")
+]
+Clearance = Annotated[
+    float | None, typer.Option("--clearance-mm", metavar="MM", help="Required clearance in millimetres.")
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Set any value of the cell file, such as robots.kuka.base.x_mm=900; may be repeated.",
+        show_default=False,
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]

@@ -35,7 +35,7 @@ def say_json(value: Mapping[str, object]) -> None:
 
 @contextlib.contextmanager
 def json_failure(schema: str, *, desired: bool) -> Iterator[None]:
-    """Give a machine one JSON object also when the command cannot do its work; the error goes on upwards."""
+    """Give a machine one JSON object also when the command cannot do its work; the error is raised again."""
     try:
         yield
     except OutputError:

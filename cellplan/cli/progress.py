@@ -1,4 +1,4 @@
-"""Progress of long commands on the error stream: a bar on a terminal, a rare line elsewhere, nothing when quiet."""
+"""Progress of long commands on the error stream: a bar on a terminal, occasional lines elsewhere, nothing if quiet."""
 
 import contextlib
 import os
@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterator
 
 from cellplan.cli.errors import tell
 
-LINE_EVERY_S = 10.0  # [s] often enough to show life in a log, rare enough not to fill it
+LINE_EVERY_S = 10.0  # [s] between two lines of a log
 
 Listener = Callable[[str, float], None]
 
 
 @contextlib.contextmanager
 def progress_listener(*, quiet: bool) -> Iterator[Listener]:
-    """Listen to the progress of stages for as long as the block runs."""
+    """A callback for the progress of stages, valid within the ``with`` statement."""
     if quiet:
         yield lambda _stage, _share: None
     elif _is_screen():
@@ -26,13 +26,13 @@ def progress_listener(*, quiet: bool) -> Iterator[Listener]:
 
 
 def _is_screen() -> bool:
-    """Whether someone watches a terminal that can redraw a line."""
+    """Whether the error stream is a terminal that can redraw a line."""
     return sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb"
 
 
 @contextlib.contextmanager
 def _bar() -> Iterator[Listener]:
-    """Draw one bar that is gone when the work is done; colours follow NO_COLOR."""
+    """A bar that disappears at the end; colours follow NO_COLOR."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -47,7 +47,7 @@ def _bar() -> Iterator[Listener]:
 
 
 def _lines() -> Listener:
-    """Write a line whenever enough time has passed."""
+    """A line whenever ``LINE_EVERY_S`` has passed."""
     last = time.monotonic()
 
     def listen(stage: str, share: float) -> None:

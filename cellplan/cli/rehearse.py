@@ -1,11 +1,11 @@
-"""``cellplan rehearse``: execute a solved program on cells with errors, and correct it from measurements."""
+"""``cellplan rehearse``: execute a solved program on cells with errors and correct it from measurements."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -13,19 +13,19 @@ from cellplan.errors import ExitStatus
 SCHEMA = "cellplan.rehearse/1"
 
 ErrorsFile = Annotated[
-    Path, typer.Option("--errors", metavar="FILE", help="How the real cell differs (YAML).", show_default=False)
+    Path, typer.Option("--errors", metavar="FILE", help="Errors of the real cell (YAML).", show_default=False)
 ]
 Feedback = Annotated[
     bool, typer.Option("--feedback", help="Correct the references from pass to pass until the true error converges.")
 ]
 InPass = Annotated[
-    bool, typer.Option("--in-pass", help="Also execute with the measured error fed back from instant to instant.")
+    bool, typer.Option("--in-pass", help="Also execute with the measured error fed back from sample to sample.")
 ]
-Rounds = Annotated[int, typer.Option("--rounds", metavar="N", help="Most corrections from pass to pass.")]
+Rounds = Annotated[int, typer.Option("--rounds", metavar="N", help="Maximum number of corrections.")]
 Trials = Annotated[
-    int | None, typer.Option("--trials", metavar="N", help="Real cells that are drawn (default: as in the file).")
+    int | None, typer.Option("--trials", metavar="N", help="Number of sampled cells (default: as in the file).")
 ]
-Seed = Annotated[int | None, typer.Option("--seed", metavar="N", help="Seed of the draws (default: as in the file).")]
+Seed = Annotated[int | None, typer.Option("--seed", metavar="N", help="Seed of the samples (default: as in the file).")]
 Output = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder (default: outputs/<cell name>/rehearsal).")
 ]
@@ -39,6 +39,7 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
     rounds: Rounds = 20,
     trials: Trials = None,
     seed: Seed = None,
+    settings: Settings = None,
     output: Output = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -46,19 +47,19 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
 ) -> None:
     """Execute the solved program on perturbed cells and report the true errors of the tools on the part.
 
-    Exit status: 0 the true errors are within tolerance (after feedback when asked), 1 they are not, 2 bad input,
-    3 no solution, 4 internal error.
+    Exit status: 0 the true errors are within tolerance (with --feedback: after correction), 1 they are not,
+    2 bad input, 3 no solution, 4 internal error.
     """
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.io.cell.load import load_cell
         from cellplan.io.cell_errors import load_errors
         from cellplan.io.run.folder import REHEARSAL, refuse_unless_replaceable
-        from cellplan.pipeline.overrides import with_draws
+        from cellplan.pipeline.overrides import with_draws, with_overrides
         from cellplan.pipeline.rehearsal.rehearse import rehearse as rehearse_cell
         from cellplan.pipeline.rehearsal.write import write_rehearsal
         from cellplan.report.text.rehearsal import summary_lines
 
-        asked = load_cell(cell, allow_dirs=allow_dir or ())
+        asked = with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), settings or ())
         stated = with_draws(load_errors(errors, asked), trials=trials, seed=seed)
         folder = output or Path("outputs") / asked.name / REHEARSAL
         refuse_unless_replaceable(folder)

@@ -27,7 +27,7 @@ def robots(as_json: AsJson = False) -> None:
 
 
 def _record(name: str, model: RobotModel) -> dict[str, Any]:
-    """What is known about one robot, in printed units."""
+    """One robot in printed units."""
     from cellplan.kinematics.reach import arm_reach
 
     return {
@@ -40,7 +40,7 @@ def _record(name: str, model: RobotModel) -> dict[str, Any]:
 
 
 def _lines(record: dict[str, Any]) -> list[str]:
-    """One robot for people: joint, range, largest speed."""
+    """One robot as text: joint, range, largest speed."""
     lines = [record["name"], f"  reach {record['reach_mm']:g} mm from the first axis; {record['source']}"]
     for joint in record["joints"]:
         limits, speed = limits_text(joint)

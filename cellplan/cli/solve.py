@@ -5,7 +5,18 @@ from typing import Annotated
 
 import typer
 
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet
+from cellplan.cli.options import (
+    AllowDirs,
+    AsJson,
+    CellFile,
+    Clearance,
+    Duration,
+    Integrator,
+    Method,
+    Mode,
+    Quiet,
+    Settings,
+)
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -15,22 +26,7 @@ SCHEMA = "cellplan.solve/1"
 Output = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="DIR", help="Run folder (default: outputs/<cell name>).")
 ]
-Mode = Annotated[
-    str | None,
-    typer.Option("--mode", metavar="MODE", help="Who moves: simultaneous, pairwise or part_at_rest."),
-]
-Method = Annotated[str | None, typer.Option("--method", metavar="NAME", help="How joint speeds are found.")]
-Integrator = Annotated[
-    str | None,
-    typer.Option(
-        "--integrator", metavar="NAME", help="accurate, or euler: steps along the clock (default: as the cell says)."
-    ),
-]
-Duration = Annotated[float | None, typer.Option("--duration", metavar="S", help="Time for the job in seconds.")]
-Clearance = Annotated[
-    float | None, typer.Option("--clearance-mm", metavar="MM", help="Distance to keep (default: as the cell says).")
-]
-TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Work on this task only.")]
+TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Plan this task only.")]
 KeepRejected = Annotated[
     bool, typer.Option("--keep-rejected", help="Write the tables of a failed run below rejected/.")
 ]
@@ -44,6 +40,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     integrator: Integrator = None,
     duration: Duration = None,
     clearance_mm: Clearance = None,
+    settings: Settings = None,
     task: TaskName = None,
     as_json: AsJson = False,
     keep_rejected: KeepRejected = False,
@@ -70,7 +67,13 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
 
         given = load_cell(cell, allow_dirs=allow_dir or ())
         asked = with_overrides(
-            given, mode=mode, method=method, integrator=integrator, duration=duration, clearance_mm=clearance_mm
+            given,
+            settings or (),
+            mode=mode,
+            method=method,
+            integrator=integrator,
+            duration=duration,
+            clearance_mm=clearance_mm,
         )
         require_task(asked, task)
         folder = output or Path("outputs") / asked.name

@@ -1,4 +1,4 @@
-"""``cellplan verify``: re-check a run on disk, file by file and figure by figure."""
+"""``cellplan verify``: verify a run on disk again."""
 
 import typer
 
@@ -17,7 +17,7 @@ def verify(
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
 ) -> None:
-    """Re-check what is on disk: files, inputs, tables and report, without planning anything.
+    """Verify a run on disk again: files, inputs, tables and report, without planning.
 
     Exit status: 0 verified, 1 a check fails, 2 not a run, changed or stale, 4 internal error.
     """
@@ -31,8 +31,8 @@ def verify(
         except NotVerifiedError as error:
             if not as_json:
                 raise
-            told = {"schema": SCHEMA, "status": "failed", "exit": int(error.status), "folder": str(run)}
-            say_json({**told, "errors": error.findings})
+            failure = {"schema": SCHEMA, "status": "failed", "exit": int(error.status), "folder": str(run)}
+            say_json({**failure, "errors": error.findings})
             raise typer.Exit(error.status) from None
         record = read_record(run)
     if as_json:
@@ -43,8 +43,8 @@ def verify(
         return
     lines = [
         f"{verified.cell.name}: verified",
-        f"  files as they were written: {verified.file_count}",
-        f"  inputs as they were read: {', '.join(verified.inputs_compared) or 'none compared'}",
+        f"  unchanged files: {verified.file_count}",
+        f"  unchanged inputs: {', '.join(verified.inputs_compared) or 'none compared'}",
         *(f"  note: {remark}" for remark in verified.remarks),
         *figure_lines(record),
     ]

@@ -14,10 +14,10 @@ from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.transforms import Array, is_rigid, pose_from
 
 POINT_SIZE: Final = 1e-7  # [m] size given to a point or a line, so that the engine sees a triangle: far below 0.1 mm
-SURFACE_TOLERANCE: Final = 2e-5  # [m] a tessellated cylinder lies outside the true one by no more than this
-CONVEX_ROOM: Final = 2e-6  # [m] vertices of a convex mesh may stand out of a triangle's plane: single precision
+SURFACE_TOL: Final = 2e-5  # [m] a tessellated cylinder lies outside the true one by no more than this
+CONVEX_TOL: Final = 2e-6  # [m] vertices of a convex mesh may stand out of a triangle's plane: single precision
 CONVEX_WORK: Final = 40_000_000  # [-] vertices times triangles up to which convexity is tested: half a second
-HULL_ROOM: Final = 2e-7  # [-] of its radius by which a vertex may stick out of a mesh's hull (see convex_hull)
+HULL_TOL: Final = 2e-7  # [-] of its radius by which a vertex may stick out of a mesh's hull (see convex_hull)
 RIGID_CHUNK: Final = 20_000  # [-] poses checked at once: about 10 MB
 FLAT_PADDING: Final = 1e-6  # [m] thickness given to the box round a flat surface
 
@@ -78,7 +78,7 @@ def prepare(name: str, shape: Solid) -> CollisionBody:
         name=name,
         shape=shape,
         hull=hull,
-        looseness=0.0 if is_convex else HULL_ROOM * radius,
+        looseness=0.0 if is_convex else HULL_TOL * radius,
         is_convex=is_convex,
         core=core,
         inflation=inflation,
@@ -122,7 +122,7 @@ def _hull(shape: Solid) -> tuple[Solid, bool]:
 
 
 def _is_convex(mesh: Mesh) -> bool:
-    """Whether a closed mesh has all its vertices behind the plane of each of its triangles, rounding aside.
+    """Whether a closed mesh has all its vertices behind the plane of each of its triangles, apart from rounding.
 
     Most collision meshes are convex hulls already. A mesh too large for this test counts as not convex, which costs
     time but no accuracy.
@@ -135,7 +135,7 @@ def _is_convex(mesh: Mesh) -> bool:
     offset = np.einsum("ij,ij->i", normal, corner[:, 0])
     step = max(1, RIGID_CHUNK * 10 // len(mesh.vertices))
     return all(
-        float((mesh.vertices @ normal[k : k + step].T - offset[k : k + step]).max()) <= CONVEX_ROOM
+        float((mesh.vertices @ normal[k : k + step].T - offset[k : k + step]).max()) <= CONVEX_TOL
         for k in range(0, len(normal), step)
     )
 
@@ -164,8 +164,8 @@ def _core(shape: Solid) -> tuple[Mesh, float]:
 
 
 def fine_segments(radius: float) -> int:
-    """Sides of a prism round a cylinder that keep it within ``SURFACE_TOLERANCE`` of the cylinder."""
-    return max(8, int(np.ceil(np.pi / np.arccos(radius / (radius + SURFACE_TOLERANCE)))))
+    """Sides of a prism round a cylinder that keep it within ``SURFACE_TOL`` of the cylinder."""
+    return max(8, int(np.ceil(np.pi / np.arccos(radius / (radius + SURFACE_TOL)))))
 
 
 def _thin_triangle(length: float) -> Mesh:

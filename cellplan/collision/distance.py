@@ -1,4 +1,4 @@
-"""Distance of two bodies at one sample: proved, never above the truth, and within 0.1 mm of it when asked for."""
+"""Distance of two bodies at one sample: proved, never above the truth, and within 0.1 mm of it where that is needed."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -34,7 +34,7 @@ class Reading:
 TOUCHING: Final = Reading(True, 0.0, True, None)
 
 
-def look(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int) -> Reading:
+def quick_reading(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int) -> Reading:
     """Cheap reading: whether the bodies touch for certain, and a distance that may be loose."""
     first, second = pair
     a, b = engine.bodies[first], engine.bodies[second]
@@ -57,7 +57,7 @@ def look(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int
     return Reading(False, 0.0, False, None)
 
 
-def sharpen(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int, reading: Reading) -> Reading:
+def exact_reading(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int, reading: Reading) -> Reading:
     """Exact reading of two bodies of which a cheap one is at hand."""
     if reading.is_exact:
         return reading
@@ -67,4 +67,4 @@ def sharpen(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: 
 
 def measure(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int) -> Reading:
     """Exact reading of two bodies."""
-    return sharpen(engine, pair, poses, sample=sample, reading=look(engine, pair, poses, sample=sample))
+    return exact_reading(engine, pair, poses, sample=sample, reading=quick_reading(engine, pair, poses, sample=sample))

@@ -1,7 +1,7 @@
-"""The door to FCL: which of two solids touch, and how far apart their convex hulls or surfaces are.
+"""Queries to FCL: which of two solids touch, and how far apart their convex hulls or surfaces are.
 
 FCL's yes and no are trusted; of its distances only those between two surfaces of triangles. Every other distance is a
-proposal that ``certificate`` has to prove. Poses are checked before they come here (``bodies.checked_poses``), requests
+proposal that ``separation`` has to prove. Poses are checked before (``bodies.checked_poses``), requests
 and results are new for each question because FCL leaves old values in them.
 """
 
@@ -29,7 +29,7 @@ class QueryCounts:
 
 
 class Engine:
-    """A set of bodies that can be asked about in pairs; built once, safe to send to another process.
+    """Collision queries on pairs of a set of bodies; built once, safe to send to another process.
 
     Attributes:
         bodies: The bodies.
@@ -39,7 +39,7 @@ class Engine:
     """
 
     def __init__(self, bodies: Sequence[CollisionBody]) -> None:
-        """Take the bodies; what FCL needs of each is built when it is first asked for."""
+        """Store the bodies; FCL's objects are built when they are first needed."""
         self.bodies = tuple(bodies)
         self.centres = np.array([body.centre for body in self.bodies]).reshape(-1, 3)
         self.radii = np.array([body.radius for body in self.bodies])
@@ -65,11 +65,10 @@ class Engine:
 
     def sphere_centres(self, poses: BodyPoses, *, sample: int) -> Array:
         """Centres of the bounding spheres in the world at a sample in [m], shape (B, 3)."""
-        centres: Array = (poses.R[:, sample] @ self.centres[..., None])[..., 0] + poses.p[:, sample]
-        return centres
+        return (poses.R[:, sample] @ self.centres[..., None])[..., 0] + poses.p[:, sample]
 
     def touch(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> bool:
-        """Say whether two bodies touch at a sample. A mesh is its surface here; what lies inside is asked elsewhere."""
+        """Whether two bodies touch at a sample. A mesh is its surface; see ``overlap.containment`` for its inside."""
         self.queries.contacts += 1
         a, b = self._placed("solid", first, poses, sample), self._placed("solid", second, poses, sample)
         return bool(fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0)

@@ -10,11 +10,15 @@ from cellplan.geometry.mesh.topology import count_edges, make_mesh
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 
-FLAT: Final = 1e-6  # [-] of the largest spread: thinner meshes count as flat; coal crashes on those below 1e-8
-GRID: Final = 1e-9  # [-] of the extent: vertices nearer than that are one; coal crashes on heaps of almost equal ones
-HULL_ROOM: Final = 1e-7  # [-] of the extent by which a vertex may stick out of the hull; without rounding it is none
+FLAT_FRACTION: Final = 1e-6  # [-] of the largest spread: thinner meshes count as flat; coal crashes on those below 1e-8
+GRID_FRACTION: Final = (
+    1e-9  # [-] of the extent: vertices nearer than that are one; coal crashes on heaps of almost equal ones
+)
+HULL_FRACTION: Final = (
+    1e-7  # [-] of the extent by which a vertex may stick out of the hull; without rounding it is none
+)
 MAX_CORNERS: Final = 2000  # the work of every distance grows with their number
-FEW_CORNERS: Final = 250  # coal keeps at most 255 neighbours of a corner: so few corners cannot have more
+FEW_CORNER_COUNT: Final = 250  # coal keeps at most 255 neighbours of a corner: so few corners cannot have more
 MAX_GROWTH: Final = 1.1  # [-] by which a hull of some of the points may be blown up to hold the others
 PAIR_CHUNK: Final = 4_000_000  # [-] products of points and planes worked on at once: about 30 MB
 GOLDEN_ANGLE: Final = np.pi * (3.0 - np.sqrt(5.0))  # [rad]
@@ -34,7 +38,9 @@ def convex_hull(mesh: Mesh) -> Mesh:
         raise InputError(f"{mesh.source}: expected a body with a volume, got a flat one")
     extent = float(np.ptp(points, axis=0).max())
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    snapped = np.unique(np.round((points - middle) / (GRID * extent)), axis=0) * (GRID * extent) + middle
+    snapped = (
+        np.unique(np.round((points - middle) / (GRID_FRACTION * extent)), axis=0) * (GRID_FRACTION * extent) + middle
+    )
     for chosen in _choices(snapped):
         hull = None if _is_flat(chosen) else _hull(chosen, mesh.source)
         if hull is None or len(hull.vertices) > MAX_CORNERS:
@@ -56,7 +62,7 @@ def is_hull(hull: Mesh, points: Array) -> bool:
 
 def _holds(hull: Mesh, points: Array) -> bool:
     """Whether all points, shape (N, 3), lie behind every face of a hull, up to 1e-7 of their extent."""
-    return _sticking_out(hull, points) <= HULL_ROOM * float(np.ptp(points, axis=0).max())
+    return _sticking_out(hull, points) <= HULL_FRACTION * float(np.ptp(points, axis=0).max())
 
 
 def _is_flat(points: Array) -> bool:
@@ -64,13 +70,13 @@ def _is_flat(points: Array) -> bool:
     if len(points) < 4:
         return True
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return not spread[2] > FLAT * spread[0]
+    return not spread[2] > FLAT_FRACTION * spread[0]
 
 
 def _choices(points: Array) -> Iterator[Array]:
     """All points; then fewer and fewer, the farthest ones in directions spread evenly over the sphere."""
     yield points
-    for count in (MAX_CORNERS, FEW_CORNERS):
+    for count in (MAX_CORNERS, FEW_CORNER_COUNT):
         height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
         angle = GOLDEN_ANGLE * np.arange(count)
         width = np.sqrt(1.0 - height**2)

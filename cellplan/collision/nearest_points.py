@@ -81,5 +81,4 @@ def _touch(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: i
 def _unit(direction: Array) -> Array:
     """The direction at unit length; upward where there is none."""
     length = float(np.linalg.norm(direction))
-    unit: Array = direction / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
-    return unit
+    return direction / length if length > 0.0 else np.array([0.0, 0.0, 1.0])

@@ -14,7 +14,7 @@ from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array, pose
 
-ROOM = 1.5e-4  # [m] measured distances may lie below the truth by 0.1 mm
+DISTANCE_TOL = 1.5e-4  # [m] measured distances may lie below the truth by 0.1 mm
 
 HITS: tuple[tuple[Solid, Solid, float], ...] = (
     (Box((1.0, 1.0, 1.0)), Box((1.0, 1.0, 1.0)), 0.9),
@@ -43,7 +43,7 @@ def prove_engine() -> None:
     for first, second, y, distance in DISTANCES:
         engine, poses = _side_by_side(first, second, y)
         reading = measure(engine, (0, 1), poses, sample=0)
-        right = not reading.touches and distance - ROOM <= reading.bound <= distance + 1e-9
+        right = not reading.touches and distance - DISTANCE_TOL <= reading.bound <= distance + 1e-9
         _expect(right, f"{_names(first, second)} {y} m apart have {distance} m between them")
     engine, poses = _side_by_side(tessellate(Box((1.0, 1.0, 1.0))), Sphere(0.1), 0.0)
     _expect(is_inside(engine, (0, 1), poses, sample=0), "a ball in a closed mesh is inside it")

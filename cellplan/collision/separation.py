@@ -54,5 +54,4 @@ def heights(shape: Solid, R: Array, p: Array, *, X_WS: Array) -> Array:
         X_WS: Pose of the half-space; everything below its xy plane is solid.
     """
     up = X_WS[:3, 2]
-    above: Array = p @ up - X_WS[:3, 3] @ up - supports(shape, -(up @ R))
-    return above
+    return p @ up - X_WS[:3, 3] @ up - supports(shape, -(up @ R))

@@ -7,7 +7,7 @@ import numpy as np
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.transforms import Array
 
-FLAT: Final = 1e-15  # [m^3] a smaller volume is none
+VOLUME_TOL: Final = 1e-15  # [m^3] a smaller volume is none
 
 
 def centre_and_inertia(solid: Solid) -> tuple[Array, Array]:
@@ -48,7 +48,7 @@ def _mesh(mesh: Mesh) -> tuple[Array, Array]:
     corners = (mesh.vertices - middle)[mesh.faces]
     volumes = np.linalg.det(corners) / 6.0
     volume = float(volumes.sum())
-    if abs(volume) < FLAT:
+    if abs(volume) < VOLUME_TOL:
         return middle, np.zeros((3, 3))
     centre = (volumes[:, None] * corners.sum(axis=1)).sum(axis=0) / (4.0 * volume)
     sums = corners.sum(axis=1)

@@ -11,7 +11,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 
-FACING: Final = 1e-9  # [-] a direction this near to the normal of a face is the normal: rounding
+FACING_TOL: Final = 1e-9  # [-] a direction this near to the normal of a face is the normal: rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ def support(shape: Solid, directions: Array) -> Array:
 
 def support_point(shape: Solid, n: Array) -> Array:
     """Point of the shape farthest along a unit direction, shape (3,); the middle of the face or edge that is so."""
-    toward = np.where(np.abs(n) > FACING, np.sign(n), 0.0)
+    toward = np.where(np.abs(n) > FACING_TOL, np.sign(n), 0.0)
     point: Array
     match shape:
         case Box(size):
@@ -101,14 +101,14 @@ def support_point(shape: Solid, n: Array) -> Array:
         case Cylinder(radius, length):
             across = float(np.hypot(n[0], n[1]))
             point = np.array([0.0, 0.0, 0.5 * length * toward[2]])
-            point[:2] = radius * n[:2] / across if across > FACING else 0.0
+            point[:2] = radius * n[:2] / across if across > FACING_TOL else 0.0
         case Capsule(radius, length):
             point = radius * n + np.array([0.0, 0.0, 0.5 * length * toward[2]])
         case Sphere(radius):
             point = radius * n
         case Mesh():
             reach = shape.vertices @ n
-            highest = reach >= reach.max() - FACING * float(np.ptp(reach))
+            highest = reach >= reach.max() - FACING_TOL * float(np.ptp(reach))
             point = 0.5 * (shape.vertices[highest].min(axis=0) + shape.vertices[highest].max(axis=0))
     return point
 
@@ -138,7 +138,7 @@ def bounding_sphere(shape: Solid) -> tuple[Array, float]:
 def bounding_capsule(shape: Solid) -> tuple[Array, float]:
     """Both ends of a line in the shape's frame, shape (2, 3), and a radius round it that hold the whole shape.
 
-    The line lies along the longest extent: for slender shapes this tells much more than a sphere does.
+    The line lies along the longest extent: for slender shapes this bounds much better than a sphere.
     """
     match shape:
         case Box(size):

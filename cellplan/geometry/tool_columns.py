@@ -14,12 +14,21 @@ from cellplan.geometry.line_spans import line_spans
 from cellplan.geometry.shapes import Mesh, Solid, support_point
 from cellplan.geometry.transforms import Array
 
-GRAZE: Final = 1e-5  # [m] an axis that is free this far aside, or a back end that is so near the far side, only touches
-SIDE_ROOM: Final = 1e-4  # [m] what the side of a body reaches into a wall along it by less is touching, not depth
-EDGE_ROOM: Final = 1e-6  # [m] columns of a rim stand this far within it, so that rounding does not lose them
-HALF: Final = 0.5  # [-] a column that is less than half as deep just beside grazes
-RIM_COLUMNS: Final = 24  # on the rim of a body's outline
-RINGS: Final = (0.9, 0.75, 0.6, 0.45, 0.3, 0.15)  # [-] shares of the rim's radius at which columns stand as well
+GRAZE_TOL: Final = (
+    1e-5  # [m] an axis that is free this far to the side, or a back end that is so near the far side, only touches
+)
+SIDE_TOL: Final = 1e-4  # [m] what the side of a body reaches into a wall along it by less is touching, not depth
+EDGE_TOL: Final = 1e-6  # [m] columns of a rim stand this far within it, so that rounding does not lose them
+HALF_FRACTION: Final = 0.5  # [-] a column that is less than half as deep just beside grazes
+RIM_COLUMN_COUNT: Final = 24  # on the rim of a body's outline
+RING_FRACTIONS: Final = (
+    0.9,
+    0.75,
+    0.6,
+    0.45,
+    0.3,
+    0.15,
+)  # [-] shares of the rim's radius at which columns stand as well
 LINES_AT_ONCE: Final = 200_000  # lines followed at once: memory
 
 
@@ -64,9 +73,9 @@ def axis_depths(length: float, shape: Solid, X_ST: Array) -> Array:
     """
     axis = np.array([[0.0, 0.0]])
     found = depths(_along_axis(axis, length), shape, X_ST)
-    deep = found > GRAZE
+    deep = found > GRAZE_TOL
     if np.any(deep):
-        beside = GRAZE * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+        beside = GRAZE_TOL * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
         found[deep] = depths(_along_axis(np.concatenate([axis, beside]), length), shape, X_ST[deep])
     return found
 
@@ -94,16 +103,16 @@ def body_columns(shape: Solid, X_TS: Array, zone: float) -> Columns:
     Args:
         shape: The body.
         X_TS: Its pose in the tool frame.
-        zone: Radius round the tool's axis in [m] that is looked at more closely when the body is wider.
+        zone: Radius round the tool's axis in [m] that is sampled more densely when the body is wider.
     """
     centre, rim = _outline(shape, X_TS)
     lengths = np.linalg.norm(rim - centre, axis=1)
     unit = (rim - centre) / np.where(lengths > 0.0, lengths, 1.0)[:, None]
-    on_rim = centre + np.maximum(lengths - EDGE_ROOM, 0.0)[:, None] * unit
-    within = centre + np.maximum(lengths - SIDE_ROOM, 0.5 * lengths)[:, None] * unit
-    others = [centre[None], *(centre + share * (rim[1::2] - centre) for share in RINGS)]
+    on_rim = centre + np.maximum(lengths - EDGE_TOL, 0.0)[:, None] * unit
+    within = centre + np.maximum(lengths - SIDE_TOL, 0.5 * lengths)[:, None] * unit
+    others = [centre[None], *(centre + share * (rim[1::2] - centre) for share in RING_FRACTIONS)]
     if np.linalg.norm(rim, axis=1).max() > zone:
-        others += [zone * share * _directions()[:, :2] for share in (1.0, *RINGS)]
+        others += [zone * share * _directions()[:, :2] for share in (1.0, *RING_FRACTIONS)]
     points = np.concatenate([on_rim, within, *others])
     own = np.arange(len(points))
     own[: len(rim)] += len(rim)
@@ -135,25 +144,24 @@ def _depths(columns: Columns, shape: Solid, X_ST: Array) -> Array:
     directions = np.broadcast_to(R[:, None, :, 2], points.shape)
     spans = line_spans(shape, points.reshape(-1, 3), directions.reshape(-1, 3))
     pose, column = np.divmod(spans.line, max(count, 1))
-    entered = (spans.leave > columns.back[column] + GRAZE) & (spans.enter < columns.front[column])
+    entered = (spans.leave > columns.back[column] + GRAZE_TOL) & (spans.enter < columns.front[column])
     depth = np.zeros(poses * lines)
     place = pose * lines + columns.line[column]
     np.maximum.at(depth, place[entered], (columns.front[column] - spans.enter)[entered])
     by_line = depth.reshape(poses, lines)
     beside = by_line[:, columns.guards].min(axis=2)
-    counted = np.where(beside < HALF * by_line, beside, by_line)
-    deepest: Array = counted.max(axis=1)
-    return deepest
+    counted = np.where(beside < HALF_FRACTION * by_line, beside, by_line)
+    return counted.max(axis=1)
 
 
 def _directions() -> Array:
-    """Unit directions across the tool's axis, shape (RIM_COLUMNS, 3)."""
-    angle = 2.0 * np.pi * np.arange(RIM_COLUMNS) / RIM_COLUMNS
-    return np.column_stack([np.cos(angle), np.sin(angle), np.zeros(RIM_COLUMNS)])
+    """Unit directions across the tool's axis, shape (RIM_COLUMN_COUNT, 3)."""
+    angle = 2.0 * np.pi * np.arange(RIM_COLUMN_COUNT) / RIM_COLUMN_COUNT
+    return np.column_stack([np.cos(angle), np.sin(angle), np.zeros(RIM_COLUMN_COUNT)])
 
 
 def _outline(shape: Solid, X_TS: Array) -> tuple[Array, Array]:
-    """Middle and rim of a body's convex outline seen along the tool's axis, shapes (2,) and (2 RIM_COLUMNS, 2).
+    """Middle and rim of a body's convex outline seen along the tool's axis, shapes (2,) and (2 RIM_COLUMN_COUNT, 2).
 
     The rim has the body's farthest points in even directions and, in turns with them, the points at even angles.
     """
@@ -166,8 +174,8 @@ def _outline(shape: Solid, X_TS: Array) -> tuple[Array, Array]:
     facing = n[:, :2] @ n[:, :2].T
     height = np.sum((farthest - centre) * n[:, :2], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        away = np.where(facing > HALF, height[:, None] / facing, np.inf).min(axis=0)
-    rim = np.empty((2 * RIM_COLUMNS, 2))
+        away = np.where(facing > HALF_FRACTION, height[:, None] / facing, np.inf).min(axis=0)
+    rim = np.empty((2 * RIM_COLUMN_COUNT, 2))
     rim[0::2], rim[1::2] = farthest, centre + away[:, None] * n[:, :2]
     return centre, rim
 
@@ -188,7 +196,7 @@ def line_depths(X_FT: Array, shape: Solid, X_ST: Array, *, zone: float, is_all: 
     """
     along = float(X_FT[:3, 3] @ X_FT[:3, 2])
     found = axis_depths(max(along, zone), shape, X_ST)
-    if is_all and along < -EDGE_ROOM:
+    if is_all and along < -EDGE_TOL:
         turned = X_ST * np.array([1.0, -1.0, -1.0, 1.0])  # half a turn about x: the columns of y and z
         found = np.maximum(found, axis_depths(-along, shape, turned))
     return found

@@ -10,7 +10,7 @@ from cellplan.geometry import arrays
 Array = arrays.Array
 
 SMALL_ANGLE: Final = 1e-6  # [rad] below this the series of sin and cos are exact to double precision
-HALF_TURN_ROOM: Final = 1e-4  # [rad] nearer to pi than this the skew part of R is too small to give the axis
+HALF_TURN_TOL: Final = 1e-4  # [rad] nearer to pi than this the skew part of R is too small to give the axis
 
 _NEXT: Final = np.array([1, 2, 0])
 _AFTER: Final = np.array([2, 0, 1])
@@ -41,8 +41,7 @@ def inverse(X: Array) -> Array:
 
 def transform_points(X_AB: Array, p_B: Array) -> Array:
     """Points given in B, shape (..., N, 3), expressed in A."""
-    moved: Array = p_B @ np.swapaxes(X_AB[..., :3, :3], -1, -2) + X_AB[..., None, :3, 3]
-    return moved
+    return p_B @ np.swapaxes(X_AB[..., :3, :3], -1, -2) + X_AB[..., None, :3, 3]
 
 
 def rotation_from_rpy(rpy: ArrayLike) -> Array:
@@ -75,16 +74,14 @@ def skew(v: Array) -> Array:
 
 def cross(a: Array, b: Array) -> Array:
     """Cross products of vectors, shape (..., 3): to the last bit those of NumPy, in a third of its time for a few."""
-    c: Array = a[..., _NEXT] * b[..., _AFTER] - a[..., _AFTER] * b[..., _NEXT]
-    return c
+    return a[..., _NEXT] * b[..., _AFTER] - a[..., _AFTER] * b[..., _NEXT]
 
 
 def rotation_about(axis: Array, angle: ArrayLike) -> Array:
     """Rotations by angles in [rad], shape (...), about one unit axis (Rodrigues' formula), shape (..., 3, 3)."""
     S = skew(np.asarray(axis, dtype=float))
     angle = np.asarray(angle, dtype=float)[..., None, None]
-    rotation: Array = np.eye(3) + np.sin(angle) * S + (1.0 - np.cos(angle)) * (S @ S)
-    return rotation
+    return np.eye(3) + np.sin(angle) * S + (1.0 - np.cos(angle)) * (S @ S)
 
 
 def rotation_vector(R: Array) -> Array:
@@ -102,7 +99,7 @@ def rotation_vector(R: Array) -> Array:
     angle = np.arctan2(sine, cosine)
     scale = np.where(sine > SMALL_ANGLE, angle / np.where(sine > SMALL_ANGLE, sine, 1.0), 1.0)
     vector: Array = sine_axis * scale[..., None]
-    half_turn = (np.pi - angle) < HALF_TURN_ROOM
+    half_turn = (np.pi - angle) < HALF_TURN_TOL
     if np.any(half_turn):
         vector[half_turn] = _half_turn_vectors(R[half_turn], angle[half_turn], sine_axis[half_turn])
     return vector
@@ -115,8 +112,7 @@ def _half_turn_vectors(R: Array, angle: Array, sine_axis: Array) -> Array:
     axis = np.take_along_axis(outer, largest[..., None, None], axis=-1)[..., 0]
     axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
     sign = np.where(np.sum(axis * sine_axis, axis=-1) < 0.0, -1.0, 1.0)
-    vectors: Array = axis * (sign * angle)[..., None]
-    return vectors
+    return axis * (sign * angle)[..., None]
 
 
 def rotation_exp(vector: Array) -> Array:
@@ -127,8 +123,7 @@ def rotation_exp(vector: Array) -> Array:
     safe = np.where(small, 1.0, angle)
     a = np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)
     b = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
-    rotation: Array = np.eye(3) + a * S + b * (S @ S)
-    return rotation
+    return np.eye(3) + a * S + b * (S @ S)
 
 
 def quaternion_to_rotation(wxyz: Array) -> Array:

@@ -1,6 +1,6 @@
 """Guard: work on foreign files that could take a program down is done in a child process, within limits.
 
-The same way of working is open to work of our own that can be done aside.
+The same mechanism runs work of our own in the background.
 """
 
 from cellplan.guard.background import BackgroundProcess

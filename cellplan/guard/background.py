@@ -1,4 +1,4 @@
-"""Run functions in a background process; what cannot be done there is done in this one."""
+"""Run functions in a background process; fall back to this process."""
 
 import os
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from typing import Final, Self, TypeVar
 from cellplan.guard.worker import Answer, Job
 from cellplan.guard.worker_process import ChildProcess, Guard
 
-PATIENT: Final = Guard(file="cellplan", worker="the child process", seconds=600.0, megabytes=4000)  # no foreign work
+OWN_WORK: Final = Guard(file="cellplan", worker="the child process", seconds=600.0, megabytes=4000)  # no foreign work
 
 Value = TypeVar("Value")
 
@@ -18,15 +18,15 @@ Value = TypeVar("Value")
 class BackgroundProcess:
     """Does jobs in a child process, one after the other, until the ``with`` statement ends.
 
-    The child is no more than a help: without a second processor there is none, and whatever it cannot do, for want of
-    memory or of leave to start a process, is done in this process as soon as its result is asked for.
+    The child is no more than a help: without a second processor there is none, and whatever it cannot do, for lack
+    of memory or of permission to start a process, is done in this process as soon as its result is needed.
     """
 
     def __init__(self) -> None:
         """Prepare; the process is started with the first job."""
         self._child: ChildProcess | None = None
         self._is_desired = processors() > 1
-        self._waiting = ThreadPoolExecutor(max_workers=1, thread_name_prefix="cellplan-aside")
+        self._waiting = ThreadPoolExecutor(max_workers=1, thread_name_prefix="cellplan-background")
 
     def __enter__(self) -> Self:
         """Begin to take jobs."""
@@ -53,7 +53,7 @@ class BackgroundProcess:
         Returns:
             What gives the result, once it is there; exceptions are those of the function.
         """
-        begun = self._begun(Job(function, arguments, None, PATIENT.seconds, PATIENT.megabytes))
+        begun = self._begun(Job(function, arguments, None, OWN_WORK.seconds, OWN_WORK.megabytes))
 
         def result() -> Value:
             answer = None if begun is None else begun.result()
@@ -65,9 +65,9 @@ class BackgroundProcess:
         return result
 
     def _begun(self, job: Job) -> Future[Answer | None] | None:
-        """The answer to come; None when there is no child to ask."""
+        """The future answer; None when there is no child."""
         if self._is_desired and self._child is None:
-            with suppress(OSError, TypeError):  # no leave, no memory, no interpreter
+            with suppress(OSError, TypeError):  # no permission, no memory, no interpreter
                 self._child = ChildProcess()
         if not self._is_desired or self._child is None:
             self._is_desired = False
@@ -77,7 +77,7 @@ class BackgroundProcess:
     def _asked(self, child: ChildProcess, job: Job) -> Answer | None:
         """Answer of the child; None when it has none."""
         try:
-            return child.ask(job, PATIENT)
+            return child.ask(job, OWN_WORK)
         except Exception:  # noqa: BLE001 - the child is gone, or the job cannot be sent: it is done here
             self._is_desired = False
             return None

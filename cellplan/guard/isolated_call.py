@@ -24,7 +24,7 @@ def in_child(function: Callable[..., Value], *arguments: object, guard: Guard) -
 
     Raises:
         OverrunError: The work crashed, or took too long or too much memory.
-        CellplanError: What the function itself raises; other exceptions are told as internal errors.
+        CellplanError: What the function itself raises; other exceptions are reported as internal errors.
     """
     with _lock:
         answer = _child().ask(_job(function, arguments, guard), guard)
@@ -39,7 +39,7 @@ def in_child(function: Callable[..., Value], *arguments: object, guard: Guard) -
 
 
 def _job(function: Callable[..., object], arguments: tuple[object, ...], guard: Guard) -> Job:
-    """A job for the child, in the folder where this process stands."""
+    """A job for the child, in the working directory of this process."""
     folder = None
     with contextlib.suppress(OSError):  # it may have been removed
         folder = os.getcwd()  # noqa: PTH109 - a text crosses

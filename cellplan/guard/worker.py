@@ -14,7 +14,7 @@ MEGABYTE: Final = 1 << 20  # [bytes]
 
 
 class Job(NamedTuple):
-    """What the parent wants: a function of a module, its arguments, where and within which limits."""
+    """A job of the parent: a function of a module, its arguments, its folder and its limits."""
 
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
@@ -24,7 +24,7 @@ class Job(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What became of a job: its value, our own error, no memory left, or another exception in words."""
+    """The result of a job: its value, our own error, no memory left, or another exception as text."""
 
     value: Any = None
     error: CellplanError | None = None
@@ -35,7 +35,7 @@ class Answer(NamedTuple):
 def serve() -> None:
     """Do jobs until the parent closes the pipe.
 
-    What libraries print is led nowhere: the answers have the pipe for themselves. Ctrl-C is the parent's business.
+    Output of libraries is discarded: the pipe carries answers only. Ctrl-C is handled by the parent.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _set_limit("RLIMIT_CORE", 0)  # a crash leaves no file behind
@@ -44,7 +44,7 @@ def serve() -> None:
     os.dup2(nowhere, sys.stdout.fileno())
     while True:
         try:
-            job = pickle.load(sys.stdin.buffer)  # noqa: S301 - the parent's own words
+            job = pickle.load(sys.stdin.buffer)  # noqa: S301 - written by the parent
         except EOFError:
             return
         answers.write(pickle.dumps(_done(job)))
@@ -63,7 +63,7 @@ def _done(job: Job) -> Answer:
         return Answer(error=error)
     except MemoryError:
         return Answer(is_out_of_memory=True)
-    except Exception as error:  # noqa: BLE001 - told by the parent
+    except Exception as error:  # noqa: BLE001 - reported by the parent
         return Answer(surprise=f"{type(error).__name__}: {error}")
 
 

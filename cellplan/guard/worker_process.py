@@ -75,7 +75,7 @@ class ChildProcess:
             clock.cancel()
 
     def kill(self) -> None:
-        """End the process in the middle of a job; whoever waits for its answer is told that it crashed."""
+        """End the process in the middle of a job; a caller that waits for its answer gets an error."""
         if self.owner == os.getpid():
             self._process.kill()
 
@@ -102,7 +102,7 @@ class ChildProcess:
             self._has_path = True
         pickle.dump(job, self._process.stdin)
         self._process.stdin.flush()
-        answer: Answer = pickle.load(self._process.stdout)  # noqa: S301 - our own child's words
+        answer: Answer = pickle.load(self._process.stdout)  # noqa: S301 - written by our own child
         return answer
 
     def _end_late(self, late: threading.Event) -> None:
@@ -111,7 +111,7 @@ class ChildProcess:
         self._process.kill()
 
     def _overrun(self, guard: Guard, *, is_late: bool) -> OverrunError:
-        """What to say of a process that ended without an answer."""
+        """The error for a process that ended without an answer."""
         status = self._process.returncode
         if is_late or status == -getattr(signal, "SIGXCPU", 0):
             return OverrunError(f"{guard.file}: {guard.worker} took longer than {guard.seconds:g} s")

@@ -100,7 +100,7 @@ def _wrong_joints(
 
 
 def _unknown(what: str, name: str, known: list[str]) -> str:
-    """A name that nobody bears."""
+    """A name that does not exist."""
     return f"expected {what} ({listed(known)}), got {shown(name)}{did_you_mean(name, known)}"
 
 

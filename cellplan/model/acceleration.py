@@ -111,7 +111,7 @@ class ProcessSpeed:
         mean: Mean speed in [m/s] from the start of the path, once the tool has settled, to its end.
         peak: Largest speed between two samples.
         peak_at_s: Its instant.
-        steady_share: Share of that time, 0..1, in which the speed is within ``STEADY`` of the peak.
+        steady_share: Share of that time, 0..1, in which the speed is within ``STEADY_FRACTION`` of the peak.
         slower: Stretches of time in [s] in which it is lower, as (from, to).
     """
 
@@ -151,7 +151,7 @@ class MotionAccelerations:
 
 
 UNKNOWN_ACCELERATIONS: Final = MotionAccelerations()
-STEADY: Final = 0.05  # [-] of the peak: a process speed that varies less is constant
+STEADY_FRACTION: Final = 0.05  # [-] of the peak: a process speed that varies less is constant
 
 
 def full_speed_in(rule: AccelerationRule, index: int) -> float | None:

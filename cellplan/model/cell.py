@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cellplan.errors import InputError
 from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
@@ -78,6 +79,10 @@ class Robot:
     controller_cycle: float = USUAL_CYCLE
     attachments: tuple[Body, ...] = ()
     pedestal: Pedestal | None = None
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return f"<Robot '{self.name}': {self.model.name}, {len(self.model.joints)} joints>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -153,10 +158,15 @@ class Part:
             raise ValueError("part: expected a pose in the world")
         return self.X_WP
 
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        holders = ", ".join(grasp.robot for grasp in self.held_by)
+        return f"<Part: {type(self.shape).__name__}, {f'held by {holders}' if holders else 'fixed in the world'}>"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Obstacle:
-    """A fixed thing in the cell."""
+    """A fixed obstacle in the cell."""
 
     name: str
     shape: Shape
@@ -165,7 +175,7 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LockedJoint:
-    """A joint that fails: from the instant ``since`` in [s] on it stays where it is."""
+    """A joint that fails: from the time ``since`` in [s] on it is locked."""
 
     robot: str
     joint: str
@@ -179,9 +189,9 @@ class MotionSettings:
     Attributes:
         mode: Who moves.
         duration: Length of the common clock in [s]; None when it ends with the last task.
-        step: Time between two instants in [s].
+        step: Time between two samples in [s].
         cyclic: Whether all joints are to end where they started.
-        locked: Joints that fail on the way.
+        locked: Joints that fail during the motion.
     """
 
     mode: Mode
@@ -201,7 +211,7 @@ class Exclusion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckSettings:
-    """What the checks demand.
+    """Requirements of the checks.
 
     Attributes:
         clearance: Smallest allowed distance in [m] between things that must not touch.
@@ -236,8 +246,8 @@ class Cell:
         obstacles: The environment.
         motion: Mode and clock.
         solver: Method and gains.
-        checks: Demands.
-        origin: Where the words stand in the file.
+        checks: Required clearance and tolerances.
+        origin: The document that the cell was read from.
         inputs: SHA-256 of every file that was read, by the path as written.
     """
 
@@ -251,6 +261,24 @@ class Cell:
     checks: CheckSettings
     origin: Origin
     inputs: Mapping[str, str]
+
+    def with_values(self, values: Mapping[str, object]) -> "Cell":
+        """The cell of the same document with other values, validated as if they stood in the file.
+
+        Addresses are key paths of the cell file: ``motion.duration_s``, ``robots.kuka.base.x_mm``,
+        ``tasks.seam.path.polyline.points_mm[2]``. Named entries are addressed by name, list elements by index; the
+        components of a pose may be given as ``x_mm``, ``y_mm``, ``z_mm``, ``roll_deg``, ``pitch_deg``, ``yaw_deg``.
+
+        Args:
+            values: Values in the units of the cell file, by address; None leaves a key out, so that its default holds.
+
+        Raises:
+            InvalidFileError: Everything that is wrong with the changed cell, one located line each.
+            InputError: The cell was not read from a file, or was changed in Python since.
+        """
+        if self.origin.source is None:
+            raise InputError(f"cell '{self.name}': expected a cell that was read from a file, got one built in Python")
+        return self.origin.source.with_values(self, values)
 
     def robot(self, name: str) -> Robot:
         """The robot of that name."""
@@ -308,3 +336,8 @@ class Cell:
     def joint_count(self) -> int:
         """Length of the stacked joint vector."""
         return sum(len(robot.model.joints) for robot in self.robots)
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        robots, tasks = (", ".join(each.name for each in named) for named in (self.robots, self.tasks))
+        return f"<Cell '{self.name}': robots {robots}; tasks {tasks}; {self.motion.mode}>"

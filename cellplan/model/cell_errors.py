@@ -55,12 +55,12 @@ class PoseAmounts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotErrors:
-    """How one robot differs from its data sheet and its place.
+    """Deviations of one robot from its data sheet and its pose.
 
     Attributes:
-        joint_offsets: Real less told joint position in [rad] or [m], by joint name.
+        joint_offsets: Actual minus commanded joint position in [rad] or [m], by joint name.
         link_lengths: Lengthening of the link before a joint in [m], by joint name.
-        base: The real base seen from the written one.
+        base: Pose of the actual base in the nominal base frame.
         tool: The real tool tip seen from the written one.
     """
 
@@ -79,7 +79,7 @@ class CellErrors:
         grasps: The real part seen from where it should be, by the robot that holds it.
         position_noise: Standard deviation of each measured coordinate of a tool tip on the part in [m].
         orientation_noise: Standard deviation of each measured small turn of a tool on the part in [rad].
-        seed: Seed of all draws.
+        seed: Seed of all samples.
         trials: Number of real cells that are drawn.
         file: File name as the user gave it.
         digest: SHA-256 of the file; empty when there is none.

@@ -1,4 +1,4 @@
-"""Idle robots: who has nothing to do in a run, and where it stands meanwhile."""
+"""Idle robots: robots without work in a run, and where they stand meanwhile."""
 
 from collections.abc import Collection
 
@@ -19,7 +19,7 @@ def idle_robots(cell: Cell, tasks: Collection[str]) -> tuple[str, ...]:
 def not_in_program(cell: Cell, tasks: Collection[str]) -> str:
     """One line on moves that a run leaves out: those of robots with a task, which is not the run's, to and from home.
 
-    Empty when there are none; a robot that has nothing to do in the whole cell never leaves its home.
+    Empty when there are none; a robot without work in the whole cell never leaves its home.
     """
     workers = {task.robot for task in cell.tasks}
     idle = [name for name in idle_robots(cell, tasks) if name in workers]

@@ -1,4 +1,4 @@
-"""What was not judged in full: pairs of bodies that were left out, or of which less was asked, and why."""
+"""What was not judged in full: pairs of bodies that were left out, or with a weaker rule than clearance, and why."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Final
 
 
 class LeftOutKind(StrEnum):
-    """Why less than the full distance is asked of bodies that are not two links of one robot's file."""
+    """Why less than the clearance is demanded of bodies that are not two links of one robot's file."""
 
     EXCLUDED = "excluded"  # named under checks.exclude
     GRIP = "grip"  # the part and what holds it
@@ -39,7 +39,7 @@ class LeftOut:
     Attributes:
         kind: Why.
         bodies: Their names: a pair, all things of the surroundings, or a robot whose links have none.
-        reason: What is asked instead, in words.
+        reason: What is demanded instead, as text.
     """
 
     kind: LeftOutKind

@@ -192,6 +192,10 @@ class Motion:
         """The rows of a phase, both ends included."""
         return rows_of(phase, self.sigma)
 
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return f"<Motion of {self.q.shape[1]} joints, {len(self.times)} samples, {float(self.times[-1]):g} s>"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointTable:

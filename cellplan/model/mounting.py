@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.shapes import Box, Cylinder, Solid
 from cellplan.geometry.transforms import Array, inverse, pose
 
-LOWEST_PEDESTAL: Final = 1e-6  # [m] a base that stands nearer to the floor than this has no pedestal below it
+PEDESTAL_TOL: Final = 1e-6  # [m] a base that stands nearer to the floor than this has no pedestal below it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,7 @@ class Pedestal:
         """
         x, y, top = (float(value) for value in X_WB[:3, 3])
         height = top - self.floor
-        if height < LOWEST_PEDESTAL:
+        if height < PEDESTAL_TOL:
             return None
         heading = float(np.arctan2(X_WB[1, 0], X_WB[0, 0]))
         X_WS = pose((x, y, self.floor + 0.5 * height), (0.0, 0.0, heading))

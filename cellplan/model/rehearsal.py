@@ -38,10 +38,10 @@ class PathFigures:
 
     Attributes:
         AT_p: Largest distance of the barycentre line from the commanded path.
-        AT_p_at_s: Its instant in [s].
+        AT_p_at_s: Time of it in [s].
         AT_abc: Largest mean deviation of the three angles.
         RT_p: Largest mean distance from the barycentre plus three standard deviations.
-        RT_p_at_s: Its instant in [s].
+        RT_p_at_s: Time of it in [s].
         RT_abc: Largest three standard deviations of the three angles.
     """
 
@@ -86,7 +86,7 @@ class Round:
         position: Largest true position error by task in [m].
         orientation: Largest true orientation error by task in [rad].
         share: Largest true error as a share of its tolerance.
-        measured_share: The same of the measured errors, noise included: what the correction goes by.
+        measured_share: The same of the measured errors, noise included, which the correction uses.
     """
 
     number: int
@@ -105,7 +105,7 @@ class Correction:
         rounds: Every execution.
         best: Number of the round with the smallest measured error: the one that is kept.
         accuracy: True errors of that round.
-        references: What the written cell was told in it.
+        references: References of the nominal cell in this pass.
         q: Its joint positions in [rad] or [m], shape (N, nq).
     """
 
@@ -124,8 +124,8 @@ class Trial:
     Attributes:
         draw: How it differs from the written one.
         before: True errors of the program as it was solved.
-        correction: What correcting came to; None when it was not asked for.
-        in_pass: True errors with correction within the pass; None when it was not asked for or lost a path.
+        correction: Result of the correction; None when it was not requested.
+        in_pass: True errors with correction within the pass; None when it was not requested or diverged.
     """
 
     draw: Draw
@@ -135,7 +135,7 @@ class Trial:
 
     @property
     def final(self) -> tuple[TaskAccuracy, ...]:
-        """The errors that count: after correcting where that was asked for."""
+        """The errors that are judged: after the correction where it was requested."""
         return self.before if self.correction is None else self.correction.accuracy
 
 
@@ -157,7 +157,7 @@ class RunRehearsal:
         judged_from: First sample that is judged, by task: before it the tool may still be coming to its path.
         trials: The real cells.
         before: Figures over all trials by task, as solved.
-        after: The same after correcting; None when it was not asked for.
+        after: The same after the correction; None when it was not requested.
         corrected: The corrected program; None when there is not one for one real cell.
     """
 
@@ -180,8 +180,8 @@ class Rehearsal:
         runs: One, or one per task in the pairwise mode.
         checks: Every verified statement: true errors over all trials, then what the program, or the corrected one,
             fails on the written cell.
-        has_feedback: Whether correction from pass to pass was asked for.
-        has_in_pass: Whether correction within the pass was asked for.
+        has_feedback: Whether correction from pass to pass was requested.
+        has_in_pass: Whether correction within the pass was requested.
     """
 
     cell: Cell

@@ -19,7 +19,7 @@ CAUTION = (
 )
 
 
-EVEN = 1e-9  # [-] of the whole time: cycles that differ by less are equally long
+CYCLE_TOL = 1e-9  # [-] of the whole time: cycles that differ by less are equally long
 REDUCED_SPEED = 0.25  # [m/s] of the tool tip: what ISO 10218-1 allows while people are near
 
 
@@ -61,6 +61,10 @@ class Check:
     unit: str
     at_s: float | None
     message: str
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return f"<Check {self.name} of '{self.subject}' {'passed' if self.passed else 'failed'}: {self.message}>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -113,7 +117,7 @@ class ToolDepth:
         task: Name of the task.
         robot: Name of the operator.
         depth: Largest depth in [m]; 0 when the tool is free or just touches.
-        at_s: Its instant in [s]; None where a path is looked at before it has a clock.
+        at_s: Its instant in [s]; None where a path is judged before it has a clock.
         limit: Depth that is allowed in [m].
         body: What of the tool is so deep: ``axis``, or the name of a body of it.
     """
@@ -232,9 +236,9 @@ class ClearanceReport:
             middle of the stretch by no more than about a twentieth and a millimetre.
         closest: The closest pairs that are to keep the demanded distance, nearest first.
         not_certified: Pairs that were not found to touch or to come nearer than demanded, and not proved not to.
-        distance_queries: How often the collision engine was asked for a distance.
-        contact_queries: How often it was asked for a contact.
-        cut_steps: How many steps between samples had to be looked at in finer steps.
+        distance_queries: Number of distance queries to the collision engine.
+        contact_queries: Number of contact queries.
+        cut_steps: Number of steps between samples that had to be searched in finer steps.
         left_out: What was not judged in full, but for two links of one robot's file.
     """
 
@@ -254,7 +258,7 @@ class ClearanceReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Conditioning:
-    """How far the motion stays from singularities (metres and radians as they come).
+    """How far the motion stays from singularities (mixed units: metres and radians).
 
     Attributes:
         stack: Smallest singular value of the cooperation Jacobian's constrained rows J, over the joints that may move,
@@ -325,7 +329,7 @@ class Repeatability:
     def period(self) -> float | None:
         """Length of a cycle in [s]; None when the cycles differ in length."""
         lengths = np.diff(self.instants)
-        return float(lengths.mean()) if np.ptp(lengths) <= EVEN * self.instants[-1] else None
+        return float(lengths.mean()) if np.ptp(lengths) <= CYCLE_TOL * self.instants[-1] else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -384,3 +388,9 @@ class Report:
     def cycle_time(self) -> float:
         """Length of the common clock in [s]."""
         return float(self.times[-1])
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        failed = sum(not check.passed for check in self.checks)
+        verdict = f"failed: {failed} of {len(self.checks)} checks" if failed else f"passed: {len(self.checks)} checks"
+        return f"<Report of '{self.cell}', {self.mode}, {len(self.times)} samples, {verdict}>"

@@ -1,8 +1,9 @@
-"""Solver settings: how joint motion is found, and what it is to do besides following the tasks."""
+"""Solver settings: the resolution method, its parameters, and secondary goals in the null space of the tasks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from types import MappingProxyType
 from typing import Final, Literal
 
 from cellplan.geometry.transforms import Array
@@ -18,32 +19,65 @@ MethodName = Literal[  # each is the name of a file and a function in planning/m
     "quadratic_program",
 ]
 
-NULL_SPACE_METHODS: Final[frozenset[str]] = frozenset(
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MethodTraits:
+    """What a resolution method is and can do.
+
+    Attributes:
+        label: Name in reports.
+        has_null_space: Whether goals besides the tasks can be pursued in the null space of the task Jacobian.
+        feeds_back: Whether the pose error is fed back with the gain of the solver; searches minimise it directly.
+        takes_euler_steps: Whether a joint step is a joint velocity times the time step.
+        is_accurate: Whether the motion can also be resolved by collocation (the integrator ``accurate``).
+    """
+
+    label: str
+    has_null_space: bool = True
+    feeds_back: bool = True
+    takes_euler_steps: bool = False
+    is_accurate: bool = False
+
+    @property
+    def is_search(self) -> bool:
+        """Whether configurations are found by minimising the pose error, without a Jacobian inverse."""
+        return not self.feeds_back
+
+
+METHODS: Final[Mapping[MethodName, MethodTraits]] = MappingProxyType(
     {
-        "weighted_pseudo_inverse",
-        "damped_least_squares",
-        "filtered_inverse",
-        "filtered_inverse_ii",
-        "quadratic_program",
+        "weighted_pseudo_inverse": MethodTraits(
+            label="weighted pseudo-inverse", takes_euler_steps=True, is_accurate=True
+        ),
+        "damped_least_squares": MethodTraits(label="damped least squares", takes_euler_steps=True),
+        "jacobian_transpose": MethodTraits(label="Jacobian transpose", has_null_space=False),
+        "filtered_inverse": MethodTraits(label="filtered inverse I"),
+        "filtered_inverse_ii": MethodTraits(label="filtered inverse II"),
+        "heuristic_search": MethodTraits(
+            label="heuristic search, the best joint first", has_null_space=False, feeds_back=False
+        ),
+        "recursive_search": MethodTraits(
+            label="recursive search, joint by joint", has_null_space=False, feeds_back=False
+        ),
+        "quadratic_program": MethodTraits(label="quadratic program", takes_euler_steps=True),
     }
-)  # methods that leave room for goals besides the tasks
-
-
-ACCURATE_METHODS: Final[frozenset[str]] = frozenset({"weighted_pseudo_inverse"})  # methods with an accurate mode
+)
+NULL_SPACE_METHODS: Final = tuple(sorted(name for name, traits in METHODS.items() if traits.has_null_space))
+ACCURATE_METHODS: Final = tuple(sorted(name for name, traits in METHODS.items() if traits.is_accurate))
 
 
 class Integrator(StrEnum):
-    """How joint speeds become joint positions.
+    """How joint velocities become joint positions.
 
     ``ACCURATE`` finds joint positions as polynomials in time that keep the tools on their tasks, within a stated error;
-    ``EULER`` goes on from instant to instant of the clock and feeds the pose error back.
+    ``EULER`` steps from sample to sample of the clock and feeds the pose error back.
     """
 
     ACCURATE = "accurate"
     EULER = "euler"
 
 
-def against_accurate(method: str, *, has_goals: bool, near_limits: float, load: float) -> tuple[str, ...]:
+def against_accurate(method: MethodName, *, has_goals: bool, near_limits: float, load: float) -> tuple[str, ...]:
     """Keys of the solver's settings, as in the cell file, that rule the accurate mode out.
 
     Args:
@@ -53,7 +87,7 @@ def against_accurate(method: str, *, has_goals: bool, near_limits: float, load: 
         load: See ``WeightingSettings``.
     """
     obstacles = {
-        "method": method not in ACCURATE_METHODS,
+        "method": not METHODS[method].is_accurate,
         "secondary": has_goals,
         "weighting.near_limits": near_limits != 0.0,
         "weighting.load": load != 0.0,
@@ -62,7 +96,7 @@ def against_accurate(method: str, *, has_goals: bool, near_limits: float, load: 
 
 
 class SingularityMeasure(StrEnum):
-    """What tells how near a singularity is."""
+    """Measure of the distance from a singularity."""
 
     SINGULAR_VALUE = "singular_value"
     MANIPULABILITY = "manipulability"
@@ -70,7 +104,7 @@ class SingularityMeasure(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DampedLeastSquaresSettings:
-    """When damping sets in; its largest factor is ``SolverSettings.damping``.
+    """Where damping sets in; its largest factor is ``SolverSettings.damping``.
 
     Attributes:
         measure: Smallest singular value ([Nicolato2007]_ Eq. 2.12) or manipulability ([Vargas2012]_ Eqs. 9-10).
@@ -98,12 +132,12 @@ class FilteredInverseSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchSettings:
-    """How the heuristic and the recursive search look for the next configuration ([Nicolato2007]_ ch. 3).
+    """Settings of the heuristic and the recursive search for the next configuration ([Nicolato2007]_ ch. 3).
 
     Attributes:
-        tolerance: Largest root of the cost at which an instant counts as reached, in [m].
+        tolerance: Largest square root of the cost at which a sample counts as reached, in [m].
         orientation_weight: Weight ``gamma`` of the orientation in the cost in [m^2].
-        rounds: Rounds over all joints before an instant counts as out of reach.
+        rounds: Rounds over all joints after which a sample counts as out of reach.
         brakes: Whether joints slow down near their limits (Eqs. 3.29, 3.30).
         sequence: Joints as (robot, joint) in the order in which the recursive search moves them; None for the order
             of the stacked joint vector.
@@ -121,8 +155,8 @@ class QuadraticProgramSettings:
     """Limits and slack of the quadratic program.
 
     Attributes:
-        slack_weight: Weight of the task's slack against the weighted joint speeds.
-        ramp: Time in [s] in which a joint without a known acceleration limit reaches its top speed; None: at once.
+        slack_weight: Cost of the task's slack relative to that of weighted joint velocities.
+        ramp: Time in [s] in which a joint without a known acceleration limit reaches its velocity limit; None: at once.
     """
 
     slack_weight: float = 1e8
@@ -140,14 +174,14 @@ class GoalKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SecondaryGoal:
-    """One goal that is pursued as far as the tasks leave room ([Ribeiro2010]_ Eqs. D.43-D.47).
+    """One goal that is pursued in the null space of the tasks ([Ribeiro2010]_ Eqs. D.43-D.47).
 
     Attributes:
         kind: What is improved.
-        gain: How strongly: ``k0`` of Eq. D.44.
+        gain: Gain ``k0`` of Eq. D.44.
         within: Distance in [m] below which bodies push each other away (obstacles only).
-        postures: Reference configuration by robot, shape (n,) each (configuration only); robots left out: their start
-            posture.
+        configurations: Desired configuration by robot, shape (n,) each (``posture`` only); that of a robot left out is
+            its start posture.
     """
 
     kind: GoalKind
@@ -158,11 +192,11 @@ class SecondaryGoal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WeightingSettings:
-    """How joint weights change along the motion; 0 leaves them as they are.
+    """Joint weights that change along the motion; with 0 they are constant.
 
     Attributes:
-        near_limits: How strongly a joint is held back on its way to a limit.
-        load: How strongly a joint is held back by the weight it has to lift.
+        near_limits: Gain of the weight that grows as a joint approaches a limit.
+        load: Gain of the weight that grows with the gravity load of a joint.
     """
 
     near_limits: float = 0.0
@@ -171,7 +205,7 @@ class WeightingSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SolverSettings:
-    """How joint motion is found.
+    """Settings of the solver.
 
     Attributes:
         method: The resolution method.
@@ -182,9 +216,10 @@ class SolverSettings:
         filtered_inverse: Settings of both filtered inverses.
         search: Settings of both searches.
         quadratic_program: Settings of that method.
-        weighting: How joint weights change along the motion.
+        weighting: Joint weights that change along the motion.
         goals: Secondary goals in the null space.
-        integrator: How joint speeds become positions; ``is_accurate`` says whether the other settings allow it.
+        integrator: How joint velocities become positions; None (``auto``) for the accurate mode wherever the other
+            settings allow it, else Euler's steps.
         accuracy: Largest tool error between the nodes of the accurate mode in [m]; angles in as many [rad].
     """
 
@@ -198,7 +233,7 @@ class SolverSettings:
     quadratic_program: QuadraticProgramSettings = QuadraticProgramSettings()
     weighting: WeightingSettings = WeightingSettings()
     goals: tuple[SecondaryGoal, ...] = ()
-    integrator: Integrator = Integrator.EULER
+    integrator: Integrator | None = Integrator.EULER
     accuracy: float = 1e-7
 
     @property
@@ -210,5 +245,10 @@ class SolverSettings:
 
     @property
     def is_accurate(self) -> bool:
-        """Whether the motion is resolved accurately: it is asked for, and nothing rules it out."""
-        return self.integrator is Integrator.ACCURATE and not self.against_accurate
+        """Whether the motion is resolved accurately: Euler's steps are not prescribed, and nothing rules it out."""
+        return self.integrator is not Integrator.EULER and not self.against_accurate
+
+    @property
+    def traits(self) -> MethodTraits:
+        """What the method is and can do."""
+        return METHODS[self.method]

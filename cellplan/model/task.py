@@ -283,3 +283,7 @@ class Task:
         """Index of the first of these times in [s], shape (N,), at which errors are judged; at most the last."""
         first = int(np.searchsorted(times, self.judged_from - INSTANT_ROOM))
         return min(first, len(times) - 1) if self.settle > 0.0 else 0
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return f"<Task '{self.name}' of robot '{self.robot}': {type(self.path).__name__}, {self.relative_to}>"

@@ -43,6 +43,10 @@ class Toolpath:
     stand_off: float = 0.0
     is_timed: bool = False
 
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return f"<Toolpath of '{self.name}', {1e3 * self.length:.4g} mm, {'closed' if self.is_closed else 'open'}>"
+
     @property
     def length(self) -> float:
         """Length of the whole path on the surface in [m]."""

@@ -68,3 +68,9 @@ class Solution:
     def passed(self) -> bool:
         """Whether every check of every phase passed."""
         return all(run.report.passed for run in self.runs)
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        verdict = "passed" if self.passed else "failed"
+        runs = ", ".join(run.name for run in self.runs if run.name is not None)
+        return f"<Solution of '{self.cell.name}', {self.cell.motion.mode}{f': {runs}' if runs else ''}, {verdict}>"

@@ -64,7 +64,7 @@ def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
     Raises:
         InputError: Two bodies have the same name.
     """
-    named = NameOrder.of(cell).cell  # the order of a file does not decide which pairs are looked at first
+    named = NameOrder.of(cell).cell  # the order of a file does not decide which pairs come first
     bodies = [body for robot in named.robots for body in _robot_bodies(robot)]
     bodies.append(part_body(cell, cell.part, *cell.part.held_by[:1]))
     bodies += [_fixed(thing.name, Kind.OBSTACLE, shape=thing.shape, X_WS=thing.X_WS) for thing in named.obstacles]
@@ -96,7 +96,7 @@ def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q:
 
 
 def is_ground(body: SceneBody) -> bool:
-    """Whether a body is a half-space, which has no surface to ask the engine about."""
+    """Whether a body is a half-space, which is no body of the engine."""
     return isinstance(body.shape, HalfSpace)
 
 
@@ -154,7 +154,7 @@ def part_body(cell: Cell, part: Part, grasp: Grasp | None = None) -> SceneBody:
     """The part, carried by one of its holders or fixed in the world."""
     if grasp is None:
         if part.X_WP is None:
-            raise InputError(f"{cell.origin.at('part')}: nobody holds the part and it has no place in the world")
+            raise InputError(f"{cell.origin.at('part')}: the part has neither a holder nor a pose in the world")
         return _fixed("part", Kind.PART, shape=part.shape, X_WS=part.X_WP @ part.X_PS)
     holder = cell.robot(grasp.robot)
     return SceneBody(

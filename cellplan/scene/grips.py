@@ -18,17 +18,17 @@ from cellplan.model.units import MM
 from cellplan.scene.bodies import SceneBody, part_body
 from cellplan.scene.pairs import Rule
 
-GRIP_ROOM: Final = 1e-4  # [m] by which the face of a grip may lie deeper than the grip: what counts there is its depth
-ALL_AXES: Final = 6  # [-] components of a grasp that leaves nothing open
+GRIP_TOL: Final = 1e-4  # [m] by which the face of a grip may lie deeper than the grip: what counts there is its depth
+COMPONENT_COUNT: Final = 6  # [-] components of a grasp that leaves nothing open
 RIGID: Final = "checked for contact only: rigid with a flange that holds the part"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GripWatch:
-    """What is asked of a further holder's body and the part.
+    """What is demanded of a further holder's body and the part.
 
     Attributes:
-        rule: What is asked.
+        rule: What is demanded.
         reason: Why less than the full distance is.
         is_whole: Whether the whole body is watched.
         outside: What of it is watched otherwise; None when nothing is.
@@ -55,10 +55,10 @@ def grip_watch(cell: Cell, body: SceneBody, grasp: Grasp) -> GripWatch:
         return GripWatch(rule=Rule.CONTACT, reason=RIGID, is_whole=False, outside=None)
     robot, zone = cell.robot(grasp.robot), cell.checks.contact_zone
     X_ST = inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT
-    surface, is_in_zone = outside_grip(body.shape, X_ST, radius=zone, layer=grasp.depth + GRIP_ROOM)
+    surface, is_in_zone = outside_grip(body.shape, X_ST, radius=zone, layer=grasp.depth + GRIP_TOL)
     watched = prepare(body.name, body.shape if surface is None or not is_in_zone else surface)
     outside = watched if is_in_zone and surface is not None else None
-    if len(grasp.axes) == ALL_AXES and (outside is not None or not is_in_zone):
+    if len(grasp.axes) == COMPONENT_COUNT and (outside is not None or not is_in_zone):
         if closed_depth(cell, body, grasp) > grasp.depth:
             outside, is_in_zone = None, True
         else:

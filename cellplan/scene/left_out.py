@@ -16,7 +16,7 @@ from cellplan.scene.bodies import Kind, SceneBody, is_ground
 from cellplan.scene.mounting import is_of_own_file
 from cellplan.scene.pairs import Excluded, Rule, ScenePair
 
-Told = tuple[int, int, LeftOutKind, str]  # both bodies, kind and reason
+Entry = tuple[int, int, LeftOutKind, str]  # both bodies, kind and reason
 
 KIND: Final = {
     Rule.CONTACT: LeftOutKind.CONTACT_ONLY,
@@ -35,11 +35,11 @@ def left_out(
     *,
     engine: Engine,
 ) -> tuple[LeftOut, ...]:
-    """What was left out or asked less of, in the order of the bodies.
+    """What was left out, or has a weaker rule than clearance, in the order of the bodies.
 
     Then come the surroundings among themselves, and robots whose links have no bodies.
 
-    Bodies that never move and keep the demanded clearance are not told: nothing was let pass there.
+    Bodies that never move and keep the demanded clearance are not listed: nothing was excused there.
 
     Args:
         cell: The cell.
@@ -49,8 +49,8 @@ def left_out(
         engine: The solids.
     """
     standing = _Standing(cell, bodies, engine)
-    told = [*_relaxed(bodies, pairs), *(each for each in _excluded(excluded) if not standing.is_clear(*each[:3]))]
-    found = sorted(told, key=lambda each: each[:2])
+    entries = [*_relaxed(bodies, pairs), *(each for each in _excluded(excluded) if not standing.is_clear(*each[:3]))]
+    found = sorted(entries, key=lambda each: each[:2])
     named = [LeftOut(kind, (bodies[i].name, bodies[j].name), reason) for i, j, kind, reason in found]
     things = tuple(body.name for body in bodies if body.kind is Kind.OBSTACLE)
     among = [LeftOut(LeftOutKind.ENVIRONMENT, things, AMONG_THINGS)] if len(things) > 1 else []
@@ -63,7 +63,7 @@ class _Standing:
     """Bodies that never move, where they stand."""
 
     def __init__(self, cell: Cell, bodies: Sequence[SceneBody], engine: Engine) -> None:
-        """Place them; the others are placed as if all joints were at zero, and nobody asks for them."""
+        """Place them; the others are placed as if all joints were at zero, and not used."""
         self._bodies, self._engine, self._clearance = bodies, engine, cell.checks.clearance
         X = [body.X_BS if body.robot is None else cell.robot(body.robot).X_WB @ body.X_BS for body in bodies]
         placed: Array = np.array(X).reshape(-1, 4, 4)
@@ -85,14 +85,14 @@ class _Standing:
         return measure(engine, (first, second), poses, sample=0).bound >= self._clearance
 
 
-def _relaxed(bodies: Sequence[SceneBody], pairs: Sequence[ScenePair]) -> Iterator[Told]:
-    """Watched pairs of which less than the full distance is asked."""
+def _relaxed(bodies: Sequence[SceneBody], pairs: Sequence[ScenePair]) -> Iterator[Entry]:
+    """Watched pairs with a weaker rule than clearance."""
     for pair in pairs:
         if pair.rule is not Rule.CLEARANCE and not is_of_own_file(bodies[pair.first], bodies[pair.second]):
             yield pair.first, pair.second, KIND[pair.rule], pair.reason
 
 
-def _excluded(excluded: Sequence[Excluded]) -> Iterator[Told]:
+def _excluded(excluded: Sequence[Excluded]) -> Iterator[Entry]:
     """Pairs that are not watched, but for those that a robot's own file sets."""
     for pair in excluded:
         if pair.kind is not None:

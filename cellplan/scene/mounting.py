@@ -15,8 +15,8 @@ from cellplan.model.left_out import LeftOutKind
 from cellplan.scene.bodies import Kind, SceneBody
 
 MOUNT_DEPTH: Final = 0.002  # [m] by which a tool may reach into the link that its flange, without a body, is part of
-MOST_NAMED: Final = 3  # [-] bodies that an error names; the others are counted
-WITHOUT_LEAVE: Final = (Kind.LINK, Kind.TOOL, Kind.PART)  # nothing of these stands on another one of them
+MAX_NAMED: Final = 3  # [-] bodies that an error names; the others are counted
+NEVER_STANDING: Final = (Kind.LINK, Kind.TOOL, Kind.PART)  # nothing of these stands on another one of them
 
 
 class Mount(StrEnum):
@@ -61,7 +61,7 @@ def stand_on_each_other(a: SceneBody, b: SceneBody) -> bool:
     """
     if a.robot is not None and a.robot == b.robot:
         return False
-    return a.is_at_rest and b.is_at_rest and not (a.kind in WITHOUT_LEAVE and b.kind in WITHOUT_LEAVE)
+    return a.is_at_rest and b.is_at_rest and not (a.kind in NEVER_STANDING and b.kind in NEVER_STANDING)
 
 
 def is_rigid_with_flange(body: SceneBody, cell: Cell) -> bool:
@@ -90,7 +90,7 @@ def left_out_kind(a: SceneBody, b: SceneBody) -> LeftOutKind | None:
 
 
 def mounted_pair(a: SceneBody, b: SceneBody, ends: tuple[int, int], cell: Cell) -> MountedPair | None:
-    """What is asked of two bodies of which one holds the part or stands on the other; None for all others."""
+    """The depth allowed for two bodies of which one holds the part or stands on the other; None for all others."""
     first, second = ends
     if stand_on_each_other(a, b):
         return MountedPair(first=first, second=second, mount=Mount.STANDING, limit=cell.checks.standing_depth)
@@ -121,8 +121,8 @@ def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Seque
     """
     for mounted, links in faults:
         body, others = bodies[mounted], [bodies[link].name for link in links]
-        more = len(others) - MOST_NAMED
-        named = ", ".join(others[:MOST_NAMED])
+        more = len(others) - MAX_NAMED
+        named = ", ".join(others[:MAX_NAMED])
         if more > 0:
             named += f" and {more} more {'body' if more == 1 else 'bodies'}"
         robot = str(bodies[links[0]].robot)

@@ -20,7 +20,7 @@ MOUNTED = (Kind.ATTACHMENT, Kind.PEDESTAL)  # bodies that the user puts on or be
 
 
 class Rule(StrEnum):
-    """What is asked of a pair."""
+    """What is demanded of a pair."""
 
     CLEARANCE = "clearance"  # keep the distance that the cell demands
     CONTACT = "contact"  # do not touch; the distance between them is the robot's own design
@@ -39,8 +39,8 @@ class ScenePair:
             and the part. None for a half-space, and where all of a tool lies inside its zone.
         is_ground: Whether the second body is a half-space.
         clearance_class: What keeps its distance from what.
-        rule: What is asked of them.
-        reason: Why less than the full distance is asked; empty for the rule ``clearance``.
+        rule: What is demanded of them.
+        reason: Why less than the clearance is demanded; empty for the rule ``clearance``.
         demand: Distance in [m] that a pair with the rule ``clearance`` is to keep.
     """
 

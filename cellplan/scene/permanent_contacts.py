@@ -30,14 +30,14 @@ from cellplan.scene.mounting import (
 )
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, near_in_chain, stands_on
 
-POSTURES: Final = (
+CONFIGURATION_COUNT: Final = (
     48  # random configurations beside the reference; a pair that is free in one of ten escapes 0.6 % of trials
 )
 CONSTANT_DISTANCE_TOL: Final = (
     1e-3  # [m] a distance that varies by less over all configurations is a matter of mounting, not of motion
 )
-ROUNDING: Final = 1e-6  # [m] poses are worked out to less than that: what stands on a floor may seem to float
-ENDLESS: Final = np.pi  # [rad] or [m] range sampled to either side of zero where a joint has no limit
+CONTACT_TOL: Final = 1e-6  # [m] poses are worked out to less than that: what stands on a floor may seem to float
+UNLIMITED_RANGE: Final = np.pi  # [rad] or [m] range sampled to either side of zero where a joint has no limit
 
 
 @dataclass(slots=True)
@@ -63,9 +63,9 @@ def apply_design(
     engine: Engine,
     chains: Mapping[str, ScrewChain],
 ) -> Design:
-    """Leave out what always touches by a robot's own design, and ask only for "no contact" where it sets the distance.
+    """Leave out pairs in permanent contact by a robot's design; forbid only contact where design sets the distance.
 
-    Looked at are pairs of one robot at the reference configuration and at random ones within the joint limits:
+    Examined are pairs of one robot at the reference configuration and at random ones within the joint limits:
 
     - two links of its own file, with at most two joints between them or with a bar of a linkage, that touch in all of
       them: left out; else checked for contact, not for distance;
@@ -75,7 +75,7 @@ def apply_design(
 
     Where a flange has no body, tool and part may touch the link before it; how deep is judged. A robot whose foot has
     no body may likewise stand with its first link in the surroundings, if it does so in every configuration. The
-    links of each robot that holds the part are looked at as if it were the one that carries it.
+    links of each robot that holds the part are examined as if it were the one that carries it.
     """
     sampled = _Sampled(cell, bodies, engine, chains)
     design, faults = Design(), dict[tuple[int, str | None], list[int]]()
@@ -118,7 +118,7 @@ class _Sampled:
     def __init__(
         self, cell: Cell, bodies: Sequence[SceneBody], engine: Engine, chains: Mapping[str, ScrewChain]
     ) -> None:
-        """Draw the configurations; nothing is placed before it is asked for."""
+        """Draw the configurations; bodies are placed when they are first needed."""
         self.cell, self.bodies, self.engine = cell, bodies, engine
         self.views = _views(cell, bodies)
         self._chains, self._configurations = chains, _configurations(cell)
@@ -145,12 +145,12 @@ class _Sampled:
         )
 
     def always_stands(self, pair: ScenePair) -> bool:
-        """Whether a link touches a thing in every configuration, rounding aside."""
+        """Whether a link touches a thing in every configuration, apart from rounding."""
         poses, (first, second) = self.poses(None), (pair.first, pair.second)
         if not is_ground(self.bodies[second]):
-            return self.distances(pair, None)[1] <= ROUNDING
+            return self.distances(pair, None)[1] <= CONTACT_TOL
         height = heights(self.engine.bodies[first].hull, poses.R[first], poses.p[first], X_WS=self.bodies[second].X_BS)
-        return bool(np.all(height <= ROUNDING))
+        return bool(np.all(height <= CONTACT_TOL))
 
     def distances(self, pair: ScenePair, holder: str | None) -> tuple[float, float]:
         """Smallest and largest distance of two bodies in [m]."""
@@ -170,15 +170,15 @@ def _views(cell: Cell, bodies: Sequence[SceneBody]) -> dict[str | None, Sequence
 
 
 def _configurations(cell: Cell) -> dict[str, Array]:
-    """Reference configuration and random ones within the limits, by robot, shape (POSTURES + 1, n)."""
+    """Reference configuration and random ones within the limits, by robot, shape (CONFIGURATION_COUNT + 1, n)."""
     return {robot.name: _random_configurations(robot.model, generator(robot.name)) for robot in cell.robots}
 
 
 def _random_configurations(model: RobotModel, rng: np.random.Generator) -> Array:
     """Reference configuration first, then random ones."""
-    lower = np.where(np.isfinite(model.lower), model.lower, -ENDLESS)
-    upper = np.where(np.isfinite(model.upper), model.upper, ENDLESS)
-    q = rng.uniform(lower, upper, size=(POSTURES + 1, len(model.joints)))
+    lower = np.where(np.isfinite(model.lower), model.lower, -UNLIMITED_RANGE)
+    upper = np.where(np.isfinite(model.upper), model.upper, UNLIMITED_RANGE)
+    q = rng.uniform(lower, upper, size=(CONFIGURATION_COUNT + 1, len(model.joints)))
     q[0] = 0.0
     return q
 
@@ -195,11 +195,10 @@ def _stands(design: Design, cell: Cell, pair: ScenePair) -> bool:
 
 
 def _own_links(design: Design, sampled: _Sampled, pair: ScenePair) -> bool:
-    """Leave out two near links of one robot's file that always touch; of the others only contact is looked for."""
+    """Leave out two near links of one robot's file that always touch; the others are checked for contact only."""
     if sampled.always_touch(pair, None):
-        reason = (
-            f"touch at the reference configuration and at {POSTURES} random ones: it is their shape, not the motion"
-        )
+        configurations = f"the reference configuration and at {CONFIGURATION_COUNT} random ones"
+        reason = f"touch at {configurations}: it is their shape, not the motion"
         design.excluded.append(Excluded(pair.first, pair.second, reason))
     else:
         reason = "checked for contact only: two joints apart, their distance is set by the robot's design"

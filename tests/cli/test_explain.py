@@ -87,8 +87,8 @@ def test_a_start_that_is_to_be_found_leaves_the_rank_open(cells: Path, capsys: p
 
     assert "graph: 9 links (vertices), 9 joints (edges): 6 real, 3 virtual (PPR, in the plane xy)" in lines
     assert lines[-2:] == [
-        "  rank: not known, the start of right is to be found (`cellplan check` finds it)",
-        "  degree of redundancy: 6 - 3 = 3 wherever the rows are independent",
+        "  rank: unknown until the start of right is found (by `cellplan check`)",
+        "  degree of redundancy: 6 - 3 = 3 where the rows are independent",
     ]
     matrix = record_of(cells / "planar_pair.yaml", capsys)["matrices"][0]
     assert (matrix["rank"], matrix["redundancy"], matrix["starts_to_find"]) == (None, None, ["right"])
@@ -105,7 +105,7 @@ def test_a_stretched_arm_is_told_to_be_singular(
 
     assert lines[-2:] == [
         "  degree of redundancy: 18 - 17 = 1",
-        "  only 17 of 18 rows are independent there: 1 direction in which the tools cannot move as asked",
+        "  only 17 of 18 rows are independent there: 1 direction in which the tools cannot move as required",
     ]
 
 
@@ -139,7 +139,7 @@ def test_free_spin_and_too_few_joints_are_told(cells: Path, tmp_path: Path, caps
     lines = explained(path, capsys)
 
     assert "  circle  right  x y z tool axis (spin is free)" in lines
-    assert lines[-1] == "  more is asked for than the joints can give: 5 rows for 3 columns"
+    assert lines[-1] == "  overconstrained: 5 rows for 3 columns"
 
 
 def test_many_robots_with_long_names_stay_within_the_screen() -> None:

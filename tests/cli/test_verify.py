@@ -26,7 +26,7 @@ def test_a_sound_run_is_told_with_its_figures(copy: Copy, capsys: pytest.Capture
     assert (status, err) == (0, "")
     lines = out.splitlines()
     assert lines[0] == "small-pair: verified"
-    assert lines[1] == f"  files as they were written: {sum(path.is_file() for path in copy.run.rglob('*')) - 1}"
+    assert lines[1] == f"  unchanged files: {sum(path.is_file() for path in copy.run.rglob('*')) - 1}"
     assert lines[2].endswith("robots/left.yaml, robots/right.urdf, small.yaml")
     assert any(line.startswith("  task path (right): largest error ") for line in lines)
 

@@ -6,7 +6,7 @@ import pytest
 from builders.scene_builders import random_pose
 
 from cellplan.collision.bodies import BodyPoses, CollisionBody, checked_poses, prepare
-from cellplan.collision.distance import Reading, look, measure
+from cellplan.collision.distance import Reading, measure, quick_reading
 from cellplan.collision.engine import Engine
 from cellplan.collision.hulls import convex_hull
 from cellplan.collision.overlap.containment import is_inside
@@ -206,7 +206,7 @@ def test_the_certificate_is_never_above_a_second_engine_in_many_states() -> None
         engine, poses = Engine((prepare("a", a), prepare("b", b))), random_states(1000 + number, 6000, reach=0.8)
         truth = coal_distances(a, b, poses)
         for k in np.flatnonzero(truth > 1e-7):  # on the border both answers are right
-            bound = look(engine, (0, 1), poses, sample=int(k)).bound
+            bound = quick_reading(engine, (0, 1), poses, sample=int(k)).bound
             assert bound <= truth[k] + ROUNDING
             tight += bound >= truth[k] - EXACT
             states += 1
@@ -215,11 +215,11 @@ def test_the_certificate_is_never_above_a_second_engine_in_many_states() -> None
 
 
 def _compare(engine: Engine, poses: BodyPoses, truth: np.ndarray) -> None:
-    """Touching where the truth is below zero; elsewhere never above it and near it; the cheap look never above it."""
+    """Touching where the truth is below zero; elsewhere never above it and near it; a quick reading never above it."""
     for k, distance in enumerate(truth):
         if abs(distance) < 1e-7:
             continue  # on the border both answers are right
-        cheap, exact = look(engine, (0, 1), poses, sample=k), measure(engine, (0, 1), poses, sample=k)
+        cheap, exact = quick_reading(engine, (0, 1), poses, sample=k), measure(engine, (0, 1), poses, sample=k)
         assert exact.touches == (distance <= 0.0), f"state {k}, distance {distance}"
         if distance > 0.0:
             assert cheap.bound <= distance + ROUNDING

@@ -18,7 +18,7 @@ ROW = re.compile(r"^\| `(?P<place>[^`]+)` \| (?P<names>(?:`[^`]+`(?:, )?)+) \| .
 RECIPES = dict(re.findall(r"^### A new ([^\n]+)\n(.*?)(?=^##)", PAGE, re.MULTILINE | re.DOTALL))
 # Every module of the package that has to be changed for a further one names one of those that exist like this.
 TRACES = {
-    "resolution method": r'"heuristic_search"',
+    "resolution method": r"\bjacobian_transpose\b",
     "check": r"\bcheck_locked\b",
     "program format": r"\brender_csv\b",
     "command": r"\bcellplan\.cli\.verify\b",
@@ -43,6 +43,7 @@ def least_norm(problem):
 
     return advance
 '''
+TRAITS = '"least_norm": MethodTraits(label="least norm", has_null_space=False, takes_euler_steps=True),'
 CHECK = '''"""Check of the travel of all joints."""
 
 import numpy as np
@@ -149,9 +150,9 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (copy / "planning" / "methods" / "least_norm.py").write_text(METHOD, encoding="utf-8")
     insert(copy / "model" / "solver.py", "MethodName = Literal[", '"least_norm",')
     insert(
-        copy / "report" / "record" / "method.py",
-        "METHOD_NAMES: Final[dict[MethodName, str]] = {",
-        '"least_norm": "least norm",',
+        copy / "model" / "solver.py",
+        "METHODS: Final[Mapping[MethodName, MethodTraits]] = MappingProxyType(\n    {",
+        TRAITS,
     )
     (copy / "checks" / "joints" / "travel.py").write_text(CHECK, encoding="utf-8")
     insert(

@@ -50,7 +50,7 @@ def test_a_bystander_has_links_and_no_columns():
     assert len(structure.circuits) == 1
     assert "op1/tool" in structure.graph.links
     assert structure.matrices[0].missing == ("holder", "op0")
-    assert "robot op1  (random) stands by" in structure_lines(structure_record(structure))
+    assert "robot op1  (random) idle" in structure_lines(structure_record(structure))
 
 
 def test_two_tasks_of_one_operator_double_the_rows_and_not_the_rank():

@@ -1,7 +1,6 @@
 """What the command line changes of the solver: the method brings its integrator along unless the cell names one."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -88,16 +87,15 @@ def test_the_integrator_is_the_one_a_cell_file_with_these_words_would_take(
 ) -> None:
     cell = with_overrides(cell_with(solver), **choices)
 
-    assert cell.solver.integrator is Integrator(integrator)
     assert cell.solver.is_accurate == (integrator == "accurate")
     (tmp_path / "again.yaml").write_text(render_cell(cell), encoding="utf-8")
-    assert load_cell(tmp_path / "again.yaml").solver.integrator is cell.solver.integrator
+    assert load_cell(tmp_path / "again.yaml").solver.integrator is Integrator(integrator)
 
 
-def test_a_method_against_the_integrator_of_the_cell_file_is_refused_with_its_line(cell_with: Write) -> None:
+def test_a_method_against_the_integrator_of_the_cell_file_is_refused(cell_with: Write) -> None:
     assert refusal(cell_with("solver: {integrator: accurate}"), method="jacobian_transpose") == [
-        "--method: expected weighted_pseudo_inverse, as c:14: solver.integrator asks for the accurate mode, got "
-        "'jacobian_transpose'; add --integrator euler"
+        "c with solver.method = jacobian_transpose: solver.method: expected weighted_pseudo_inverse in the accurate "
+        "mode, got 'jacobian_transpose'; choose it, or choose solver.integrator: euler"
     ]
 
 
@@ -108,23 +106,26 @@ def test_a_method_against_the_integrator_of_the_cell_file_is_refused_with_its_li
             "solver: {method: quadratic_program}",
             {},
             [
-                "--integrator: expected euler, as c:14: solver.method is 'quadratic_program', got 'accurate'; "
-                "add --method weighted_pseudo_inverse"
+                "c:14 with solver.integrator = accurate: solver.method: expected weighted_pseudo_inverse in the "
+                "accurate mode, got 'quadratic_program'; choose it, or choose solver.integrator: euler"
             ],
         ),
         (
             "",
             {"method": "quadratic_program"},
-            ["--method: expected weighted_pseudo_inverse with --integrator accurate, got 'quadratic_program'"],
+            [
+                "c with solver.method = quadratic_program: solver.method: expected weighted_pseudo_inverse in the "
+                "accurate mode, got 'quadratic_program'; choose it, or choose solver.integrator: euler"
+            ],
         ),
         (
             "solver: {secondary: {posture: {}}, weighting: {load: 1}}",
             {},
             [
-                "--integrator: expected euler, as c:14: solver.secondary asks for goals besides the tasks, got "
-                "'accurate'; remove them from the cell",
-                "--integrator: expected euler, as c:14: solver.weighting.load asks for joint weights that change along "
-                "the motion, got 'accurate'; remove them from the cell",
+                "c:14 with solver.integrator = accurate: solver.secondary: expected no goals besides the tasks in the "
+                "accurate mode, got posture; remove them, or choose solver.integrator: euler",
+                "c:14 with solver.integrator = accurate: solver.weighting.load: expected 0 in the accurate mode, got "
+                "1; remove it, or choose solver.integrator: euler",
             ],
         ),
     ],
@@ -139,14 +140,41 @@ def test_the_accurate_mode_is_refused_where_it_does_not_go(
 
 def test_an_unknown_integrator_is_refused_with_the_nearest_word(cell_with: Write) -> None:
     assert refusal(cell_with(""), integrator="acurate") == [
-        "--integrator: expected one of accurate, euler, got 'acurate'; did you mean 'accurate'?"
+        "c with solver.integrator = acurate: solver.integrator: expected auto, accurate or euler, got 'acurate', did "
+        "you mean 'accurate'?"
     ]
 
 
-def test_a_choice_made_in_a_program_outlasts_the_same_method(cell_with: Write) -> None:
-    cell = cell_with("")
-    stepped = replace(cell, solver=replace(cell.solver, integrator=Integrator.EULER))
+def test_settings_are_read_as_strictly_as_the_cell_file(cell_with: Write) -> None:
+    cell = with_overrides(cell_with(""), ["motion.duration_s = 3", "tasks.circle.axes=[x, y, rz]"], mode="part_at_rest")
 
-    again = with_overrides(stepped, method="weighted_pseudo_inverse", duration=3.0)
+    assert (cell.motion.duration, str(cell.motion.mode), cell.tasks[0].axes) == (3.0, "part_at_rest", (0, 1, 5))
 
-    assert again.solver.integrator is Integrator.EULER
+
+@pytest.mark.parametrize(
+    ("setting", "finding"),
+    [
+        ("motion.duration_s", "--set: expected KEY=VALUE, such as motion.duration_s=2.5, got 'motion.duration_s'"),
+        ("=3", "--set: expected KEY=VALUE, such as motion.duration_s=2.5, got '=3'"),
+        (
+            "motion.duration_s=010",
+            "--set motion.duration_s: expected a number without leading zeros, got 010; it can be read as octal",
+        ),
+        (
+            "motion.duration_s=",
+            "--set motion.duration_s: expected a value, got nothing; leave the key out to use its default",
+        ),
+        ("solver.seed=1\nname: x", "--set solver.seed: expected a value on one line, got several"),
+        ("motion.mode=pairwise", "--set: expected every key once, got 'motion.mode' again"),
+    ],
+)
+def test_settings_that_cannot_be_read_are_refused(cell_with: Write, setting: str, finding: str) -> None:
+    with pytest.raises(InputError) as caught:
+        with_overrides(cell_with(""), [setting], mode="pairwise")
+
+    assert str(caught.value) == finding
+
+
+def test_a_setting_that_is_not_yaml_is_refused(cell_with: Write) -> None:
+    with pytest.raises(InputError, match=r"^--set solver.seed: not valid YAML: "):
+        with_overrides(cell_with(""), ["solver.seed=[1"])

@@ -11,11 +11,11 @@ from cellplan.model.idle import idle_robots
 from cellplan.model.motion import Schedule
 from cellplan.model.report import Check
 
-ROOM: Final = 1e-7  # [deg] or [mm]: tables have twelve decimals, and cells as many
+HOME_TOL: Final = 1e-7  # [deg] or [mm]: tables have twelve decimals, and cells as many
 
 
 def check_idle(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> list[Check]:
-    """One check for each robot that has nothing to do: how far it is from its home at most.
+    """One check for each idle robot: its largest distance from its home.
 
     Args:
         cell: The cell; a robot without a home is held against its first row.
@@ -32,15 +32,15 @@ def _stands(robot: Robot, times: Array, q: Array) -> Check:
     away = np.abs(q - (q[0] if robot.home is None else robot.home)) * scales
     row, column = np.unravel_index(int(np.argmax(away)), away.shape)
     joint, value = robot.model.joints[column], float(away[row, column])
-    unit, passed = joint.display_unit.name, value <= ROOM
+    unit, passed = joint.display_unit.name, value <= HOME_TOL
     found = f"stands at its home, {value:.2g} {unit} from it at most" if passed else ""
-    far = f"joint {joint.name} is {value:.6g} {unit} from its home at {times[row]:.3f} s, and has nothing to do"
+    far = f"joint {joint.name} is {value:.6g} {unit} from its home at {times[row]:.3f} s, although the robot is idle"
     return Check(
         name="home",
         subject=robot.name,
         passed=passed,
         value=value,
-        limit=ROOM,
+        limit=HOME_TOL,
         unit=unit,
         at_s=float(times[row]),
         message=f"idle robot {robot.name}: {found or far}",

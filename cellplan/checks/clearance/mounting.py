@@ -13,13 +13,13 @@ from cellplan.scene.bodies import Kind, is_ground
 from cellplan.scene.mounting import Mount
 from cellplan.scene.scene import Scene
 
-ROUNDING: Final = 1e-6  # [m] poses are worked out to less than that: bodies that just touch are not deep
+DEPTH_TOL: Final = 1e-6  # [m] poses are worked out to less than that: bodies that just touch are not deep
 CURES: Final = {
     Mount.GRIP: "is the grasp the right way round? If the grip is that deep, say so with depth_mm of the grasp",
     Mount.MOUNT: "does the tool lie in front of the flange? If they may touch, name them under checks.exclude",
     Mount.STANDING: "does it stand where it should? Put the one on the other, or name them under checks.exclude",
 }
-NOISE: Final = 1e-3  # [-] of 0.01 mm: a depth of 3 mm that is worked out as 3.000000001 is shown as 3
+DISPLAY_TOL: Final = 1e-3  # [-] of 0.01 mm: a depth of 3 mm that is worked out as 3.000000001 is shown as 3
 PIT: Final = "a pit? Put the base on the ground, or name them under checks.exclude"
 
 
@@ -42,8 +42,8 @@ def check_mounting(scene: Scene, q: Array, times: Array | None = None) -> tuple[
 
 
 def _passed(found: FoundDepth) -> bool:
-    """Whether a depth is within its limit, rounding aside."""
-    return found.depth <= found.pair.limit + ROUNDING
+    """Whether a depth is within its limit, apart from rounding."""
+    return found.depth <= found.pair.limit + DEPTH_TOL
 
 
 def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
@@ -73,7 +73,7 @@ def _all_standing(scene: Scene, standing: Sequence[FoundDepth], times: Array | N
         return []
     deepest = max(standing, key=lambda each: each.depth)
     check = _check(scene, deepest, times)
-    if deepest.depth > ROUNDING:
+    if deepest.depth > DEPTH_TOL:
         return [check]
     limit = MM * deepest.pair.limit
     words = f"nothing that stands reaches into what carries it, allowed are {limit:g} mm"
@@ -91,4 +91,4 @@ def _named(scene: Scene, found: FoundDepth) -> tuple[str, str]:
 
 def _shown(depth_mm: float) -> str:
     """A depth rounded up to 0.01 mm, never less than there is; four digits are enough."""
-    return f"{abs(math.ceil(100.0 * depth_mm - NOISE)) / 100.0:.4g}"
+    return f"{abs(math.ceil(100.0 * depth_mm - DISPLAY_TOL)) / 100.0:.4g}"

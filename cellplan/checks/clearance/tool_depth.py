@@ -19,13 +19,13 @@ from cellplan.model.units import MM
 
 AXIS: Final = "axis"
 AXIS_COMPONENTS: Final = (0, 1, 2, 3, 4)  # of a task: they leave no more than the turn about one axis open
-ROOM: Final = 1e-6  # [m] tracking errors of a micrometre do not decide about a cut that is as deep as it may be
-FINE_STEP: Final = 1e-3  # [m] longer steps of a tool between two rows are looked at in between, joints moving evenly
-MOST_INSTANTS: Final = 4000  # instants to which long steps are refined; programs of more rows are taken as they are
-POSES: Final = 400  # poses of a body that are looked at, beside those round the deepest of them
-POSES_ON_MESH: Final = 100  # likewise on a mesh, where a line costs fifty times as much
-NEAR_WORST: Final = 20  # rows looked at round the deepest pose of a body
-SHARE_OF_RADIUS: Final = 0.5  # [-] of a body's radius that it moves between two poses at which it is looked at
+DEPTH_TOL: Final = 1e-6  # [m] tracking errors of a micrometre do not decide about a cut that is as deep as it may be
+FINE_STEP: Final = 1e-3  # [m] longer steps of a tool between two rows are subdivided, joints moving evenly
+MAX_TIMES: Final = 4000  # instants to which long steps are refined; programs of more rows are taken as they are
+POSE_COUNT: Final = 400  # poses of a body that are evaluated, beside those round the deepest of them
+MESH_POSE_COUNT: Final = 100  # likewise on a mesh, where a line costs fifty times as much
+NEAR_WORST_COUNT: Final = 20  # rows evaluated round the deepest pose of a body
+RADIUS_FRACTION: Final = 0.5  # [-] of a body's radius that it moves between two poses at which it is evaluated
 
 
 def tool_depths(
@@ -34,7 +34,7 @@ def tool_depths(
     """The largest depth of the tool of every task on the part, at any instant of the program.
 
     The axis of a tool counts from the tip back to where the flange stands beside it, and its bodies count. The axis is
-    looked at at every row, and between rows that are more than a millimetre apart. Bodies are looked at whenever the
+    evaluated at every row, and between rows that are more than a millimetre apart. Bodies are evaluated whenever the
     tool has moved on by half of a body's radius, so that no spot that a body passes over is left out, and at the rows
     round the deepest of these; a program that is too long for that is cut into even steps of motion.
 
@@ -109,7 +109,7 @@ def _tool_on_part(
     own = {name: q[name] for name in sorted(movers)}
     X_PT = inverse(part_poses(cell, chains, own)) @ chains[task.robot].tool_poses(own[task.robot])
     longest = float(np.linalg.norm(np.diff(X_PT[:, :3, 3], axis=0), axis=1).max(initial=0.0))
-    parts = min(int(np.ceil(longest / FINE_STEP)), MOST_INSTANTS // max(1, len(times) - 1))
+    parts = min(int(np.ceil(longest / FINE_STEP)), MAX_TIMES // max(1, len(times) - 1))
     if parts < 2:
         return times, X_PT
     rows = np.arange(parts * (len(times) - 1) + 1) / parts
@@ -125,13 +125,13 @@ def _deepest(columns: Columns, cell: Cell, X_ST: Array) -> tuple[int, float]:
     if not len(columns.line):
         return 0, 0.0
     shape = cell.part.shape
-    rows = _even_steps(columns, X_ST, POSES_ON_MESH if isinstance(shape, Mesh) else POSES)
+    rows = _even_steps(columns, X_ST, MESH_POSE_COUNT if isinstance(shape, Mesh) else POSE_COUNT)
     found = depths(columns, shape, X_ST[rows])
     worst = int(np.argmax(found))
     if not found[worst] > 0.0:
         return int(rows[worst]), 0.0
     low, high = rows[max(worst - 1, 0)], rows[min(worst + 1, len(rows) - 1)]
-    near = np.unique(np.append(np.linspace(low, high, NEAR_WORST).astype(np.intp), rows[worst]))
+    near = np.unique(np.append(np.linspace(low, high, NEAR_WORST_COUNT).astype(np.intp), rows[worst]))
     closer = depths(columns, shape, X_ST[near])
     at = int(np.argmax(closer))
     return int(near[at]), float(closer[at])
@@ -142,16 +142,15 @@ def _even_steps(columns: Columns, X_ST: Array, most: int) -> NDArray[np.intp]:
     shift = np.linalg.norm(np.diff(X_ST[:, :3, 3], axis=0), axis=1)
     turned = np.linalg.norm(np.diff(X_ST[:, :3, :3], axis=0), axis=(1, 2))  # chord of the angle, times sqrt(2) at most
     moved = np.append(0.0, np.cumsum(shift + columns.reach * turned))
-    step = max(SHARE_OF_RADIUS * columns.radius, moved[-1] / most, ROOM)
+    step = max(RADIUS_FRACTION * columns.radius, moved[-1] / most, DEPTH_TOL)
     marks = np.append(np.arange(0.0, moved[-1], step), moved[-1])
-    rows: NDArray[np.intp] = np.unique(np.append(np.searchsorted(moved, marks), len(X_ST) - 1))
-    return rows
+    return np.unique(np.append(np.searchsorted(moved, marks), len(X_ST) - 1))
 
 
 def _check(task: Task, found: ToolDepth) -> Check:
     """The check of one task."""
     depth, limit = MM * found.depth, MM * found.limit
-    passed = found.depth <= found.limit + ROOM
+    passed = found.depth <= found.limit + DEPTH_TOL
     what = "its axis" if found.body == AXIS else f"{found.robot}/{found.body}"
     when = " on its path" if found.at_s is None else f" at {found.at_s:.3f} s"
     message = (
@@ -173,11 +172,11 @@ def _check(task: Task, found: ToolDepth) -> Check:
 def _cures(task: Task, found: ToolDepth) -> Iterator[str]:
     """What may be wrong when a tool is too deep."""
     if task.project is not None and task.tool_axis is not None and task.tool_axis @ task.project > 0.0:
-        yield "turn tool_axis round: it points out of the surface, so that the tool comes through the part"
+        yield "reverse tool_axis: it points out of the surface, so that the tool comes through the part"
     elif task.project is None and isinstance(task.path, SampledPath | TimedPath):
         yield "check the points and axes of the file: do they lie on the surface, do the axes point into it?"
     elif task.project is None:
-        yield "lay the path on the surface with path.project, or check its place, the sign of offset_mm and tool_axis"
+        yield "project the path onto the surface (path.project), or check its place, the sign of offset_mm, tool_axis"
     elif found.body == AXIS:
         yield "check the tool's pose and the side that the path is projected from"
     else:

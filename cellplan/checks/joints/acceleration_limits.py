@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
-from cellplan.checks.joints.speed_jumps import NO_INSTANTS, desired_jumps
-from cellplan.checks.tools.process_speed import process_speeds
+from cellplan.checks.joints.speed_jumps import NO_TIMES, desired_jumps
+from cellplan.checks.tools.speeds import process_speeds
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.shapes import bounding_box
-from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.acceleration import (
     JointAcceleration,
@@ -28,8 +28,6 @@ from cellplan.model.report import Check
 
 FAILURE_ROWS: Final = (1.5, 2.5)  # [-] steps before and after the instant at which a joint fails: not judged
 FAILURE_REASON: Final = "a joint that fails stops at once, and the others take over at once"
-
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
 def motion_accelerations(
@@ -48,7 +46,7 @@ def motion_accelerations(
     X_WT = {robot.name: chains[robot.name].tool_poses(q[robot.name]) for robot in cell.robots}
     cycles = {robot.name: robot.controller_cycle for robot in cell.robots}
     judged = _judged(cell, times)
-    jumps_at = desired_jumps(schedule) if schedule.is_continuous else NO_INSTANTS
+    jumps_at = desired_jumps(schedule) if schedule.is_continuous else NO_TIMES
     joints = (_joints(robot, times, q[robot.name], judged=judged, jumps_at=jumps_at) for robot in cell.robots)
     return MotionAccelerations(
         joints=tuple(use for uses in joints for use in uses),

@@ -5,11 +5,11 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.speed_jumps import NO_INSTANTS, joint_jumps
+from cellplan.checks.joints.speed_jumps import NO_TIMES, joint_jumps
 from cellplan.geometry.transforms import Array
 
-ROUNDING: Final = 1e-9  # [-] of a step: 4 ms are four steps of 1 ms, whatever the last digit says
-STILL: Final = 1e-9  # [rad] or [m] in a step: a joint that moves less stands still
+STEP_TOL: Final = 1e-9  # [-] of a step: 4 ms are four steps of 1 ms, whatever the last digit says
+STANDSTILL_TOL: Final = 1e-9  # [rad] or [m] in a step: a joint that moves less stands still
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,11 +42,10 @@ def point_accelerations(times: Array, points: Array) -> Array:
     speeds = np.zeros((len(times) + 1, *points.shape[1:]))
     speeds[1:-1] = np.diff(points, axis=0) / steps.reshape(spread)
     around = 0.5 * (np.concatenate([steps[:1], steps]) + np.concatenate([steps, steps[-1:]]))
-    accelerations: Array = np.diff(speeds, axis=0) / around.reshape(spread)
-    return accelerations
+    return np.diff(speeds, axis=0) / around.reshape(spread)
 
 
-def joint_accelerations(times: Array, q: Array, *, cycle: float, jumps_at: Array = NO_INSTANTS) -> RowAccelerations:
+def joint_accelerations(times: Array, q: Array, *, cycle: float, jumps_at: Array = NO_TIMES) -> RowAccelerations:
     """Sizes of the accelerations of joints at the rows; a jump of speed counts over the controller's cycle.
 
     Where a joint leaves rest, the change of speed at that row is followed by another one as large or larger when the
@@ -67,7 +66,7 @@ def joint_accelerations(times: Array, q: Array, *, cycle: float, jumps_at: Array
     jumps = np.maximum(_jumps(moves), _jumps(moves[::-1])[::-1])
     jumps = np.maximum(jumps, step * joint_jumps(times, q, jumps_at))
     by_jump = jumps / (step * min(step, cycle))
-    is_jump = (jumps > 0.5 * step * step * values) & (jumps > STILL)
+    is_jump = (jumps > 0.5 * step * step * values) & (jumps > STANDSTILL_TOL)
     return RowAccelerations(values=np.maximum(values, by_jump), is_jump=is_jump)
 
 
@@ -78,15 +77,14 @@ def _jumps(moves: Array) -> Array:
     excess = 2.0 * np.abs(first) - np.abs(second)
     is_same_way = np.where(first * second < 0.0, np.abs(first), excess)
     sizes = np.clip(is_same_way, 0.0, np.abs(first))
-    jumps: Array = np.where(np.abs(before) <= STILL, sizes, 0.0)
-    return jumps
+    return np.where(np.abs(before) <= STANDSTILL_TOL, sizes, 0.0)
 
 
 def jerks(times: Array, accelerations: Array, *, window: float) -> Array:
     """Size of the jerk at the rows: the change of acceleration over a window, divided by the window.
 
     Between two rows the acceleration is taken to change evenly; before the first row and after the last one it is zero.
-    For each row the window that begins there and the one that ends there are looked at, and the larger change counts;
+    For each row the window that begins there and the one that ends there are compared, and the larger change counts;
     as the acceleration is piecewise linear, no window elsewhere has a larger one. A window that is shorter than the
     step gives the change over that step, divided by the step.
 
@@ -99,12 +97,11 @@ def jerks(times: Array, accelerations: Array, *, window: float) -> Array:
         Sizes, shape (N, n).
     """
     share = window * (len(times) - 1) / float(times[-1])
-    whole = int(share + ROUNDING)
+    whole = int(share + STEP_TOL)
     rest = max(share - whole, 0.0)
     begins = _changes(accelerations, whole, rest)
     ends = _changes(accelerations[::-1], whole, rest)[::-1]
-    larger: Array = np.maximum(np.linalg.norm(begins, axis=-1), np.linalg.norm(ends, axis=-1)) / window
-    return larger
+    return np.maximum(np.linalg.norm(begins, axis=-1), np.linalg.norm(ends, axis=-1)) / window
 
 
 def _changes(accelerations: Array, whole: int, rest: float) -> Array:
@@ -115,5 +112,4 @@ def _changes(accelerations: Array, whole: int, rest: float) -> Array:
     reached = padded[whole : whole + n + 1]
     count = min(n, max(len(reached) - 1, 0))
     later[:count] = (1.0 - rest) * reached[:count] + rest * reached[1 : count + 1]
-    changes: Array = later - accelerations
-    return changes
+    return later - accelerations

@@ -53,11 +53,11 @@ def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Rep
 
 
 def check_joint_drift(found: Repeatability | None, *, is_demanded: bool) -> tuple[Check, ...]:
-    """Whether every joint comes back in every cycle; nothing is checked when the cell does not ask for it.
+    """Whether every joint comes back in every cycle; nothing is checked when the cell does not demand it.
 
     Args:
-        found: What is known of the run; a run without a cycle cannot keep the demand.
-        is_demanded: Whether the cell asks for a joint motion that closes.
+        found: Drift of the run; a run without a cycle cannot meet the demand.
+        is_demanded: Whether the cell demands a closed joint motion.
     """
     if not is_demanded:
         return ()

@@ -11,7 +11,9 @@ from cellplan.model.cell import Cell, LockedJoint
 from cellplan.model.report import Check, TaskAccuracy
 from cellplan.model.task import Tolerance
 
-STILL: Final = 1e-9  # [deg] or [mm] by which a joint that stands still may differ: a thousand units in the tables
+STANDSTILL_TOL: Final = (
+    1e-9  # [deg] or [mm] by which a joint that stands still may differ: a thousand units in the tables
+)
 
 
 def check_locked(cell: Cell, times: Array, q: Mapping[str, Array]) -> list[Check]:
@@ -25,7 +27,7 @@ def check_locked(cell: Cell, times: Array, q: Mapping[str, Array]) -> list[Check
     return [_check(cell, lock, times, q[lock.robot]) for lock in cell.motion.locked]
 
 
-def told_with_failures(
+def with_locked_joints(
     checks: Iterable[Check], errors: TaskAccuracy, tolerance: Tolerance, *, times: Array, locked: Iterable[LockedJoint]
 ) -> list[Check]:
     """Failed checks on the accuracy of one task, with the joints that had failed when its tool left the path.
@@ -62,7 +64,7 @@ def _check(cell: Cell, lock: LockedJoint, times: Array, q: Array) -> Check:
     moved = scale * np.abs(q[first:, index] - q[first, index])
     worst = int(np.argmax(moved))
     value, at_s = float(moved[worst]), float(times[first + worst])
-    if value <= STILL:
+    if value <= STANDSTILL_TOL:
         message = f"{name} stands still at {scale * q[first, index]:.4f} {unit} from {lock.since:.3f} s on"
     else:
         message = f"{name} is locked from {lock.since:.3f} s on but moves by {value:.4g} {unit}, worst at {at_s:.3f} s"
@@ -74,9 +76,9 @@ def _verdict(lock: LockedJoint, message: str, *, value: float, unit: str, at_s: 
     return Check(
         name="locked_joint",
         subject=f"{lock.robot}/{lock.joint}",
-        passed=value <= STILL,
+        passed=value <= STANDSTILL_TOL,
         value=value,
-        limit=STILL,
+        limit=STANDSTILL_TOL,
         unit=unit,
         at_s=at_s,
         message=message,

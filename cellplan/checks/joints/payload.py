@@ -18,7 +18,7 @@ from cellplan.model.units import MM
 
 GRAVITY: Final = 9.80665  # [m/s^2] standard gravity, downwards along the world's z
 UP: Final = np.array([0.0, 0.0, 1.0])
-WRIST: Final = 3  # [-] turning axes before the flange that are looked at
+WRIST_AXIS_COUNT: Final = 3  # [-] revolute axes before the flange that are judged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,7 +132,7 @@ def _wrist(robot: Robot) -> list[Joint]:
     """The last turning axes on the way to the flange, in the order of the joints."""
     axes: tuple[Joint | FollowerJoint, ...] = (*robot.model.joints, *robot.model.followers)
     link, found = robot.model.flange_link, list[Joint]()
-    while link != BASE and len(found) < WRIST:
+    while link != BASE and len(found) < WRIST_AXIS_COUNT:
         axis = axes[link]
         if isinstance(axis, Joint) and axis.is_revolute:
             found.append(axis)

@@ -1,4 +1,4 @@
-"""Jumps of speed that the desired motion asks for, and what joints make of them in rows that were read back."""
+"""Velocity jumps of the desired motion, and the joint accelerations that they cause in the rows read back."""
 
 from typing import Final
 
@@ -7,10 +7,10 @@ import numpy as np
 from cellplan.geometry.transforms import Array, rotation_vector
 from cellplan.model.motion import Schedule
 
-BESIDE: Final = 1e-6  # [s] before and after an instant: the speeds on its two sides
-SMALLEST: Final = 1e-4  # [m/s] or [rad/s]: a smaller change of a tool's speed is no jump
-ON_ROW: Final = 1e-6  # [-] of a step: nearer instants are those of the row
-NO_INSTANTS: Final = np.zeros(0)
+SIDE_S: Final = 1e-6  # [s] before and after an instant: the speeds on its two sides
+JUMP_TOL: Final = 1e-4  # [m/s] or [rad/s]: a smaller change of a tool's speed is no jump
+ROW_TOL: Final = 1e-6  # [-] of a step: nearer instants are those of the row
+NO_TIMES: Final = np.zeros(0)
 
 
 def desired_jumps(schedule: Schedule) -> Array:
@@ -19,15 +19,14 @@ def desired_jumps(schedule: Schedule) -> Array:
     So it does where a constant law starts, passes a corner or ends, and where a trajectory starts or ends at speed.
     """
     instants = schedule.jumps
-    beside = np.concatenate([instants - BESIDE, instants, instants + BESIDE])
+    beside = np.concatenate([instants - SIDE_S, instants, instants + SIDE_S])
     is_jump = np.zeros(len(instants), dtype=bool)
     for X_PT in schedule.poses(np.clip(beside, 0.0, float(schedule.times[-1]))):
         before, at, after = np.split(X_PT, 3)
-        change = (after[:, :3, 3] - 2.0 * at[:, :3, 3] + before[:, :3, 3]) / BESIDE
-        turn = (_turns(at, after) - _turns(before, at)) / BESIDE
-        is_jump |= (np.linalg.norm(change, axis=1) > SMALLEST) | (np.linalg.norm(turn, axis=1) > SMALLEST)
-    jumps: Array = instants[is_jump]
-    return jumps
+        change = (after[:, :3, 3] - 2.0 * at[:, :3, 3] + before[:, :3, 3]) / SIDE_S
+        turn = (_turns(at, after) - _turns(before, at)) / SIDE_S
+        is_jump |= (np.linalg.norm(change, axis=1) > JUMP_TOL) | (np.linalg.norm(turn, axis=1) > JUMP_TOL)
+    return instants[is_jump]
 
 
 def joint_jumps(times: Array, q: Array, instants: Array) -> Array:
@@ -47,8 +46,8 @@ def joint_jumps(times: Array, q: Array, instants: Array) -> Array:
     rest = np.zeros_like(q[:2])
     changes = np.concatenate([rest, np.diff(np.concatenate([q[:1], q, q[-1:]]), n=2, axis=0) / step, rest])  # row + 2
     place = instants / step
-    first = np.floor(place + ON_ROW).astype(np.intp)
-    is_between = np.abs(place - first) > ON_ROW
+    first = np.floor(place + ROW_TOL).astype(np.intp)
+    is_between = np.abs(place - first) > ROW_TOL
     last = first + is_between
     total = np.abs(changes[first + 2] + is_between[:, None] * changes[last + 2])
     usual = np.maximum(np.abs(changes[first + 1]), np.abs(changes[last + 3]))
@@ -59,5 +58,4 @@ def joint_jumps(times: Array, q: Array, instants: Array) -> Array:
 
 def _turns(X_from: Array, X_to: Array) -> Array:
     """Rotation vectors from poses to others in the frame that both are given in, shape (N, 3)."""
-    turns: Array = rotation_vector(X_to[:, :3, :3] @ np.swapaxes(X_from[:, :3, :3], 1, 2))
-    return turns
+    return rotation_vector(X_to[:, :3, :3] @ np.swapaxes(X_from[:, :3, :3], 1, 2))

@@ -1,4 +1,4 @@
-"""Execution: what the tools of a real cell do on the part when the joints do what they are told."""
+"""Execution: poses of the tools of a real cell on the part when its joints follow the commanded positions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,14 +16,14 @@ from cellplan.model.task import Frame
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measurement:
-    """A measuring system that looks at the tools on the part: standard deviations in [m] and [rad]."""
+    """A measuring system for tool poses on the part: standard deviations in [m] and [rad]."""
 
     position_noise: float = 0.0
     orientation_noise: float = 0.0
 
 
 class RealCell:
-    """A cell as it really stands, ready to be told joint positions.
+    """A cell with its real geometry, which executes commanded joint positions.
 
     Its kinematics is that of successive screw displacements, which no planner uses.
     """
@@ -56,7 +56,7 @@ class RealCell:
 
 
 def measured_poses(X_PT: Sequence[Array], system: Measurement, rng: np.random.Generator) -> tuple[Array, ...]:
-    """What a measuring system sees of tool poses on the part, shape (N, 4, 4) each.
+    """Measurements of tool poses on the part, shape (N, 4, 4) each.
 
     Each coordinate of the tip in P, and each component of a small turn about the axes of P, has normal noise of its
     own. Without noise no number is taken from the generator.

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from cellplan.checks.tools.between_rows import BetweenLook
+from cellplan.checks.tools.between_rows import ErrorsBetweenRows
 from cellplan.geometry.transforms import Array
 from cellplan.model.between_rows import BetweenError
 from cellplan.model.cell import Cell
@@ -36,8 +36,8 @@ def look_between(
     """
     if not schedule.is_continuous or not (accuracy or closures):
         return tuple(accuracy), tuple(closures)
-    look = BetweenLook(scene, schedule, q)
-    of_tasks, of_closures = look.errors_between(accuracy, closures)
+    program = ErrorsBetweenRows(scene, schedule, q)
+    of_tasks, of_closures = program.errors_between(accuracy, closures)
     return (
         tuple(replace(errors, between=between) for errors, between in zip(accuracy, of_tasks, strict=True)),
         tuple(replace(errors, between=between) for errors, between in zip(closures, of_closures, strict=True)),

@@ -9,7 +9,7 @@ so does the desired point within its own sag. The error is then nowhere larger t
 with the errors at both rows and in the middle, and the distance :math:`\sigma` of the desired point in the middle from
 the middle of both ends: a smooth path sags by a quarter of it in half a step, of which twice as much is taken.
 Rotations likewise: as chords of unit vectors, with the square of the sum of all turns in place of M. Where this bound
-is wider than what is allowed, and where the motion of a tool is not smooth, the step is looked at in ten parts.
+is wider than what is allowed, and where the motion of a tool is not smooth, the step is subdivided into ten parts.
 """
 
 import math
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.tools.tracking import errors_on_part, part_poses, seen_from_task
+from cellplan.geometry.arrays import Indices
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.between_rows import BetweenError, BetweenRows
 from cellplan.model.cell import Relation
@@ -30,15 +31,13 @@ from cellplan.model.report import ClosureAccuracy, TaskAccuracy
 from cellplan.model.task import INSTANT_ROOM, Frame, Task
 from cellplan.scene.scene import Scene
 
-Steps = NDArray[np.intp]
-
-PARTS: Final = 10  # [-] subdivisions of a step
-WORST: Final = 20  # [-] steps with the largest errors in their middle that are subdivided in any case
-CHUNK: Final = 4000  # [-] instants looked at at once
-ESTIMATE: Final = 0.1  # [-] taken off a step that is estimated from a much longer one
-NEARBY: Final = 1e-4  # [-] of a step: how far on both sides of an instant a change of speed is looked for
-AROUND: Final = (-NEARBY, 0.0, NEARBY)
-KINK: Final = 0.1  # [-] of what is allowed: a smaller error by a change of speed does not count
+SUBDIVISION_COUNT: Final = 10  # [-] subdivisions of a step
+WORST_COUNT: Final = 20  # [-] steps with the largest errors in their middle that are subdivided in any case
+MAX_TIMES: Final = 4000  # [-] times evaluated at once
+ESTIMATE_FRACTION: Final = 0.1  # [-] taken off a step that is estimated from a much longer one
+SIDE_FRACTION: Final = 1e-4  # [-] of a step: how far on both sides of a time a change of velocity is measured
+SIDES: Final = (-SIDE_FRACTION, 0.0, SIDE_FRACTION)
+KINK_FRACTION: Final = 0.1  # [-] of what is allowed: a smaller error by a change of speed does not count
 ROTATIONS: Final = (3, 4, 5)
 
 
@@ -61,11 +60,11 @@ class _Tool:
     first: int
 
 
-class BetweenLook:
+class ErrorsBetweenRows:
     """A program between its rows."""
 
     def __init__(self, scene: Scene, schedule: Schedule, q: Mapping[str, Array]) -> None:
-        """Take the program.
+        """Store the program.
 
         Args:
             scene: The cell made computable.
@@ -92,7 +91,7 @@ class BetweenLook:
             judged = np.arange(count) >= tool.first
             chosen |= judged & np.any(bounds[place] > tool.allowed, axis=1)
             for kind in range(2):
-                chosen[np.argsort(-middle[:, place, kind] * judged, kind="stable")[:WORST]] = True
+                chosen[np.argsort(-middle[:, place, kind] * judged, kind="stable")[:WORST_COUNT]] = True
         k, s = _subdivided(np.flatnonzero(chosen), self._jumped, self._share)
         fine, (instants, corners) = self._errors(tools, k, s), self._corners(tools)
         found = [
@@ -131,8 +130,8 @@ class BetweenLook:
     def _middles(self, tools: Sequence[_Tool], count: int) -> tuple[Array, Array]:
         """Errors in the middle of each step, and sags of the desired tip and axes there, shape (count, tools, 2)."""
         errors, sags = np.empty((count, len(tools), 2)), np.zeros((count, len(tools), 2))
-        for begin in range(0, count, CHUNK):
-            k = np.arange(begin, min(begin + CHUNK, count))
+        for begin in range(0, count, MAX_TIMES):
+            k = np.arange(begin, min(begin + MAX_TIMES, count))
             poses_desired = self._desired_poses(k, np.full(len(k), 0.5))
             errors[k] = self._errors_of(tools, k, np.full(len(k), 0.5), poses_desired)
             for place, tool in enumerate(tools):
@@ -142,20 +141,20 @@ class BetweenLook:
                     sags[k, place] = _sag(poses_desired[tool.place] - chord, tool.relation)
         return errors, sags
 
-    def _errors(self, tools: Sequence[_Tool], k: Steps, s: Array) -> Array:
+    def _errors(self, tools: Sequence[_Tool], k: Indices, s: Array) -> Array:
         """Errors at shares s of steps k, shape (M, tools, 2)."""
         errors = np.empty((len(k), len(tools), 2))
-        for begin in range(0, len(k), CHUNK):
-            part = slice(begin, begin + CHUNK)
+        for begin in range(0, len(k), MAX_TIMES):
+            part = slice(begin, begin + MAX_TIMES)
             errors[part] = self._errors_of(tools, k[part], s[part], self._desired_poses(k[part], s[part]))
         return errors
 
-    def _desired_poses(self, k: Steps, s: Array) -> tuple[Array, ...]:
+    def _desired_poses(self, k: Indices, s: Array) -> tuple[Array, ...]:
         """Desired poses of all tasks at shares s of steps k, shape (M, 4, 4) each."""
         times = self._schedule.times
         return self._schedule.poses(times[k] + s * (times[k + 1] - times[k]))
 
-    def _errors_of(self, tools: Sequence[_Tool], k: Steps, s: Array, poses_desired: Sequence[Array]) -> Array:
+    def _errors_of(self, tools: Sequence[_Tool], k: Indices, s: Array, poses_desired: Sequence[Array]) -> Array:
         """Errors of all tools against desired poses, shape (M, tools, 2)."""
         cell, chains = self._scene.cell, self._scene.chains
         q = {name: rows[k] + s[:, None] * (rows[k + 1] - rows[k]) for name, rows in self._q.items()}
@@ -184,10 +183,10 @@ class BetweenLook:
         bound[:, 0] = nearby[:, 0] + chain.bend(self._moved) / 32.0 + 0.5 * sag[:, 0]
         chord = 2.0 * np.sin(0.5 * nearby[:, 1]) + chain.turn_bend(self._moved) / 32.0 + 0.5 * sag[:, 1]
         bound[:, 1] = 2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord))
-        asked = sum(axis in relation.axes for axis in ROTATIONS)
-        if not asked:
+        constrained = sum(axis in relation.axes for axis in ROTATIONS)
+        if not constrained:
             bound[:, 1] = 0.0
-        elif asked < len(ROTATIONS) and not relation.is_spin_free:
+        elif constrained < len(ROTATIONS) and not relation.is_spin_free:
             bound[:, 1] = np.inf
         return bound
 
@@ -195,7 +194,7 @@ class BetweenLook:
         """Instants at which tools may change their speed at once, and the error of each tool there.
 
         A change of speed by v at a share s of a step of length h makes an error of ``v h s (1 - s)``. Where the rows of
-        a shorter step would lie is not asked: the error is that of a corner in the middle of a step.
+        a shorter step would lie does not matter: the error is that of a corner in the middle of a step.
 
         Returns:
             Instants in [s], shape (J,), and errors with the present step in [m] and [rad], shape (J, tools, 2).
@@ -204,11 +203,11 @@ class BetweenLook:
         instants = self._schedule.jumps
         instants = instants[(instants > times[0] + INSTANT_ROOM) & (instants <= times[-1])]
         errors = np.zeros((len(instants), len(tools), 2))
-        around = [self._schedule.poses(np.clip(instants + shift * step, times[0], times[-1])) for shift in AROUND]
+        around = [self._schedule.poses(np.clip(instants + shift * step, times[0], times[-1])) for shift in SIDES]
         for place, tool in enumerate(tools):
             if tool.place is not None:
                 before, at, after = (poses[tool.place] for poses in around)
-                errors[:, place] = _sag(after - 2.0 * at + before, tool.relation) / (4.0 * NEARBY)
+                errors[:, place] = _sag(after - 2.0 * at + before, tool.relation) / (4.0 * SIDE_FRACTION)
         return instants, errors
 
     def _worst(self, found: "_Found", kind: int) -> BetweenError:
@@ -235,7 +234,7 @@ class BetweenLook:
             longest_step=self._longest_step(found, kind, errors=errors, rows=rows, k=k),
         )
 
-    def _longest_step(self, found: "_Found", kind: int, *, errors: Array, rows: Array, k: Steps) -> float | None:
+    def _longest_step(self, found: "_Found", kind: int, *, errors: Array, rows: Array, k: Indices) -> float | None:
         """A step in [s] that keeps what is allowed, as all shorter ones do; None when the present one does.
 
         Errors grow with the square of the step; near a corner they are taken to grow with the step itself.
@@ -250,7 +249,7 @@ class BetweenLook:
         times, step, allowed = self._schedule.times, self._schedule.step, found.tool.allowed[kind]
         if not np.any(errors > allowed) or np.any(rows >= allowed):
             return None
-        corners = np.where(found.corners[:, kind] > KINK * allowed, found.corners[:, kind], 0.0)
+        corners = np.where(found.corners[:, kind] > KINK_FRACTION * allowed, found.corners[:, kind], 0.0)
         corners[(found.instants < times[found.tool.first]) | (found.instants > times[-1] - INSTANT_ROOM)] = 0.0
         share = min(1.0, (allowed - float(rows.max())) / max(float(corners.max(initial=0.0)), allowed))
         near = np.searchsorted(times, found.instants[corners > 0.0])
@@ -269,8 +268,8 @@ class _Found:
         tool: The tool.
         middle: Errors in the middle of all steps, shape (N - 1, 2).
         bounds: No error in a step is larger, shape (N - 1, 2).
-        chosen: Steps that were looked at closely, shape (N - 1,).
-        k: Steps of the instants looked at, shape (M,).
+        chosen: Steps that were subdivided, shape (N - 1,).
+        k: Indices of the instants looked at, shape (M,).
         s: Shares of these steps, shape (M,).
         fine: Errors there, shape (M, 2).
         instants: When the tool may change its speed at once, in [s], shape (J,).
@@ -281,7 +280,7 @@ class _Found:
     middle: Array
     bounds: Array
     chosen: NDArray[np.bool_]
-    k: Steps
+    k: Indices
     s: Array
     fine: Array
     instants: Array
@@ -301,7 +300,7 @@ def _sag(off: Array, relation: Relation) -> Array:
     return np.stack([np.linalg.norm(off[:, axes, 3], axis=1), np.linalg.norm(turned, axis=(1, 2))], axis=1)
 
 
-def _within_steps(times: Array, instants: Array) -> tuple[Steps, Array]:
+def _within_steps(times: Array, instants: Array) -> tuple[Indices, Array]:
     """Steps and shares of them for those instants that lie between two rows."""
     k = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(times) - 2)
     inside = (instants > times[k] + INSTANT_ROOM) & (instants < times[k + 1] - INSTANT_ROOM)
@@ -309,16 +308,16 @@ def _within_steps(times: Array, instants: Array) -> tuple[Steps, Array]:
     return k, (instants - times[k]) / (times[k + 1] - times[k])
 
 
-def _subdivided(steps: Steps, jumped: Steps, share: Array) -> tuple[Steps, Array]:
+def _subdivided(steps: Indices, jumped: Indices, share: Array) -> tuple[Indices, Array]:
     """Steps and shares of them: nine inner ones of each, and those at which the motion of a tool is not smooth."""
-    inner = np.arange(1, PARTS) / PARTS
+    inner = np.arange(1, SUBDIVISION_COUNT) / SUBDIVISION_COUNT
     k = np.concatenate([np.repeat(steps, len(inner)), jumped])
     return k, np.concatenate([np.tile(inner, len(steps)), share])
 
 
 def _stops_at_once(tools: Sequence[_Tool], corners: Array) -> bool:
     """Whether tools end at a speed that would be an error to be seen, were the end no row; corners there, (J, T, 2)."""
-    return bool(np.any(corners > KINK * np.array([tool.allowed for tool in tools])))
+    return bool(np.any(corners > KINK_FRACTION * np.array([tool.allowed for tool in tools])))
 
 
 def _fitting(step: float, duration: float) -> float:
@@ -330,6 +329,6 @@ def _fitting(step: float, duration: float) -> float:
 
 def _shorter(step: float, share: float) -> float:
     """A share of a step in [s], with two digits; less by what an estimate from a much longer step may miss."""
-    shorter = step * share * (1.0 - ESTIMATE * (1.0 - share))
+    shorter = step * share * (1.0 - ESTIMATE_FRACTION * (1.0 - share))
     digit = 10.0 ** (math.floor(math.log10(shorter)) - 1)
     return float(f"{math.floor(shorter / digit) * digit:.2g}")

@@ -24,7 +24,7 @@ def closure_accuracy(
     """Closure errors of every holder but the first ([Ribeiro2010]_ 4.5), in P; open components are zero.
 
     A rigid part cannot give way: what is an error here is force between the robots in the shop. Holders that stand
-    still are looked at as well.
+    still are checked as well.
 
     Args:
         cell: The cell.

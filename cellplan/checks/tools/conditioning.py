@@ -12,7 +12,7 @@ from cellplan.model.motion import Schedule
 from cellplan.model.report import Conditioning
 from cellplan.model.task import Frame
 
-MOST_SAMPLES: Final = 2000  # [-] worked on at once, however small the stack is
+MAX_SAMPLES: Final = 2000  # [-] worked on at once, however small the stack is
 STACK_WORK: Final = 4_000_000  # [-] entries of the stacked matrices worked on at once: 32 MB
 
 
@@ -32,7 +32,7 @@ def conditioning(
 
     An operator's Jacobian has the rows its task constrains, a further holder's those of its grasp; that of the robot
     that carries the part gives the twist of the part frame, or has the rows of the path it carries the part along.
-    Joints that stand still are left out. Metres and radians stand side by side as they come.
+    Joints that stand still are left out. The units are mixed: metres and radians, without weights.
 
     Args:
         cell: The cell.
@@ -47,7 +47,7 @@ def conditioning(
     stack: list[Array] = []
     robots: dict[str, list[Array]] = {}
     relations = _relations(cell, schedule, moving)
-    most = min(MOST_SAMPLES, max(1, STACK_WORK // (6 * cell.joint_count * max(1, len(relations)))))
+    most = min(MAX_SAMPLES, max(1, STACK_WORK // (6 * cell.joint_count * max(1, len(relations)))))
     for first in range(0, count, most):
         piece = slice(first, first + most)
         positions = {name: values[piece] for name, values in q.items()}

@@ -1,10 +1,15 @@
-"""How fast tools and arms move in the world: what a risk assessment asks first."""
+"""Speeds: of tools and arms in the world, as a risk assessment needs them, and of the process on the part."""
+
+from collections.abc import Mapping
 
 import numpy as np
 
+from cellplan.checks.tools.tracking import seen_from_task
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.acceleration import STEADY_FRACTION, ProcessSpeed
 from cellplan.model.cell import Robot
+from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.report import REDUCED_SPEED, RobotSpeed
 
 
@@ -31,8 +36,54 @@ def robot_speed(robot: Robot, chain: ScrewChain, times: Array, q: Array) -> Robo
     )
 
 
+def process_speeds(schedule: Schedule, X_WT: Mapping[str, Array], X_WP: Array) -> dict[str, ProcessSpeed]:
+    """Speed of every tool that moves along its path, by task.
+
+    Args:
+        schedule: The clock and the tasks.
+        X_WT: Tool poses in the world, shape (N, 4, 4), by robot.
+        X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
+    """
+    found = {
+        scheduled.task.name: _process_speed(scheduled, schedule.times, X_WT[scheduled.task.robot], X_WP=X_WP)
+        for scheduled in schedule.tasks
+    }
+    return {name: speed for name, speed in found.items() if speed is not None}
+
+
+def _process_speed(scheduled: TaskSchedule, times: Array, X_WT: Array, *, X_WP: Array) -> ProcessSpeed | None:
+    """Speeds between the samples from the start of the path, once settled, to its end; None for a tool at rest."""
+    task = scheduled.task
+    room = 1e-6 * float(times[-1])  # rounding of instants
+    begin = task.start + task.settle
+    steps = np.flatnonzero((times[:-1] >= begin - room) & (times[1:] <= scheduled.end + room))
+    if not len(steps) or not scheduled.length > 0.0:
+        return None
+    points = seen_from_task(task, X_WT, X_WP)[:, :3, 3]
+    speeds = (np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(times))[steps]
+    lengths = np.diff(times)[steps]
+    peak = float(speeds.max())
+    if not peak > 0.0:
+        return None
+    is_slow = speeds < (1.0 - STEADY_FRACTION) * peak
+    return ProcessSpeed(
+        mean=float(speeds @ lengths / lengths.sum()),
+        peak=peak,
+        peak_at_s=float(times[steps[int(np.argmax(speeds))] + 1]),
+        steady_share=float(lengths[~is_slow].sum() / lengths.sum()),
+        slower=_stretches(is_slow, times[steps], times[steps + 1]),
+    )
+
+
+def _stretches(
+    flags: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], begins: Array, ends: Array
+) -> tuple[tuple[float, float], ...]:
+    """Stretches of time over neighbouring steps that are flagged."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return tuple((float(begins[a]), float(ends[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True))
+
+
 def _speeds(points: Array, times: Array) -> Array:
     """Speeds of points, shape (N, ..., 3), between the samples in [m/s], shape (N - 1, ...)."""
     steps = np.diff(times).reshape(-1, *[1] * (points.ndim - 2))
-    speeds: Array = np.linalg.norm(np.diff(points, axis=0), axis=-1) / steps
-    return speeds
+    return np.linalg.norm(np.diff(points, axis=0), axis=-1) / steps

@@ -18,11 +18,10 @@ def part_poses(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Arr
     """The part frame in the world at every instant, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed place."""
     if not cell.part.held_by:
         if cell.part.X_WP is None:
-            raise ValueError("a part that nobody holds needs a pose in the world")
+            raise ValueError("a part without a holder needs a pose in the world")
         return cell.part.X_WP[None]
     grasp = cell.part.held_by[0]
-    poses: Array = chains[grasp.robot].tool_poses(q[grasp.robot]) @ inverse(grasp.X_PT)
-    return poses
+    return chains[grasp.robot].tool_poses(q[grasp.robot]) @ inverse(grasp.X_PT)
 
 
 def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP: Array) -> TaskAccuracy:
@@ -110,7 +109,7 @@ def worst_error(name: str, times: Array, error: Array, *, subject: str, limit: f
         name: What is checked.
         times: Instants in [s] at which it is judged, shape (N,).
         error: Lengths of the error in the unit of the limit, shape (N,).
-        subject: Task or robot that is looked at.
+        subject: Task or robot that is judged.
         limit: What is allowed.
         words: Unit, and whose error it is.
     """
@@ -130,7 +129,7 @@ def worst_error(name: str, times: Array, error: Array, *, subject: str, limit: f
 
 
 def _turn_between(axes: Array, desired: Array) -> Array:
-    """Rotation vectors in P that lay unit axes on the desired ones, shape (N, k, 3) each to (N, 3).
+    """Rotation vectors in P that turn unit axes onto the desired ones, shape (N, k, 3) each to (N, 3).
 
     The direction is that of ``sum a_i x d_i``; the angle follows from the chord ``sum |d_i - a_i|^2``, which loses no
     digits at the small angles that matter: three axes turn by ``4 (1 - cos) = 8 sin^2(angle / 2)``, a single one by

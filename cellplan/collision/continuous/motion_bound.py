@@ -26,20 +26,18 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.collision.bodies import BodyPoses, CollisionBody
 from cellplan.collision.distance import Reading
 from cellplan.collision.engine import Engine
 from cellplan.collision.separation import supports
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.shapes import Mesh
-from cellplan.geometry.transforms import Array
 
-Samples = NDArray[np.intp]
 Pair = tuple[int, int]
 
 SUPPORT_WORK: Final = 200_000  # [-] products of a direction and a vertex worth spending on one reading: about 0.5 ms
-ROUNDING: Final = 1e-9  # [m] taken off what is carried over, so that rounding never lifts a bound above the truth
+ROUNDING_TOL: Final = 1e-9  # [m] taken off what is carried over, so that rounding never lifts a bound above the truth
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,18 +92,18 @@ class PairMotion:
         self._strays_b, self._strays_a = self._bends.second / 8.0, self._bends.first / 8.0
 
     def step_travel(self, step: int) -> float:
-        """How far no point of the one body travels farther in a step, seen from the other, in [m]."""
+        """Upper bound of the distance that any point of either body travels in a step, seen from the other, in [m]."""
         along_b, along_a = (float(moved[0]) for moved in self.displacement(step, slice(step + 1, step + 2)))
         along_b += float(self._bends.second[step]) / 3.0
         along_a += float(self._bends.first[step]) / 3.0
-        return min(along_a, along_b, float(self._bends.reach[step])) + ROUNDING
+        return min(along_a, along_b, float(self._bends.reach[step])) + ROUNDING_TOL
 
-    def displacement(self, sample: int, others: slice | Samples) -> tuple[Array, Array]:
+    def displacement(self, sample: int, others: slice | Indices) -> tuple[Array, Array]:
         """Farthest that a point of the second body seen from the first, and of the first seen from the second, moved.
 
         Args:
             sample: The sample that is compared with.
-            others: The samples that are asked about, m of them.
+            others: The samples to compare with it, m of them.
 
         Returns:
             Two arrays in [m], shape (m,).
@@ -129,12 +127,12 @@ class PairMotion:
             moved_b, moved_a = self.displacement(sample, slice(first, last + 1))
             strayed_b = np.maximum(moved_b[1:], moved_b[:-1]) + self._strays_b[first:last]
             strayed_a = np.maximum(moved_a[1:], moved_a[:-1]) + self._strays_a[first:last]
-            proved = reading.bound - np.minimum(strayed_a, strayed_b) - ROUNDING
+            proved = reading.bound - np.minimum(strayed_a, strayed_b) - ROUNDING_TOL
             np.maximum(low[first:last], proved, out=low[first:last])
         if reading.direction is not None:
             first, last = self._affordable(sample, first, last)
             proved = self._carried_direction(reading.direction, sample, first, last)
-            np.maximum(low[first:last], proved - ROUNDING, out=low[first:last])
+            np.maximum(low[first:last], proved - ROUNDING_TOL, out=low[first:last])
 
     def _affordable(self, sample: int, first: int, last: int) -> tuple[int, int]:
         """As much of a stretch round the sample as support functions are not too much work for."""
@@ -155,8 +153,7 @@ class PairMotion:
         in_B = np.einsum("ij,ij->i", turning, p) - supports(a, turning) - supports(b, -n_B[None])[0]
         by_A = np.minimum(in_A[1:], in_A[:-1]) - self._strays_b[first:last]
         by_B = np.minimum(in_B[1:], in_B[:-1]) - self._strays_a[first:last]
-        proved: Array = np.maximum(by_A, by_B) - self._a.looseness - self._b.looseness
-        return proved
+        return np.maximum(by_A, by_B) - self._a.looseness - self._b.looseness
 
 
 class _Carried:
@@ -168,7 +165,7 @@ class _Carried:
         points, self._radius = (body.ends, body.girth) if is_slender else (body.centre[None], body.radius)
         self._points = [R @ point + p for point in points]
 
-    def displacement(self, sample: int, others: slice | Samples, turn: Array) -> Array:
+    def displacement(self, sample: int, others: slice | Indices, turn: Array) -> Array:
         """Farthest that a point of the body moved between a sample and m others, which turned it so far, shape (m,)."""
         farthest: Array = self._radius * turn
         squares = [np.einsum("ij,ij->i", moved, moved) for moved in (p[others] - p[sample] for p in self._points)]
@@ -179,5 +176,4 @@ class _Carried:
 def _turns(change: Array) -> Array:
     """Spectral norms of differences of rotations, shape (n, 3, 3): ``|R' - R|_F = sqrt(2) |R' - R|_2``."""
     flat = change.reshape(-1, 9)
-    turns: Array = np.sqrt(0.5 * np.einsum("ij,ij->i", flat, flat))
-    return turns
+    return np.sqrt(0.5 * np.einsum("ij,ij->i", flat, flat))

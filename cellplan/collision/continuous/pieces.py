@@ -10,15 +10,15 @@ from typing import Final
 import numpy as np
 
 from cellplan.collision.bodies import BodyPoses, CollisionBody
-from cellplan.collision.continuous.motion_bound import ROUNDING, Bends, Motion, Pair
-from cellplan.collision.distance import SURELY_APART, TIGHT, Reading, look
+from cellplan.collision.continuous.motion_bound import ROUNDING_TOL, Bends, Motion, Pair
+from cellplan.collision.distance import SURELY_APART, TIGHT, Reading, quick_reading
 from cellplan.collision.engine import Engine
 from cellplan.collision.separation import separation
 from cellplan.geometry.shapes import Mesh, bounding_capsule
 from cellplan.geometry.transforms import Array
 
-SMALL: Final = 8  # [-] triangles of a piece up to which its distance is measured
-PIECES: Final = 4  # [-] pieces that a body is taken apart into at once; those that are far need no more
+SMALL_COUNT: Final = 8  # [-] triangles of a piece up to which its distance is measured
+PIECE_COUNT: Final = 4  # [-] pieces that a body is taken apart into at once; those that are far need no more
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +86,7 @@ def can_be_split(body: CollisionBody) -> bool:
 def split(engine: Engine, pair: Pair) -> tuple[Engine, bool]:
     """The pieces of that body of a pair which has more triangles, after the other one; and whether it is the first.
 
-    At least one of the two must be one that can be split. It is taken apart once, however often it is asked for.
+    At least one of the two must be one that can be split. It is taken apart once only.
     """
     sizes = [len(engine.bodies[k].core.faces) if can_be_split(engine.bodies[k]) else 0 for k in pair]
     is_first = sizes[0] > sizes[1]
@@ -95,7 +95,7 @@ def split(engine: Engine, pair: Pair) -> tuple[Engine, bool]:
 
 
 def read_piece(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, goal: float) -> tuple[Reading, bool]:
-    """Reading of a piece and another body, and whether a direction proves as much as there is, or as is asked for.
+    """Reading of a piece and another body, and whether a direction proves all of it, or reaches the goal.
 
     Where the hulls do not prove the goal, small pieces are measured exactly; large ones are not, as their own pieces
     are less work.
@@ -105,13 +105,13 @@ def read_piece(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, goa
         pair: The piece and the other body, or the other way round.
         poses: Where they are.
         sample: The sample.
-        goal: Distance in [m] that is asked for.
+        goal: Distance in [m] that is to be proved.
     """
-    reading = look(engine, pair, poses, sample=sample)
+    reading = quick_reading(engine, pair, poses, sample=sample)
     if reading.touches or reading.is_exact or reading.bound >= goal:
         return reading, True
     dented = [engine.bodies[k] for k in pair if can_be_split(engine.bodies[k])]
-    if len(dented) == 1 and len(dented[0].core.faces) > SMALL:
+    if len(dented) == 1 and len(dented[0].core.faces) > SMALL_COUNT:
         return reading, False
     return _exact(engine, pair, poses, sample=sample, reading=reading)
 
@@ -123,7 +123,7 @@ def _exact(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, reading
     if points is None:
         return Reading(False, 0.0, True, None), False
     apart = points[1] - points[0]
-    distance = max(0.0, float(np.linalg.norm(apart)) - ROUNDING)
+    distance = max(0.0, float(np.linalg.norm(apart)) - ROUNDING_TOL)
     X_first, X_second = ((poses.R[body, sample], poses.p[body, sample]) for body in pair)
     a, b = engine.bodies[first], engine.bodies[second]
     proved = separation(a.hull, b.hull, apart, X_first=X_first, X_second=X_second)
@@ -139,7 +139,7 @@ def _pieces(body: CollisionBody) -> list[CollisionBody]:
     """The surface of a body cut again and again across its longest extent, each half with as many triangles."""
     mesh = body.core
     groups = [np.arange(len(mesh.faces))]
-    while len(groups) < PIECES:
+    while len(groups) < PIECE_COUNT:
         halves = [half for group in groups for half in _halves(mesh, group)]
         if len(halves) == len(groups):
             break

@@ -10,8 +10,8 @@ from cellplan.geometry.mesh.topology import make_mesh
 from cellplan.geometry.shapes import Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.transforms import Array
 
-FINEST: Final = 1.0 / 16.0  # [-] of the zone's radius: triangles across its border are cut down to this
-ROUND_SIDES: Final = 96  # [-] sides of a sphere or the caps of a capsule: 0.1 % of the radius
+FINEST_FRACTION: Final = 1.0 / 16.0  # [-] of the zone's radius: triangles across its border are cut down to this
+ROUND_SIDE_COUNT: Final = 96  # [-] sides of a sphere or the caps of a capsule: 0.1 % of the radius
 
 
 def outside_zone(shape: Solid, centre: Array, radius: float) -> tuple[Mesh | None, bool]:
@@ -36,7 +36,7 @@ def outside_zone(shape: Solid, centre: Array, radius: float) -> tuple[Mesh | Non
         is_cut |= bool(np.any(inside))
         open_ = open_[~inside]
         longest = np.linalg.norm(open_ - np.roll(open_, -1, axis=1), axis=2).max(axis=1, initial=0.0)
-        across = (_distance_bound(open_, centre, longest) < radius) & (longest > FINEST * radius)
+        across = (_distance_bound(open_, centre, longest) < radius) & (longest > FINEST_FRACTION * radius)
         kept.append(open_[~across])
         open_ = halved(open_[across])
     triangles = np.concatenate(kept) if kept else np.empty((0, 3, 3))
@@ -52,7 +52,7 @@ def _surface(shape: Solid) -> Mesh:
         case Cylinder(radius):
             return tessellate(shape, fine_segments(radius))
         case Capsule() | Sphere():
-            return tessellate(shape, ROUND_SIDES)
+            return tessellate(shape, ROUND_SIDE_COUNT)
         case _:
             return tessellate(shape)
 
@@ -63,5 +63,4 @@ def _distance_bound(triangles: Array, centre: Array, longest: Array) -> Array:
     area = np.linalg.norm(normal, axis=1)
     to_plane = np.abs(np.einsum("ij,ij->i", normal, centre - triangles[:, 0])) / np.where(area > 0.0, area, np.inf)
     to_corner = np.linalg.norm(triangles - centre, axis=2).min(axis=1)
-    bound: Array = np.maximum(to_plane, to_corner - longest)
-    return bound
+    return np.maximum(to_plane, to_corner - longest)

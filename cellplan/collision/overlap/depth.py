@@ -22,10 +22,10 @@ from cellplan.collision.separation import heights
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.transforms import Array
 
-CLOSE: Final = 1e-5  # [m] the bound is above the true depth by no more than this …
-SHARE: Final = 1e-3  # [-] … and this share of it
-MOST_DIRECTIONS: Final = 60_000  # [-] triangles of directions cut at once; beyond it the bound stays as it is
-LEVELS: Final = 40  # [-] times that triangles are cut, at most: by then they are smaller than rounding
+DEPTH_TOL: Final = 1e-5  # [m] the bound is above the true depth by no more than this …
+DEPTH_FRACTION: Final = 1e-3  # [-] … and this share of it
+MAX_DIRECTIONS: Final = 60_000  # [-] triangles of directions cut at once; beyond it the bound stays as it is
+MAX_LEVELS: Final = 40  # [-] times that triangles are cut, at most: by then they are smaller than rounding
 WORK: Final = 2_000_000  # [-] products of a direction and a vertex worked out at once: 16 MB
 
 
@@ -62,8 +62,7 @@ def ground_depth(body: CollisionBody, poses: BodyPoses, index: int, *, X_WS: Arr
         index: Which of them the solid is.
         X_WS: Pose of the half-space.
     """
-    below: Array = np.maximum(0.0, body.looseness - heights(body.hull, poses.R[index], poses.p[index], X_WS=X_WS))
-    return below
+    return np.maximum(0.0, body.looseness - heights(body.hull, poses.R[index], poses.p[index], X_WS=X_WS))
 
 
 def convex_depth(first: Solid, second: Solid, R_AB: Array, p_AB: Array) -> float:
@@ -78,12 +77,12 @@ def convex_depth(first: Solid, second: Solid, R_AB: Array, p_AB: Array) -> float
     n = _octants()
     v = _difference(first, second, R_AB, p_AB, n)
     best = float(np.einsum("kij,kij->ki", v, n).min())
-    for _ in range(LEVELS):
+    for _ in range(MAX_LEVELS):
         if best <= 0.0:
             return 0.0
         low = np.einsum("kic,kjc->kij", v, n).min(axis=2).max(axis=1)
-        is_open = low < best - CLOSE - SHARE * best
-        if not is_open.any() or np.count_nonzero(is_open) > MOST_DIRECTIONS:
+        is_open = low < best - DEPTH_TOL - DEPTH_FRACTION * best
+        if not is_open.any() or np.count_nonzero(is_open) > MAX_DIRECTIONS:
             break
         n, v = n[is_open], v[is_open]
         middle = n + np.roll(n, -1, axis=1)

@@ -3,14 +3,11 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.collision.overlap.contact_zone import outside_zone
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.mesh.topology import make_mesh
 from cellplan.geometry.shapes import Mesh, Solid
-from cellplan.geometry.transforms import Array
-
-Flags = NDArray[np.bool_]
 
 SLIVER: Final = 1e-12  # [m2] twice the area of triangles that are left out: clipping leaves some without any
 
@@ -71,5 +68,4 @@ def _turned(triangles: Array, height: Array, flags: Flags, *, is_odd: Flags) -> 
 def _crossing(triangles: Array, height: Array, corner: int) -> Array:
     """Where the side from the first corner to another one has no height, shape (K, 3)."""
     share = height[:, :1] / (height[:, :1] - height[:, corner : corner + 1])
-    crossing: Array = triangles[:, 0] + share * (triangles[:, corner] - triangles[:, 0])
-    return crossing
+    return triangles[:, 0] + share * (triangles[:, corner] - triangles[:, 0])

@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 from cellplan.geometry.curves.curve import Curve, Interval
 from cellplan.geometry.transforms import Array
 
-NODES: Final = 12  # Gauss-Legendre nodes of a panel
+NODE_COUNT: Final = 12  # Gauss-Legendre nodes of a panel
 PANEL_CHUNK: Final = 4096  # panels worked on at once: about 10 MB
-RESOLVED: Final = 1e-12  # [-] a speed whose last Legendre coefficients are smaller than this share is resolved
-NEGLIGIBLE: Final = 1e-14  # [-] of the whole length: less than this is rounding, whatever share of a panel it is
-DEEPEST_SPLIT: Final = 24  # halvings of a panel; only a cusp asks for more
-NEWTON_STEPS: Final = 60  # far more than Newton needs; a step that leaves its bracket halves it instead
-QUICK_STEPS: Final = 8  # Newton steps without a bracket; speeds that are resolved on a panel hardly ask for five
+RESOLVED_FRACTION: Final = 1e-12  # [-] a speed whose last Legendre coefficients are smaller than this share is resolved
+NEGLIGIBLE_FRACTION: Final = (
+    1e-14  # [-] of the whole length: less than this is rounding, whatever share of a panel it is
+)
+MAX_SPLITS: Final = 24  # halvings of a panel; only a cusp needs more
+MAX_NEWTON_STEPS: Final = 60  # far more than Newton needs; a step that leaves its bracket halves it instead
+MAX_QUICK_STEPS: Final = 8  # Newton steps without a bracket; speeds that are resolved on a panel hardly need five
 PARAMETER_TOL: Final = 1e-13  # [-] of a panel from -1 to 1: a Newton step as small as this lands on the last digit
 
 
@@ -27,7 +29,7 @@ class ArcLength:
     Attributes:
         edges: Parameters between the panels, shape (K + 1,); every knot of the curve is one.
         behind: Length in [m] behind each edge, shape (K + 1,).
-        series: Legendre coefficients of the length from a panel's start, over -1..1, shape (K, NODES + 1).
+        series: Legendre coefficients of the length from a panel's start, over -1..1, shape (K, NODE_COUNT + 1).
     """
 
     edges: Array
@@ -48,8 +50,7 @@ class ArcLength:
         panel = np.clip(np.searchsorted(self.edges, u, side="right") - 1, 0, len(self.series) - 1)
         low, high = self.edges[panel], self.edges[panel + 1]
         x = np.clip(2.0 * (u - low) / (high - low) - 1.0, -1.0, 1.0)
-        lengths: Array = self.behind[panel] + legendre.legval(x, self.series[panel].T, tensor=False)
-        return lengths
+        return self.behind[panel] + legendre.legval(x, self.series[panel].T, tensor=False)
 
     def parameters(self, length: Array, interval: Interval) -> Array:
         """Parameters at lengths in [m] from the start of the curve, kept within an interval between two knots.
@@ -74,7 +75,7 @@ class QuickParameters:
     Attributes:
         arc: The length.
         series: Chebyshev coefficients of the length from a panel's start and of its derivative, over -1..1, shape
-            (K, NODES + 1, 2).
+            (K, NODE_COUNT + 1, 2).
     """
 
     arc: ArcLength
@@ -82,30 +83,29 @@ class QuickParameters:
 
     def parameters(self, length: Array, interval: Interval) -> Array:
         """Parameters at lengths in [m], as `ArcLength.parameters` finds them but for rounding."""
-        arc, degrees = self.arc, np.arange(NODES + 1.0)
+        arc, degrees = self.arc, np.arange(NODE_COUNT + 1.0)
         first = np.searchsorted(arc.edges, interval[0], side="left")
         last = np.searchsorted(arc.edges, interval[1], side="left") - 1
         panel = np.clip(np.searchsorted(arc.behind, length, side="right") - 1, first, last)
         start, whole = arc.behind[panel], arc.behind[panel + 1] - arc.behind[panel]
         desired, series = np.clip(length - start, 0.0, whole), self.series[panel]
         x = np.clip(2.0 * desired / np.where(whole > 0.0, whole, 1.0) - 1.0, -1.0, 1.0)
-        for _ in range(QUICK_STEPS):
+        for _ in range(MAX_QUICK_STEPS):
             reached = (np.cos(np.arccos(x)[:, None] * degrees)[:, None, :] @ series)[:, 0]
             rate = reached[:, 1]
             step = (desired - reached[:, 0]) / np.where(rate > 0.0, rate, np.inf)
             following = np.clip(x + step, -1.0, 1.0)
             if np.all((np.abs(following - x) <= PARAMETER_TOL) & (rate > 0.0)):
                 low, high = arc.edges[panel], arc.edges[panel + 1]
-                found: Array = np.clip(low + 0.5 * (following + 1.0) * (high - low), interval[0], interval[1])
-                return found
+                return np.clip(low + 0.5 * (following + 1.0) * (high - low), interval[0], interval[1])
             x = following
         return arc.parameters(length, interval)
 
 
 def quickly(arc: ArcLength) -> QuickParameters:
     """Prepare a length for being inverted often."""
-    nodes = chebyshev.chebpts1(NODES + 1)
-    change = np.linalg.solve(chebyshev.chebvander(nodes, NODES), legendre.legvander(nodes, NODES))
+    nodes = chebyshev.chebpts1(NODE_COUNT + 1)
+    change = np.linalg.solve(chebyshev.chebvander(nodes, NODE_COUNT), legendre.legvander(nodes, NODE_COUNT))
     lengths = arc.series @ change.T
     rates = np.pad(chebyshev.chebder(lengths, axis=1), ((0, 0), (0, 1)))
     return QuickParameters(arc=arc, series=np.stack([lengths, rates], axis=2))
@@ -115,9 +115,11 @@ def measure(curve: Curve) -> ArcLength:
     """Measure a curve to about twelve digits: panels are halved until the speed is resolved on each."""
     edges = np.asarray(curve.knots, dtype=float)
     speed = _speed_series(curve, edges[:-1], edges[1:])
-    for _ in range(DEEPEST_SPLIT):
+    for _ in range(MAX_SPLITS):
         rest, width = np.abs(speed[:, -2:]).max(axis=1), np.diff(edges)
-        is_open = (rest > RESOLVED * speed[:, 0]) & (rest * width > NEGLIGIBLE * float(speed[:, 0] @ width))
+        is_open = (rest > RESOLVED_FRACTION * speed[:, 0]) & (
+            rest * width > NEGLIGIBLE_FRACTION * float(speed[:, 0] @ width)
+        )
         if not np.any(is_open):
             break
         edges = _halve(edges, is_open)
@@ -138,11 +140,11 @@ def _halve(edges: Array, chosen: NDArray[np.bool_]) -> Array:
 
 
 def _speed_series(curve: Curve, low: Array, high: Array) -> Array:
-    """Legendre coefficients of the speed |dp/du| on each panel, shape (K, NODES)."""
-    nodes, weights = legendre.leggauss(NODES)
-    analysis = legendre.legvander(nodes, NODES - 1) * weights[:, None] * (np.arange(NODES) + 0.5)
+    """Legendre coefficients of the speed |dp/du| on each panel, shape (K, NODE_COUNT)."""
+    nodes, weights = legendre.leggauss(NODE_COUNT)
+    analysis = legendre.legvander(nodes, NODE_COUNT - 1) * weights[:, None] * (np.arange(NODE_COUNT) + 0.5)
     whole = (float(curve.knots[0]), float(curve.knots[-1]))
-    coefficients = np.empty((len(low), NODES))
+    coefficients = np.empty((len(low), NODE_COUNT))
     for first in range(0, len(low), PANEL_CHUNK):
         chosen = slice(first, first + PANEL_CHUNK)
         u = low[chosen, None] + 0.5 * (nodes + 1.0) * (high - low)[chosen, None]
@@ -158,7 +160,7 @@ def _invert(series: Array, desired: Array) -> Array:
     low, high = -np.ones_like(desired), np.ones_like(desired)
     whole = np.sum(coefficients, axis=0)
     x = np.clip(2.0 * desired / np.where(whole > 0.0, whole, 1.0) - 1.0, -1.0, 1.0)
-    for _ in range(NEWTON_STEPS):
+    for _ in range(MAX_NEWTON_STEPS):
         excess = legendre.legval(x, coefficients, tensor=False) - desired
         low, high = np.where(excess <= 0.0, x, low), np.where(excess >= 0.0, x, high)
         rate = legendre.legval(x, slope, tensor=False)

@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 
-SAME: Final = float(np.finfo(float).tiny)  # nearer to a node than this, the quotient would overflow
+NODE_TOL: Final = float(np.finfo(float).tiny)  # nearer to a node than this, the quotient would overflow
 
 
 class ChebyshevBasis:
@@ -39,7 +39,7 @@ class ChebyshevBasis:
     def values(self, x: Array) -> Array:
         """Matrix that gives the values at points of 0..1, shape (m,), by the barycentric formula."""
         away = x[:, None] - self.nodes
-        hit = np.abs(away) <= SAME
+        hit = np.abs(away) <= NODE_TOL
         terms = self._signs / np.where(hit, 1.0, away)
         matrix = np.where(hit.any(axis=1, keepdims=True), hit.astype(float), terms)
         matrix /= matrix.sum(axis=1, keepdims=True)

@@ -11,7 +11,9 @@ from cellplan.geometry.transforms import Array
 
 Interval = tuple[float | Array, float | Array]  # stretch of the parameter, one or one per point: see spans_at
 
-ROUNDING: Final = np.array([-1.0, -0.6, -0.4, 0.4, 0.6, 1.0])  # [-] control points of a corner, see rounded_sides
+CORNER_CONTROLS: Final = np.array(
+    [-1.0, -0.6, -0.4, 0.4, 0.6, 1.0]
+)  # [-] control points of a corner, see rounded_sides
 
 
 class Curve(Protocol):
@@ -76,8 +78,7 @@ def spans_at(knots: Array, u: Array, interval: Interval) -> NDArray[np.intp]:
     """Index of the span that holds each parameter; at a knot that ends the interval, the span inside it."""
     first = np.searchsorted(knots, interval[0], side="right") - 1
     last = np.searchsorted(knots, interval[1], side="left") - 1
-    spans: NDArray[np.intp] = np.clip(np.searchsorted(knots, u, side="right") - 1, first, np.maximum(first, last))
-    return spans
+    return np.clip(np.searchsorted(knots, u, side="right") - 1, first, np.maximum(first, last))
 
 
 def _casteljau(control: list[Array], x: Array) -> Array:
@@ -114,11 +115,11 @@ def rounded_sides(knots: Array, corners: Array, blend: float) -> BezierCurve:
     direction = sides / np.linalg.norm(sides, axis=1, keepdims=True)
     before, after = corners[1:-1] - blend * direction[:-1], corners[1:-1] + blend * direction[1:]
     starts, ends = np.vstack([corners[:1], after]), np.vstack([before, corners[-1:]])
-    share = np.linspace(0.0, 1.0, len(ROUNDING))[:, None]
+    share = np.linspace(0.0, 1.0, len(CORNER_CONTROLS))[:, None]
     lines = starts[:, None] + share * (ends - starts)[:, None]
-    along = np.where((ROUNDING < 0.0)[:, None], direction[:-1, None], direction[1:, None])
-    turns = corners[1:-1, None] + blend * ROUNDING[:, None] * along
-    spans = np.empty((2 * len(lines) - 1, len(ROUNDING), 3))
+    along = np.where((CORNER_CONTROLS < 0.0)[:, None], direction[:-1, None], direction[1:, None])
+    turns = corners[1:-1, None] + blend * CORNER_CONTROLS[:, None] * along
+    spans = np.empty((2 * len(lines) - 1, len(CORNER_CONTROLS), 3))
     spans[0::2], spans[1::2] = lines, turns
     edges = np.concatenate([knots[:1], np.column_stack([knots[1:-1] - blend, knots[1:-1] + blend]).ravel(), knots[-1:]])
     is_long = np.diff(edges) > 1e-9 * blend  # a side that its two roundings use up leaves no straight rest

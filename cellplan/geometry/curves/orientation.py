@@ -162,5 +162,4 @@ def leaning_frames(z: Array, dz: Array, x_hint: Array) -> tuple[Array, Array]:
 
 def _turned(R: Array, v: Array) -> Array:
     """Vectors ``R v``, shapes (N, 3, 3) and (N, 3)."""
-    turned: Array = (R @ v[..., None])[..., 0]
-    return turned
+    return (R @ v[..., None])[..., 0]

@@ -7,7 +7,9 @@ import numpy as np
 from cellplan.geometry.curves.curve import BezierCurve
 from cellplan.geometry.transforms import Array
 
-END_POINTS: Final = 5  # values whose polynomial gives the derivative at an end: an error of fourth order, as inside
+END_POINT_COUNT: Final = (
+    5  # values whose polynomial gives the derivative at an end: an error of fourth order, as inside
+)
 
 
 def spline_through(knots: Array, values: Array, *, is_closed: bool) -> BezierCurve:
@@ -42,10 +44,9 @@ def _open_rates(knots: Array, values: Array) -> Array:
 
 def _end_rate(knots: Array, values: Array) -> Array:
     """Derivative at the first knot of the polynomial through the first few values, shape (3,)."""
-    x, y = knots[:END_POINTS] - knots[0], values[:END_POINTS] - values[0]
+    x, y = knots[:END_POINT_COUNT] - knots[0], values[:END_POINT_COUNT] - values[0]
     coefficients = np.linalg.solve(np.vander(x / x[-1], increasing=True), y)
-    rate: Array = coefficients[1] / x[-1]
-    return rate
+    return coefficients[1] / x[-1]
 
 
 def _periodic_rates(knots: Array, values: Array) -> Array:

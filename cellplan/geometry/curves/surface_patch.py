@@ -10,8 +10,8 @@ from cellplan.geometry.curves.curve import Curve, Interval
 from cellplan.geometry.shapes import Box, Cylinder, Sphere
 from cellplan.geometry.transforms import Array, cross
 
-BORDER_ROOM: Final = 1e-9  # [m] a point this far beyond the border of a patch still lies on it: rounding of the input
-PARALLEL: Final = 1e-12  # [-] squared share of a direction across an axis below which it runs along it
+BORDER_TOL: Final = 1e-9  # [m] a point this far beyond the border of a patch still lies on it: rounding of the input
+PARALLEL_TOL: Final = 1e-12  # [-] squared share of a direction across an axis below which it runs along it
 
 
 class Patch(Protocol):
@@ -40,8 +40,7 @@ class _Flat:
     def hits(self, points: Array, direction: Array) -> Array:
         """Where lines meet the plane, see `Patch`."""
         height = ((self.centre - points) @ self.normal) / (direction @ self.normal)
-        hits: Array = points + height[:, None] * direction
-        return hits
+        return points + height[:, None] * direction
 
     def normals(self, p: Array) -> Array:
         """The one normal, see `Patch`."""
@@ -62,8 +61,7 @@ class Face(_Flat):
         """Whether hits lie within the four edges, see `Patch`."""
         half = np.linalg.norm(self.half_edges, axis=1)
         along = (hits - self.centre) @ (self.half_edges / half[:, None]).T
-        within: NDArray[np.bool_] = np.all(np.abs(along) <= half + BORDER_ROOM, axis=1)
-        return within
+        return np.all(np.abs(along) <= half + BORDER_TOL, axis=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,8 +72,7 @@ class Cap(_Flat):
 
     def covers(self, hits: Array) -> NDArray[np.bool_]:
         """Whether hits lie within the rim, see `Patch`."""
-        within: NDArray[np.bool_] = np.linalg.norm(hits - self.centre, axis=1) <= self.radius + BORDER_ROOM
-        return within
+        return np.linalg.norm(hits - self.centre, axis=1) <= self.radius + BORDER_TOL
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,25 +91,21 @@ class Wall:
 
     def covers(self, hits: Array) -> NDArray[np.bool_]:
         """Whether hits lie between the two rims, see `Patch`."""
-        within: NDArray[np.bool_] = np.abs((hits - self.centre) @ self.axis) <= self.half_length + BORDER_ROOM
-        return within
+        return np.abs((hits - self.centre) @ self.axis) <= self.half_length + BORDER_TOL
 
     def normals(self, p: Array) -> Array:
         """Directions straight away from the axis, see `Patch`."""
         across = self._across(p)
-        normals: Array = across / np.linalg.norm(across, axis=-1, keepdims=True)
-        return normals
+        return across / np.linalg.norm(across, axis=-1, keepdims=True)
 
     def normal_rates(self, p: Array, dp: Array) -> Array:  # noqa: ARG002
         """The part of the motion across the axis, over the radius, see `Patch`."""
-        rates: Array = (dp - (dp @ self.axis)[..., None] * self.axis) / self.radius
-        return rates
+        return (dp - (dp @ self.axis)[..., None] * self.axis) / self.radius
 
     def _across(self, points: Array) -> Array:
         """Parts of the points' position across the axis."""
         offset = points - self.centre
-        across: Array = offset - (offset @ self.axis)[..., None] * self.axis
-        return across
+        return offset - (offset @ self.axis)[..., None] * self.axis
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -128,14 +121,12 @@ class Ball:
 
     def covers(self, hits: Array) -> NDArray[np.bool_]:
         """Every line that does not pass by, see `Patch`."""
-        met: NDArray[np.bool_] = np.all(np.isfinite(hits), axis=1)
-        return met
+        return np.all(np.isfinite(hits), axis=1)
 
     def normals(self, p: Array) -> Array:
         """Directions straight away from the centre, see `Patch`."""
         offset = p - self.centre
-        normals: Array = offset / np.linalg.norm(offset, axis=-1, keepdims=True)
-        return normals
+        return offset / np.linalg.norm(offset, axis=-1, keepdims=True)
 
     def normal_rates(self, p: Array, dp: Array) -> Array:  # noqa: ARG002
         """The motion over the radius, see `Patch`."""
@@ -144,12 +135,12 @@ class Ball:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ProjectedCurve:
-    """A curve laid on a patch along a direction.
+    """A curve projected onto a patch along a direction.
 
     With the height h along the direction d, ``p = c + h d`` stays on the patch when ``n . (dc + dh d) = 0``.
 
     Attributes:
-        curve: The curve before it is laid.
+        curve: The curve before projection.
         patch: Where it comes to lie.
         direction: Unit direction towards the side it comes from, shape (3,).
     """
@@ -160,7 +151,7 @@ class ProjectedCurve:
 
     @property
     def knots(self) -> Array:
-        """The knots of the curve that is laid."""
+        """The knots of the projected curve."""
         return self.curve.knots
 
     def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:
@@ -191,7 +182,7 @@ def patches_facing(shape: Box | Cylinder | Sphere, X: Array, direction: Array) -
             caps = [Cap(centre=centre + 0.5 * length * n, normal=n, radius=radius) for n in (axis, -axis)]
             wall = Wall(centre=centre, axis=axis, radius=radius, half_length=0.5 * length)
             sides: tuple[Patch, ...] = () if _runs_along(direction, axis) else (wall,)
-            return (*sides, *(cap for cap in caps if cap.normal @ direction > PARALLEL**0.5))
+            return (*sides, *(cap for cap in caps if cap.normal @ direction > PARALLEL_TOL**0.5))
         case Box(size):
             half_edges = 0.5 * np.asarray(size) * R  # column i is the half edge along axis i
             return tuple(
@@ -202,14 +193,14 @@ def patches_facing(shape: Box | Cylinder | Sphere, X: Array, direction: Array) -
                 )
                 for i in range(3)
                 for sign in (1.0, -1.0)
-                if sign * (R[:, i] @ direction) > PARALLEL**0.5
+                if sign * (R[:, i] @ direction) > PARALLEL_TOL**0.5
             )
 
 
 def _runs_along(direction: Array, axis: Array) -> bool:
     """Say whether a direction runs along an axis, so that it never meets the wall round it."""
     across = direction - (direction @ axis) * axis
-    return bool(across @ across <= PARALLEL)
+    return bool(across @ across <= PARALLEL_TOL)
 
 
 def _round_hits(points: Array, direction: Array, *, across: Array, offset: Array, radius: float) -> Array:
@@ -218,9 +209,8 @@ def _round_hits(points: Array, direction: Array, *, across: Array, offset: Array
     ``offset`` and ``across`` are position and direction in the section's plane (for a ball: in space).
     """
     square = across @ across
-    aside = cross(offset, across)
-    rest = radius**2 * square - np.sum(aside * aside, axis=-1)
+    normal = cross(offset, across)
+    rest = radius**2 * square - np.sum(normal * normal, axis=-1)
     root = np.sqrt(np.where(rest >= 0.0, rest, np.nan))
     height = (root - offset @ across) / square
-    hits: Array = points + height[..., None] * direction
-    return hits
+    return points + height[..., None] * direction

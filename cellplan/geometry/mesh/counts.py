@@ -4,11 +4,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
-
-Indices = NDArray[np.int64]
+from cellplan.geometry.arrays import Array, Indices
 
 PAIR_CHUNK: Final = 1_000_000  # point-triangle pairs worked on at once: about 150 MB
 
@@ -96,11 +93,9 @@ def shells(faces: Indices, count: int) -> Indices:
 def face_volumes(vertices: Array, faces: Indices) -> Array:
     """Signed volume of the tetrahedron of each triangle and the middle of the mesh, shape (M,)."""
     corner = vertices[faces] - 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    volumes: Array = _dot(corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6.0
-    return volumes
+    return _dot(corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6.0
 
 
 def _dot(a: Array, b: Array) -> Array:
     """Row-wise scalar product over the last axis."""
-    product: Array = np.einsum("...i,...i->...", a, b)
-    return product
+    return np.einsum("...i,...i->...", a, b)

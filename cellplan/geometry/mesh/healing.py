@@ -6,15 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.counts import Indices, components, count_edges, face_volumes, shells, winding_numbers
+from cellplan.geometry.arrays import Indices
+from cellplan.geometry.mesh.counts import components, count_edges, face_volumes, shells, winding_numbers
 from cellplan.geometry.transforms import Array
 
 MAX_PIECES: Final = 5000  # [-] an assembly with its screws has some hundreds
-PROBES: Final = 64  # [-] vertices of a shell that are asked whether they lie inside the others
+PROBE_COUNT: Final = 64  # [-] vertices of a shell that are tested for lying inside the others
 
 
 def require_few_pieces(faces: Indices, *, source: str) -> None:
-    """Refuse a heap of loose triangles: each piece would have to be asked for itself what it lies inside of.
+    """Refuse a heap of loose triangles: each piece would have to be tested against all others.
 
     Raises:
         InputError: There are more than 5000 connected pieces.
@@ -67,7 +68,7 @@ def turn_outward(vertices: Array, faces: Indices, *, source: str) -> Indices:
     """Flip the whole if it faces inward, then each shell that does and stands alone: the walls of a cavity stay.
 
     Raises:
-        InputError: There are more shells than can be looked at.
+        InputError: There are more shells than can be tested.
     """
     require_few_pieces(faces, source=source)
     if face_volumes(vertices, faces).sum() < 0.0:
@@ -87,8 +88,8 @@ def turn_outward(vertices: Array, faces: Indices, *, source: str) -> Indices:
 
 
 def _all_within(around: Array, points: Array) -> bool:
-    """Whether a surface, triangles of shape (M, 3, 3), winds round all of some points, as far as a few of them tell."""
-    step = max(1, len(points) // PROBES)
+    """Whether a surface, triangles of shape (M, 3, 3), winds round all of some points, tested at a few of them."""
+    step = max(1, len(points) // PROBE_COUNT)
     return all(winding_numbers(around, points[k : k + 1])[0] >= 0.5 for k in range(0, len(points), step))
 
 
@@ -123,5 +124,4 @@ def _without_twins(faces: Indices) -> Indices:
 def _parity(faces: Indices) -> Indices:
     """1 for triangles whose corners stand in an even order, -1 for an odd one: which way they face, shape (M,)."""
     a, b, c = faces.T
-    parity: Indices = np.sign(b - a) * np.sign(c - b) * np.sign(c - a)
-    return parity
+    return np.sign(b - a) * np.sign(c - b) * np.sign(c - a)

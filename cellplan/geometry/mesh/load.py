@@ -1,4 +1,4 @@
-"""Meshes: read from files, checked to be sound, and asked where a ray meets them and what lies inside."""
+"""Meshes: read from files, checked to be sound, and queried by rays and for what lies inside."""
 
 import stat
 from pathlib import Path
@@ -35,9 +35,9 @@ __all__ = [
 ]
 
 MAX_BYTES: Final = 100_000_000
-MIN_EXTENT: Final = 1e-3  # [m] smaller things in a robot cell are slips of the unit
+MIN_EXTENT: Final = 1e-3  # [m] smaller things in a robot cell are errors of the unit
 MAX_EXTENT: Final = 20.0  # [m] larger ones as well
-FLAT_SHARE: Final = 1e-6  # [-] of the extent: thinner than this is a sheet without inside
+FLAT_FRACTION: Final = 1e-6  # [-] of the extent: thinner than this is a sheet without inside
 CREASE: Final = np.radians(30.0)  # [rad] sharper edges stay edges when normals are smoothed
 
 
@@ -47,7 +47,7 @@ def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
     What was read once is found again by the bytes of the file, as long as they and the reading code are the same.
 
     Args:
-        path: The file; its suffix tells the format.
+        path: The file; its suffix gives the format.
         scale: Metres per unit of the file, one number or one for each axis; negative ones mirror.
 
     Returns:
@@ -116,7 +116,7 @@ def is_flat(mesh: Mesh) -> bool:
     """Whether all vertices lie in one plane, up to a millionth of the extent."""
     centred = mesh.vertices - mesh.vertices.mean(axis=0)
     spread = np.linalg.eigvalsh(centred.T @ centred)
-    return bool(spread[0] <= FLAT_SHARE**2 * spread[2])
+    return bool(spread[0] <= FLAT_FRACTION**2 * spread[2])
 
 
 def corner_normals(mesh: Mesh, crease: float = CREASE) -> Array:
@@ -136,7 +136,7 @@ def corner_normals(mesh: Mesh, crease: float = CREASE) -> Array:
     np.add.at(summed, group, (angles[..., None] * normals[:, None, :]).reshape(-1, 3))
     length = np.linalg.norm(summed, axis=1, keepdims=True)
     flat = np.repeat(normals, 3, axis=0)
-    shared = length[group] > FLAT_SHARE  # the normals round a spike can cancel: there the triangle's own one stands
+    shared = length[group] > FLAT_FRACTION  # the normals round a spike can cancel: there the triangle's own one stands
     smooth: Array = np.where(shared, summed[group] / np.where(shared, length[group], 1.0), flat)
     return smooth.reshape(-1, 3, 3)
 
@@ -144,7 +144,7 @@ def corner_normals(mesh: Mesh, crease: float = CREASE) -> Array:
 def contains(mesh: Mesh, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Say which points, shape (N, 3), lie inside the mesh: those its surface winds round, shape (N,).
 
-    A few open edges do no harm. Points on the surface itself may be told either way.
+    A few open edges do no harm. Points on the surface itself may count either way.
     """
     inside = winding_numbers(mesh.vertices[mesh.faces], points) > 0.5
     return np.asarray(inside, dtype=np.bool_)

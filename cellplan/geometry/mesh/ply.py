@@ -57,7 +57,7 @@ class _Element:
 
 
 class _Values:
-    """The numbers behind the header, taken one after the other; text and binary look the same from outside."""
+    """The numbers behind the header, taken one after the other; text and binary have the same interface."""
 
     def __init__(self, body: bytes, order: str) -> None:
         """Take the bytes after the header; ``order`` is the byte order, empty for text."""

@@ -12,7 +12,7 @@ from cellplan.geometry.transforms import Array
 Triangles = tuple[Array, NDArray[np.int64]]
 Polygons = list[Sequence[int]]
 
-FOLD_SHARE: Final = 1e-9  # [-] of the polygon's area: rounding of corners that lie on one line
+FOLD_FRACTION: Final = 1e-9  # [-] of the polygon's area: rounding of corners that lie on one line
 
 
 def fan(vertices: Array, polygons: Polygons, name: str) -> Triangles:
@@ -41,7 +41,7 @@ def _cut(vertices: Array, indices: NDArray[np.int64], name: str) -> NDArray[np.i
             areas = np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0])
             whole = areas.sum(axis=1, keepdims=True)
             leaning = np.sum(areas * whole, axis=2)
-            folded = np.any(leaning < -FOLD_SHARE * np.sum(whole * whole, axis=2), axis=1)
+            folded = np.any(leaning < -FOLD_FRACTION * np.sum(whole * whole, axis=2), axis=1)
         if np.any(folded):
             count = int(folded.sum())
             raise InputError(f"{name}: expected convex faces, got {count} others: triangulate the mesh before export")

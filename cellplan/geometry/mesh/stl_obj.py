@@ -44,7 +44,7 @@ FORMATS: Final = ("stl", "obj", "ply")
 def parse_mesh(data: bytes, name: str) -> Triangles:
     """Vertices, shape (V, 3), and triangles, shape (M, 3), of a mesh file in its own unit.
 
-    The suffix of the name tells the format.
+    The suffix of the name gives the format.
 
     Raises:
         InputError: The format is not read, or the file is damaged.

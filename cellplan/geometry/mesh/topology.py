@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
+from cellplan.geometry.arrays import Indices
 from cellplan.geometry.mesh.counts import (
     EdgeCount,
-    Indices,
     components,
     count_edges,
     face_volumes,
@@ -22,10 +22,10 @@ __all__ = ["EdgeCount", "components", "count_edges", "make_mesh", "mesh_volume",
 
 FaceArray = np.ndarray[tuple[int, int], np.dtype[np.int64]]
 
-WELD_SHARE: Final = 1e-7  # [-] of the extent: vertices written in single precision differ by no more than this
+WELD_FRACTION: Final = 1e-7  # [-] of the extent: vertices written in single precision differ by no more than this
 GRID_SHIFTS: Final = (0.0, 0.5, 0.25)  # [-] of a cell of the grid that vertices are rounded to
-AREA_SHARE: Final = 1e-12  # [-] of the longest side squared: thinner triangles have no usable normal
-LOST_SHARE: Final = 0.5  # [-] of the triangles that may be without area before the mesh counts as damaged
+AREA_FRACTION: Final = 1e-12  # [-] of the longest side squared: thinner triangles have no usable normal
+LOST_FRACTION: Final = 0.5  # [-] of the triangles that may be without area before the mesh counts as damaged
 
 
 def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
@@ -60,7 +60,7 @@ def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
 def mesh_volume(mesh: Mesh) -> float:
     """Enclosed volume in [m³] by the divergence theorem; positive when the triangles face outward.
 
-    An open mesh encloses nothing: the figure then only tells how its triangles lean.
+    An open mesh encloses nothing: the figure then only shows how its triangles lean.
     """
     return _volume(mesh.vertices, mesh.faces)
 
@@ -70,8 +70,8 @@ def _weld(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
     points, corners = _merge(vertices + 0.0, faces, key=vertices + 0.0)  # + 0.0 makes -0 and 0 equal
     if not count_edges(corners[_has_three_corners(corners)]).open:
         return points, corners
-    grid = WELD_SHARE * float(np.ptp(points, axis=0).max())
-    for shift in GRID_SHIFTS:  # two vertices that one grid tells apart lie in one cell of another
+    grid = WELD_FRACTION * float(np.ptp(points, axis=0).max())
+    for shift in GRID_SHIFTS:  # two vertices that one grid separates lie in one cell of another
         near, joined = _merge(points, corners, key=np.round(points / grid + shift))
         if len(near) == len(points):
             break  # no two vertices are that near: the file is not one that rounds
@@ -92,8 +92,7 @@ def _merge(vertices: Array, faces: Indices, *, key: Array) -> tuple[Array, Indic
 
 def _has_three_corners(faces: Indices) -> NDArray[np.bool_]:
     """Which triangles still have three different corners."""
-    distinct: NDArray[np.bool_] = np.all(faces != np.roll(faces, -1, axis=1), axis=1)
-    return distinct
+    return np.all(faces != np.roll(faces, -1, axis=1), axis=1)
 
 
 def _has_area(vertices: Array, faces: Indices) -> NDArray[np.bool_]:
@@ -101,13 +100,12 @@ def _has_area(vertices: Array, faces: Indices) -> NDArray[np.bool_]:
     corner = vertices[faces]
     double_area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     longest = np.sum((corner - np.roll(corner, -1, axis=1)) ** 2, axis=2).max(axis=1, initial=0.0)
-    large: NDArray[np.bool_] = double_area > AREA_SHARE * longest
-    return large
+    return double_area > AREA_FRACTION * longest
 
 
 def _account_for(lost: int, *, total: int, source: str) -> None:
     """A few triangles without area are usual; many mean that the file is damaged."""
-    if lost > LOST_SHARE * total:
+    if lost > LOST_FRACTION * total:
         raise InputError(f"{source}: expected triangles with an area, got {lost} of {total} without: is it damaged?")
 
 

@@ -1,4 +1,4 @@
-"""Entries of a cell file, in millimetres and degrees, become the cell's frozen data in metres and radians."""
+"""Conversion of the entries of a cell file, in millimetres and degrees, to the model in metres and radians."""
 
 from collections.abc import Callable, Collection, Sequence
 from typing import Any, Final
@@ -128,7 +128,7 @@ def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
 
 
 def build_obstacle(name: str, entry: ObstacleEntry, read_mesh: MeshReader) -> Obstacle:
-    """A fixed thing."""
+    """A fixed obstacle."""
     shape, X_WS = obstacle_shape(entry, read_mesh)
     return Obstacle(name=name, shape=shape, X_WS=X_WS)
 
@@ -183,7 +183,7 @@ Direction = str | tuple[float, float, float]
 def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
     """Tool axis (None for the normal) and tool x of a task, as words or vectors.
 
-    A task that prescribes positions only, on a path that is used as drawn, needs no axis; the tool then looks against
+    A task that prescribes positions only, on a path that is not projected, needs no axis; the tool then points against
     the normal of the path's plane.
     """
     if entry.tool_axis not in {None, "normal"}:
@@ -319,7 +319,7 @@ def build_motion(entry: MotionEntry) -> MotionSettings:
 
 
 def build_checks(entry: ChecksEntry) -> CheckSettings:
-    """Demands."""
+    """Requirements of the checks."""
     return CheckSettings(
         clearance=entry.clearance_mm / MM,
         adds_accuracy=entry.body_accuracy == "add",

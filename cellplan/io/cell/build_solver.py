@@ -1,11 +1,10 @@
-"""The solver's entries, in millimetres and degrees, become frozen settings in metres and radians."""
+"""Conversion of the solver's entries to settings in metres and radians."""
 
 from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 
-from cellplan.io.cell.solver_rules import keys_against_accurate
 from cellplan.io.robots.rules import start_keys
 from cellplan.io.schema.solver import ConfigurationGoalEntry, SecondaryEntry, SolverEntry
 from cellplan.io.shapes import MM
@@ -23,7 +22,7 @@ from cellplan.model.solver import (
     WeightingSettings,
 )
 
-HALF_FEEDBACK: Final = 0.5  # gain_per_s * step_s by default: a quarter of where Euler's steps begin to swing
+HALF_FEEDBACK: Final = 0.5  # gain_per_s * step_s by default: a quarter of the stability limit of Euler's steps
 
 
 def build_solver(entry: SolverEntry, step: float, models: Mapping[str, RobotModel]) -> SolverSettings:
@@ -54,16 +53,9 @@ def build_solver(entry: SolverEntry, step: float, models: Mapping[str, RobotMode
         quadratic_program=QuadraticProgramSettings(slack_weight=program.slack_weight, ramp=program.ramp_s),
         weighting=WeightingSettings(near_limits=entry.weighting.near_limits, load=entry.weighting.load),
         goals=_goals(entry.secondary, models),
-        integrator=_integrator(entry),
+        integrator=None if entry.integrator == "auto" else Integrator(entry.integrator),
         accuracy=entry.accuracy_mm / MM,
     )
-
-
-def _integrator(entry: SolverEntry) -> Integrator:
-    """The integrator that is asked for; the accurate one wherever it goes when nothing is said."""
-    if entry.integrator is not None:
-        return Integrator(entry.integrator)
-    return Integrator.EULER if keys_against_accurate(entry) else Integrator.ACCURATE
 
 
 def _goals(entry: SecondaryEntry, models: Mapping[str, RobotModel]) -> tuple[SecondaryGoal, ...]:

@@ -1,6 +1,7 @@
-"""Cell file: read, understood, checked against itself and against the files it names; all findings at once."""
+"""Loading of a cell file and of the files that it names; all findings at once."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -19,13 +20,14 @@ from cellplan.io.cell.build import (
 from cellplan.io.cell.build_accelerations import acceleration_findings
 from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings
 from cellplan.io.cell.build_solver import build_solver
+from cellplan.io.cell.changes import changed, plain_values
 from cellplan.io.cell.referenced_files import Sources
 from cellplan.io.cell.rules import rule_findings
 from cellplan.io.cell.solver_rules import solver_findings
 from cellplan.io.cell.trajectory_rules import Targets, target_findings
 from cellplan.io.cell.user_folders import user_folders
 from cellplan.io.input.allowed_folders import AllowedFolders
-from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, raise_findings, shown
+from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, key_text, raise_findings, shown
 from cellplan.io.robots.rules import robot_findings, with_statements
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.mounting import AttachmentEntry
@@ -37,7 +39,41 @@ from cellplan.model.origin import Origin
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import TimedPath
 
-PART_EXTENT_MM: Final = (1.0, 20_000.0)  # smaller or larger parts are slips of the unit
+PART_EXTENT_MM: Final = (1.0, 20_000.0)  # smaller or larger parts are a wrong unit
+PARTS: Final = ("robots", "part", "tasks", "obstacles", "motion", "solver", "checks")  # of a cell, from its document
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CellFile:
+    """The document of a cell, and the folders of the files that it names.
+
+    Attributes:
+        document: The file, with the values that were changed since.
+        changes: These values by address, in the order in which they were set.
+        name: Name of the file, without folders.
+        folder: Folder that the names of files start from.
+        allow_dirs: Further folders that these files may lie in.
+        parts: What the cell was built from the document with, by attribute.
+    """
+
+    document: YamlDocument
+    changes: Mapping[str, object] = field(default_factory=dict)
+    name: str
+    folder: Path
+    allow_dirs: tuple[Path, ...]
+    parts: Mapping[str, object] = field(default_factory=dict)
+
+    def with_values(self, cell: Cell, values: Mapping[str, object]) -> Cell:
+        """The cell of the document with other values; see ``Cell.with_values``."""
+        for key, part in self.parts.items():
+            if getattr(cell, key) is not part:
+                raise InputError(
+                    f"cell '{cell.name}': expected the cell as it was read, got one whose {key} was changed in Python; "
+                    "call with_values first"
+                )
+        document = changed(self.document, values)
+        kept = {address: value for address, value in self.changes.items() if address not in values}
+        return _read(replace(self, document=document, changes=kept | plain_values(values)))
 
 
 def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path | None = None) -> Cell:
@@ -54,17 +90,22 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
         InputError: The cell file cannot be read at all.
     """
     path = Path(path)
-    file = str(path)
-    document = read_yaml(path, file=file)
+    document = read_yaml(path, file=str(path))
+    allowed = tuple(Path(each) for each in allow_dirs)
+    return _read(CellFile(document=document, name=path.name, folder=folder or path.parent, allow_dirs=allowed))
+
+
+def _read(source: CellFile) -> Cell:
+    """The cell of a document, after all rules were applied to it and to the files that it names."""
+    document, file = source.document, source.document.file
     pieces, findings = read_pieces(document)
     findings += document.findings
     if pieces.is_too_large:
         raise_findings(file, findings)
     findings += rule_findings(pieces, document)
-    start = folder or path.parent
-    allowed = (*(Path(each) for each in allow_dirs), *user_folders(start))
-    sources = Sources(document, AllowedFolders(folder=start, allowed=allowed))
-    sources.inputs[path.name] = document.digest
+    allowed = (*source.allow_dirs, *user_folders(source.folder))
+    sources = Sources(document, AllowedFolders(folder=source.folder, allowed=allowed))
+    sources.inputs[source.name] = document.digest
     models = _models(pieces, document, sources)
     for name, model in models.items():
         findings += robot_findings(name, pieces.robots[name], model, document)
@@ -80,7 +121,7 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
     raise_findings(file, [*findings, *sources.findings], sources.errors)
     if pieces.whole is None:
         raise InputError(f"{file}: the cell cannot be understood")
-    return _cell(pieces.whole, models, targets, document=document, sources=sources)
+    return _cell(pieces.whole, models, targets, source=source, sources=sources)
 
 
 def _models(pieces: Pieces, document: YamlDocument, sources: Sources) -> dict[str, RobotModel]:
@@ -104,7 +145,7 @@ def _targets(pieces: Pieces, sources: Sources) -> Targets:
 
 
 def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
-    """Exclusions name bodies that exist; told only when all robots are known."""
+    """Exclusions name bodies that exist; checked only when all robots are known."""
     if pieces.checks is None or set(models) != set(pieces.names["robots"]):
         return
     known = {"part", *pieces.names["environment"]}
@@ -122,7 +163,7 @@ def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: 
 
 
 def _part_extent(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
-    """A part of a likely size; meshes are looked at by their reader."""
+    """A part of a likely size; meshes are checked by their reader."""
     shape = pieces.part.geometry if pieces.part else None
     if shape is None or shape.mesh is not None:
         return
@@ -163,10 +204,11 @@ def _cell(
     models: Mapping[str, RobotModel],
     targets: Targets,
     *,
-    document: YamlDocument,
+    source: CellFile,
     sources: Sources,
 ) -> Cell:
-    """The cell, once nothing is left to complain about."""
+    """The cell, once there are no findings."""
+    document = source.document
 
     def mesh(written: str, unit: str) -> Mesh:
         """A mesh that was read before."""
@@ -176,8 +218,14 @@ def _cell(
         return found
 
     timed = {name for name, path in targets.items() if isinstance(path, TimedPath)}
-    origin = Origin(file=document.file, lines=document.lines(), document=resolved_document(whole, timed=timed))
-    return Cell(
+    origin = Origin(
+        file=document.file,
+        lines=document.lines(),
+        document=resolved_document(whole, timed=timed),
+        changes=source.changes,
+        changed={key_text(path): text for path, text in document.changes.items()},
+    )
+    cell = Cell(
         name=whole.name,
         robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
         part=build_part(whole.part, mesh),
@@ -189,3 +237,5 @@ def _cell(
         origin=origin,
         inputs=dict(sorted(sources.inputs.items())),
     )
+    parts = {key: getattr(cell, key) for key in PARTS}
+    return replace(cell, origin=replace(cell.origin, source=replace(source, parts=parts)))

@@ -41,7 +41,7 @@ class Sources:
     """
 
     def __init__(self, document: YamlDocument, folders: AllowedFolders) -> None:
-        """Remember where to look and where to complain."""
+        """Keep the folders and the document that findings refer to."""
         self._document = document
         self._folders = folders
         self._meshes: dict[tuple[str, str], Mesh | None] = {}
@@ -53,7 +53,7 @@ class Sources:
     def mesh(
         self, written: str, unit: str, path: KeyPath, *, demand: Callable[[Mesh], None] | None = None
     ) -> Mesh | None:
-        """Mesh in [m] that is as a demand wants it, which raises an input error otherwise; None after a finding."""
+        """Mesh in [m] that meets a requirement, which raises an input error otherwise; None after a finding."""
         if (written, unit) not in self._meshes:
             self._meshes[written, unit] = self._read_mesh(written, unit, path)
         mesh = self._meshes[written, unit]
@@ -131,7 +131,7 @@ class Sources:
         """Keys that say something about a URDF."""
         for key in ("package_dirs", "flange", "locked"):
             if getattr(entry, key):
-                yield self._document.key_finding(("robots", name, key), "unexpected key, it goes with a URDF only")
+                yield self._document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
 
     def _table(self, name: str, entry: RobotEntry, *, is_file: bool) -> RobotModel | None:
         """Model from a joint-axis table, bundled or in a file."""

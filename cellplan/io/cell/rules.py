@@ -1,4 +1,4 @@
-"""Rules between the entries of a cell file: names that must exist, times that must fit, what goes with what."""
+"""Rules between the entries of a cell file: names that must exist, times that must fit, keys that need each other."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -29,7 +29,7 @@ def rule_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
 
 
 def _clashing_names(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
-    """Names of files and folders that some systems cannot tell apart, and names that mean two bodies."""
+    """Names of files and folders that some systems do not distinguish, and names that mean two bodies."""
     for section in ("robots", "tasks"):
         seen: dict[str, str] = {}
         for name in pieces.names[section]:
@@ -143,7 +143,7 @@ def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[F
         cure = "give tool_axis a direction"
         if task.relative_to == "part":
             cure = f"add project: +z (or another side), or {cure}"
-        text = f"tool_axis: normal needs a path that is laid on the part: {cure}"
+        text = f"tool_axis: normal requires a path that is projected onto the part: {cure}"
         key = "path" if task.tool_axis is None else "tool_axis"
         yield document.finding(("tasks", name, key), text)
 

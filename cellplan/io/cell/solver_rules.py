@@ -1,4 +1,4 @@
-"""What the solver and the motion say must fit the cell: feedback and step, joints that exist, goals that can be met."""
+"""Rules of solver and motion: stable feedback, joints that exist, goals that the method can pursue."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final
@@ -9,42 +9,32 @@ from cellplan.io.schema.partial import Pieces
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
-from cellplan.model.solver import ACCURATE_METHODS, NULL_SPACE_METHODS, against_accurate
+from cellplan.model.solver import ACCURATE_METHODS, METHODS, NULL_SPACE_METHODS, against_accurate
 
-FEEDBACK_LIMIT: Final = 2.0  # gain_per_s * step_s at which Euler's steps begin to swing ever wider
+FEEDBACK_LIMIT: Final = 2.0  # gain_per_s * step_s at which Euler's steps become unstable
 OR_EULER: Final = "or choose solver.integrator: euler"
 
 
 def feedback_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
-    """The error feedback dies away with Euler's steps."""
+    """The error feedback is stable with Euler's steps."""
     if pieces.motion is None or pieces.solver is None or pieces.solver.gain_per_s is None:
         return
     gain, step = pieces.solver.gain_per_s, pieces.motion.step_s
     if gain * step >= FEEDBACK_LIMIT:
         text = (
             f"expected a gain below {FEEDBACK_LIMIT / step:g} (2 / step_s), got {gain:g}; "
-            "the error feedback would swing ever wider"
+            "the error feedback would be unstable"
         )
         yield document.finding(("solver", "gain_per_s"), text)
 
 
-def keys_against_accurate(solver: SolverEntry) -> tuple[str, ...]:
-    """Keys of the solver that rule the accurate mode out, whether it is asked for or not."""
-    return against_accurate(
-        solver.method,
-        has_goals=bool(_goals(solver)),
-        near_limits=solver.weighting.near_limits,
-        load=solver.weighting.load,
-    )
-
-
 def accurate_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
-    """The accurate mode, when asked for by name, goes with everything else that is asked of the solver."""
+    """An explicit ``integrator: accurate`` must be compatible with the other settings of the solver."""
     solver = pieces.solver
     if solver is None or solver.integrator != "accurate":
         return
     texts = {
-        "method": f"expected {listed(sorted(ACCURATE_METHODS))} in the accurate mode, got {shown(solver.method)}; "
+        "method": f"expected {listed(ACCURATE_METHODS)} in the accurate mode, got {shown(solver.method)}; "
         f"choose it, {OR_EULER}",
         "secondary": f"expected no goals besides the tasks in the accurate mode, got {listed(_goals(solver))}; "
         f"remove them, {OR_EULER}",
@@ -52,7 +42,10 @@ def accurate_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Findin
         f"remove it, {OR_EULER}",
         "weighting.load": f"expected 0 in the accurate mode, got {shown(solver.weighting.load)}; remove it, {OR_EULER}",
     }
-    for key in keys_against_accurate(solver):
+    weighting = solver.weighting
+    for key in against_accurate(
+        solver.method, has_goals=bool(_goals(solver)), near_limits=weighting.near_limits, load=weighting.load
+    ):
         yield document.finding(("solver", *key.split(".")), texts[key])
 
 
@@ -62,7 +55,7 @@ def _goals(solver: SolverEntry) -> list[str]:
 
 
 def solver_findings(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
-    """Joints that the solver and the motion name exist; the method leaves room for what is asked besides the tasks.
+    """Joints that the solver and the motion name exist; the method has a null space for goals besides the tasks.
 
     Args:
         pieces: What of the file is understood.
@@ -78,7 +71,7 @@ def solver_findings(pieces: Pieces, models: Mapping[str, RobotModel], document: 
             yield document.finding(path, f"expected every joint once, got '{lock.robot}/{lock.joint}' again")
         clock = None if motion is None else motion.duration_s
         if clock is not None and lock.from_s >= clock:
-            text = f"expected an instant before the end at {clock:g} s, got {lock.from_s:g}"
+            text = f"expected a time before the end at {clock:g} s, got {lock.from_s:g}"
             yield document.finding((*path, "from_s"), text)
     if solver is None:
         return
@@ -88,13 +81,13 @@ def solver_findings(pieces: Pieces, models: Mapping[str, RobotModel], document: 
         if step in (solver.search.sequence or ())[:index]:
             yield document.finding(path, f"expected every joint once, got '{step.robot}/{step.joint}' again")
     yield from _configurations(solver, pieces, models, document=document)
-    if solver.method not in NULL_SPACE_METHODS:
+    if not METHODS[solver.method].has_null_space:
         yield from _without_null_space(solver, pieces, document)
 
 
 def _without_null_space(solver: SolverEntry, pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
-    """What a method that leaves no room besides the tasks cannot do."""
-    text = f"expected a method that leaves room besides the tasks ({listed(sorted(NULL_SPACE_METHODS))})"
+    """Goals that a method without a null space cannot pursue."""
+    text = f"expected a method with a null space besides the tasks ({listed(NULL_SPACE_METHODS)})"
     if _goals(solver):
         yield document.finding(("solver", "secondary"), f"{text}, got '{solver.method}'")
     if pieces.motion is not None and pieces.motion.cyclic:

@@ -22,11 +22,11 @@ COLUMNS: Final = (TIME, *POSITION, *AXIS, *QUATERNION)
 
 MOST_BYTES: Final = 50_000_000
 MOST_POINTS: Final = 200_000
-MOST_COMPLAINTS: Final = 20  # lines with findings after which nobody reads on
+MOST_COMPLAINTS: Final = 20  # lines with findings that are reported; more are counted only
 UNIT_ROOM: Final = 1e-3  # [-] room for axes and quaternions written with four digits
-FARTHEST: Final = 100_000.0  # [mm] no part is that large: a slip of the unit
-SHORTEST_S: Final = 1e-6  # [s] between two instants, halved for rounding; no controller tells nearer ones apart
-LATEST: Final = 1e6  # [s] eleven days: a slip of the unit
+FARTHEST: Final = 100_000.0  # [mm] no part is that large: a wrong unit
+SHORTEST_S: Final = 1e-6  # [s] between two times, halved for rounding; no controller resolves less
+LATEST: Final = 1e6  # [s] eleven days: a wrong unit
 CLOSING_ROOM: Final = 1e-3  # [mm] room for a return to the start written with three decimals
 FEWEST_CLOSED: Final = 4  # rows of a trajectory that encloses something and repeats its start
 MM: Final = 1e-3  # [m/mm]
@@ -40,7 +40,7 @@ _LENGTH_UNITS: Final = ("", "_m", "_cm", "_in", "_inch", "_um", "[mm]", " mm", "
 
 @dataclass(slots=True)
 class _Findings:
-    """Findings gathered while reading; more than anybody reads are only counted."""
+    """Findings gathered while reading; beyond a limit they are only counted."""
 
     found: list[Finding] = field(default_factory=list)
 
@@ -64,7 +64,7 @@ def read_toolpath_csv(
 
     Args:
         path: The file.
-        is_smooth: Whether a smooth curve is laid through the points instead of straight sides; a trajectory is smooth.
+        is_smooth: Whether a smooth curve joins the points instead of straight sides; a trajectory is smooth.
         is_closed: Whether the last point is joined to the first; a closed trajectory repeats its start at its end.
         source: Name of the file for messages; by default its last part.
 
@@ -229,19 +229,19 @@ def _units(
 
 
 def _examine_times(times: Array, findings: _Findings) -> None:
-    """Complain about instants that do not start at zero and grow from row to row."""
+    """Require times that start at zero and increase from row to row."""
     if times[0] != 0.0:
         text = f"expected 0 in the first row, got {times[0]:.9g}; a task is shifted by its start_s"
         findings.add(2, text, column=TIME)
     for row in np.flatnonzero(~(np.diff(times) > 0.5 * SHORTEST_S))[:MOST_COMPLAINTS]:
-        text = f"expected an instant after {times[row]:.9g} of the row before, got {times[row + 1]:.9g}"
+        text = f"expected a time after {times[row]:.9g} of the row before, got {times[row + 1]:.9g}"
         findings.add(int(row) + 3, text, column=TIME)
 
 
 def _close(
     values: Array, columns: list[str], directions: tuple[Array | None, Array | None], findings: _Findings
 ) -> None:
-    """Make the last row of a closed trajectory repeat the first to the last digit, or complain that it does not."""
+    """Make the last row of a closed trajectory equal to the first, which it must repeat within rounding."""
     last = len(values) + 1
     if len(values) < FEWEST_CLOSED:
         findings.add(last, f"expected at least {FEWEST_CLOSED} rows for a closed trajectory, got {len(values)}")

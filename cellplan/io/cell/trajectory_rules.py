@@ -26,12 +26,12 @@ def target_findings(pieces: Pieces, targets: Targets, document: YamlDocument) ->
 
 
 def _axes(task: TaskEntry, path: SampledPath | TimedPath, document: YamlDocument, name: str) -> Iterator[Finding]:
-    """A file without orientations, not laid on the part, has no normals."""
+    """A file without orientations that is not projected onto the part has no normals."""
     has_axes = path.axes is not None or path.rotations is not None
     if needs_surface(task) and task.path.project is None and not has_axes:
         project = "" if task.relative_to == "world" else "add project: +z (or another side), "
         text = (
-            "tool_axis: normal needs axes or quaternions in the file, or a path that is laid on the part: "
+            "tool_axis: normal requires axes or quaternions in the file, or a path that is projected onto the part: "
             f"add columns i,j,k, {project}or give tool_axis a direction"
         )
         yield document.finding(("tasks", name, "tool_axis" if task.tool_axis else "path"), text)

@@ -1,7 +1,7 @@
 """Folders that the user allows all cells to read from, by an environment variable or a configuration of the user's own.
 
 A cell has no say in it: a relative path would mean whatever lies beside a cell, and a configuration below the folder of
-the cell, which may have come with it, is not looked at.
+the cell, which may have come with it, is not read.
 """
 
 import os
@@ -34,7 +34,7 @@ def user_folders(cell_folder: Path) -> tuple[Path, ...]:
 
 
 def configuration_file() -> Path | None:
-    """Where the user's own configuration is looked for; None where there is no such place."""
+    """Path of the user's own configuration; None where there is none."""
     place = os.environ.get("APPDATA" if sys.platform == "win32" else "XDG_CONFIG_HOME", "")
     folder = Path(place)
     if not folder.is_absolute():

@@ -102,7 +102,7 @@ def _part(entry: Mapping[str, Any], part: Part) -> dict[str, Any]:
 
 
 def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
-    """A task with its start as it is now; one without a time of its own goes on filling the clock."""
+    """A task with its present start; one without a time of its own still fills the clock."""
     written = {**entry, "start_s": task.start}
     if task.duration is not None:
         written["duration_s"] = task.duration
@@ -126,7 +126,7 @@ def _solver(entry: Mapping[str, Any], solver: SolverSettings) -> dict[str, Any]:
 
 
 def _checks(entry: Mapping[str, Any], checks: CheckSettings) -> dict[str, Any]:
-    """The demands; the clearance as it was asked for."""
+    """Required clearance and tolerances."""
     as_read = entry["clearance_mm"] / 1e3
     return {**entry, "clearance_mm": entry["clearance_mm"] if as_read == checks.clearance else 1e3 * checks.clearance}
 

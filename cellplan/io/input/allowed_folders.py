@@ -63,7 +63,7 @@ class AllowedFolders:
 
 
 def _is(path: Path, question: str) -> bool:
-    """Answer of the file system; names that it cannot even look up are no."""
+    """Answer of the file system; no for names that it cannot resolve."""
     try:
         return bool(getattr(path, question)())
     except (OSError, ValueError):

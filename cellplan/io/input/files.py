@@ -1,4 +1,4 @@
-"""Reading files that somebody else wrote: regular files only, of bounded size, known by their digest."""
+"""Reading foreign files: regular files only, of bounded size, known by their digest."""
 
 import hashlib
 import os

@@ -7,7 +7,7 @@ from typing import Final
 
 from cellplan.errors import InputError, InvalidFileError
 
-COMPLAINT_LIMIT: Final = 100  # a file with more is told so; nobody reads on
+COMPLAINT_LIMIT: Final = 100  # of a file; more are counted only
 SHOWN_LENGTH: Final = 40  # characters of a wrong text that are repeated in a message
 LISTED_LIMIT: Final = 60  # words of a list in a message; more than any robot's joints
 SHORTEST_GUESS: Final = 3  # characters; for shorter words every other one is near
@@ -20,18 +20,21 @@ class Finding:
     """One thing that is wrong in a file.
 
     Attributes:
-        line: Line from 1; 0 when the finding is about the whole file.
+        line: Line from 1; 0 when the finding is about the whole file or about a value that is not in the file.
         key: Key path as the user would write it; empty for the whole file.
         text: What is wrong, what was found and what is allowed.
+        changes: What was changed of the file before it was read: ``motion.duration_s = 2.5``; empty for nothing.
     """
 
     line: int
     key: str
     text: str
+    changes: str = ""
 
     def to_error(self, file: str) -> InputError:
         """The finding as one line: ``file:line: key: text``."""
         where = f"{file}:{self.line}" if self.line else file
+        where += f" with {self.changes}" if self.changes else ""
         return InputError(": ".join(part for part in (where, self.key, self.text) if part))
 
 

@@ -100,7 +100,7 @@ class _Meshes:
     """Mesh files of a table, each read once for each unit."""
 
     def __init__(self, document: YamlDocument, folders: AllowedFolders, place: KeyPath) -> None:
-        """Remember where to look and where to complain."""
+        """Keep the folders and the document that findings refer to."""
         self._document, self._place = document, place
         self._folders = folders
         self._read: dict[tuple[str, str], Mesh] = {}

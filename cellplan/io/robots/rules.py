@@ -9,15 +9,13 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.io.input.findings import Finding, did_you_mean, listed, shown
 from cellplan.io.robots.build_payload import build_payload, payload_findings
-from cellplan.io.robots.urdf.limits import JointLimits
+from cellplan.io.robots.limits import RATES, StatedLimits, limit_findings, limits_of, tightest
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import BodyAccuracy, Joint, RobotModel
 
-FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference posture: farther is a slip of the unit
+FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference configuration: farther is a wrong unit
 Given = tuple[float, ...] | dict[str, Any] | None  # a configuration in the units of a file; None: to be found
-
-ROOM: Final = 1e-9  # [rad] or [m]: degrees in a cell do not read back to the last bit
 
 
 def start_keys(model: RobotModel) -> tuple[str, ...]:
@@ -44,14 +42,14 @@ def _configuration(given: Given, model: RobotModel) -> Array | None:
     return np.where(turns, np.deg2rad(values), np.divide(values, 1000.0))
 
 
-def limits_in_si(entry: LimitsEntry) -> JointLimits:
+def limits_in_si(entry: LimitsEntry) -> StatedLimits:
     """Limits of a cell in [rad], [m], [rad/s], [m/s] and the two rates after these."""
     slides = entry.unit == "mm"
     given = (getattr(entry, name) for name in (SLIDING_LIMITS if slides else TURNING_LIMITS))
     lower, upper, velocity, acceleration, jerk = (
         None if value is None else value / 1000.0 if slides else float(np.deg2rad(value)) for value in given
     )
-    return JointLimits(
+    return StatedLimits(
         lower=lower, upper=upper, velocity=velocity, acceleration=acceleration, jerk=jerk, wraps=entry.wrap
     )
 
@@ -132,10 +130,22 @@ def tightened(
         if limits is None:
             joints.append(joint)
             continue
-        wider = list(_wider(joint, limits))
+        own, cell = limits_of(joint), limits_in_si(limits)
+        wider = list(limit_findings(own, cell, is_revolute=joint.is_revolute))
+        if cell.wraps:
+            wider = [("wrap", "unexpected key, only a continuous joint of a URDF may turn without end")]
         findings += [document.finding((*path, "limits", joint.name, key), text) for key, text in wider]
-        joints.append(joint if wider else _within(joint, limits_in_si(limits)))
+        joints.append(joint if wider else _within(joint, tightest(own, cell), is_slowed=cell.velocity is not None))
     return replace(model, joints=tuple(joints)), findings
+
+
+def _within(joint: Joint, limits: StatedLimits, *, is_slowed: bool) -> Joint:
+    """The joint with tighter limits; one whose velocity the cell limits keeps its rated velocity."""
+    return replace(
+        joint,
+        rated_velocity=joint.top_speed if is_slowed else None,
+        **{name: getattr(limits, name) for name in RATES},
+    )
 
 
 def with_statements(entry: RobotEntry, model: RobotModel) -> RobotModel:
@@ -145,51 +155,3 @@ def with_statements(entry: RobotEntry, model: RobotModel) -> RobotModel:
         bodies = tuple(replace(body, accuracy=None) for body in model.bodies)
         model = replace(model, body_accuracy=accuracy, bodies=bodies)
     return model if entry.payload is None else replace(model, payload=build_payload(entry.payload))
-
-
-def _wider(joint: Joint, entry: LimitsEntry) -> Iterator[tuple[str, str]]:
-    """Limits of a cell that allow more than the model does, by key; and what leaves no room."""
-    limits, unit = limits_in_si(entry), "deg" if joint.is_revolute else "mm"
-    if limits.wraps:
-        yield "wrap", "unexpected key, only a continuous joint of a URDF may turn without end"
-        return
-    for key, value, own, ending in (
-        ("lower", limits.lower, joint.lower, unit),
-        ("upper", limits.upper, joint.upper, unit),
-        ("velocity", limits.velocity, joint.velocity, f"{unit}_s"),
-        ("acceleration", limits.acceleration, joint.acceleration, f"{unit}_s2"),
-        ("jerk", limits.jerk, joint.jerk, f"{unit}_s3"),
-    ):
-        if value is None or own is None:
-            continue
-        sign = -1.0 if key == "lower" else 1.0
-        if sign * (value - own) > ROOM:
-            bound = f"at {'least' if key == 'lower' else 'most'} {shown(_in_file_unit(joint, own))}"
-            text = f"expected {bound}, the limit of the model, got {shown(_in_file_unit(joint, value))}"
-            yield f"{key}_{ending}", text
-    lower = joint.lower if limits.lower is None else limits.lower
-    upper = joint.upper if limits.upper is None else limits.upper
-    if not lower < upper:
-        key = "lower" if limits.upper is None else "upper"
-        ends = f"{shown(_in_file_unit(joint, lower))} and {shown(_in_file_unit(joint, upper))}"
-        yield f"{key}_{unit}", f"expected a lower limit below the upper one, got {ends}"
-
-
-def _within(joint: Joint, limits: JointLimits) -> Joint:
-    """The joint with tighter limits; limits of acceleration and jerk may also be new ones."""
-    accelerations = [value for value in (joint.acceleration, limits.acceleration) if value is not None]
-    jerks = [value for value in (joint.jerk, limits.jerk) if value is not None]
-    return replace(
-        joint,
-        acceleration=min(accelerations, default=None),
-        jerk=min(jerks, default=None),
-        rated_velocity=None if limits.velocity is None else joint.top_speed,
-        lower=joint.lower if limits.lower is None else max(joint.lower, limits.lower),
-        upper=joint.upper if limits.upper is None else min(joint.upper, limits.upper),
-        velocity=joint.velocity if limits.velocity is None else min(joint.velocity, limits.velocity),
-    )
-
-
-def _in_file_unit(joint: Joint, value: float) -> float:
-    """Degrees or millimetres for a message."""
-    return round(float(np.rad2deg(value)) if joint.is_revolute else 1000.0 * value, 6)

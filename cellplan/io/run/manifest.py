@@ -19,7 +19,7 @@ SIZE_LIMIT: Final = 5_000_000  # [bytes] of the manifest; two hundred runs of si
 BUNDLED: Final = "bundled:"  # begins the name of an input that comes with the program
 MADE_LATER: Final = frozenset({PROGRAMS, REHEARSAL, "view.html"})  # made from a run after it was written; no part of it
 IGNORED: Final = ".DS_Store"  # put into every folder by the file manager of one system
-KEYS: Final = ("schema", "cell", "status", "cell_file", "inputs", "versions", "files")
+KEYS: Final = ("schema", "cell", "status", "cell_file", "changes", "inputs", "versions", "files")
 _DIGEST: Final = re.compile(r"[0-9a-f]{64}")
 
 
@@ -39,6 +39,7 @@ class Manifest:
         cell: Name of the cell.
         status: ``passed`` or ``failed``.
         cell_file: Name of the cell file, without folders.
+        changes: Values that were set when the cell was solved, by their address in the cell file.
         inputs: SHA-256 of every file that was read, by its path from the folder of the cell file.
         versions: Version by package, of those whose arithmetic the result rests on.
         files: Every file of the run but the manifest, by its path in the run folder.
@@ -47,6 +48,7 @@ class Manifest:
     cell: str
     status: str
     cell_file: str
+    changes: Mapping[str, object]
     inputs: Mapping[str, str]
     versions: Mapping[str, str]
     files: Mapping[str, StoredFile]
@@ -73,6 +75,7 @@ def render_manifest(
         "cell": cell.name,
         "status": "passed" if passed else "failed",
         "cell_file": PurePath(cell.origin.file).name,
+        "changes": dict(cell.origin.changes),
         "inputs": dict(sorted(cell.inputs.items())),
         "versions": dict(versions),
         "files": {name: {"bytes": size, "sha256": digest} for name, (size, digest) in sorted(files.items())},
@@ -102,6 +105,7 @@ def parse_manifest(data: bytes, file: str) -> Manifest:
         raise InputError(f"{file}: inputs: expected the cell file {shown(texts['cell_file'])} among them")
     return Manifest(
         **texts,
+        changes=dict(_mapping(record, "changes", file)) if "changes" in record else {},
         inputs=inputs,
         versions={name: str(value) for name, value in _mapping(record, "versions", file)},
         files={

@@ -53,7 +53,7 @@ class GraspEntry(Entry):
     )
     depth_mm: Annotated[float, Field(ge=0.0, le=1000.0)] = Field(
         default=2.0,
-        description="How deep the holder's flange, tool and all that is rigid with them may reach into the part.",
+        description="Largest penetration of the part by the holder's flange, tool and all that is rigid with them.",
     )
 
     @model_validator(mode="after")
@@ -64,7 +64,7 @@ class GraspEntry(Entry):
 
 
 class PartEntry(Entry):
-    """The workpiece; somebody holds it, or it is fixed in the world."""
+    """The workpiece, held by robots or fixed in the world."""
 
     geometry: PartShapeEntry = Field(description="Shape of the part.")
     held_by: tuple[GraspEntry, ...] = Field(
@@ -74,7 +74,7 @@ class PartEntry(Entry):
         "world.",
     )
     at: PoseEntry | None = Field(
-        default=None, description="Pose of the part frame in the world; required exactly when nobody holds the part."
+        default=None, description="Pose of the part frame in the world; required exactly when no robot holds the part."
     )
     mass_kg: Mass | None = Field(
         default=None, description="Mass, for the payload and for weights that grow with the load; absent: not stated."
@@ -93,7 +93,7 @@ class PartEntry(Entry):
         if not self.held_by and self.at is None:
             raise rule("missing, expected the pose of the part in the world, or a robot under held_by", "at")
         if self.centre_mm is not None and self.mass_kg is None:
-            raise rule("unexpected key, a centre of mass goes with mass_kg", "centre_mm")
+            raise rule("unexpected key, a centre of mass requires mass_kg", "centre_mm")
         if self.held_by and set(self.held_by[0].axes) != set(ALL_AXES):
             words = "unexpected key, the first holder carries the part frame; further holders may leave axes open"
             raise rule(words, "held_by[0].axes")
@@ -101,12 +101,12 @@ class PartEntry(Entry):
 
 
 class LockedJointEntry(Entry):
-    """A joint that fails on the way."""
+    """A joint that fails during the motion."""
 
     robot: Name = Field(description="Robot of the joint.")
-    joint: Text = Field(description="Joint that stays where it is.")
+    joint: Text = Field(description="Joint that is locked.")
     from_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
-        default=0.0, description="Instant from which on it stays where it is."
+        default=0.0, description="Time from which on it is locked."
     )
 
 
@@ -120,7 +120,7 @@ class MotionEntry(Entry):
     duration_s: Seconds | None = Field(
         default=None,
         description="Length of the common clock; every task ends within it. When absent, every task has a time of its "
-        "own (duration_s, feed_mm_s or a file with instants) and the clock ends with the last one.",
+        "own (duration_s, feed_mm_s or a file with times) and the clock ends with the last one.",
     )
     step_s: Seconds = Field(default=0.001, description="Time between two samples.")
     controller_cycle_ms: CycleTime = Field(
@@ -130,12 +130,12 @@ class MotionEntry(Entry):
     corners: CornerChoice = Field(default="stop", description="Stop at corners, or round them.")
     cyclic: bool = Field(default=False, description="Whether all joints are to end where they started.")
     locked_joints: tuple[LockedJointEntry, ...] = Field(
-        default=(), description="Joints that fail on the way; the others take over as far as they can."
+        default=(), description="Joints that fail during the motion; the others compensate where they can."
     )
 
     @model_validator(mode="after")
     def _has_a_sensible_clock(self) -> Self:
-        """At least one step, and not more samples than anybody can use."""
+        """At least one step, and a bounded number of samples."""
         if self.duration_s is None:
             return self
         if self.step_s > self.duration_s:
@@ -164,7 +164,7 @@ class ExclusionEntry(Entry):
 
 
 class ChecksEntry(Entry):
-    """What the checks demand."""
+    """Requirements of the checks."""
 
     clearance_mm: Annotated[float, Field(ge=0.0, le=10_000.0)] = Field(
         default=5.0, description="Smallest allowed distance between things that must not touch."
@@ -260,7 +260,7 @@ class CellDocument(Entry):
     part: PartEntry = Field(description="The workpiece.")
     tasks: dict[Name, TaskEntry] = Field(min_length=1, max_length=TASK_LIMIT, description="Tasks by name.")
     environment: dict[Name, ObstacleEntry] = Field(
-        default={}, max_length=OBSTACLE_LIMIT, description="Fixed things in the cell by name."
+        default={}, max_length=OBSTACLE_LIMIT, description="Fixed obstacles in the cell by name."
     )
     motion: MotionEntry = Field(description="Who moves, and the common clock.")
     acceleration: AccelerationChoice | None = Field(
@@ -269,6 +269,6 @@ class CellDocument(Entry):
         "own: {full_speed_in_s: [0.25, 0.25, 0.25, 0.15]} when absent. A stated limit of a joint counts before it; "
         "unlimited leaves also those unjudged that a robot file states.",
     )
-    solver: SolverEntry = Field(default=SolverEntry(), description="How joint speeds are found.")
-    checks: ChecksEntry = Field(default=ChecksEntry(), description="What the checks demand.")
+    solver: SolverEntry = Field(default=SolverEntry(), description="Resolution method, integrator and their settings.")
+    checks: ChecksEntry = Field(default=ChecksEntry(), description="Requirements of the checks.")
     layout: LayoutEntry | None = Field(default=None, description="What a layout search may change; not used by solve.")

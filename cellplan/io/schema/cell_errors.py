@@ -7,7 +7,7 @@ from pydantic import ConfigDict, Field, Tag, model_validator
 from cellplan.io.schema.common import Entry, Name, by_kind, one_of_keys, require_one
 from cellplan.io.schema.solver import LARGEST_SEED
 
-LARGEST_SHIFT_MM: Final = 1_000.0  # an error of a metre is a slip of the unit
+LARGEST_SHIFT_MM: Final = 1_000.0  # an error of a metre is a wrong unit
 LARGEST_TURN_ERROR_DEG: Final = 45.0  # likewise an eighth of a turn
 TRIAL_LIMIT: Final = 10_000
 AMOUNT_WORDS: Final = "a number, {normal: NUMBER} or {uniform: NUMBER}"
@@ -20,7 +20,7 @@ TurnWidth = Annotated[float, Field(ge=0.0, le=LARGEST_TURN_ERROR_DEG)]
 
 
 class ShiftSpreadEntry(Entry):
-    """A length that differs from trial to trial, zero on average."""
+    """A length that varies from trial to trial, with mean zero."""
 
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SPREADS))
 
@@ -35,7 +35,7 @@ class ShiftSpreadEntry(Entry):
 
 
 class TurnSpreadEntry(Entry):
-    """An angle that differs from trial to trial, zero on average."""
+    """An angle that varies from trial to trial, with mean zero."""
 
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SPREADS))
 
@@ -60,7 +60,7 @@ TurnAmount = Annotated[
 
 
 class PoseErrorEntry(Entry):
-    """Pose of a real frame seen from the one that the cell names."""
+    """Pose of an actual frame in the nominal one."""
 
     xyz_mm: tuple[ShiftAmount, ShiftAmount, ShiftAmount] = Field(default=(0.0, 0.0, 0.0), description="Position.")
     rpy_deg: tuple[TurnAmount, TurnAmount, TurnAmount] = Field(
@@ -69,27 +69,30 @@ class PoseErrorEntry(Entry):
 
 
 class RobotErrorsEntry(Entry):
-    """How one robot differs from its data sheet and its place."""
+    """Deviations of one robot from its data sheet and its pose."""
 
     joint_offsets_deg: dict[str, TurnAmount] = Field(
-        default={}, description="Real less told angle of revolute joints, by joint name."
+        default={}, description="Actual minus commanded angle of revolute joints, by joint name."
     )
     joint_offsets_mm: dict[str, ShiftAmount] = Field(
-        default={}, description="Real less told position of prismatic joints, by joint name."
+        default={}, description="Actual minus commanded position of prismatic joints, by joint name."
     )
     link_lengths_mm: dict[str, ShiftAmount] = Field(
         default={},
-        description="By how much the link before a joint is longer: the joint's axis point, and everything after it, "
+        description="Excess length of the link before a joint: the joint's axis point, and everything after it, "
         "moves away from the axis point of the joint before (from the base frame's origin for the first joint).",
     )
-    base: PoseErrorEntry = Field(default=PoseErrorEntry(), description="The real base seen from the written one.")
+    base: PoseErrorEntry = Field(
+        default=PoseErrorEntry(), description="Pose of the actual base in the nominal base frame."
+    )
     tool: PoseErrorEntry = Field(
-        default=PoseErrorEntry(), description="The real tool tip seen from the written one, z out of the tool."
+        default=PoseErrorEntry(),
+        description="Pose of the actual tool tip in the nominal tool frame, z out of the tool.",
     )
 
 
 class MeasurementEntry(Entry):
-    """The measuring system that looks at the tools on the part."""
+    """The measuring system that measures the tools relative to the part."""
 
     position_noise_mm: ShiftWidth = Field(
         default=0.0, description="Standard deviation of each measured coordinate of a tool tip."
@@ -103,15 +106,15 @@ class ErrorsDocument(Entry):
     """A whole errors file."""
 
     cellplan_errors: Literal[1] = Field(description="Version of the format.")
-    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(default=0, description="Seed of all draws.")
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(default=0, description="Seed of all samples.")
     trials: Annotated[int, Field(ge=1, le=TRIAL_LIMIT)] = Field(
-        default=1, description="Number of real cells that are drawn, where an amount is a distribution."
+        default=1, description="Number of sampled cells, where an amount is a distribution."
     )
     robots: dict[Name, RobotErrorsEntry] = Field(
         default={}, description="Errors of the cell's robots by name; a robot that is not named is exact."
     )
     grasp: dict[Name, PoseErrorEntry] = Field(
         default={},
-        description="The real part seen from where it should sit, by the name of the robot that holds it.",
+        description="Pose of the actual part in the nominal part frame, by the name of the robot that holds it.",
     )
     measurement: MeasurementEntry = Field(default=MeasurementEntry(), description="Noise of the measuring system.")

@@ -11,7 +11,7 @@ Component = Annotated[float, Field(ge=-1e6, le=1e6)]
 PlaneDirection = tuple[Component, Component]
 
 START_WORDS: Final = "+x, -x, +y, -y, +z, -z or a direction [u, v] on the plane's axes"
-SHORTEST_START: Final = 1e-6  # [-] a shorter direction is a slip
+SHORTEST_START: Final = 1e-6  # [-] a shorter vector has no direction
 
 StartChoice = Annotated[
     Annotated[SignedAxis, Tag(f"<{START_WORDS}>")] | Annotated[PlaneDirection, Tag("<list>")],

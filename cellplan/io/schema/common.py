@@ -11,8 +11,8 @@ NAME_WORDS: Final = "a name of 1 to 40 letters, digits, '_' or '-' that does not
 
 FARTHEST_MM: Final = 100_000.0  # nothing in a cell is farther away than 100 m
 THINNEST_MM: Final = 0.001  # nothing solid is thinner than a micrometre
-LARGEST_FRAME_DEG: Final = 720.0  # two turns: more in the pose of a frame is a slip of the unit
-LARGEST_TURN_DEG: Final = 3_600.0  # ten turns: more is a slip of the unit
+LARGEST_FRAME_DEG: Final = 720.0  # two turns: more in the pose of a frame is a wrong unit
+LARGEST_TURN_DEG: Final = 3_600.0  # ten turns: more is a wrong unit
 
 Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN)]
 Coordinate = Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)]
@@ -24,7 +24,7 @@ PlaneCoordinates = tuple[Coordinate, Coordinate]
 FrameAngle = Annotated[float, Field(ge=-LARGEST_FRAME_DEG, le=LARGEST_FRAME_DEG)]
 Angles = tuple[FrameAngle, FrameAngle, FrameAngle]
 
-SHORTEST_DIRECTION: Final = 1e-6  # [-] a shorter vector is a slip, not a direction
+SHORTEST_DIRECTION: Final = 1e-6  # [-] a shorter vector has no direction
 
 
 def rule(text: str, key: str = "") -> PydanticCustomError:

@@ -1,14 +1,16 @@
-"""Findings of the file format in plain words: pydantic's findings, told as where, what, got and allowed."""
+"""Mismatches between a file and its format: pydantic's findings as data, located in the file."""
 
 import re
 from collections.abc import Mapping
+from functools import partial
 from types import NoneType, UnionType
 from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, Tag, ValidationError
 
-from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown
-from cellplan.io.schema.common import NAME_WORDS, Entry
+from cellplan.io.input.findings import Finding, KeyPath
+from cellplan.io.schema.common import Entry
+from cellplan.io.schema.mismatch import Kind, Mismatch, mismatch_text
 from cellplan.io.yaml.reader import YamlDocument
 
 UNITS: Final[Mapping[str, str]] = {
@@ -22,8 +24,10 @@ UNITS: Final[Mapping[str, str]] = {
     "_mm": "millimetres",
     "_s": "seconds",
 }  # by the ending of the key, longest first
-FINDING_LIMIT: Final = 1000  # findings that are told; a file with more is not corrected line by line
+FINDING_LIMIT: Final = 1000  # findings that are reported; a file with more is not corrected line by line
 TAG: Final = re.compile(r"<.*>")
+COUNTS: Final = frozenset({"too_short", "too_long"})
+BOUNDS: Final = frozenset({"greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number"})
 
 
 AnyEntry = TypeVar("AnyEntry", bound=Entry)
@@ -43,8 +47,9 @@ def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | 
         return model.model_validate(document.root), []
     except ValidationError as error:
         findings = error.errors(include_url=False, include_context=True, include_input=False)
-    told = [_Finding(model, document, dict(finding)).finding() for finding in findings[:FINDING_LIMIT]]
-    return None, [finding for finding in dict.fromkeys(told) if finding is not None]
+    mismatches = [_Reader(model, document, dict(finding)).mismatch() for finding in findings[:FINDING_LIMIT]]
+    located = [_located(mismatch, document) for mismatch in mismatches if mismatch is not None]
+    return None, list(dict.fromkeys(located))
 
 
 def understood(model: type[AnyEntry], document: YamlDocument, path: KeyPath) -> AnyEntry | None:
@@ -65,103 +70,101 @@ def value_at(root: Any, path: KeyPath) -> Any:
     return root
 
 
-class _Finding:
-    """One finding of pydantic, with its place in the file and in the format."""
+def _located(mismatch: Mismatch, document: YamlDocument) -> Finding:
+    """A mismatch as a line of the file: at its key when the key is wrong, else at its value."""
+    text = mismatch_text(mismatch)
+    if mismatch.is_at_key:
+        return document.key_finding(mismatch.path, text)
+    return document.finding(mismatch.path, text)
 
-    def __init__(self, model: type[Entry], document: YamlDocument, finding: dict[str, Any]) -> None:
-        """Take the finding apart."""
+
+class _Reader:
+    """Reads one finding of pydantic, with its place in the file and in the format."""
+
+    def __init__(self, model: type[Entry], document: YamlDocument, finding: Mapping[str, Any]) -> None:
+        """Split the finding into its place and its kind."""
         location = tuple(finding["loc"])
         self.model = model
         self.document = document
         self.is_key = location[-1:] == ("[key]",)
         self.location: KeyPath = location[:-1] if self.is_key else location
         self.path: KeyPath = tuple(key for key in self.location if not TAG.fullmatch(str(key)))
-        self.kind: str = finding["type"]
+        self.type: str = finding["type"]
         self.text: str = finding["msg"]
         self.context: dict[str, Any] = finding.get("ctx", {})
 
-    def finding(self) -> Finding | None:
-        """The finding in plain words; None when the reader has complained about this value already."""
+    @property
+    def value(self) -> Any:
+        """What stands at the place of the finding."""
+        return value_at(self.document.root, self.path)
+
+    def mismatch(self) -> Mismatch | None:
+        """The finding as data; None when another one about the same value says more."""
         if any(self.path[: n + 1] in self.document.unreadable for n in range(len(self.path))):
             return None
         if self.is_key:
-            return self.document.key_finding(self.path, f"expected {NAME_WORDS}, got {shown(self.path[-1])}")
-        if self.kind == "extra_forbidden":
-            return self.document.key_finding(self.path, self._unknown_key())
-        return self._rule() if self.kind == "rule" else self._value()
-
-    def _value(self) -> Finding | None:
-        """Finding about a value that is absent or not allowed."""
-        if self.kind == "too_short" and len(value_at(self.document.root, self.path)) >= self.context["min_length"]:
+            return Mismatch(kind=Kind.NAME, path=self.path, got=self.path[-1])
+        if self.type == "extra_forbidden":
+            allowed = fields_of(annotation_at(self.model, self.location[:-1]))
+            return Mismatch(kind=Kind.UNKNOWN_KEY, path=self.path, allowed=tuple(allowed))
+        if self.type == "rule":
+            below = re.findall(r"[^.\[\]]+", self.context["key"])
+            path = (*self.path, *(int(key) if key.isdigit() else key for key in below))
+            return Mismatch(kind=Kind.RULE, path=path, expected=self.context["text"])
+        if self.type == "too_short" and len(self.value) >= self.context["min_length"]:
             return None  # short only of entries that are wrong themselves
-        if self.kind != "missing":
-            return self._about(self.path, self._allowed())
+        return self._missing() if self.type == "missing" else self._about_value()
+
+    def _missing(self) -> Mismatch:
+        """A key or an element of a list of fixed length that is absent."""
         if isinstance(self.path[-1], int):
-            return self._about(self.path[:-1], self._expected(self.location[:-1]))
-        return self.document.finding(self.path, f"missing, expected {self._description()}")
+            got = value_at(self.document.root, self.path[:-1])
+            return Mismatch(kind=Kind.TYPE, path=self.path[:-1], expected=self._type(self.location[:-1]), got=got)
+        fields = fields_of(annotation_at(self.model, self.location[:-1]))
+        words = (fields[str(self.location[-1])].description or "a value").rstrip(".")
+        expected = words if words[:2].isupper() else words[:1].lower() + words[1:]
+        return Mismatch(kind=Kind.MISSING, path=self.path, expected=expected)
 
-    def _about(self, path: KeyPath, expected: str) -> Finding:
-        """Finding about a value: expected, got."""
-        value = value_at(self.document.root, path)
-        is_word = isinstance(value, str) and self.kind == "literal_error"
-        hint = did_you_mean(value, _words(expected)) if is_word else ""
-        got = str(len(value)) if expected.startswith("at ") and isinstance(value, dict | tuple) else shown(value)
-        return self.document.finding(path, f"expected {expected}, got {got}{hint}")
-
-    def _rule(self) -> Finding:
-        """Finding of a rule between several keys."""
-        path = self.path
-        for key in re.findall(r"[^.\[\]]+", self.context["key"]):
-            path = (*path, int(key) if key.isdigit() else key)
-        text = self.context["text"]
-        if text.startswith("unexpected key"):
-            return self.document.key_finding(path, text)
-        return self.document.finding(path, text)
-
-    def _unknown_key(self) -> str:
-        """What to say about a key that nobody knows."""
-        allowed = list(_fields(_annotation_at(self.model, self.location[:-1])))
-        return f"unknown key{did_you_mean(str(self.path[-1]), allowed)}; allowed: {listed(allowed)}"
-
-    def _description(self) -> str:
-        """What a missing key is for."""
-        fields = _fields(_annotation_at(self.model, self.location[:-1]))
-        words = fields[str(self.location[-1])].description or "a value"
-        first = words.rstrip(".")
-        return first if first[:2].isupper() else first[:1].lower() + first[1:]
-
-    def _allowed(self) -> str:
-        """What may stand here, by the kind of finding."""
+    def _about_value(self) -> Mismatch:
+        """A value that is not allowed."""
+        about = partial(Mismatch, path=self.path, got=self.value)
         branch = str(self.location[-1]) if self.location else ""
-        if self.kind == "choice":
-            return self.text
-        if TAG.fullmatch(branch) and self.kind in {"literal_error", "string_type"}:
-            return branch[1:-1]
-        if self.kind in {"too_short", "too_long"} and not _is_fixed_list(_annotation_at(self.model, self.location)):
-            return self._count()
-        if self.kind == "string_pattern_mismatch":
-            return NAME_WORDS
-        if self.kind in {"greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number"}:
+        if self.type == "choice":
+            return about(kind=Kind.TYPE, expected=self.text)
+        if TAG.fullmatch(branch) and self.type in {"literal_error", "string_type"}:
+            kind = Kind.CHOICE if self.type == "literal_error" else Kind.TYPE
+            return about(kind=kind, expected=branch[1:-1], allowed=tuple(_words(branch[1:-1])))
+        if self.type in COUNTS and not _is_fixed_list(annotation_at(self.model, self.location)):
+            return about(kind=Kind.COUNT, at_least=self.context.get("min_length"), at_most=self._most_entries())
+        if self.type == "string_pattern_mismatch":
+            return about(kind=Kind.NAME)
+        if self.type in BOUNDS:
             return self._bound()
-        return self._expected(self.location)
+        expected = self._type(self.location)
+        is_literal = self.type == "literal_error"
+        return about(
+            kind=Kind.CHOICE if is_literal else Kind.TYPE,
+            expected=expected,
+            allowed=tuple(_words(expected)) if is_literal else (),
+        )
 
-    def _count(self) -> str:
-        """How many entries are allowed."""
-        is_short = self.kind == "too_short"
-        bound = self.context["min_length" if is_short else "max_length"]
-        return f"at {'least' if is_short else 'most'} {bound} {'entry' if bound == 1 else 'entries'}"
+    def _most_entries(self) -> int | None:
+        """Largest number of entries, where there are too many."""
+        return self.context["max_length"] if self.type == "too_long" else None
 
-    def _bound(self) -> str:
-        """A number and its bound, with the unit that the key names."""
-        number = f"number{self._unit()}"
-        value = value_at(self.document.root, self.path)
+    def _bound(self) -> Mismatch:
+        """A number beyond its bound, or one that is not finite."""
         lower = self.context.get("gt", self.context.get("ge"))
-        if lower is not None and lower >= 0.0 and value <= 0.0 and not (lower == 0.0 and "ge" in self.context):
-            return f"a positive {number}"
-        if lower is not None:
-            return f"a {number} of at least {shown(lower)}"
-        upper = self.context.get("le", self.context.get("lt"))
-        return f"a {number} of at most {shown(upper)}" if upper is not None else f"a finite {number}"
+        is_positive = lower is not None and lower >= 0.0 >= self.value and not (lower == 0.0 and "ge" in self.context)
+        return Mismatch(
+            kind=Kind.BOUND,
+            path=self.path,
+            at_least=lower,
+            at_most=self.context.get("le", self.context.get("lt")),
+            is_positive=is_positive,
+            unit=self._unit(),
+            got=self.value,
+        )
 
     def _unit(self) -> str:
         """`` of millimetres``, from the ending of the nearest key."""
@@ -169,11 +172,10 @@ class _Finding:
         unit = next((unit for ending, unit in UNITS.items() if key.endswith(ending)), None)
         return " per second" if key.endswith("_per_s") else f" of {unit}" if unit else ""
 
-    def _expected(self, location: KeyPath) -> str:
-        """What the format wants at a place."""
-        annotation = _annotation_at(self.model, location)
-        is_number = annotation is float
-        return f"a number{self._unit()}" if is_number else _phrase(annotation)
+    def _type(self, location: KeyPath) -> str:
+        """The type of value that the format has at a place."""
+        annotation = annotation_at(self.model, location)
+        return f"a number{self._unit()}" if annotation is float else _phrase(annotation)
 
 
 def _words(expected: str) -> list[str]:
@@ -181,7 +183,7 @@ def _words(expected: str) -> list[str]:
     return re.split(", | or ", re.split(" or a | or [{]", expected)[0])
 
 
-def _fields(annotation: Any) -> Mapping[str, Any]:
+def fields_of(annotation: Any) -> Mapping[str, Any]:
     """Fields of an entry; none of anything else."""
     return annotation.model_fields if isinstance(annotation, type) and issubclass(annotation, BaseModel) else {}
 
@@ -216,14 +218,14 @@ def _tagged_arms(annotation: Any) -> dict[str, Any]:
     return branches
 
 
-def _annotation_at(annotation: Any, location: KeyPath) -> Any:
+def annotation_at(annotation: Any, location: KeyPath) -> Any:
     """What the format says about a place."""
     for key in location:
         if TAG.fullmatch(str(key)):
             annotation = _tagged_arms(annotation).get(str(key))
             continue
         annotation = _bare(annotation)
-        if fields := _fields(annotation):
+        if fields := fields_of(annotation):
             annotation = fields[str(key)].annotation if str(key) in fields else None
         elif get_origin(annotation) is dict:
             annotation = get_args(annotation)[1]
@@ -247,7 +249,7 @@ def _phrase(annotation: Any) -> str:
         arms = get_args(annotation)
         items = {float: "numbers", str: "texts"}.get(_bare(arms[0]), "entries")
         return f"a list of {items}" if arms[-1] is Ellipsis else f"a list of {len(arms)} {items}"
-    if fields := _fields(annotation):
+    if fields := fields_of(annotation):
         return f"a mapping with keys out of {', '.join(fields)}"
     kinds = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
     return kinds.get(annotation, "a mapping")

@@ -32,7 +32,7 @@ class Pieces:
         whole: The whole file; None when anything in it is not understood.
         robots: Robots that are understood, by name.
         tasks: Tasks that are understood, by name.
-        environment: Fixed things that are understood, by name.
+        environment: Obstacles that are understood, by name.
         part: The part, if understood.
         motion: The motion, if understood.
         solver: The solver's settings, if understood.
@@ -56,12 +56,12 @@ class Pieces:
 
     @property
     def is_too_large(self) -> bool:
-        """Whether there are more robots or tasks than any cell has, so that nothing else is worth a look."""
+        """Whether there are more robots or tasks than any cell has, so that no other finding matters."""
         return len(self.robots) > ROBOT_LIMIT or len(self.tasks) > TASK_LIMIT or not self.names["robots"]
 
 
 def read_pieces(document: YamlDocument) -> tuple[Pieces, list[Finding]]:
-    """Understand a cell file as far as possible; the findings tell the rest."""
+    """Parse a cell file as far as possible; the findings name the rest."""
     whole, findings = validate(CellDocument, document)
     pieces = Pieces(
         whole=whole,

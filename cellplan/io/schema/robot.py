@@ -9,9 +9,9 @@ from cellplan.io.schema.common import Angle, Coordinate, Coordinates, Entry, Pos
 from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
 
-LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a slip of the unit
-FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a slip of the unit
-FASTEST_MM_S: Final = 10_000.0  # 10 m/s: faster is a slip of the unit
+LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a wrong unit
+FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a wrong unit
+FASTEST_MM_S: Final = 10_000.0  # 10 m/s: faster is a wrong unit
 STEEPEST: Final = 1e9  # deg/s2 or mm/s2, as in robot files
 WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses all its digits
 HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
@@ -61,9 +61,9 @@ class ToolEntry(PoseEntry):
 
     @model_validator(mode="after")
     def _weighs_what_it_balances(self) -> Self:
-        """A centre of mass goes with a mass."""
+        """A centre of mass requires a mass."""
         if self.centre_mm is not None and self.mass_kg is None:
-            raise rule("unexpected key, a centre of mass goes with mass_kg", "centre_mm")
+            raise rule("unexpected key, a centre of mass requires mass_kg", "centre_mm")
         return self
 
 

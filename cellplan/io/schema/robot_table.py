@@ -165,8 +165,8 @@ class RobotTableDocument(Entry):
     )
     bodies: BodiesChoice = Field(
         default=(),
-        description="Solids of the links, in the base frame at the reference posture: a list of them, or a mapping "
-        "that also states how good they are.",
+        description="Solids of the links, in the base frame at the reference configuration: a list of them, or a "
+        "mapping that also states their accuracy.",
     )
     payload: PayloadEntry | None = Field(
         default=None, description="What the robot may carry; the report says so when absent."

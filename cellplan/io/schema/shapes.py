@@ -94,9 +94,9 @@ def require_unit(entry: Entry) -> None:
     if has_mesh and not has_unit:
         raise rule(_UNIT_RULE, "unit")
     if has_unit and not has_mesh:
-        raise rule("unexpected key, a unit goes with a mesh only", "unit")
+        raise rule("unexpected key, a unit requires a mesh", "unit")
     if getattr(entry, "open", None) is not None and not has_mesh:
-        raise rule("unexpected key, open goes with a mesh only", "open")
+        raise rule("unexpected key, open requires a mesh", "open")
 
 
 class OneShape(Entry):

@@ -21,10 +21,10 @@ Gain = Annotated[float, Field(gt=0.0, le=1e9)]
 
 
 class DampedLeastSquaresEntry(Entry):
-    """When the damping of `damped_least_squares` sets in; `damping` says how large it grows."""
+    """Where the damping of `damped_least_squares` sets in; `damping` is its largest factor."""
 
     measure: Literal["singular_value", "manipulability"] = Field(
-        default="singular_value", description="What tells how near a singularity is."
+        default="singular_value", description="Measure of the distance from a singularity."
     )
     region: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
         default=0.02,
@@ -35,7 +35,7 @@ class DampedLeastSquaresEntry(Entry):
 
 
 class FilteredInverseEntry(Entry):
-    """How `filtered_inverse` and `filtered_inverse_ii` follow the Jacobian."""
+    """Settings of `filtered_inverse` and `filtered_inverse_ii`."""
 
     gain_per_s: Gain = Field(default=1000.0, description="Update gain.")
     start: Literal["zero", "inverse"] = Field(
@@ -51,18 +51,18 @@ class SearchJointEntry(Entry):
 
 
 class SearchEntry(Entry):
-    """How `heuristic_search` and `recursive_search` look for the next configuration."""
+    """Settings of `heuristic_search` and `recursive_search`."""
 
     tolerance_mm: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(
-        default=1e-4, description="Largest root of the cost at which an instant counts as reached."
+        default=1e-4, description="Largest square root of the cost at which a sample counts as reached."
     )
     orientation_weight_m2: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
         default=0.01, description="Weight of the orientation in the cost."
     )
     rounds: Annotated[int, Field(ge=1, le=MOST_ROUNDS)] = Field(
-        default=2000, description="Rounds over all joints before an instant counts as out of reach."
+        default=2000, description="Rounds over all joints after which a sample counts as out of reach."
     )
-    brakes: bool = Field(default=False, description="Whether joints slow down on their way to a limit.")
+    brakes: bool = Field(default=False, description="Whether joints slow down near their limits.")
     sequence: tuple[SearchJointEntry, ...] | None = Field(
         default=None,
         min_length=1,
@@ -75,18 +75,18 @@ class QuadraticProgramEntry(Entry):
     """Limits and slack of `quadratic_program`."""
 
     slack_weight: Annotated[float, Field(gt=0.0, le=1e12)] = Field(
-        default=1e8, description="Weight of the task's slack against the weighted joint speeds."
+        default=1e8, description="Cost of the task's slack relative to that of weighted joint velocities."
     )
     ramp_s: Annotated[float, Field(gt=0.0, le=1e3)] | None = Field(
         default=None,
-        description="Time in which a joint without an acceleration limit reaches its top speed; absent: at once.",
+        description="Time in which a joint without an acceleration limit reaches its velocity limit; absent: at once.",
     )
 
 
 class ManipulabilityGoalEntry(Entry):
     """Away from singularities."""
 
-    gain: Gain = Field(default=1.0, description="How strongly, in rad^2/s per unit of log manipulability.")
+    gain: Gain = Field(default=1.0, description="Gain in rad^2/s per unit of log manipulability.")
 
 
 class JointLimitsGoalEntry(Entry):
@@ -94,26 +94,23 @@ class JointLimitsGoalEntry(Entry):
 
     gain: Gain = Field(
         default=100.0,
-        description="How strongly, in rad^2/s: a joint of range r in an arm of n joints is drawn back at the rate "
-        "gain / (n r^2).",
+        description="Gain in rad^2/s: a joint of range r in an arm of n joints returns at the rate gain / (n r^2).",
     )
 
 
 class ObstacleGoalEntry(Entry):
     """Distance from obstacles and from other robots."""
 
-    gain: Gain = Field(default=0.1, description="How strongly, in rad^2/s.")
+    gain: Gain = Field(default=0.1, description="Gain in rad^2/s.")
     within_mm: Annotated[float, Field(gt=0.0, le=10_000.0)] = Field(
-        default=200.0, description="Distance below which bodies push each other away."
+        default=200.0, description="Distance below which bodies repel each other."
     )
 
 
 class ConfigurationGoalEntry(Entry):
     """A desired configuration."""
 
-    gain: Gain = Field(
-        default=1.0, description="How strongly, in 1/s: the rate at which a joint of weight 1 goes there."
-    )
+    gain: Gain = Field(default=1.0, description="Gain in 1/s: the rate at which a joint of weight 1 approaches it.")
     at: dict[Name, dict[str, JointPosition]] = Field(
         default={}, description="Reference positions by robot, one key per joint; robots left out: their start posture."
     )
@@ -134,25 +131,25 @@ class WeightingEntry(Entry):
     """Joint weights that change along the motion."""
 
     near_limits: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
-        default=0.0, description="How strongly a joint is held back on its way to a limit; 0: not at all."
+        default=0.0, description="Gain of the weight that grows as a joint approaches a limit; 0: constant weights."
     )
     load: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
-        default=0.0, description="How strongly a joint is held back by the weight it has to lift; 0: not at all."
+        default=0.0, description="Gain of the weight that grows with the gravity load of a joint; 0: constant weights."
     )
 
 
 class SolverEntry(Entry):
-    """How joint motion is found."""
+    """Resolution method, integrator and their settings."""
 
     method: MethodName = Field(
         default="weighted_pseudo_inverse", description='Resolution method; the guide "Which method when" compares them.'
     )
-    integrator: Literal["accurate", "euler"] | None = Field(
-        default=None,
-        description="How joint speeds become positions: accurate resolves the motion until the tool error between all "
-        "nodes is below accuracy_mm, euler steps along the clock and feeds the error back. accurate goes with "
-        "weighted_pseudo_inverse, without secondary goals, near_limits and load. When absent: accurate where it goes, "
-        "else euler; gain_per_s and damping do not count in this.",
+    integrator: Literal["auto", "accurate", "euler"] = Field(
+        default="auto",
+        description="How joint velocities become positions: accurate finds joint polynomials whose tool error between "
+        "all nodes is below accuracy_mm, euler steps along the clock and feeds the pose error back. accurate requires "
+        "weighted_pseudo_inverse without secondary goals, near_limits and load; gain_per_s and damping do not apply to "
+        "it. auto is accurate where that is possible, else euler.",
     )
     accuracy_mm: Annotated[float, Field(ge=1e-9, le=1.0)] = Field(
         default=1e-4,
@@ -161,13 +158,13 @@ class SolverEntry(Entry):
     )
     gain_per_s: Gain | None = Field(
         default=None,
-        description="Gain of the pose-error feedback; 0.5 / step_s when absent. gain_per_s * step_s is below 2. Used "
-        "by euler, and by accurate only where it has to fall back to Euler's steps.",
+        description="Gain of the pose-error feedback; 0.5 / step_s when absent. gain_per_s * step_s is below 2. "
+        "Applies to Euler's steps, also where the accurate mode falls back to them.",
     )
     damping: DampingChoice = Field(
         default="auto",
-        description="Largest damping factor; auto lets the smallest singular value decide, 0 turns it off. Used by "
-        "euler, and by accurate only where it has to fall back to Euler's steps.",
+        description="Largest damping factor; auto: from the smallest singular value, 0: no damping. Applies to "
+        "Euler's steps, also where the accurate mode falls back to them.",
     )
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(default=0, description="Seed of every random search.")
     damped_least_squares: DampedLeastSquaresEntry = Field(

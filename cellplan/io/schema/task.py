@@ -25,7 +25,7 @@ PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
 FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
 DEEPEST_CUT_MM: Final = 100.0  # a tool that is to stand deeper in the part is no tool that works on its surface
-LONGEST_S: Final = 1e6  # [s] eleven days: longer is a slip of the unit
+LONGEST_S: Final = 1e6  # [s] eleven days: longer is a wrong unit
 MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
 Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
@@ -85,7 +85,7 @@ class CsvEntry(Entry):
         "that brings its own clock."
     )
     smooth: bool = Field(
-        default=True, description="Whether a curve is laid through the points instead of straight sides."
+        default=True, description="Whether the points are joined by a smooth curve instead of straight sides."
     )
     closed: bool = Field(
         default=False,
@@ -140,7 +140,7 @@ CornerChoice = Annotated[
 
 
 class PathEntry(Entry):
-    """Exactly one path, and how it is laid on the part."""
+    """Exactly one path, and its projection onto the part."""
 
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PATHS))
 
@@ -151,7 +151,8 @@ class PathEntry(Entry):
     csv: CsvChoice | None = Field(default=None, description="Tool targets from a file.")
     project: Direction | None = Field(
         default=None,
-        description="Side of the part that the path is laid on, seen from the part frame; absent: used as drawn.",
+        description="Side of the part, as a direction in the part frame, from which the path is projected onto the "
+        "part; absent: not projected.",
     )
     offset_mm: Coordinate | None = Field(
         default=None,
@@ -160,7 +161,7 @@ class PathEntry(Entry):
 
     @model_validator(mode="after")
     def _is_one_path(self) -> Self:
-        """Exactly one path; an offset goes with a planar path that is used as drawn."""
+        """Exactly one path; an offset goes with a planar path that is not projected."""
         require_one(self, PATHS)
         if self.offset_mm is not None and not self.is_planar:
             raise rule("unexpected key, only a path in a plane has an offset", "offset_mm")
@@ -220,7 +221,10 @@ class TaskEntry(Entry):
         description="Direction of the tool's z axis in the part frame; normal, the default, points into the surface or "
         "takes the file's orientations.",
     )
-    tool_x: Direction = Field(default="+x", description="Direction in the part frame that the tool's x axis leans to.")
+    tool_x: Direction = Field(
+        default="+x",
+        description="Direction in the part frame onto which the tool's x axis is aligned as closely as possible.",
+    )
     tool_turn_deg: Angle = Field(
         default=0.0,
         description="Angle by which the tool turns about its own z axis, evenly over the length of the path, "
@@ -247,19 +251,19 @@ class TaskEntry(Entry):
         default=None, description="Largest speed along the path on the surface; excludes duration_s."
     )
     repeat: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
-        default=1, description="How often a closed path is gone through; more than once only a closed one."
+        default=1, description="Number of cycles along the path; more than one only for a closed path."
     )
     approach_mm: StandOff = Field(
-        default=0.0, description="Distance from which the tool comes to the start of its path, along its own axis."
+        default=0.0, description="Distance from which the tool approaches the start of its path, along its own axis."
     )
     approach_s: Seconds = Field(default=0.5, description="Time for the approach, which ends when the path starts.")
     retract_mm: StandOff = Field(
-        default=0.0, description="Distance to which the tool leaves the end of its path, along its own axis."
+        default=0.0, description="Distance to which the tool retracts from the end of its path, along its own axis."
     )
-    retract_s: Seconds = Field(default=0.5, description="Time for leaving.")
+    retract_s: Seconds = Field(default=0.5, description="Time for the retraction.")
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
         default=0.0,
-        description="Time after the start during which the tool may come from beside its path: its error is reported "
+        description="Time after the start during which the tool may converge to its path: its error is reported "
         "and not judged. Shorter than the task.",
     )
     tool_depth_mm: ToolDepth | None = Field(
@@ -275,11 +279,11 @@ class TaskEntry(Entry):
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
-        """Duration or feed; each word once; only a path on the part has a surface to lie on."""
+        """Duration or feed; each word once; only a path on the part can be projected onto its surface."""
         if self.duration_s is not None and self.feed_mm_s is not None:
             raise rule("expected either duration_s or feed_mm_s, got both", "feed_mm_s")
         if self.relative_to == "world" and self.path.project is not None:
-            raise rule("unexpected key, a path in the world is not laid on the part", "path.project")
+            raise rule("unexpected key, a path in the world is not projected onto the part", "path.project")
         if self.relative_to == "world" and self.tool_depth_mm is not None:
             raise rule("unexpected key, a tool in the world does not work on the part", "tool_depth_mm")
         for name, words in (("axes", self.axes), ("free", self.free)):
@@ -297,7 +301,7 @@ class TaskEntry(Entry):
 
     @property
     def leaving_s(self) -> float:
-        """Time after the path that leaving takes."""
+        """Time after the path that the retraction takes."""
         return self.retract_s if self.retract_mm else 0.0
 
     @property

@@ -61,6 +61,7 @@ class YamlDocument:
         keys: Place of each key.
         findings: What the reader refused; the caller adds its own and raises all at once.
         unreadable: Key paths whose value was refused.
+        changes: Key paths at which other values were set after reading, each with its text in messages.
     """
 
     file: str
@@ -70,6 +71,7 @@ class YamlDocument:
     keys: Mapping[KeyPath, Mark]
     findings: tuple[Finding, ...]
     unreadable: frozenset[KeyPath]
+    changes: Mapping[KeyPath, str] = field(default_factory=dict)
 
     def line(self, path: KeyPath) -> int:
         """Line of a value; of the nearest enclosing one when the value is absent."""
@@ -79,12 +81,23 @@ class YamlDocument:
 
     def finding(self, path: KeyPath, text: str) -> Finding:
         """A finding about a value."""
-        return Finding(line=self.line(path), key=key_text(path), text=text)
+        return self._finding(path, self.line(path), text)
 
     def key_finding(self, path: KeyPath, text: str) -> Finding:
         """A finding about a key."""
-        line = self.keys[path].line if path in self.keys else self.line(path)
-        return Finding(line=line, key=key_text(path), text=text)
+        return self._finding(path, self.keys[path].line if path in self.keys else self.line(path), text)
+
+    def _finding(self, path: KeyPath, line: int, text: str) -> Finding:
+        """A finding at a line, or at the change that set the value."""
+        is_new = path not in self.values
+        set_here = [
+            change
+            for place, change in self.changes.items()
+            if path[: len(place)] == place or (is_new and place[: len(path)] == path)
+        ]
+        if set_here:
+            return Finding(line=0, key=key_text(path), text=text, changes=set_here[-1])
+        return Finding(line=line, key=key_text(path), text=text, changes=", ".join(self.changes.values()))
 
     def lines(self) -> dict[str, int]:
         """Line of each value by key path as text."""

@@ -58,7 +58,7 @@ def _number_or_text(text: str) -> str | int | float:
 
 
 def _number(text: str) -> int | float:
-    """Finite number that is written so that nobody can take it for an octal one."""
+    """Finite number that cannot be read as an octal one."""
     if LEADING_ZERO.match(text):
         raise SurpriseError(f"expected a number without leading zeros, got {_short(text)}; it can be read as octal")
     if len(text) <= WHOLE_DIGITS and WHOLE_NUMBER.fullmatch(text):

@@ -20,7 +20,7 @@ def _block_mapping(values: Mapping[str, object], indent: str) -> Iterator[str]:
     """Lines of a mapping, one key to a line."""
     for key, value in values.items():
         head = f"{indent}{_text(key)}:"
-        flow = f"{head} {_flow(value)}"
+        flow = f"{head} {flow_text(value)}"
         is_open = isinstance(value, Mapping | tuple | list) and bool(value)
         if not is_open or (_depth(value) <= 2 and len(flow) <= WIDTH):
             yield flow
@@ -35,7 +35,7 @@ def _block(value: object, indent: str) -> Iterator[str]:
         yield from _block_mapping(value, indent)
     elif isinstance(value, tuple | list):
         for item in value:
-            yield f"{indent}- {_flow(item)}"
+            yield f"{indent}- {flow_text(item)}"
 
 
 def _depth(value: object) -> int:
@@ -47,12 +47,16 @@ def _depth(value: object) -> int:
     return 0
 
 
-def _flow(value: object) -> str:
-    """A value on one line."""
+def flow_text(value: object) -> str:
+    """A value on one line, as it would stand behind its key.
+
+    Raises:
+        ValueError: A number in it is not finite.
+    """
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_text(key)}: {_flow(item)}" for key, item in value.items()) + "}"
+        return "{" + ", ".join(f"{_text(key)}: {flow_text(item)}" for key, item in value.items()) + "}"
     if isinstance(value, tuple | list):
-        return "[" + ", ".join(_flow(item) for item in value) + "]"
+        return "[" + ", ".join(flow_text(item) for item in value) + "]"
     if isinstance(value, bool):
         return "true" if value else "false"
     return _number(value) if isinstance(value, int | float) else _text(str(value))

@@ -14,17 +14,7 @@ from cellplan.io.run.manifest import BUNDLED
 from cellplan.io.run.stored import CELL, StoredRun
 from cellplan.model.cell import Cell
 
-ANY: Final = "*"
 FOUND: Final = frozenset({"start", "start_deg", "home", "home_deg"})  # written ``auto`` where they were to be found
-METHOD: Final = ("solver", "method")
-INTEGRATOR: Final = ("solver", "integrator")
-CHOSEN: Final = (  # what the command line may have set instead of the cell file
-    ("motion", "mode"),
-    ("motion", "duration_s"),
-    METHOD,
-    INTEGRATOR,
-    ("checks", "clearance_mm"),
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,7 +24,7 @@ class StoredCell:
     Attributes:
         cell: The cell that was solved, every start posture filled in.
         compared: Names of the inputs that are as they were.
-        remarks: What was not compared, or chosen on the command line.
+        remarks: What was not compared, or set when the cell was solved.
     """
 
     cell: Cell
@@ -52,26 +42,26 @@ def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequen
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
 
     Raises:
-        InputError: An input has changed or cannot be found; the resolved copy is not made from the cell file.
+        InputError: An input has changed or cannot be looked for; the resolved copy is not made from the cell file.
     """
     if cell is None:
         return _without_file(stored)
-    original = load_cell(cell, allow_dirs=allow_dirs)
+    changes = stored.manifest.changes
+    original = load_cell(cell, allow_dirs=allow_dirs).with_values(changes)
     now = {stored.manifest.cell_file if name == cell.name else name: sha for name, sha in original.inputs.items()}
     _refuse_stale(stored, now, where=f"'{cell}'")
     resolved = _resolved(stored, folder=cell.parent, allow_dirs=allow_dirs)
     written, copied = written_document(original), written_document(resolved)
-    found = list(_differences(written, copied))
-    chosen = [each for each in found if _may_differ(each[0], each[1])]
-    foreign = [each for each in found if each not in chosen]
+    foreign = [each for each in _differences(written, copied) if not _may_differ(each[0], each[1])]
     if foreign:
         raise InvalidFileError([_foreign(stored, cell, each) for each in foreign])
-    remarks = [
-        f"{key_text(path)}: {shown(new)} was chosen on the command line; the cell file has {shown(old)}"
-        for path, old, new in chosen
-        if path[-1] not in FOUND and not _follows(path, original, chosen)
-    ]
-    return StoredCell(cell=resolved, compared=tuple(now), remarks=tuple(remarks))
+    remarks = tuple(f"{_change(address, value)} when the cell was solved" for address, value in changes.items())
+    return StoredCell(cell=resolved, compared=tuple(now), remarks=remarks)
+
+
+def _change(address: str, value: object) -> str:
+    """A value that was set, as text."""
+    return f"{address} was left out" if value is None else f"{address} was set to {shown(value)}"
 
 
 def _without_file(stored: StoredRun) -> StoredCell:
@@ -144,18 +134,7 @@ def _differences(old: object, new: object, path: KeyPath = ()) -> Iterator[tuple
 
 def _may_differ(path: KeyPath, old: object) -> bool:
     """Whether a run may have another value there than its cell file."""
-    if len(path) == 3 and path[0] == "robots" and path[2] in FOUND:
-        return old == "auto" or old is None
-    return any(
-        len(path) == len(chosen) and all(key in (ANY, part) for key, part in zip(chosen, path, strict=True))
-        for chosen in CHOSEN
-    )
-
-
-def _follows(path: KeyPath, original: Cell, chosen: Sequence[tuple[KeyPath, object, object]]) -> bool:
-    """Whether a value follows from another one: an integrator that the cell file leaves open goes with the method."""
-    is_open = path == INTEGRATOR and key_text(path) not in original.origin.lines
-    return is_open and any(other == METHOD for other, _, _ in chosen)
+    return len(path) == 3 and path[0] == "robots" and path[2] in FOUND and (old == "auto" or old is None)
 
 
 def _foreign(stored: StoredRun, cell: Path, difference: tuple[KeyPath, object, object]) -> InputError:

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.certify.run_pairs import rows_moved_by, scene_of_rows, scene_of_run
-from cellplan.certify.still_robots import HomeTrials, Instants
+from cellplan.certify.still_robots import HomeTrials, RunSamples
 from cellplan.checks.clearance.check import check_clearance
 from cellplan.errors import HomeNotFoundError
 from cellplan.geometry.transforms import Array
@@ -120,7 +120,7 @@ class _Search:
         self._cell, self._robot, self._chain = scene.cell, robot, scene.chains[robot.name]
         self._runs = [_idle_run(scene, run, robot.name) for run in runs if robot.name in run.phase.idle]
         picked = [np.unique(np.linspace(0, len(run.q) - 1, INSTANTS).astype(int)) for run in self._runs]
-        instants = [Instants(scene=run.scene, q=run.q[few]) for run, few in zip(self._runs, picked, strict=True)]
+        instants = [RunSamples(scene=run.scene, q=run.q[few]) for run, few in zip(self._runs, picked, strict=True)]
         self._trials = HomeTrials(robot.name, instants)
         self._failed = Counter[str]()
 

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
 
 
 def joint_record(joint: Joint) -> dict[str, Any]:
-    """Name, type, limits and speed of one joint; the unit stands in the keys."""
-    scale, unit = (math.degrees(1.0), "deg") if joint.is_revolute else (1e3, "mm")
+    """Name, type, limits and speed of one joint, with the unit in the keys."""
+    unit, scale = joint.display_unit
     return {
         "name": joint.name,
         "type": str(joint.kind),
@@ -22,13 +22,13 @@ def joint_record(joint: Joint) -> dict[str, Any]:
 
 
 def limits_text(record: dict[str, Any]) -> tuple[str, str]:
-    """Range and largest speed of one joint, for people."""
+    """Range and largest speed of one joint as text."""
     unit = "deg" if "lower_deg" in record else "mm"
     lower, upper = record[f"lower_{unit}"], record[f"upper_{unit}"]
-    limits = "without end" if lower is None or upper is None else f"{lower:g} … {upper:g} {unit}"
+    limits = "endless" if lower is None or upper is None else f"{lower:g} … {upper:g} {unit}"
     return limits, f"{record[f'velocity_{unit}_s']:g} {unit}/s"
 
 
 def _figure(value: float) -> float | None:
-    """The figure of the data sheet again; None for a joint that may turn without end."""
+    """The value of the data sheet; None for an endless joint."""
     return float(f"{value:.9g}") if math.isfinite(value) else None

@@ -6,11 +6,10 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.motion import Motion, NearestSingular
-from cellplan.model.solver import Integrator, MethodName, SolverSettings
+from cellplan.model.solver import Integrator, SolverSettings
 from cellplan.model.units import MM
 from cellplan.report.record.common import Number, number
 
-SEARCHES: Final[frozenset[MethodName]] = frozenset({"heuristic_search", "recursive_search"})  # no error feedback
 SLACK_UNIT: Final = "norm of the twist residual, mixed units: m/s and rad/s"
 
 
@@ -156,7 +155,7 @@ def _own_settings(solver: SolverSettings) -> SettingsRecord:
     if solver.method == "quadratic_program":
         program = solver.quadratic_program
         return {"slack_weight": number(program.slack_weight), "ramp_s": number(program.ramp)}
-    return _search_settings(solver) if solver.method in SEARCHES else {}
+    return _search_settings(solver) if solver.traits.is_search else {}
 
 
 def _search_settings(solver: SolverSettings) -> SettingsRecord:

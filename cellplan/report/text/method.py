@@ -6,24 +6,10 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.model.solver import Integrator, MethodName
+from cellplan.model.solver import METHODS, Integrator, MethodName, MethodTraits
 from cellplan.report.record.common import Record
-from cellplan.report.record.solver import SEARCHES
 
 DEFAULT_METHOD: Final[MethodName] = "weighted_pseudo_inverse"  # not mentioned in summaries
-METHOD_NAMES: Final[dict[MethodName, str]] = {
-    "weighted_pseudo_inverse": "weighted pseudo-inverse",
-    "damped_least_squares": "damped least squares",
-    "jacobian_transpose": "Jacobian transpose",
-    "filtered_inverse": "filtered inverse I",
-    "filtered_inverse_ii": "filtered inverse II",
-    "heuristic_search": "heuristic search, the best joint first",
-    "recursive_search": "recursive search, joint by joint",
-    "quadratic_program": "quadratic program",
-}
-EULER_STEPS: Final[frozenset[MethodName]] = frozenset(  # the others iterate towards each sample
-    {"weighted_pseudo_inverse", "damped_least_squares", "quadratic_program"}
-)
 SHOWN_DIGITS: Final = 2  # of an error between nodes
 MIN_SHOWN: Final = 1e-9  # [mm] smaller errors are shown as this one
 
@@ -55,11 +41,12 @@ def method_lines(record: Record, step_s: float) -> Iterator[str]:
 
 def _integration_lines(record: Record, step: str) -> Iterator[str]:
     """The method and the integration of joint velocities."""
-    name, resolution = METHOD_NAMES[record["method"]], record["resolution"]
+    traits: MethodTraits = METHODS[record["method"]]
+    name, resolution = traits.label, record["resolution"]
     feedback = f"pose errors are fed back with a gain of {record['gain_per_s']:g} per second"
     if record["integrator"] != Integrator.ACCURATE:
-        steps = f", Euler steps of {step}" if record["method"] in EULER_STEPS else ""
-        yield f"Method: {name}{steps}." if record["method"] in SEARCHES else f"Method: {name}{steps}; {feedback}."
+        steps = f", Euler steps of {step}" if traits.takes_euler_steps else ""
+        yield f"Method: {name}{steps}." if traits.is_search else f"Method: {name}{steps}; {feedback}."
         return
     yield f"Method: {name}."
     if resolution is None:

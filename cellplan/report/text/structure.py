@@ -1,19 +1,19 @@
-"""What ``cellplan explain`` shows on the screen: a cell's structure in lines of at most a hundred columns."""
+"""The structure of a cell as text, in lines of at most a hundred columns."""
 
 import textwrap
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final
 
+from cellplan.report.record.common import Record
 from cellplan.report.record.joint_limits import limits_text
 
-Record = dict[str, Any]
-WIDTH = 100  # columns of a terminal that most people have
-GAP = 2  # spaces between two columns of a table
-BLOCKS = {-1: "- J", 1: "+ J", 0: "."}
+WIDTH: Final = 100  # columns of a terminal
+GAP: Final = 2  # spaces between two columns of a table
+BLOCKS: Final = {-1: "- J", 1: "+ J", 0: "."}
 
 
 def structure_lines(record: Record) -> list[str]:
-    """Lines for people about one cell."""
+    """All lines about one cell."""
     joints = sum(len(robot["joints"]) for robot in record["robots"])
     counts = [(len(record["robots"]), "robot"), (joints, "joint"), (len(record["tasks"]), "task")]
     holders = ", ".join(record["part"]["held_by"])
@@ -33,12 +33,12 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def _robot_lines(robots: list[Record]) -> Iterator[str]:
+def _robot_lines(robots: Iterable[Record]) -> Iterator[str]:
     for robot in robots:
         duties = ["holds the part"] if robot["holds_part"] else []
         duties += [f"works on {', '.join(robot['works_on'])}"] if robot["works_on"] else []
         yield ""
-        yield from _wrapped(f"robot {robot['name']}  ({robot['model']}) ", " and ".join(duties) or "stands by")
+        yield from _wrapped(f"robot {robot['name']}  ({robot['model']}) ", " and ".join(duties) or "idle")
         name_width = max((len(axis["name"]) for axis in robot["joints"] + robot["followers"]), default=0)
         for joint in robot["joints"]:
             limits, speed = limits_text(joint)
@@ -47,9 +47,9 @@ def _robot_lines(robots: list[Record]) -> Iterator[str]:
             yield f"  {axis['name']:<{name_width}}  {axis['type']:<9}  {axis['ratio']:g} times {axis['leader']}"
 
 
-def _task_lines(tasks: list[Record]) -> Iterator[str]:
+def _task_lines(tasks: Sequence[Record]) -> Iterator[str]:
     yield ""
-    yield "tasks, and what they ask for on the part"
+    yield "tasks and their constrained components"
     task_width, robot_width = _width(task["name"] for task in tasks), _width(task["robot"] for task in tasks)
     for task in tasks:
         desired = [name for name in task["constrained"] if not name.startswith("across")]
@@ -63,13 +63,13 @@ def _closure_lines(part: Record) -> Iterator[str]:
     if closures:
         width = _width(closure["name"] for closure in closures)
         yield ""
-        yield f"grasps that close a loop over the part and the world; {part['held_by'][0]} carries the part frame"
+        yield f"grasps of co-holders, which close kinematic loops; {part['held_by'][0]} carries the part frame"
         for closure in closures:
-            yield f"  {closure['name']:<{width}}  keeps {' '.join(closure['kept'])}"
+            yield f"  {closure['name']:<{width}}  constrains {' '.join(closure['kept'])}"
 
 
 def _graph_lines(graph: Record, closures: list[str]) -> Iterator[str]:
-    """Counts, then every chain as the links it joins."""
+    """Counts, then the links and joints of every chain."""
     e, v, circuits = graph["edges"], graph["vertices"], graph["independent_circuits"]
     where = "PPPS, in space" if graph["plane"] is None else f"PPR, in the plane {graph['plane']}"
     virtual = sum(joint["virtual"] for joint in graph["joints"])
@@ -86,18 +86,18 @@ def _graph_lines(graph: Record, closures: list[str]) -> Iterator[str]:
 
 
 def _owner(joint: Record, closures: list[str]) -> str:
-    """Whose chain a joint belongs to: a robot's, a task's, or what the grasp of a further holder leaves open."""
+    """Name of the chain of a joint: of a robot, of a task, or of the free components of a co-holder's grasp."""
     if not joint["virtual"]:
         return str(joint["owner"])
     return f"{'grasp' if joint['owner'] in closures else 'task'} {joint['owner']}"
 
 
 def _circuit_lines(record: Record) -> Iterator[str]:
-    """The joints round each circuit, from the part on, with the sign with which each is passed."""
+    """The joints of each circuit, starting at the part, with the sign of traversal."""
     joints = {joint["name"]: joint for joint in record["graph"]["joints"]}
     width = _width(joint["owner"] for joint in joints.values())
     yield ""
-    yield "circuits: + where a joint is passed from its base side, - where it is passed against that"
+    yield "circuits: + joint traversed from its base side, - joint traversed in the opposite direction"
     for number, circuit in enumerate(record["circuits"], start=1):
         by_owner: dict[str, list[str]] = {}
         for step in _from_first_virtual(circuit["passed"], joints):
@@ -108,9 +108,9 @@ def _circuit_lines(record: Record) -> Iterator[str]:
 
 
 def _from_first_virtual(passed: list[Record], joints: dict[str, Record]) -> list[Record]:
-    """A circuit as told from the first virtual joint on: along the virtual chain, then back over the robots.
+    """A circuit from its first virtual joint: along the virtual chain, then back over the robots.
 
-    A circuit without a virtual chain is told from the world on, up one robot that holds the part and down another.
+    A circuit without a virtual chain begins at the world: up one robot that holds the part and down another.
     """
     virtual = [joints[step["joint"]]["virtual"] for step in passed]
     upward = [step["sign"] > 0 and joints[step["joint"]]["from"] == "world" for step in passed]
@@ -143,9 +143,9 @@ def _rank_lines(matrix: Record) -> Iterator[str]:
     rows, columns, rank = matrix["rows"], matrix["columns"], matrix["rank"]
     if rank is None:
         missing = ", ".join(matrix["starts_to_find"])
-        yield from _wrapped("  ", f"rank: not known, the start of {missing} is to be found (`cellplan check` finds it)")
+        yield from _wrapped("  ", f"rank: unknown until the start of {missing} is found (by `cellplan check`)")
         if columns >= rows:
-            yield f"  degree of redundancy: {columns} - {rows} = {columns - rows} wherever the rows are independent"
+            yield f"  degree of redundancy: {columns} - {rows} = {columns - rows} where the rows are independent"
     else:
         smallest = matrix["smallest_singular_value"]
         yield f"  rank at the start: {rank}" + ("" if smallest is None else f", smallest singular value {smallest:.3g}")
@@ -153,14 +153,14 @@ def _rank_lines(matrix: Record) -> Iterator[str]:
         if rank < rows:
             yield (
                 f"  only {rank} of {rows} rows are independent there: "
-                f"{_count(rows - rank, 'direction')} in which the tools cannot move as asked"
+                f"{_count(rows - rank, 'direction')} in which the tools cannot move as required"
             )
     if rank is None and columns < rows:
-        yield f"  more is asked for than the joints can give: {_count(rows, 'row')} for {_count(columns, 'column')}"
+        yield f"  overconstrained: {_count(rows, 'row')} for {_count(columns, 'column')}"
 
 
 def _groups(column_blocks: Record, *, left: int) -> Iterator[list[str]]:
-    """Robots in groups whose columns fit beside each other."""
+    """Robots in groups whose columns fit side by side."""
     group: list[str] = []
     used = left
     for robot in column_blocks:
@@ -174,7 +174,7 @@ def _groups(column_blocks: Record, *, left: int) -> Iterator[list[str]]:
 
 
 def _wrapped(head: str, text: str) -> list[str]:
-    """A line that goes on below its own text when it is too long; words are never broken."""
+    """A line with a hanging indent; words are never broken."""
     return textwrap.wrap(
         text,
         WIDTH,
@@ -187,7 +187,7 @@ def _wrapped(head: str, text: str) -> list[str]:
 
 
 def _width(names: Iterable[str]) -> int:
-    """Width of a column that takes all names."""
+    """Width of the longest name."""
     return max(map(len, names), default=0)
 
 

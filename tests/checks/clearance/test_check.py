@@ -64,6 +64,8 @@ def test_contacts_are_found_to_the_sample_and_named_with_their_time() -> None:
     assert failed(checks, "clearance") == [
         f"clearance robot_robot: a/block to b/block 0.0 mm at {first:.3f} s, required 5.0 mm"
     ]
+    free = [check.subject for check in checks if check.name == "collision" and check.passed]
+    assert str(ClearanceClass.ROBOT_ROBOT) not in free  # the class in which they touch
 
 
 def test_a_touch_at_a_single_sample_is_found() -> None:

@@ -122,8 +122,8 @@ def test_the_cure_fits_the_task() -> None:
         source="path.csv", points=np.zeros((2, 3)), axes=None, rotations=None, is_smooth=True, is_closed=False
     )
     words = {
-        "lay the path on the surface with path.project": work("drill"),
-        "turn tool_axis round": replace(work("drill"), project=up, tool_axis=up),
+        "project the path onto the surface (path.project)": work("drill"),
+        "reverse tool_axis": replace(work("drill"), project=up, tool_axis=up),
         "check the points and axes of the file": replace(work("drill"), path=file),
     }
     for cure, task in words.items():

@@ -151,6 +151,9 @@ def test_process_speed_has_mean_peak_and_the_stretches_that_are_slower(
     assert speed.peak == pytest.approx(ratio * speed.mean, rel=1e-3)
     assert speed.steady_share == pytest.approx(share, abs=0.01)
     assert len(speed.slower) == stretches
+    ends = [bound for stretch in speed.slower for bound in stretch]
+    assert ends == sorted(ends)
+    assert not ends or (ends[0], ends[-1]) == (schedule.times[0], pytest.approx(schedule.times[-1], abs=1e-12))
 
 
 def inverse_of(schedule: Schedule) -> Array:

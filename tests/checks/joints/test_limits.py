@@ -37,6 +37,7 @@ def report(robot, positions):
 
 def test_margin_speed_and_instants_of_a_sine():
     use, checks = report(one_joint_robot(), np.radians(-60 + 50 * np.sin(np.pi * TIMES)))
+    assert np.degrees([use.min, use.max]) == pytest.approx([-110.0, -10.0], abs=1e-9)
     assert np.degrees(use.margin) == pytest.approx(45.0, abs=1e-9)  # nearest at -110, 45 above -155, and at -10
     assert use.margin_at_s == pytest.approx(0.5, abs=1e-9) or use.margin_at_s == pytest.approx(1.5, abs=1e-9)
     assert np.degrees(use.peak_velocity) == pytest.approx(50 * np.pi, rel=1e-5)  # chord of 1 ms against the tangent

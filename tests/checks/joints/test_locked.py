@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders.planar_arm import START, circle_schedule, planar_arm_cell
 
-from cellplan.checks.joints.locked import check_locked, told_with_failures
+from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import LockedJoint
@@ -81,7 +81,7 @@ def accuracy_checks(*locks, jump_at=None):
     errors = task_accuracy(scheduled, chains["arm"], q=motion.q, X_WP=X_WP)
     checks = check_accuracy(schedule, errors, scheduled.task)
     tolerance = scheduled.task.tolerance
-    told = told_with_failures(checks, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
+    told = with_locked_joints(checks, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
     return list(checks), told
 
 

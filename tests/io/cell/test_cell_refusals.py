@@ -94,13 +94,13 @@ Refuse = Callable[..., list[str]]
         (
             "    tool_axis: normal",
             "    relative_to: world\n    tool_axis: -z",
-            "c:19: tasks.ring.path.project: unexpected key, a path in the world is not laid on the part",
+            "c:19: tasks.ring.path.project: unexpected key, a path in the world is not projected onto the part",
         ),
         (
             "plane: xy}, project: +z}",
             "plane: xy}}\n    relative_to: world",
-            "c:21: tasks.ring.tool_axis: tool_axis: normal needs a path that is laid on the part: give tool_axis a "
-            "direction",
+            "c:21: tasks.ring.tool_axis: tool_axis: normal requires a path that is projected onto the part: give "
+            "tool_axis a direction",
         ),
         (
             "  held_by:\n    - {robot: holder, at: {xyz_mm: [-250, 0, 0]}}\n",
@@ -149,7 +149,7 @@ Refuse = Callable[..., list[str]]
             "environment:",
             "solver: {gain_per_s: 2000}\nenvironment:",
             "c:22: solver.gain_per_s: expected a gain below 2000 (2 / step_s), got 2000; the error feedback "
-            "would swing ever wider",
+            "would be unstable",
         ),
         (
             "environment:",

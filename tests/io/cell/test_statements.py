@@ -114,12 +114,12 @@ def test_masses_that_are_not_stated_are_none_and_not_zero(load: Callable[..., Ce
         (
             "tool: {xyz_mm: [0, 0, 100]}",
             "tool: {centre_mm: [0, 0, 40]}",
-            "c:10: robots.worker.tool.centre_mm: unexpected key, a centre of mass goes with mass_kg",
+            "c:10: robots.worker.tool.centre_mm: unexpected key, a centre of mass requires mass_kg",
         ),
         (
             "part:\n",
             "part:\n  centre_mm: [1, 2, 3]\n",
-            "c:13: part.centre_mm: unexpected key, a centre of mass goes with mass_kg",
+            "c:13: part.centre_mm: unexpected key, a centre of mass requires mass_kg",
         ),
         (
             WEIGHTS,

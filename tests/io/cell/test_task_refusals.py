@@ -89,8 +89,8 @@ Refuse = Callable[..., list[str]]
         (
             ", project: +z",
             "",
-            "c:20: tasks.ring.tool_axis: tool_axis: normal needs a path that is laid on the part: add project: "
-            "+z (or another side), or give tool_axis a direction",
+            "c:20: tasks.ring.tool_axis: tool_axis: normal requires a path that is projected onto the part: add "
+            "project: +z (or another side), or give tool_axis a direction",
         ),
         (
             ", project: +z",
@@ -238,7 +238,7 @@ def test_a_file_without_axes_gives_no_normal(refuse: Refuse, tmp_path: Path) -> 
     told = refuse(("{circle: {radius_mm: 100, plane: xy}, project: +z}", "{csv: path.csv}"))
 
     assert told == [
-        "c:20: tasks.ring.tool_axis: tool_axis: normal needs axes or quaternions in the file, or a path that "
-        "is laid on "
+        "c:20: tasks.ring.tool_axis: tool_axis: normal requires axes or quaternions in the file, or a path that "
+        "is projected onto "
         "the part: add columns i,j,k, add project: +z (or another side), or give tool_axis a direction"
     ]

@@ -217,14 +217,14 @@ def test_a_column_of_instants_makes_a_trajectory(read) -> None:
 def test_instants_must_start_at_zero_and_increase(read) -> None:
     assert findings_of(read, TIMED + "0.1,0,0,0\n0.2,1,0,0\n0.2,2,0,0\n0.1,3,0,0\n") == [
         "weld.csv:2: column 't_s': expected 0 in the first row, got 0.1; a task is shifted by its start_s",
-        "weld.csv:4: column 't_s': expected an instant after 0.2 of the row before, got 0.2",
-        "weld.csv:5: column 't_s': expected an instant after 0.2 of the row before, got 0.1",
+        "weld.csv:4: column 't_s': expected a time after 0.2 of the row before, got 0.2",
+        "weld.csv:5: column 't_s': expected a time after 0.2 of the row before, got 0.1",
     ]
     assert findings_of(read, TIMED + "0,0,0,0\n1e7,1,0,0\n") == [
         "weld.csv:3: column 't_s': expected at most 1000000 s either way, got 1e7"
     ]
     assert findings_of(read, TIMED + "0,0,0,0\n1e-9,1,0,0\n") == [
-        "weld.csv:3: column 't_s': expected an instant after 0 of the row before, got 1e-09"
+        "weld.csv:3: column 't_s': expected a time after 0 of the row before, got 1e-09"
     ]
 
 

@@ -16,13 +16,20 @@ from cellplan.io.robots.bundled import load_bundled
 from cellplan.io.yaml.reader import parse_yaml
 from cellplan.io.yaml.writer import yaml_text
 from cellplan.model.cell import Cell, Mode
+from cellplan.model.solver import Integrator, SolverSettings
 
 Load = Callable[..., Cell]
 KUKA = load_bundled("kuka_kr6")
 
 
 def same(a: object, b: object) -> bool:
-    """Whether two pieces of a cell are equal to the last bit, apart from where they were read from."""
+    """Whether two pieces of a cell are equal to the last bit, apart from where they were read from.
+
+    A copy names the integrator that ``auto`` stands for.
+    """
+    if isinstance(a, SolverSettings) and isinstance(b, SolverSettings) and a.integrator is None:
+        named = Integrator.ACCURATE if a.is_accurate else Integrator.EULER
+        return same(dataclasses.replace(a, integrator=named), b)
     if isinstance(a, np.ndarray):
         return isinstance(b, np.ndarray) and np.array_equal(a, b)
     if isinstance(a, tuple):

@@ -139,7 +139,7 @@ Refuse = Callable[..., list[str]]
         (
             "weights: [1, 1, 1, 1, 1, 1]",
             "flange: tool0",
-            "c:11: robots.worker.flange: unexpected key, it goes with a URDF only",
+            "c:11: robots.worker.flange: unexpected key, it applies to a URDF only",
         ),
         (
             "weights: [1, 1, 1, 1, 1, 1]",
@@ -188,7 +188,7 @@ Refuse = Callable[..., list[str]]
         (
             "tool: {xyz_mm: [0, 0, 100]}",
             "tool: {geometry: {sphere: {radius_mm: 5}, open: true}}",
-            "c:10: robots.worker.tool.geometry.open: unexpected key, open goes with a mesh only",
+            "c:10: robots.worker.tool.geometry.open: unexpected key, open requires a mesh",
         ),
         (
             "tool: {xyz_mm: [0, 0, 100]}",

@@ -117,3 +117,21 @@ def test_a_manifest_laid_out_by_somebody_else_is_refused(run: tuple[Path, Manife
 
     with pytest.raises(InputError, match="it is not laid out as cellplan does"):
         parse_manifest(data.replace(b"\n", b"\r\n"), "m")
+
+
+def test_what_was_set_of_the_cell_is_listed_and_read_back(load: Any) -> None:
+    changes = {"motion.duration_s": 5, "robots.worker.start_deg": [0.1, 0, 0, 0, 90, 0], "solver.integrator": None}
+    changed = load().with_values(changes)
+
+    text = render_manifest(changed, passed=True, versions={}, files={})
+
+    assert parse_manifest(text.encode(), "m").changes == changes
+
+
+def test_a_manifest_that_lists_no_changes_is_read_as_one_without_any(run: tuple[Path, Manifest]) -> None:
+    record = json.loads((run[0] / "manifest.json").read_text())
+    assert record.pop("changes") == {}
+
+    older = (json.dumps(record, indent=2, ensure_ascii=False) + "\n").encode()
+
+    assert parse_manifest(older, "m").changes == {}

@@ -156,16 +156,16 @@ def test_a_run_without_a_manifest_is_to_be_solved_again(copy: Path) -> None:
     assert refusal(copy / "run").endswith("got a run without a manifest: solve the cell again")
 
 
-def test_what_the_command_line_chose_is_told(sound: Path, tmp_path: Path) -> None:
+def test_what_was_set_when_the_cell_was_solved_is_reported(sound: Path, tmp_path: Path) -> None:
     cell = load_cell(sound / "cell" / "small.yaml")
     write_run(solve(with_overrides(cell, mode="part_at_rest", duration=1.5, clearance_mm=7)), tmp_path / "run")
 
     remarks = open_gate(tmp_path / "run", cell=sound / "cell" / "small.yaml").remarks
 
     assert sorted(remarks) == [
-        "checks.clearance_mm: 7 was chosen on the command line; the cell file has 5",
-        "motion.duration_s: 1.5 was chosen on the command line; the cell file has 1",
-        "motion.mode: 'part_at_rest' was chosen on the command line; the cell file has 'simultaneous'",
+        "checks.clearance_mm was set to 7 when the cell was solved",
+        "motion.duration_s was set to 1.5 when the cell was solved",
+        "motion.mode was set to 'part_at_rest' when the cell was solved",
     ]
 
 
@@ -174,19 +174,23 @@ def test_what_the_command_line_chose_is_told(sound: Path, tmp_path: Path) -> Non
     [
         (
             {"integrator": "euler"},
-            ["solver.integrator: 'euler' was chosen on the command line; the cell file has 'accurate'"],
+            ["solver.integrator was set to 'euler' when the cell was solved"],
         ),
         (
             {"method": "damped_least_squares"},  # brings its integrator along, which nobody chose
+            ["solver.method was set to 'damped_least_squares' when the cell was solved"],
+        ),
+        (
+            {"integrator": "euler", "settings": ["solver.seed=4"]},  # an address without an option of its own
             [
-                "solver.method: 'damped_least_squares' was chosen on the command line; the cell file has "
-                "'weighted_pseudo_inverse'"
+                "solver.integrator was set to 'euler' when the cell was solved",
+                "solver.seed was set to 4 when the cell was solved",
             ],
         ),
     ],
 )
 def test_a_run_with_another_integrator_passes_and_tells_what_was_chosen(
-    sound: Path, tmp_path: Path, choices: dict[str, str], remarks: list[str]
+    sound: Path, tmp_path: Path, choices: dict[str, Any], remarks: list[str]
 ) -> None:
     cell = load_cell(sound / "cell" / "small.yaml")
     write_run(solve(with_overrides(cell, **choices)), tmp_path / "run")

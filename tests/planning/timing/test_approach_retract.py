@@ -11,7 +11,6 @@ from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell
 from cellplan.model.motion import TaskSchedule
 from cellplan.model.task import StraightMove
-from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.solve import solve
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
@@ -85,9 +84,9 @@ def test_a_program_starts_and_ends_clear_of_the_part(cell: Cell) -> None:
 
 
 def test_another_duration_leaves_time_for_the_way_back(cell: Cell) -> None:
-    filled = replace(cell, tasks=(replace(cell.tasks[0], duration=None),))
+    filled = replace(cell, tasks=(replace(cell.tasks[0], duration=None),), motion=replace(cell.motion, duration=6.0))
 
-    times, moved = scheduled(with_overrides(filled, duration=6.0))
+    times, moved = scheduled(filled)
 
     assert times[-1] == 6.0
     assert moved.end == pytest.approx(6.0 - filled.tasks[0].leaving)

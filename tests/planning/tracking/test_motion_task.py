@@ -1,5 +1,7 @@
 """References of a motion task; closures against the derivative of an independent kinematics, in each mode."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from builders.jacobian_cells import planners_jacobian
@@ -11,7 +13,6 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Grasp, Mode
 from cellplan.model.motion import Schedule
 from cellplan.model.task import Frame
-from cellplan.pipeline.overrides import with_overrides
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.tracking.motion_task import MotionTask, closures
 from cellplan.planning.tracking.problem import TrackingProblem
@@ -91,6 +92,10 @@ def test_only_the_kept_components_of_a_closure_become_rows():
     assert np.abs(tasks.error).max() < 1e-12
 
 
+def in_mode(cell, mode):
+    return replace(cell, motion=replace(cell.motion, mode=mode))
+
+
 @pytest.mark.parametrize(
     ("mode", "moving"),
     [
@@ -99,20 +104,20 @@ def test_only_the_kept_components_of_a_closure_become_rows():
     ],
 )
 def test_all_holders_move_in_every_run(mode, moving):
-    cell = with_overrides(carried(sharing(random_cell(44, operators=3), 2)), mode=str(mode))
+    cell = in_mode(carried(sharing(random_cell(44, operators=3), 2)), mode)
     assert [set(run.moving) for run in plan_phases(cell).program] == moving
     assert all(len(closures(cell, run.moving)) == 2 for run in plan_phases(cell).program)
 
 
 def test_no_holder_moves_with_the_part_at_rest():
-    cell = with_overrides(sharing(random_cell(45, operators=3), 2), mode="part_at_rest")
+    cell = in_mode(sharing(random_cell(45, operators=3), 2), Mode.PART_AT_REST)
     (run,) = plan_phases(cell).program
     assert run.moving == ("op0",)
     assert closures(cell, run.moving) == ()
 
 
 def test_the_part_cannot_be_carried_while_it_is_to_rest():
-    cell = with_overrides(carried(random_cell(46, operators=1)), mode="part_at_rest")
+    cell = in_mode(carried(random_cell(46, operators=1)), Mode.PART_AT_REST)
     with pytest.raises(InputError) as caught:
         plan_phases(cell)
     assert str(caught.value) == (

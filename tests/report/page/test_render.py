@@ -101,8 +101,8 @@ def test_names_of_drawn_parts_do_not_clash(failed_page: str) -> None:
 
 def test_verdict_comes_first_in_plain_words(failed_run: Any, failed_page: str) -> None:
     text = Page(failed_page).text
-    verdict = text.index("✗ FAILED 3 of 28 checks do not hold")
-    assert verdict < text.index("Cycle time") < text.index("What was checked")
+    verdict = text.index("✗ FAILED 3 of 28 checks failed")
+    assert verdict < text.index("Cycle time") < text.index("Verification")
     for check in failed_run.report.checks:
         if not check.passed:
             assert check.message in text
@@ -110,7 +110,7 @@ def test_verdict_comes_first_in_plain_words(failed_run: Any, failed_page: str) -
 
 def test_passed_run_says_so(passed_run: Any) -> None:
     text = Page(page_of(passed_run, plots={})).text
-    assert "✓ PASSED All 27 checks hold." in text
+    assert "✓ PASSED All 27 checks passed." in text
     assert "FAILED" not in text
 
 
@@ -131,8 +131,8 @@ def test_caution_and_assumptions_are_printed(failed_page: str) -> None:
         "the risk assessment stays with the integrator." in text
     )
     assert "Joints move linearly between samples; the samples are 1 ms apart." in text
-    assert "certified at every instant, between the samples too, as long as every joint moves evenly" in text
-    assert "asked the collision engine for 349 distances and 348 contacts" in text
+    assert "certified at all times, also between the samples, provided that every joint moves evenly" in text
+    assert "took 349 distance queries and 348 contact queries" in text
     assert "belong in the required clearance of 5 mm" in text
     assert "@media print" in failed_page
 
@@ -214,7 +214,7 @@ def test_overview_leads_to_the_report_of_every_run(pairwise_runs: Any) -> None:
         "rhombus/report.html",
         "rectangle/report.html",
     ]
-    assert "3 of 82 checks do not hold" in page.text
+    assert "3 of 82 checks failed" in page.text
     assert "rhombus : kuka/B5 and abb/A5 collide" in page.text
     assert "Cycle time 12.00 s 3 runs, one after another" in page.text
 
@@ -233,7 +233,7 @@ def test_joints_that_do_not_come_back_have_a_table(passed_run: Any) -> None:
 
     text = page_of(run)
 
-    assert "The joints do not come back" in text
+    assert "The joints do not return" in text
     assert "after each of the 2 cycles of 1 s" in text
     assert "1.15 deg" in text
     assert "Repeatability" not in page_of(passed_run)
@@ -247,7 +247,7 @@ def test_a_failed_joint_is_told_in_plain_words(passed_run: Any) -> None:
     page = report_page(record, passed_run.report.checks, cell=cell, plots={})
 
     assert "Joint kuka/B2 fails at 2.000 s and stays at " in page
-    assert "the other joints take over, and every task is kept." in page
+    assert "the other joints compensate, and every task stays within its tolerance." in page
 
 
 def test_with_many_robots_pictures_are_folded_and_each_robot_has_a_line(
@@ -262,7 +262,7 @@ def test_with_many_robots_pictures_are_folded_and_each_robot_has_a_line(
         assert {link[1:] for link in page.links} <= set(page.ids)
         assert page.tags.count("details") == page.tags.count("summary")
         assert page.tags.count("figure") - page.tags.count("details") <= 1  # of clearance
-        assert "The joint of each robot with the least room and the fastest one" in page.text
+        assert "Smallest margin and highest speed of each robot; details follow" in page.text
         assert {f"joints-{robot}" for robot in run.report.q} <= set(page.ids)
 
 
@@ -273,7 +273,7 @@ def test_with_few_robots_nothing_is_folded(passed_run: Any) -> None:
 def test_the_line_of_a_robot_names_its_worst_joints(failed_run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(render, "MAX_UNFOLDED", 3)
     text = Page(page_of(failed_run, plots={})).text
-    overview = text[text.index("The joint of each robot") :]
+    overview = text[text.index("Smallest margin and highest speed of each robot") :]
 
     for robot in failed_run.report.q:
         uses = [use for use in failed_run.report.joints if use.robot == robot]

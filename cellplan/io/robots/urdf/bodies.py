@@ -25,7 +25,7 @@ class MeshShelf:
     Attributes:
         folder: Folder of the URDF.
         package_dirs: Folders that hold packages (or are one).
-        within: Folders that a mesh must lie in to be looked at; None for all.
+        within: Folders that a mesh must lie in to be read; None for all.
         files: Mesh files read so far, in the order of first use.
     """
 
@@ -78,7 +78,7 @@ def find_mesh(uri: str, folder: Path, *, package_dirs: tuple[Path, ...], within:
 
     ``package://NAME/rest`` is looked up as ``DIR/NAME/rest``, then in a DIR that is itself called NAME, then in the
     folder of the URDF and those above it, in the same two ways. Absolute paths and ``file://`` count only below the
-    URDF's folder or a package folder. Nothing outside the folders ``within`` is even looked for.
+    URDF's folder or a package folder. Nothing outside the folders ``within`` is accessed.
 
     Raises:
         InputError: There is no such file; the message names every place that was tried.
@@ -102,7 +102,7 @@ def find_mesh(uri: str, folder: Path, *, package_dirs: tuple[Path, ...], within:
 
 
 def _is_file(place: Path) -> bool:
-    """Whether there is a file; names that the system cannot even look for are none."""
+    """Whether there is a file; false for names that the system cannot resolve."""
     try:
         return place.is_file()
     except (OSError, ValueError):

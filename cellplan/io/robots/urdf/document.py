@@ -16,7 +16,7 @@ from cellplan.io.robots.urdf.xml import Element, origin_of, read_xml
 
 MAX_LINKS: Final = 200
 MAX_MOVABLE: Final = 64
-MAX_SIZE: Final = 20.0  # [m] larger bodies are slips of the unit
+MAX_SIZE: Final = 20.0  # [m] larger bodies are a wrong unit
 NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,39}")  # the same everywhere: safe in tables and file names
 MOVABLE: Final = ("revolute", "continuous", "prismatic")
 REFUSED: Final = ("floating", "planar")
@@ -149,7 +149,7 @@ def _by_name(things: Iterable[Named]) -> dict[str, Named]:
 
 
 def _require_nothing_hidden(root: Element, links: dict[str, UrdfLink], joints: dict[str, UrdfJoint]) -> None:
-    """Count links, joints and collisions wherever they stand: none may lie where the reader does not look."""
+    """Count links, joints and collisions wherever they stand: none may lie where the reader does not read."""
     everywhere = [element for element in root.walk(FOREIGN) if element.tag in ("link", "joint", "collision")]
     known = {id(link.element) for link in links.values()} | {id(joint.element) for joint in joints.values()}
     known |= {id(solid.element) for link in links.values() for solid in link.solids}

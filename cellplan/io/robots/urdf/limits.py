@@ -6,42 +6,21 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.io.robots.limits import StatedLimits, limit_findings, tightest
 from cellplan.io.robots.urdf.document import UrdfJoint
 from cellplan.io.robots.urdf.tree import in_user_unit
 
-ROOM: Final = 1e-9  # [rad] or [m]: degrees in a cell do not read back to the last bit
-MAX_TURN: Final = 4.0 * np.pi  # [rad] limits beyond two turns each way are slips of the unit
+MAX_TURN: Final = 4.0 * np.pi  # [rad] limits beyond two turns each way are mistakes of the unit
 MAX_TRAVEL: Final = 20.0  # [m]
 MAX_TURN_SPEED: Final = 100.0  # [rad/s] the fastest wrists reach 20
 MAX_TRAVEL_SPEED: Final = 10.0  # [m/s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JointLimits:
-    """Limits of one joint from the cell in [rad], [m] and their rates; None leaves the URDF's.
-
-    Attributes:
-        lower: Lowest position.
-        upper: Highest position.
-        velocity: Largest speed.
-        acceleration: Largest acceleration, if known.
-        jerk: Largest jerk, if known.
-        wraps: Whether a continuous joint may turn without end.
-    """
-
-    lower: float | None = None
-    upper: float | None = None
-    velocity: float | None = None
-    acceleration: float | None = None
-    jerk: float | None = None
-    wraps: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Range:
     """Complete limits of one joint; infinite positions where it may turn without end.
 
-    ``rated_velocity`` is the URDF's own top speed where the cell names another; None where it does not.
+    ``rated_velocity`` is the velocity limit of the URDF where the cell states one; None where it does not.
     """
 
     lower: float
@@ -50,48 +29,38 @@ class Range:
     rated_velocity: float | None = None
 
 
-def joint_range(joint: UrdfJoint, desired: JointLimits, followers: Iterable[UrdfJoint]) -> Range:
+def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJoint]) -> Range:
     """Limits of a driven joint: the tightest of the URDF's, the cell's and those of the joints that follow it.
 
     Raises:
-        InputError: A limit is missing, is widened by the cell, leaves no room or has an unlikely size.
+        InputError: A limit is missing, is widened by the cell, leaves no range or has an unlikely size.
     """
-    lower, upper = _positions(joint, desired)
-    velocity = _speed(joint, desired)
+    given = joint.limit
+    own = StatedLimits(lower=given.lower, upper=given.upper, velocity=given.velocity)
+    for key, text in limit_findings(own, cell, is_revolute=joint.kind != "prismatic"):
+        raise joint.error(f"{key}: {text}")
+    limits = tightest(own, cell)
+    lower, upper = _endless(joint, cell) if cell.wraps else (limits.lower, limits.upper)
+    if lower is None or upper is None:
+        raise joint.error(_missing_positions(joint))
+    velocity = _velocity(joint, limits)
     for follower in followers:
         lower, upper, velocity = _within_follower(follower, lower, upper, velocity=velocity)
     if not lower < upper:
-        got = f"{in_user_unit(joint, lower)} and {in_user_unit(joint, upper)}"
-        raise joint.error(f"expected the lower limit below the upper one, got {got}")
-    _require_likely(joint, Range(lower=lower, upper=upper, velocity=velocity))
-    rated = None if desired.velocity is None else joint.limit.velocity
-    return Range(lower=lower, upper=upper, velocity=velocity, rated_velocity=rated)
+        ends = f"{in_user_unit(joint, lower)} and {in_user_unit(joint, upper)}"
+        raise joint.error(f"expected a lower limit below the upper one, got {ends}")
+    found = Range(
+        lower=lower, upper=upper, velocity=velocity, rated_velocity=None if cell.velocity is None else given.velocity
+    )
+    _require_likely(joint, found)
+    return found
 
 
-def _positions(joint: UrdfJoint, desired: JointLimits) -> tuple[float, float]:
-    """Lower and upper limit."""
-    if desired.wraps:
-        return _endless(joint, desired)
-    given = joint.limit
-    if given.lower is None or given.upper is None:
-        if desired.lower is None or desired.upper is None:
-            raise joint.error(_missing_positions(joint))
-        return desired.lower, desired.upper
-    for name, own, new, is_wider in (
-        ("lower", given.lower, desired.lower, desired.lower is not None and desired.lower < given.lower - ROOM),
-        ("upper", given.upper, desired.upper, desired.upper is not None and desired.upper > given.upper + ROOM),
-    ):
-        if is_wider and new is not None:
-            got = f"{in_user_unit(joint, new)} against {in_user_unit(joint, own)} in the URDF"
-            raise joint.error(f"expected the {name} limit of the cell to tighten the URDF's, got {got}")
-    return max(given.lower, _or(desired.lower, given.lower)), min(given.upper, _or(desired.upper, given.upper))
-
-
-def _endless(joint: UrdfJoint, desired: JointLimits) -> tuple[float, float]:
+def _endless(joint: UrdfJoint, cell: StatedLimits) -> tuple[float, float]:
     """Limits of a joint that the cell lets turn without end."""
     if joint.kind != "continuous":
         raise joint.error(f"expected `wrap: true` only for a continuous joint, got a {joint.kind} one")
-    if desired.lower is not None or desired.upper is not None:
+    if cell.lower is not None or cell.upper is not None:
         raise joint.error("expected either `wrap: true` or limits, got both")
     return -np.inf, np.inf
 
@@ -107,19 +76,15 @@ def _missing_positions(joint: UrdfJoint) -> str:
     return f"has no room between 'lower' and 'upper' in the URDF: give it {bounds}"
 
 
-def _speed(joint: UrdfJoint, desired: JointLimits) -> float:
-    """Speed limit."""
-    own, new = joint.limit.velocity, desired.velocity
-    unit = "mm_s" if joint.kind == "prismatic" else "deg_s"
-    if own is None and new is None:
+def _velocity(joint: UrdfJoint, limits: StatedLimits) -> float:
+    """Velocity limit."""
+    if limits.velocity is None:
+        unit = "mm_s" if joint.kind == "prismatic" else "deg_s"
         cure = f"give it `limits: {{{joint.name}: {{velocity_{unit}: …}}}}`"
         raise joint.error(f"has no positive velocity limit in the URDF: {cure}")
-    if new is not None and not new > 0.0:
-        raise joint.error(f"expected a positive velocity limit, got {in_user_unit(joint, new, '/s')}")
-    if own is not None and new is not None and new > own * (1.0 + ROOM):
-        got = f"{in_user_unit(joint, new, '/s')} against {in_user_unit(joint, own, '/s')} in the URDF"
-        raise joint.error(f"expected the velocity limit of the cell to tighten the URDF's, got {got}")
-    return min(_or(own, np.inf), _or(new, np.inf))
+    if not limits.velocity > 0.0:
+        raise joint.error(f"expected a positive velocity limit, got {in_user_unit(joint, limits.velocity, '/s')}")
+    return limits.velocity
 
 
 def _within_follower(follower: UrdfJoint, lower: float, upper: float, *, velocity: float) -> tuple[float, float, float]:
@@ -145,8 +110,3 @@ def _require_likely(joint: UrdfJoint, limits: Range) -> None:
     if limits.velocity > (MAX_TRAVEL_SPEED if slides else MAX_TURN_SPEED):
         hint = "10 m/s, got {:g} m/s: is the unit mm/s?" if slides else "100 rad/s, got {:g} rad/s: is it in deg/s?"
         raise joint.error(f"expected a velocity limit of at most {hint.format(limits.velocity)}")
-
-
-def _or(value: float | None, other: float) -> float:
-    """The value, or the other one where there is none."""
-    return other if value is None else value

@@ -8,9 +8,10 @@ from types import MappingProxyType
 from cellplan.errors import CellplanError
 from cellplan.geometry.transforms import Array
 from cellplan.io.input.allowed_folders import AllowedFolders
+from cellplan.io.robots.limits import StatedLimits
 from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_document
-from cellplan.io.robots.urdf.limits import JointLimits, joint_range
+from cellplan.io.robots.urdf.limits import joint_range
 from cellplan.io.robots.urdf.tree import (
     Roles,
     ZeroConfiguration,
@@ -22,8 +23,6 @@ from cellplan.io.robots.urdf.tree import (
     zero_configuration,
 )
 from cellplan.model.robot import FollowerJoint, Joint, JointKind, Link, RobotModel
-
-__all__ = ["JointLimits", "UrdfOptions", "UrdfRobot", "load_urdf", "read_urdf"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +40,7 @@ class UrdfOptions:
 
     flange: str | None = None
     package_dirs: tuple[Path, ...] = ()
-    limits: Mapping[str, JointLimits] = field(default_factory=lambda: MappingProxyType({}))
+    limits: Mapping[str, StatedLimits] = field(default_factory=lambda: MappingProxyType({}))
     locked: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     lock_units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     within: AllowedFolders | None = None
@@ -99,7 +98,7 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     return UrdfRobot(model=model, mesh_files=tuple(shelf.files))
 
 
-def _require_known_limits(document: UrdfDocument, roles: Roles, limits: Mapping[str, JointLimits]) -> None:
+def _require_known_limits(document: UrdfDocument, roles: Roles, limits: Mapping[str, StatedLimits]) -> None:
     """Limits make sense only for joints that are driven."""
     driven = {joint.name for joint in roles.driven}
     for name in limits:
@@ -119,12 +118,12 @@ def _require_lock_units(document: UrdfDocument, units: Mapping[str, str]) -> Non
 
 
 def _driven(
-    joint: UrdfJoint, roles: Roles, configuration: ZeroConfiguration, *, limits: Mapping[str, JointLimits]
+    joint: UrdfJoint, roles: Roles, configuration: ZeroConfiguration, *, limits: Mapping[str, StatedLimits]
 ) -> Joint:
     """A driven joint with its axis in B."""
     followers = [other for other in roles.followers if other.mimic and other.mimic.leader == joint.name]
-    desired = limits.get(joint.name, JointLimits())
-    allowed = joint_range(joint, desired, followers)
+    stated = limits.get(joint.name, StatedLimits())
+    allowed = joint_range(joint, stated, followers)
     axis_B, point_B = _axis_in_base(joint, configuration)
     return Joint(
         name=joint.name,
@@ -135,8 +134,8 @@ def _driven(
         lower=allowed.lower,
         upper=allowed.upper,
         velocity=allowed.velocity,
-        acceleration=desired.acceleration,
-        jerk=desired.jerk,
+        acceleration=stated.acceleration,
+        jerk=stated.jerk,
         rated_velocity=allowed.rated_velocity,
     )
 

@@ -16,8 +16,8 @@ from cellplan.io.input.findings import shown
 
 MAX_BYTES: Final = 5_000_000
 MAX_DEPTH: Final = 64  # nesting of elements: a URDF needs seven
-MAX_TURN: Final = 4.0 * np.pi  # [rad] larger angles of a frame are slips of the unit
-MAX_OFFSET: Final = 20.0  # [m] longer steps between frames are slips of the unit
+MAX_TURN: Final = 4.0 * np.pi  # [rad] larger angles of a frame are a wrong unit
+MAX_OFFSET: Final = 20.0  # [m] longer steps between frames are a wrong unit
 
 
 @dataclass(slots=True)

@@ -11,7 +11,8 @@ from cellplan.errors import InputError
 from cellplan.geometry.mesh.load import mesh_volume
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere
 from cellplan.geometry.transforms import Array, pose, pose_from, rotation_about
-from cellplan.io.robots.urdf.load import JointLimits, UrdfOptions, load_urdf, read_urdf
+from cellplan.io.robots.limits import StatedLimits
+from cellplan.io.robots.urdf.load import UrdfOptions, load_urdf, read_urdf
 from cellplan.model.robot import BASE, JointKind, RobotModel
 
 LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="0"/>'
@@ -138,25 +139,25 @@ def test_limits_and_names_are_taken_over(tmp_path: Path) -> None:
 
 
 def test_the_cell_tightens_and_supplies_limits(tmp_path: Path) -> None:
-    def limits_of(inside: str, desired: JointLimits, kind: str = "revolute") -> tuple[float, float, float]:
+    def limits_of(inside: str, desired: StatedLimits, kind: str = "revolute") -> tuple[float, float, float]:
         path = write(tmp_path, link("base"), link("tip"), joint("a1", "base", "tip", inside, kind=kind))
         made = read_urdf(path, UrdfOptions(limits={"a1": desired})).joints[0]
         return made.lower, made.upper, made.velocity
 
-    assert limits_of(LIMIT, JointLimits(lower=0.0)) == (0.0, 2.0, 3.0)
-    assert limits_of(LIMIT, JointLimits(upper=1.0, velocity=2.0)) == (-1.0, 1.0, 2.0)
-    assert limits_of(LIMIT, JointLimits(lower=-1.0 - 1e-12)) == (-1.0, 2.0, 3.0)  # rounding of degrees, clamped
-    assert limits_of("", JointLimits(lower=-1, upper=1, velocity=2)) == (-1.0, 1.0, 2.0)
+    assert limits_of(LIMIT, StatedLimits(lower=0.0)) == (0.0, 2.0, 3.0)
+    assert limits_of(LIMIT, StatedLimits(upper=1.0, velocity=2.0)) == (-1.0, 1.0, 2.0)
+    assert limits_of(LIMIT, StatedLimits(lower=-1.0 - 1e-12)) == (-1.0, 2.0, 3.0)  # rounding of degrees, clamped
+    assert limits_of("", StatedLimits(lower=-1, upper=1, velocity=2)) == (-1.0, 1.0, 2.0)
     assert limits_of(
-        '<limit lower="0" upper="0" velocity="0" effort="0"/>', JointLimits(lower=-1, upper=1, velocity=2)
+        '<limit lower="0" upper="0" velocity="0" effort="0"/>', StatedLimits(lower=-1, upper=1, velocity=2)
     ) == (*(-1.0, 1.0, 2.0),)
-    assert limits_of(LIMIT, JointLimits(lower=-9, upper=9), "continuous") == (-9.0, 9.0, 3.0)
-    assert limits_of(LIMIT, JointLimits(wraps=True), "continuous") == (-np.inf, np.inf, 3.0)
+    assert limits_of(LIMIT, StatedLimits(lower=-9, upper=9), "continuous") == (-9.0, 9.0, 3.0)
+    assert limits_of(LIMIT, StatedLimits(wraps=True), "continuous") == (-np.inf, np.inf, 3.0)
 
 
 def test_the_cell_supplies_an_acceleration_limit(tmp_path: Path) -> None:
     path = write(tmp_path, *arm())
-    desired = {"a1": JointLimits(acceleration=5.0)}
+    desired = {"a1": StatedLimits(acceleration=5.0)}
     assert [joint.acceleration for joint in read_urdf(path, UrdfOptions(limits=desired)).joints][:1] == [5.0]
 
 

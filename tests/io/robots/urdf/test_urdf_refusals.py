@@ -7,7 +7,8 @@ from xml.etree import ElementTree as ET
 import pytest
 from builders.urdf_texts import ARM, LIMIT, joint, refusal, refused
 
-from cellplan.io.robots.urdf.load import JointLimits, UrdfOptions
+from cellplan.io.robots.limits import StatedLimits
+from cellplan.io.robots.urdf.load import UrdfOptions
 
 MIMIC = '<mimic joint="{}"/>'
 
@@ -218,7 +219,7 @@ MIMIC = '<mimic joint="{}"/>'
                 '<link name="f"/>',
                 joint("g", "base", "f", '<mimic joint="a1" offset="9"/><limit lower="-1" upper="1" velocity="1"/>'),
             ],
-            "r.urdf:4: joint 'a1': expected the lower limit below the upper one, got -57.2958 deg and -458.366 deg",
+            "r.urdf:4: joint 'a1': expected a lower limit below the upper one, got -57.2958 deg and -458.366 deg",
         ),
     ],
 )
@@ -244,40 +245,37 @@ GRIPPER = (
 @pytest.mark.parametrize(
     ("limits", "locked", "message"),
     [
-        ({"a2": JointLimits()}, {}, "r.urdf: limits: unknown joint 'a2', expected one of: a1, m, finger, twin"),
-        ({"m": JointLimits()}, {}, "r.urdf:6: joint 'm': has limits in the cell, but it is fixed"),
-        ({"twin": JointLimits()}, {}, "r.urdf:10: joint 'twin': has limits in the cell, but it follows another joint"),
-        ({"finger": JointLimits()}, {}, "r.urdf:8: joint 'finger': has limits in the cell, but it is locked"),
+        ({"a2": StatedLimits()}, {}, "r.urdf: limits: unknown joint 'a2', expected one of: a1, m, finger, twin"),
+        ({"m": StatedLimits()}, {}, "r.urdf:6: joint 'm': has limits in the cell, but it is fixed"),
+        ({"twin": StatedLimits()}, {}, "r.urdf:10: joint 'twin': has limits in the cell, but it follows another joint"),
+        ({"finger": StatedLimits()}, {}, "r.urdf:8: joint 'finger': has limits in the cell, but it is locked"),
         (
-            {"a1": JointLimits(lower=-2.0)},
+            {"a1": StatedLimits(lower=-2.0)},
             {},
-            "r.urdf:4: joint 'a1': expected the lower limit of the cell to tighten the URDF's, "
-            "got -114.592 deg against -57.2958 deg in the URDF",
+            "r.urdf:4: joint 'a1': lower_deg: expected at least -57.29578, the limit of the model, got -114.591559",
         ),
         (
-            {"a1": JointLimits(upper=2.5)},
+            {"a1": StatedLimits(upper=2.5)},
             {},
-            "r.urdf:4: joint 'a1': expected the upper limit of the cell to tighten the URDF's, "
-            "got 143.239 deg against 114.592 deg in the URDF",
+            "r.urdf:4: joint 'a1': upper_deg: expected at most 114.591559, the limit of the model, got 143.239449",
         ),
         (
-            {"a1": JointLimits(velocity=4.0)},
+            {"a1": StatedLimits(velocity=4.0)},
             {},
-            "r.urdf:4: joint 'a1': expected the velocity limit of the cell to tighten the URDF's, "
-            "got 229.183 deg/s against 171.887 deg/s in the URDF",
+            "r.urdf:4: joint 'a1': velocity_deg_s: expected at most 171.887339, the limit of the model, got 229.183118",
         ),
         (
-            {"a1": JointLimits(velocity=0.0)},
+            {"a1": StatedLimits(velocity=0.0)},
             {},
             "r.urdf:4: joint 'a1': expected a positive velocity limit, got 0 deg/s",
         ),
         (
-            {"a1": JointLimits(lower=1.5, upper=1.5)},
+            {"a1": StatedLimits(lower=1.5, upper=1.5)},
             {},
-            "r.urdf:4: joint 'a1': expected the lower limit below the upper one, got 85.9437 deg and 85.9437 deg",
+            "r.urdf:4: joint 'a1': upper_deg: expected a lower limit below the upper one, got 85.943669 and 85.943669",
         ),
         (
-            {"a1": JointLimits(wraps=True)},
+            {"a1": StatedLimits(wraps=True)},
             {},
             "r.urdf:4: joint 'a1': expected `wrap: true` only for a continuous joint, got a revolute one",
         ),
@@ -293,7 +291,7 @@ GRIPPER = (
     ],
 )
 def test_unsound_options_are_refused(
-    tmp_path: Path, limits: Mapping[str, JointLimits], locked: Mapping[str, float], message: str
+    tmp_path: Path, limits: Mapping[str, StatedLimits], locked: Mapping[str, float], message: str
 ) -> None:
     options = UrdfOptions(limits=limits, locked={"finger": 0.0} | dict(locked))
     assert refused(tmp_path, *GRIPPER, options=options) == message
@@ -309,7 +307,7 @@ def test_a_gripper_must_be_locked_and_a_flange_must_exist(tmp_path: Path) -> Non
 
 
 def test_endless_turning_and_limits_exclude_each_other(tmp_path: Path) -> None:
-    options = UrdfOptions(limits={"a1": JointLimits(lower=-1.0, wraps=True)})
+    options = UrdfOptions(limits={"a1": StatedLimits(lower=-1.0, wraps=True)})
     lines = [*ARM[:2], joint("a1", "base", "tip", LIMIT, kind="continuous")]
     expected = "r.urdf:4: joint 'a1': expected either `wrap: true` or limits, got both"
     assert refused(tmp_path, *lines, options=options) == expected

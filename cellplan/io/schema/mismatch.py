@@ -1,0 +1,86 @@
+"""Mismatches between a file and its format, as data, and their one rendering as text."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from cellplan.io.input.findings import KeyPath, did_you_mean, listed, shown
+from cellplan.io.schema.common import NAME_WORDS
+
+
+class Kind(StrEnum):
+    """What is wrong with a value of a file."""
+
+    UNKNOWN_KEY = "unknown key"
+    MISSING = "missing"
+    NAME = "name"  # of an entry
+    TYPE = "type"
+    CHOICE = "choice"  # none of the words that are allowed
+    BOUND = "bound"  # of a number
+    COUNT = "count"  # of entries
+    RULE = "rule"  # between several keys; brings its own text
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mismatch:
+    """A value that the format does not allow, as data; `mismatch_text` renders it.
+
+    Attributes:
+        kind: What is wrong.
+        path: Key path of the value.
+        expected: What may stand there, as a phrase; the whole text of a rule.
+        allowed: Words or keys that may stand there.
+        at_least: Lower bound of a number or of a count; None without one.
+        at_most: Upper bound; None without one.
+        is_positive: Whether the lower bound reads as "positive".
+        unit: Unit of a number, as in "of millimetres"; empty without one.
+        got: The value that was found.
+    """
+
+    kind: Kind
+    path: KeyPath
+    expected: str = ""
+    allowed: tuple[str, ...] = ()
+    at_least: float | None = None
+    at_most: float | None = None
+    is_positive: bool = False
+    unit: str = ""
+    got: Any = None
+
+    @property
+    def is_at_key(self) -> bool:
+        """Whether the key is wrong rather than its value."""
+        unexpected = self.kind is Kind.RULE and self.expected.startswith("unexpected key")
+        return unexpected or self.kind is Kind.UNKNOWN_KEY or (self.kind is Kind.NAME and self.got is self.path[-1])
+
+
+def mismatch_text(mismatch: Mismatch) -> str:
+    """A mismatch as text: what is expected, what was found, and the nearest allowed word."""
+    if mismatch.kind is Kind.RULE:
+        return mismatch.expected
+    if mismatch.kind is Kind.MISSING:
+        return f"missing, expected {mismatch.expected}"
+    if mismatch.kind is Kind.UNKNOWN_KEY:
+        hint = did_you_mean(str(mismatch.path[-1]), mismatch.allowed)
+        return f"unknown key{hint}; allowed: {listed(mismatch.allowed)}"
+    counted = mismatch.kind is Kind.COUNT and isinstance(mismatch.got, dict | tuple)
+    got = str(len(mismatch.got)) if counted else shown(mismatch.got)
+    is_word = mismatch.kind is Kind.CHOICE and isinstance(mismatch.got, str)
+    hint = did_you_mean(mismatch.got, mismatch.allowed) if is_word else ""
+    return f"expected {_expected_text(mismatch)}, got {got}{hint}"
+
+
+def _expected_text(mismatch: Mismatch) -> str:
+    """What may stand at the place of a mismatch, in words."""
+    if mismatch.kind is Kind.NAME:
+        return NAME_WORDS
+    bound = mismatch.at_most if mismatch.at_least is None else mismatch.at_least
+    side = "most" if mismatch.at_least is None else "least"
+    if mismatch.kind is Kind.COUNT:
+        return f"at {side} {bound} {'entry' if bound == 1 else 'entries'}"
+    if mismatch.kind is not Kind.BOUND:
+        return mismatch.expected
+    number = f"number{mismatch.unit}"
+    if mismatch.is_positive:
+        return f"a positive {number}"
+    return f"a finite {number}" if bound is None else f"a {number} of at {side} {shown(bound)}"

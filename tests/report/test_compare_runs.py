@@ -1,0 +1,64 @@
+"""The script that compares two trees of runs: it accepts what may differ and finds what must not."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import compare_runs
+import pytest
+
+
+@pytest.fixture
+def trees(sound: Path, tmp_path: Path) -> tuple[Path, Path]:
+    """Two equal trees; the old one keeps the series in the report, as earlier versions did."""
+    for name in ("old", "new"):
+        shutil.copytree(sound / "run", tmp_path / name / "pair")
+    report, series = tmp_path / "old/pair/report.json", tmp_path / "old/pair/series.json"
+    record = json.loads(report.read_text(encoding="utf-8"))
+    record["series"] = json.loads(series.read_text(encoding="utf-8"))
+    del record["series"]["schema"], record["phases"]
+    record["caution"] = "old words"
+    report.write_text(json.dumps(record), encoding="utf-8")
+    series.unlink()
+    return tmp_path / "old", tmp_path / "new"
+
+
+def texts(trees: tuple[Path, Path]) -> dict[str, str]:
+    new = json.loads((trees[1] / "pair/report.json").read_text(encoding="utf-8"))
+    return {"old words": new["caution"]}
+
+
+def test_renamed_texts_new_keys_and_split_series_are_accepted(
+    trees: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert not compare_runs.compare_run(trees[0] / "pair", trees[1] / "pair", texts(trees))
+    assert capsys.readouterr().out == "pair: 4 tables, 0 differ; report: 0 differences, 1 new keys\n"
+
+
+def without_a_row(text: str) -> str:
+    return text[: text.rstrip().rindex("\n") + 1]
+
+
+@pytest.mark.parametrize(
+    ("file", "change"),
+    [
+        ("tables/left.csv", without_a_row),
+        ("report.json", lambda text: text.replace('"samples": ', '"samples": 1')),
+        ("report.json", lambda text: text.replace('"seed"', '"sead"')),
+        ("series.json", lambda text: text.replace('"every": 1', '"every": 2')),
+    ],
+)
+def test_any_other_difference_is_found(
+    trees: tuple[Path, Path], file: str, change: Callable[[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = trees[1] / "pair" / file
+    path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
+
+    assert compare_runs.compare_run(trees[0] / "pair", trees[1] / "pair", texts(trees))
+    assert "differ" in capsys.readouterr().out
+
+
+def test_rows_of_a_task_are_found_in_the_program_of_several() -> None:
+    assert compare_runs.contains(["a", "b", "b", "c"], ["b", "c"])
+    assert not compare_runs.contains(["a", "b", "c"], ["a", "c"])
