@@ -68,7 +68,7 @@ class ArrowInverse:
 def eliminated(M: Array, *beside: Array) -> Array:
     """Inverse ``F`` of the lower Cholesky factors of symmetric positive matrices, and ``F`` times what stands beside.
 
-    Gauss's elimination on ``[M, I, B]`` with the pivots shared between both sides: ``M^-1 = F^T F``. Lanes that are not
+    Gauss's elimination on ``[M, I, B]`` with the pivots shared between both sides: ``M^-1 = F^T F``. Batch entries that are not
     positive give what is not a number.
 
     Args:

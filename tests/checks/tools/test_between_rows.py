@@ -34,7 +34,7 @@ def swinger() -> RobotModel:
 class Known(Schedule):
     """Its one tool is desired at the poses of the rows and on straight lines between them, or late by a corner."""
 
-    instants: Array
+    sample_times: Array
     corner: float = 0.0
 
     @property
@@ -43,7 +43,7 @@ class Known(Schedule):
 
     @property
     def jumps(self) -> Array:
-        return self.instants
+        return self.sample_times
 
     def poses(self, times: Array) -> tuple[Array, ...]:
         desired = np.tile(np.eye(4), (len(times), 1, 1))
@@ -65,8 +65,8 @@ def looked(
     rows = scene.chains["arm"].tool_poses(q)
     plain = schedule(ROWS, task)
     scheduled = replace(plain.tasks[0], X_PT=rows)
-    instants = np.array([0.35] if corner else jumps)
-    known = Known(times=plain.times, tasks=(scheduled,), instants=instants, corner=corner)
+    sample_times = np.array([0.35] if corner else jumps)
+    known = Known(times=plain.times, tasks=(scheduled,), sample_times=sample_times, corner=corner)
     accuracy = task_accuracy(scheduled, scene.chains["arm"], q=q, X_WP=part_poses(cell, scene.chains, {"arm": q}))
     ((found,), _) = look_between(scene, known, {"arm": q}, accuracy=(accuracy,), closures=())
     assert found.between is not None
