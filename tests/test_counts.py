@@ -17,12 +17,12 @@ def test_a_count_that_grew_is_named_with_the_cure(tmp_path: Path, monkeypatch: p
     kept.write_text(json.dumps({"arm": {"distance queries": 100, "contact queries": 100, "gone": 7}}))
     monkeypatch.setattr(counts, "KEPT", kept)
 
-    told = counts.grown(
+    reported = counts.grown(
         counts.Case(name="arm", step_s=0.01), {"distance queries": 115, "contact queries": 116, "sweeps": 6}
     )
 
     cure = "find out why, or keep the new count by: python benchmarks/counts.py --write"
-    assert told == [
+    assert reported == [
         f"arm: contact queries grew from 100 to 116, at most 115 expected; {cure}",
         f"arm: sweeps grew from 0 to 6, at most 5 expected; {cure}",
     ]

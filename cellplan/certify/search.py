@@ -29,7 +29,7 @@ class StretchSearch:
         """Bound all pairs over the stretch by the cheapest means.
 
         Args:
-            survey: All pairs; what is found goes there.
+            survey: All pairs; receives what is found.
             motion: The motion over the stretch.
             first: The first block.
             last: The first block after the stretch.

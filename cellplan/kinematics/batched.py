@@ -1,6 +1,6 @@
 """Batched kinematics of all robots; the last axis of every array is the batch.
 
-The arrays are laid out so that NumPy works through thousands of configurations in one call; robots lie side by side
+The arrays are arranged so that NumPy works through thousands of configurations in one call; robots lie side by side
 and are filled up to the longest chain with axes that do nothing. Cells of a batch may differ in base poses and tools.
 """
 

@@ -86,7 +86,7 @@ class JointAcceleration:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointAcceleration:
-    """Acceleration in [m/s^2] and jerk in [m/s^3] of a point in the world, with their instants in [s]."""
+    """Acceleration in [m/s^2] and jerk in [m/s^3] of a point in the world, with their times in [s]."""
 
     peak: float
     peak_at_s: float

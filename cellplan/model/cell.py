@@ -171,7 +171,7 @@ class Part:
         shape: The solid.
         X_PS: Pose of the shape's frame in the part frame P.
         held_by: The robots that hold it; empty when it is fixed in the world.
-        X_WP: Pose in the world when nobody holds it; None otherwise.
+        X_WP: Pose in the world when no robot holds it; None otherwise.
         mass: Mass in [kg]; None when it is not stated.
         centre: Centre of mass in P in [m], shape (3,); None when it is not stated.
     """
@@ -190,7 +190,7 @@ class Part:
 
     @property
     def X_CP(self) -> Array:
-        """The part in the tool frame of its positioner, in W when nobody holds it, shape (4, 4)."""
+        """The part in the tool frame of its positioner, in W when no robot holds it, shape (4, 4)."""
         if self.held_by:
             return inverse(self.held_by[0].X_PT)
         if self.X_WP is None:

@@ -1,4 +1,4 @@
-"""Progress of long stages, told to whoever listens."""
+"""Progress of long stages, reported to whoever listens."""
 
 from collections.abc import Callable
 

@@ -153,7 +153,7 @@ class RunRehearsal:
 
     Attributes:
         name: Name of the only task in a run of its own; None when all tasks are worked on together.
-        times: Instants in [s], shape (N,).
+        times: Times in [s], shape (N,).
         judged_from: First sample that is judged, by task: before it the tool may still be coming to its path.
         trials: The real cells.
         before: Figures over all trials by task, as solved.

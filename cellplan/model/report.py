@@ -230,7 +230,7 @@ class ClearanceReport:
         contacts: Everything that touches, allowed or not.
         exclusions: Pairs that were not checked, as (first, second, reason).
         pair_count: Pairs that were checked.
-        curve_times: Instants of the plotted curve in [s], shape (K,).
+        curve_times: Times of the plotted curve in [s], shape (K,).
         curves: Per class a distance in [m] that is kept all through the stretch of the program (one of 200) that holds
             the instant, shape (K,) each; exact to 0.1 mm at the minimum, elsewhere below what is reached in the
             middle of the stretch by no more than about a twentieth and a millimetre.
@@ -311,25 +311,25 @@ class Repeatability:
     """Whether the joints come back when all tools do.
 
     Attributes:
-        instants: Instants in [s] at which all tools are at their start together, shape (cycles + 1,).
+        sample_times: Times in [s] at which all tools are at their start together, shape (cycles + 1,).
         drifts: One entry per joint of every robot.
         closes: Whether every joint comes back in every cycle, so that the program may be repeated as it is.
     """
 
-    instants: Array
+    sample_times: Array
     drifts: tuple[JointDrift, ...]
     closes: bool
 
     @property
     def cycles(self) -> int:
         """How many cycles there are."""
-        return len(self.instants) - 1
+        return len(self.sample_times) - 1
 
     @property
     def period(self) -> float | None:
         """Length of a cycle in [s]; None when the cycles differ in length."""
-        lengths = np.diff(self.instants)
-        return float(lengths.mean()) if np.ptp(lengths) <= CYCLE_TOL * self.instants[-1] else None
+        lengths = np.diff(self.sample_times)
+        return float(lengths.mean()) if np.ptp(lengths) <= CYCLE_TOL * self.sample_times[-1] else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

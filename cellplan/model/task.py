@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 
-INSTANT_ROOM: Final = 1e-9  # [s] instants nearer than this are the same: rounding of sums of durations
+INSTANT_ROOM: Final = 1e-9  # [s] times nearer than this are the same: rounding of sums of durations
 
 
 class PlaneName(StrEnum):
@@ -79,7 +79,7 @@ class SampledPath:
         points: Tool tip positions in [m], shape (N, 3), expressed in P.
         axes: Unit tool axes pointing into the part, shape (N, 3), or None.
         rotations: Tool orientations, shape (N, 3, 3), or None; at most one of axes and rotations is given.
-        is_smooth: Whether a curve is laid through the points instead of straight sides.
+        is_smooth: Whether a curve is interpolated through the points instead of straight sides.
         is_closed: Whether the last point is joined to the first.
     """
 
@@ -93,11 +93,11 @@ class SampledPath:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TimedPath:
-    """Trajectory from a file: tool targets with the instants at which they are passed.
+    """Trajectory from a file: tool targets with the times at which they are passed.
 
     Attributes:
         source: File name for messages.
-        times: Instants in [s] from the start of the task, increasing from 0, shape (N,).
+        times: Times in [s] from the start of the task, increasing from 0, shape (N,).
         points: Tool tip positions in [m], shape (N, 3), expressed in P.
         axes: Unit tool axes pointing into the part, shape (N, 3), or None.
         rotations: Tool orientations, shape (N, 3, 3), or None; at most one of axes and rotations is given.
@@ -115,9 +115,9 @@ class TimedPath:
         """Check at the door that time goes on and nothing is missing or not finite."""
         fewest = 4 if self.is_closed else 2
         if len(self.times) < fewest or self.points.shape != (len(self.times), 3):
-            raise ValueError(f"trajectory '{self.source}': expected at least {fewest} instants with a point each")
+            raise ValueError(f"trajectory '{self.source}': expected at least {fewest} times with a point each")
         if not np.all(np.isfinite(self.points)) or self.times[0] != 0.0 or not np.all(np.diff(self.times) > 0.0):
-            raise ValueError(f"trajectory '{self.source}': expected finite points at instants that increase from 0")
+            raise ValueError(f"trajectory '{self.source}': expected finite points at times that increase from 0")
 
     @property
     def duration(self) -> float:
@@ -126,7 +126,7 @@ class TimedPath:
 
     @property
     def is_smooth(self) -> bool:
-        """Whether a curve is laid through the points: always, a trajectory has a speed everywhere."""
+        """Whether a curve is interpolated through the points: always, a trajectory has a speed everywhere."""
         return True
 
 
@@ -197,8 +197,8 @@ class Task:
         name: Name of the task.
         robot: Name of the operator.
         path: The path as written.
-        project: Unit direction in P naming the side of the part the path is laid on (the outward side the projection
-            comes from), shape (3,); None when the path is used where it stands.
+        project: Unit direction in P naming the side of the part onto which the path is projected (the outward normal there),
+            shape (3,); None when the path is used where it stands.
         plane_offset: Position of an unprojected planar path along the plane's normal axis in [m].
         tool_axis: ``None`` for the inward surface normal (or the axes of the file), else a unit direction in P.
         tool_x: Direction in P that the tool's x axis leans to, shape (3,).
@@ -267,7 +267,7 @@ class Task:
         return self.start + self.settle if self.settle > 0.0 else 0.0
 
     def first_judged(self, times: Array) -> int:
-        """Index of the first of these instants in [s], shape (N,), at which errors are judged; at most the last."""
+        """Index of the first of these times in [s], shape (N,), at which errors are judged; at most the last."""
         first = int(np.searchsorted(times, self.judged_from - INSTANT_ROOM))
         return min(first, len(times) - 1) if self.settle > 0.0 else 0
 

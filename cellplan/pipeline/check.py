@@ -49,7 +49,7 @@ class CellCheck:
 
 
 def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
-    """Lay the paths on the part, examine or find the start postures, and look for collisions and loads there.
+    """Project the paths onto the part, examine or find the start postures, and look for collisions and loads there.
 
     Raises:
         InputError: A path misses the part, or a given start is out of limits or off its task.

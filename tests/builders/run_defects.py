@@ -124,15 +124,15 @@ def extra_file(rng, copy):
 
 def linked_file(rng, copy):
     path = copy.any_file(rng)
-    aside = copy.run.parent / "aside"
-    path.rename(aside)
-    path.symlink_to(aside)
+    lateral = copy.run.parent / "aside"
+    path.rename(lateral)
+    path.symlink_to(lateral)
 
 
 def linked_folder(rng, copy):
-    path, aside = copy.run / pick(rng, ("tables", "plots")), copy.run.parent / "aside"
-    path.rename(aside)
-    path.symlink_to(aside, target_is_directory=True)
+    path, lateral = copy.run / pick(rng, ("tables", "plots")), copy.run.parent / "aside"
+    path.rename(lateral)
+    path.symlink_to(lateral, target_is_directory=True)
 
 
 def other_line_ends(rng, copy):

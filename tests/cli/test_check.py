@@ -26,9 +26,9 @@ def test_a_sound_cell_is_told_with_postures_and_paths_and_nothing_is_written(
 def test_a_collision_at_the_start_ends_with_one(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["check", str(cells / "four_robots_initial.yaml"), "--json"])
 
-    told = json.loads(capsys.readouterr().out)
-    assert (status, told["exit"], told["status"], told["schema"]) == (1, 1, "failed", "cellplan.check/1")
-    assert any(not check["passed"] for check in told["checks"])
+    reported = json.loads(capsys.readouterr().out)
+    assert (status, reported["exit"], reported["status"], reported["schema"]) == (1, 1, "failed", "cellplan.check/1")
+    assert any(not check["passed"] for check in reported["checks"])
 
 
 def test_a_start_off_its_task_is_bad_input(cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

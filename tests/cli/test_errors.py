@@ -65,9 +65,9 @@ def test_the_traceback_of_an_internal_error_is_there_on_request(
     except ValueError as error:
         report_failure(error)
 
-    told = capsys.readouterr().err
-    assert told.startswith("Traceback (most recent call last):")
-    assert "test_errors.py" in told
+    reported = capsys.readouterr().err
+    assert reported.startswith("Traceback (most recent call last):")
+    assert "test_errors.py" in reported
 
 
 def test_bad_input_never_shows_a_traceback(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,14 +40,14 @@ def test_four_robots_are_told_as_graph_circuits_and_arrow(cells: Path, capsys: p
         "  A1  revolute   -180 … 180 deg            200 deg/s",
         "  B1  revolute   -135 … 70 deg             165 deg/s",
     ]
-    told = "\n".join(lines)
-    assert "  l = e - v + 1 = 42 - 40 + 1 = 3 independent circuits\n" in told
-    assert "  kuka            world -A2- 1 -B2- 2 -C2- 3 -D2- 4 -E2- 5 -F2- kuka/tool\n" in told
+    reported = "\n".join(lines)
+    assert "  l = e - v + 1 = 42 - 40 + 1 = 3 independent circuits\n" in reported
+    assert "  kuka            world -A2- 1 -B2- 2 -C2- 3 -D2- 4 -E2- 5 -F2- kuka/tool\n" in reported
     assert (
         "  2  rhombus    +px +py +pz +rx +ry +rz\n"
         "     abb        -F3 -E3 -D3 -C3 -B3 -A3\n"
         "     reis       +A1 +B1 +C1 +D1 +E1 +F1\n"
-    ) in told
+    ) in reported
     assert lines[-8:] == [
         "cooperation Jacobian: 18 rows, 24 columns",
         "                  reis   kuka    abb  staubli",
@@ -69,14 +69,14 @@ def test_nothing_is_wider_than_a_terminal(cells: Path, capsys: pytest.CaptureFix
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_json_counts_fit_each_other(cells: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
-    told = record_of(cells / f"{name}.yaml", capsys)
-    graph = told["graph"]
+    reported = record_of(cells / f"{name}.yaml", capsys)
+    graph = reported["graph"]
 
-    assert (told["schema"], told["status"], told["exit"]) == ("cellplan.explain/1", "passed", 0)
+    assert (reported["schema"], reported["status"], reported["exit"]) == ("cellplan.explain/1", "passed", 0)
     assert graph["vertices"] == len(graph["links"])
     assert graph["edges"] == len(graph["joints"])
-    assert graph["independent_circuits"] == len(told["circuits"]) == graph["edges"] - graph["vertices"] + 1
-    for circuit in told["circuits"]:
+    assert graph["independent_circuits"] == len(reported["circuits"]) == graph["edges"] - graph["vertices"] + 1
+    for circuit in reported["circuits"]:
         ends = {joint["name"]: (joint["from"], joint["to"]) for joint in graph["joints"]}
         way = [ends[step["joint"]][:: step["sign"]] for step in circuit["passed"]]
         assert [end for _, end in way] == [begin for begin, _ in way[1:] + way[:1]]  # each joint begins where one ended
@@ -180,5 +180,5 @@ def test_many_robots_with_long_names_stay_within_the_screen() -> None:
 def test_bad_input_is_refused_with_its_place(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["explain", str(tmp_path / "absent.yaml"), "--json"])
 
-    told = json.loads(capsys.readouterr().out)
-    assert (status, told["status"], told["exit"]) == (2, "error", 2)
+    reported = json.loads(capsys.readouterr().out)
+    assert (status, reported["status"], reported["exit"]) == (2, "error", 2)

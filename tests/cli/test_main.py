@@ -27,9 +27,9 @@ def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
 def test_help_names_every_command_and_nothing_unfinished(capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["--help"])
 
-    told = capsys.readouterr().out
+    reported = capsys.readouterr().out
     assert status == 0
-    commands = [line.split()[0] for line in told.partition("Commands:")[2].splitlines() if line.strip()]
+    commands = [line.split()[0] for line in reported.partition("Commands:")[2].splitlines() if line.strip()]
     assert commands == ["check", "explain", "solve", "verify", "export", "rehearse", "robots", "schema"]
 
 

@@ -70,9 +70,9 @@ def test_feedback_brings_it_back_and_hands_over_corrected_tables(pair: str, caps
 def test_a_machine_gets_one_object(pair: str, capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["rehearse", pair, "--errors", "spread.yaml", "--trials", "3", "--seed", "4", "-o", "out", "--json"])
 
-    told = json.loads(capsys.readouterr().out)
-    record = told["rehearsal"]
-    assert (status, told["exit"], told["schema"]) == (1, 1, "cellplan.rehearse/1")
+    reported = json.loads(capsys.readouterr().out)
+    record = reported["rehearsal"]
+    assert (status, reported["exit"], reported["schema"]) == (1, 1, "cellplan.rehearse/1")
     assert record == json.loads(Path("out/rehearsal.json").read_text(encoding="utf-8"))
     assert (record["schema"], record["trials"], record["seed"]) == ("cellplan.rehearsal/1", 3, 4)
     task = record["tasks"]["circle"]

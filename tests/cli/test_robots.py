@@ -21,12 +21,12 @@ def listed() -> dict[str, Any]:
 def test_every_bundled_robot_is_listed_with_reach_limits_and_source(capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["robots"])
 
-    told = capsys.readouterr().out
+    reported = capsys.readouterr().out
     assert status == 0
     for name in ("abb_irb1600", "kuka_kr6", "reis_rv20_16", "staubli_rx90l", "staubli_rx90l_as_printed"):
-        assert f"{name}\n  reach " in told
-    assert "  B2         -155 … 35 deg          156 deg/s\n" in told
-    assert "Ribeiro 2010, table 5" in told
+        assert f"{name}\n  reach " in reported
+    assert "  B2         -155 … 35 deg          156 deg/s\n" in reported
+    assert "Ribeiro 2010, table 5" in reported
 
 
 def test_a_machine_gets_the_figures_of_the_data_sheet(listed: dict[str, Any]) -> None:

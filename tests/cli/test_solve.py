@@ -58,15 +58,15 @@ def test_a_machine_gets_one_object_with_the_whole_report(
 
     status = run(["solve", str(coarse_cell), "-o", str(folder), "--task", "circle", "--json"])
 
-    told = json.loads(capsys.readouterr().out)
-    assert (status, told["exit"]) == (0, 0)
-    assert (told["schema"], told["status"]) == ("cellplan.solve/1", "passed")
-    assert told["report_path"] == str(folder / "report.html")
+    reported = json.loads(capsys.readouterr().out)
+    assert (status, reported["exit"]) == (0, 0)
+    assert (reported["schema"], reported["status"]) == ("cellplan.solve/1", "passed")
+    assert reported["report_path"] == str(folder / "report.html")
     written = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     series = json.loads((folder / "series.json").read_text(encoding="utf-8"))
     assert len(series["times_s"]) == written["samples"]
-    assert told["report"] == written
-    assert list(told["report"]["tasks"]) == ["circle"]
+    assert reported["report"] == written
+    assert list(reported["report"]["tasks"]) == ["circle"]
 
 
 def test_a_failed_cell_ends_with_one_and_leaves_no_tables(
@@ -198,5 +198,5 @@ def test_findings_about_a_cell_come_all_at_once_each_with_its_line(
     assert len(lines) >= 2
     assert all(line.startswith(f"{coarse_cell}:") for line in lines)
     assert any("did you mean 'model'?" in line for line in lines)
-    told = json.loads(out)
-    assert (told["status"], told["exit"], told["errors"]) == ("error", 2, lines)
+    reported = json.loads(out)
+    assert (reported["status"], reported["exit"], reported["errors"]) == ("error", 2, lines)

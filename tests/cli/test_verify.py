@@ -34,9 +34,9 @@ def test_a_sound_run_is_told_with_its_figures(copy: Copy, capsys: pytest.Capture
 def test_a_machine_gets_one_object(copy: Copy, capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["verify", str(copy.run), "--cell", str(copy.cell), "--json"])
 
-    told = json.loads(capsys.readouterr().out)
-    assert (status, told["schema"], told["status"], told["exit"]) == (0, "cellplan.verify/1", "verified", 0)
-    assert told["report"]["status"] == "passed"
+    reported = json.loads(capsys.readouterr().out)
+    assert (status, reported["schema"], reported["status"], reported["exit"]) == (0, "cellplan.verify/1", "verified", 0)
+    assert reported["report"]["status"] == "passed"
 
 
 def test_an_edited_table_ends_with_two_and_names_the_line(copy: Copy, capsys: pytest.CaptureFixture[str]) -> None:
@@ -65,8 +65,8 @@ def test_a_check_that_fails_ends_with_one(copy: Copy, capsys: pytest.CaptureFixt
     assert not (copy.run / "programs").exists()
 
     assert run(["verify", str(copy.run), "--cell", str(copy.cell), "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
-    assert (told["status"], told["exit"], len(told["errors"])) == ("failed", 1, 2)
+    reported = json.loads(capsys.readouterr().out)
+    assert (reported["status"], reported["exit"], len(reported["errors"])) == ("failed", 1, 2)
 
 
 def test_a_stale_input_ends_with_two(copy: Copy, capsys: pytest.CaptureFixture[str]) -> None:

@@ -64,11 +64,11 @@ def every_call_fails_once(
                 path.rmdir() if path.is_dir() else path.unlink()
         with faulty(place, fails_at=fails_at, number=number) as faults, pytest.raises(InputError) as caught:
             write(run)
-        told = f"call {fails_at}: {faults.calls[-1]}: {caught.value}"
-        assert str(caught.value).startswith(str(run)), told
+        reported = f"call {fails_at}: {faults.calls[-1]}: {caught.value}"
+        assert str(caught.value).startswith(str(run)), reported
         assert "\n" not in str(caught.value)
-        assert content(place) in ((before, whole) if older else ({}, whole)), told
-        assert not list(place.rglob(".*")), told
+        assert content(place) in ((before, whole) if older else ({}, whole)), reported
+        assert not list(place.rglob(".*")), reported
     return calls
 
 

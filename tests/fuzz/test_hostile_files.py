@@ -25,17 +25,17 @@ def outcome(folder: Path, file: str, seed: int) -> str:
     began = time.monotonic()
     try:
         load_cell(folder / "c.yaml")
-        told = "read"
+        reported = "read"
     except OverrunError as error:
         pytest.fail(f"{where}: {error}")
     except InputError as error:
-        told = "refused"
+        reported = "refused"
         for line in error_lines(error):
             plain = line.removeprefix("error: ").replace(f"{folder}/", "")
             assert LINE.fullmatch(plain), f"{where}: {line}"
             assert line.isprintable(), where
     assert time.monotonic() - began < LONGEST_S, where
-    return told
+    return reported
 
 
 def outcomes(folder: Path, file: str, seeds: range) -> list[str]:

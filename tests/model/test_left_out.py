@@ -4,23 +4,23 @@ from cellplan.model.left_out import left_out_lines
 
 
 def test_there_is_one_line_for_each_kind_with_bodies_and_reasons() -> None:
-    told = [
+    reported = [
         ("grip", ("a/hand", "part"), "holds the part"),
         ("excluded", ("a/hand", "post"), "a cover"),
         ("grip", ("a/tool", "part"), "holds the part"),
         ("excluded", ("b/hand", "post"), "another cover"),
     ]
 
-    assert left_out_lines(told) == [
+    assert left_out_lines(reported) == [
         "left out, excluded by the cell: a/hand - post (a cover); b/hand - post (another cover)",
         "left out, grip: a/hand - part, a/tool - part (holds the part)",
     ]
 
 
 def test_many_pairs_of_one_reason_are_counted() -> None:
-    told = [("standing", (f"r{k}/foot", "floor"), "they stand") for k in range(5)]
+    reported = [("standing", (f"r{k}/foot", "floor"), "they stand") for k in range(5)]
 
-    (line,) = left_out_lines(told)
+    (line,) = left_out_lines(reported)
 
     assert line.endswith("r0/foot - floor, r1/foot - floor, r2/foot - floor and 2 more (they stand)")
 

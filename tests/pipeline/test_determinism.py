@@ -55,5 +55,7 @@ def test_the_number_of_threads_on_offer_changes_no_byte(first, sound: Path, tmp_
 
 def test_no_file_knows_where_or_by_whom_it_was_made(first, sound: Path) -> None:
     words = {str(sound), str(ROOT), os.uname().nodename, os.environ.get("HOME", "/home/nobody")}
-    told = [(name, word) for name, data in first.items() for word in words if len(word) > 5 and word.encode() in data]
-    assert told == []
+    reported = [
+        (name, word) for name, data in first.items() for word in words if len(word) > 5 and word.encode() in data
+    ]
+    assert reported == []

@@ -196,8 +196,8 @@ def test_a_robot_whose_links_have_no_bodies_is_told() -> None:
     bare = replace(arm_model(), bodies=())
     scene = Scene.from_cell(make_cell(placed("a", arm_model()), placed("b", bare)))
 
-    (told,) = scene.left_out
-    assert (told.kind, told.bodies) == (LeftOutKind.NO_BODY, ("b",))
+    (reported,) = scene.left_out
+    assert (reported.kind, reported.bodies) == (LeftOutKind.NO_BODY, ("b",))
 
 
 def test_the_order_of_the_robots_changes_no_verdict_on_pairs() -> None:

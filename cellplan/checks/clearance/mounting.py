@@ -32,7 +32,7 @@ def check_mounting(scene: Scene, q: Array, times: Array | None = None) -> tuple[
     Args:
         scene: The scene.
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
-        times: Instants of the samples in [s], shape (N,); None where there is no motion.
+        times: Times of the samples in [s], shape (N,); None where there is no motion.
     """
     found = mounted_depths(scene, q)
     standing = [each for each in found if each.pair.mount is Mount.STANDING]

@@ -21,7 +21,7 @@ AXIS: Final = "axis"
 AXIS_COMPONENTS: Final = (0, 1, 2, 3, 4)  # of a task: they leave no more than the turn about one axis open
 DEPTH_TOL: Final = 1e-6  # [m] tracking errors of a micrometre do not decide about a cut that is as deep as it may be
 FINE_STEP: Final = 1e-3  # [m] longer steps of a tool between two rows are subdivided, joints moving evenly
-MAX_TIMES: Final = 4000  # instants to which long steps are refined; programs of more rows are taken as they are
+MAX_TIMES: Final = 4000  # times to which long steps are refined; programs of more rows are taken as they are
 POSE_COUNT: Final = 400  # poses of a body that are evaluated, beside those round the deepest of them
 MESH_POSE_COUNT: Final = 100  # likewise on a mesh, where a line costs fifty times as much
 NEAR_WORST_COUNT: Final = 20  # rows evaluated round the deepest pose of a body
@@ -82,7 +82,7 @@ def _task_depth(
     """The largest depth of one task's tool, its instant and what of the tool is so deep."""
     task = scheduled.task
     robot = cell.robot(task.robot)
-    instants, X_PT = _tool_on_part(cell, task, times, chains=chains, q=q)
+    sample_times, X_PT = _tool_on_part(cell, task, times, chains=chains, q=q)
     X_ST = inverse(cell.part.X_PS) @ X_PT
     tool, zone = robot.tool, cell.checks.contact_zone
     along = line_depths(tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not tool.bodies)
@@ -95,7 +95,7 @@ def _task_depth(
         task=task.name,
         robot=task.robot,
         depth=depth,
-        at_s=float(instants[row]),
+        at_s=float(sample_times[row]),
         limit=task.tool_depth,
         body=name,
     )
@@ -104,7 +104,7 @@ def _task_depth(
 def _tool_on_part(
     cell: Cell, task: Task, times: Array, *, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
 ) -> tuple[Array, Array]:
-    """Instants in [s] and tool poses on the part there; long steps are cut, every joint moving evenly in them."""
+    """Times in [s] and tool poses on the part there; long steps are cut, every joint moving evenly in them."""
     movers = {task.robot, *(grasp.robot for grasp in cell.part.held_by[:1])}
     own = {name: q[name] for name in sorted(movers)}
     X_PT = inverse(part_poses(cell, chains, own)) @ chains[task.robot].tool_poses(own[task.robot])
@@ -116,8 +116,8 @@ def _tool_on_part(
     whole = np.minimum(rows.astype(np.intp), len(times) - 2)
     share = (rows - whole)[:, None]
     fine = {name: values[whole] + share * (values[whole + 1] - values[whole]) for name, values in own.items()}
-    instants = times[whole] + share[:, 0] * (times[whole + 1] - times[whole])
-    return instants, inverse(part_poses(cell, chains, fine)) @ chains[task.robot].tool_poses(fine[task.robot])
+    sample_times = times[whole] + share[:, 0] * (times[whole + 1] - times[whole])
+    return sample_times, inverse(part_poses(cell, chains, fine)) @ chains[task.robot].tool_poses(fine[task.robot])
 
 
 def _deepest(columns: Columns, cell: Cell, X_ST: Array) -> tuple[int, float]:

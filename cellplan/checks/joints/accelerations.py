@@ -34,7 +34,7 @@ def point_accelerations(times: Array, points: Array) -> Array:
     acceleration ``v / h`` at its first row.
 
     Args:
-        times: Instants in [s], shape (N,), N >= 2.
+        times: Times in [s], shape (N,), N >= 2.
         points: Positions, shape (N, ...): points in the world in [m], or joints in [rad] or [m].
     """
     steps = np.diff(times)
@@ -52,10 +52,10 @@ def joint_accelerations(times: Array, q: Array, *, cycle: float, jumps_at: Array
     joint speeds up evenly or gently. By as much as the next change falls short, the speed has jumped:
     ``v_0 - (v_1 - v_0)``, between 0 and ``v_0``. No controller spreads a jump over a long step for it, so it is divided
     by its cycle, where that is shorter than the step. The same holds backwards in time where a joint comes to rest.
-    Likewise for the jumps at instants at which the desired speed of a tool is known to jump.
+    Likewise for the jumps at times at which the desired speed of a tool is known to jump.
 
     Args:
-        times: Instants in [s], shape (N,).
+        times: Times in [s], shape (N,).
         q: Positions in [rad] or [m], shape (N, n).
         cycle: Cycle of the controller in [s].
         jumps_at: Where the desired speed of a tool jumps, in [s], shape (J,).
@@ -89,7 +89,7 @@ def jerks(times: Array, accelerations: Array, *, window: float) -> Array:
     step gives the change over that step, divided by the step.
 
     Args:
-        times: Instants in [s], evenly spaced, shape (N,).
+        times: Times in [s], evenly spaced, shape (N,).
         accelerations: At the rows, with their signs, shape (N, n, d): n points or joints with d components each.
         window: In [s].
 

@@ -18,7 +18,7 @@ PRISMATIC_DRIFT_TOL: Final = 1e-6  # [m] likewise
 def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Repeatability | None:
     """How far every joint is at the end of each cycle from where it was at its start.
 
-    A cycle lies between two instants at which all tools are at the pose of their start together. Tasks that begin and
+    A cycle lies between two times at which all tools are at the pose of their start together. Tasks that begin and
     end their cycles together are taken cycle by cycle; otherwise the whole run is one cycle. Cycles that begin while a
     tool still settles are left out. Between two samples a joint moves evenly.
 
@@ -30,13 +30,13 @@ def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Rep
     Returns:
         The drift of every joint; None when a tool does not come back, or no cycle is left.
     """
-    instants = _instants(schedule)
-    if len(instants) < 2:
+    sample_times = _instants(schedule)
+    if len(sample_times) < 2:
         return None
     drifts = []
     for robot in cell.robots:
         for joint, positions in zip(robot.model.joints, q[robot.name].T, strict=True):
-            drift = np.diff(np.interp(instants, schedule.times, positions))
+            drift = np.diff(np.interp(sample_times, schedule.times, positions))
             k = int(np.argmax(np.abs(drift)))
             drifts.append(
                 JointDrift(
@@ -49,7 +49,7 @@ def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Rep
                 )
             )
     closes = all(drift.worst <= _limit(drift) for drift in drifts)
-    return Repeatability(instants=instants, drifts=tuple(drifts), closes=closes)
+    return Repeatability(sample_times=sample_times, drifts=tuple(drifts), closes=closes)
 
 
 def check_joint_drift(found: Repeatability | None, *, is_demanded: bool) -> tuple[Check, ...]:
@@ -79,14 +79,14 @@ def check_joint_drift(found: Repeatability | None, *, is_demanded: bool) -> tupl
 
 
 def _instants(schedule: Schedule) -> Array:
-    """Instants at which all tools are at their start together, shape (cycles + 1,); fewer than two: no cycle."""
+    """Times at which all tools are at their start together, shape (cycles + 1,); fewer than two: no cycle."""
     if not schedule.tasks or not all(scheduled.cycle_ends for scheduled in schedule.tasks):
         return np.zeros(0)
     bounds = [np.array([scheduled.task.start, *scheduled.cycle_ends]) for scheduled in schedule.tasks]
     is_common = all(len(b) == len(bounds[0]) and np.abs(b - bounds[0]).max() <= INSTANT_ROOM for b in bounds)
-    instants = bounds[0] if is_common else np.array([min(b[0] for b in bounds), max(b[-1] for b in bounds)])
+    sample_times = bounds[0] if is_common else np.array([min(b[0] for b in bounds), max(b[-1] for b in bounds)])
     settled = max(scheduled.task.judged_from for scheduled in schedule.tasks)
-    return instants[instants >= settled - INSTANT_ROOM]
+    return sample_times[sample_times >= settled - INSTANT_ROOM]
 
 
 def _limit(drift: JointDrift) -> float:
@@ -105,7 +105,7 @@ def _check(found: Repeatability, drift: JointDrift) -> Check:
         value=value,
         limit=limit,
         unit=unit,
-        at_s=float(found.instants[drift.at_cycle]),
+        at_s=float(found.sample_times[drift.at_cycle]),
         message=f"{drift.robot} {drift.joint} is {value:.3g} {unit} from where it was a cycle before, "
-        f"at {found.instants[drift.at_cycle]:.3f} s, the end of cycle {drift.at_cycle}; allowed {limit:g} {unit}",
+        f"at {found.sample_times[drift.at_cycle]:.3f} s, the end of cycle {drift.at_cycle}; allowed {limit:g} {unit}",
     )

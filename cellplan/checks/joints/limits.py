@@ -14,7 +14,7 @@ def joint_uses(robot: Robot, times: Array, q: Array) -> tuple[JointUse, ...]:
 
     Args:
         robot: The robot.
-        times: Instants in [s], shape (N,).
+        times: Times in [s], shape (N,).
         q: Positions, shape (N, n).
     """
     speeds = np.abs(np.diff(q, axis=0)) / np.diff(times)[:, None]

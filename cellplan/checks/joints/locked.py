@@ -21,7 +21,7 @@ def check_locked(cell: Cell, times: Array, q: Mapping[str, Array]) -> list[Check
 
     Args:
         cell: The cell.
-        times: Instants in [s], shape (N,).
+        times: Times in [s], shape (N,).
         q: Positions by robot, shape (N, n) each.
     """
     return [_check(cell, lock, times, q[lock.robot]) for lock in cell.motion.locked]
@@ -36,7 +36,7 @@ def with_locked_joints(
         checks: The checks of the task.
         errors: Its errors.
         tolerance: What it allows.
-        times: Instants in [s], shape (N,).
+        times: Times in [s], shape (N,).
         locked: Joints that fail.
     """
     outside = np.linalg.norm(errors.position_error, axis=1) > tolerance.position

@@ -59,7 +59,7 @@ def load_uses(
     Args:
         cell: The cell.
         chains: The chain of each robot.
-        times: Instants of the rows in [s], shape (N,).
+        times: Times of the rows in [s], shape (N,).
         q: Joint positions by robot in [rad] or [m], shape (N, n) each.
     """
     return tuple(_load_use(cell, robot, chains[robot.name], times=times, q=q[robot.name]) for robot in cell.robots)
@@ -147,7 +147,7 @@ def _axis_use(joint: Joint, D: Array, carried: Sequence[_Carried], times: Array)
         joint: The axis.
         D: Displacements of the link that carries it, shape (N, 4, 4).
         carried: The masses.
-        times: Instants in [s], shape (N,).
+        times: Times in [s], shape (N,).
     """
     s = D[:, :3, :3] @ joint.axis_B
     s0 = D[:, :3, :3] @ joint.point_B + D[:, :3, 3]

@@ -9,43 +9,43 @@ from cellplan.model.motion import DesiredMotion
 
 SIDE_S: Final = 1e-6  # [s] before and after an instant: the speeds on its two sides
 JUMP_TOL: Final = 1e-4  # [m/s] or [rad/s]: a smaller change of a tool's speed is no jump
-ROW_TOL: Final = 1e-6  # [-] of a step: nearer instants are those of the row
+ROW_TOL: Final = 1e-6  # [-] of a step: nearer times are those of the row
 NO_TIMES: Final = np.zeros(0)
 
 
 def desired_jumps(desired: DesiredMotion) -> Array:
-    """Instants in [s] at which the desired speed of a tool jumps, shape (J,).
+    """Times in [s] at which the desired speed of a tool jumps, shape (J,).
 
     So it does where a constant law starts, passes a corner or ends, and where a trajectory starts or ends at speed.
     """
-    instants = desired.jumps
-    beside = np.concatenate([instants - SIDE_S, instants, instants + SIDE_S])
-    is_jump = np.zeros(len(instants), dtype=bool)
+    sample_times = desired.jumps
+    beside = np.concatenate([sample_times - SIDE_S, sample_times, sample_times + SIDE_S])
+    is_jump = np.zeros(len(sample_times), dtype=bool)
     for X_PT in desired.poses(np.clip(beside, 0.0, float(desired.times[-1]))):
         before, at, after = np.split(X_PT, 3)
         change = (after[:, :3, 3] - 2.0 * at[:, :3, 3] + before[:, :3, 3]) / SIDE_S
         turn = (_turns(at, after) - _turns(before, at)) / SIDE_S
         is_jump |= (np.linalg.norm(change, axis=1) > JUMP_TOL) | (np.linalg.norm(turn, axis=1) > JUMP_TOL)
-    return instants[is_jump]
+    return sample_times[is_jump]
 
 
-def joint_jumps(times: Array, q: Array, instants: Array) -> Array:
-    """By how much the speed of each joint jumps at the rows nearest to given instants, shape (N, n), else 0.
+def joint_jumps(times: Array, q: Array, sample_times: Array) -> Array:
+    """By how much the speed of each joint jumps at the rows nearest to given times, shape (N, n), else 0.
 
     The speeds are those of the steps, 0 before the first row and after the last one. A jump at a row is the change of
     speed there; one within a step is that from the step before to the step after it. The larger change at the rows
     beside it, once for each row that is passed, is what the joint does without a jump.
 
     Args:
-        times: Instants of the rows in [s], evenly spaced, shape (N,).
+        times: Times of the rows in [s], evenly spaced, shape (N,).
         q: Positions in [rad] or [m], shape (N, n).
-        instants: Where the desired speed jumps, in [s], shape (J,).
+        sample_times: Where the desired speed jumps, in [s], shape (J,).
     """
     step = float(times[-1]) / (len(times) - 1)
     jumps = np.zeros_like(q)
     rest = np.zeros_like(q[:2])
     changes = np.concatenate([rest, np.diff(np.concatenate([q[:1], q, q[-1:]]), n=2, axis=0) / step, rest])  # row + 2
-    place = instants / step
+    place = sample_times / step
     first = np.floor(place + ROW_TOL).astype(np.intp)
     is_between = np.abs(place - first) > ROW_TOL
     last = first + is_between

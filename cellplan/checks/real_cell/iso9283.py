@@ -48,7 +48,7 @@ def path_figures(errors: Array, times: Array) -> PathFigures:
 
     Args:
         errors: Commanded less attained pose in P: position in [m], then turn in [rad], shape (T, N, 6).
-        times: Instants in [s], shape (N,).
+        times: Times in [s], shape (N,).
     """
     mean = errors.mean(axis=0)
     distances = np.linalg.norm(mean[:, :3], axis=1)

@@ -94,14 +94,14 @@ class ErrorsBetweenRows:
             for kind in range(2):
                 chosen[np.argsort(-middle[:, place, kind] * judged, kind="stable")[:WORST_COUNT]] = True
         k, s = _subdivided(np.flatnonzero(chosen), self._jumped, self._share)
-        fine, (instants, corners) = self._errors(tools, k, s), self._corners(tools)
+        fine, (sample_times, corners) = self._errors(tools, k, s), self._corners(tools)
         found = [
-            _Found(tool, middle[:, place], bounds[place], chosen, k, s, fine[:, place], instants, corners[:, place])
+            _Found(tool, middle[:, place], bounds[place], chosen, k, s, fine[:, place], sample_times, corners[:, place])
             for place, tool in enumerate(tools)
         ]
         every = [self._worst(one, kind) for one in found for kind in range(2)]
         step = min((error.longest_step for error in every if error.longest_step is not None), default=None)
-        if step is not None and _stops_at_once(tools, corners[instants > self._desired.times[-1] - INSTANT_ROOM]):
+        if step is not None and _stops_at_once(tools, corners[sample_times > self._desired.times[-1] - INSTANT_ROOM]):
             step = _fitting(step, float(self._desired.times[-1]))
         every = [error if error.longest_step is None else replace(error, longest_step=step) for error in every]
         results = [BetweenRows(position=a, orientation=b) for a, b in zip(every[::2], every[1::2], strict=True)]
@@ -192,24 +192,24 @@ class ErrorsBetweenRows:
         return bound
 
     def _corners(self, tools: Sequence[_Tool]) -> tuple[Array, Array]:
-        """Instants at which tools may change their speed at once, and the error of each tool there.
+        """Times at which tools may change their speed at once, and the error of each tool there.
 
         A change of speed by v at a share s of a step of length h makes an error of ``v h s (1 - s)``. Where the rows of
         a shorter step would lie does not matter: the error is that of a corner in the middle of a step.
 
         Returns:
-            Instants in [s], shape (J,), and errors with the present step in [m] and [rad], shape (J, tools, 2).
+            Times in [s], shape (J,), and errors with the present step in [m] and [rad], shape (J, tools, 2).
         """
         times, step = self._desired.times, self._schedule.step
-        instants = self._desired.jumps
-        instants = instants[(instants > times[0] + INSTANT_ROOM) & (instants <= times[-1])]
-        errors = np.zeros((len(instants), len(tools), 2))
-        around = [self._desired.poses(np.clip(instants + shift * step, times[0], times[-1])) for shift in SIDES]
+        sample_times = self._desired.jumps
+        sample_times = sample_times[(sample_times > times[0] + INSTANT_ROOM) & (sample_times <= times[-1])]
+        errors = np.zeros((len(sample_times), len(tools), 2))
+        around = [self._desired.poses(np.clip(sample_times + shift * step, times[0], times[-1])) for shift in SIDES]
         for place, tool in enumerate(tools):
             if tool.place is not None:
                 before, at, after = (poses[tool.place] for poses in around)
                 errors[:, place] = _sag(after - 2.0 * at + before, tool.relation) / (4.0 * SIDE_FRACTION)
-        return instants, errors
+        return sample_times, errors
 
     def _worst(self, found: "_Found", kind: int) -> BetweenError:
         """The largest error of one kind, what bounds it, and the step that would keep what is allowed."""
@@ -251,9 +251,9 @@ class ErrorsBetweenRows:
         if not np.any(errors > allowed) or np.any(rows >= allowed):
             return None
         corners = np.where(found.corners[:, kind] > KINK_FRACTION * allowed, found.corners[:, kind], 0.0)
-        corners[(found.instants < times[found.tool.first]) | (found.instants > times[-1] - INSTANT_ROOM)] = 0.0
+        corners[(found.sample_times < times[found.tool.first]) | (found.sample_times > times[-1] - INSTANT_ROOM)] = 0.0
         share = min(1.0, (allowed - float(rows.max())) / max(float(corners.max(initial=0.0)), allowed))
-        near = np.searchsorted(times, found.instants[corners > 0.0])
+        near = np.searchsorted(times, found.sample_times[corners > 0.0])
         over = errors > allowed
         kept = (allowed - rows[over]) / (errors[over] - rows[over])
         is_near = np.isin(k[over], np.concatenate([near - 1, near]))
@@ -270,10 +270,10 @@ class _Found:
         middle: Errors in the middle of all steps, shape (N - 1, 2).
         bounds: No error in a step is larger, shape (N - 1, 2).
         chosen: Steps that were subdivided, shape (N - 1,).
-        k: Indices of the instants looked at, shape (M,).
+        k: Indices of the times evaluated, shape (M,).
         s: Shares of these steps, shape (M,).
         fine: Errors there, shape (M, 2).
-        instants: When the tool may change its speed at once, in [s], shape (J,).
+        sample_times: When the tool may change its speed at once, in [s], shape (J,).
         corners: The largest error that each makes with a step of this length, shape (J, 2).
     """
 
@@ -284,7 +284,7 @@ class _Found:
     k: Indices
     s: Array
     fine: Array
-    instants: Array
+    sample_times: Array
     corners: Array
 
 
@@ -301,12 +301,12 @@ def _sag(off: Array, relation: Relation) -> Array:
     return np.stack([np.linalg.norm(off[:, axes, 3], axis=1), np.linalg.norm(turned, axis=(1, 2))], axis=1)
 
 
-def _within_steps(times: Array, instants: Array) -> tuple[Indices, Array]:
-    """Steps and shares of them for those instants that lie between two rows."""
-    k = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(times) - 2)
-    inside = (instants > times[k] + INSTANT_ROOM) & (instants < times[k + 1] - INSTANT_ROOM)
-    k, instants = k[inside], instants[inside]
-    return k, (instants - times[k]) / (times[k + 1] - times[k])
+def _within_steps(times: Array, sample_times: Array) -> tuple[Indices, Array]:
+    """Steps and shares of them for those times that lie between two rows."""
+    k = np.clip(np.searchsorted(times, sample_times, side="right") - 1, 0, len(times) - 2)
+    inside = (sample_times > times[k] + INSTANT_ROOM) & (sample_times < times[k + 1] - INSTANT_ROOM)
+    k, sample_times = k[inside], sample_times[inside]
+    return k, (sample_times - times[k]) / (times[k + 1] - times[k])
 
 
 def _subdivided(steps: Indices, jumped: Indices, share: Array) -> tuple[Indices, Array]:

@@ -19,7 +19,7 @@ def robot_speed(robot: Robot, chain: ScrewChain, times: Array, q: Array) -> Robo
     Args:
         robot: The robot.
         chain: Its kinematics.
-        times: Instants in [s], shape (N,).
+        times: Times in [s], shape (N,).
         q: Positions, shape (N, n).
     """
     tool = _speeds(chain.tool_poses(q)[:, :3, 3], times)
@@ -54,7 +54,7 @@ def process_speeds(schedule: Schedule, X_WT: Mapping[str, Array], X_WP: Array) -
 def _process_speed(scheduled: TaskSchedule, times: Array, X_WT: Array, *, X_WP: Array) -> ProcessSpeed | None:
     """Speeds between the samples from the start of the path, once settled, to its end; None for a tool at rest."""
     task = scheduled.task
-    room = 1e-6 * float(times[-1])  # rounding of instants
+    room = 1e-6 * float(times[-1])  # rounding of times
     begin = task.start + task.settle
     steps = np.flatnonzero((times[:-1] >= begin - room) & (times[1:] <= scheduled.end + room))
     if not len(steps) or not scheduled.length > 0.0:

@@ -107,7 +107,7 @@ def worst_error(name: str, times: Array, error: Array, *, subject: str, limit: f
 
     Args:
         name: What is checked.
-        times: Instants in [s] at which it is judged, shape (N,).
+        times: Times in [s] at which it is judged, shape (N,).
         error: Lengths of the error in the unit of the limit, shape (N,).
         subject: Task or robot that is judged.
         limit: What is allowed.

@@ -46,7 +46,7 @@ class RunFolder:
         """Name the folder; nothing is touched before the ``with`` statement begins."""
         self.path = path
         self.written: dict[str, tuple[int, str]] = {}
-        self._draft, self._aside = hidden_folders(path)  # aside is where the older run waits for its end
+        self._draft, self._aside = hidden_folders(path)  # sideways is where the older run waits for its end
         self._made_parents: list[Path] = []
 
     def __enter__(self) -> Self:

@@ -27,7 +27,7 @@ from cellplan.planning.start.home_candidates import home_candidates
 from cellplan.scene.scene import Scene
 
 STAGE: Final = "searching homes of idle robots"
-INSTANTS: Final = 32  # samples of each phase at which candidates are tried before one is certified
+TRIED_SAMPLES: Final = 32  # samples of each phase at which candidates are tried before one is certified
 ROOMS: Final = (0.05, 0.02, 0.0)  # [m] beyond the demanded clearance that the part and other robots are to leave a home
 MOST_CERTIFIED: Final = 24  # candidates per robot of which certification is tried; each failure adds its sample
 
@@ -119,9 +119,9 @@ class _Search:
         """
         self._cell, self._robot, self._chain = scene.cell, robot, scene.chains[robot.name]
         self._runs = [_idle_run(scene, run, robot.name) for run in runs if robot.name in run.phase.idle]
-        picked = [np.unique(np.linspace(0, len(run.q) - 1, INSTANTS).astype(int)) for run in self._runs]
-        instants = [RunSamples(scene=run.scene, q=run.q[few]) for run, few in zip(self._runs, picked, strict=True)]
-        self._trials = HomeTrials(robot.name, instants)
+        picked = [np.unique(np.linspace(0, len(run.q) - 1, TRIED_SAMPLES).astype(int)) for run in self._runs]
+        sample_times = [RunSamples(scene=run.scene, q=run.q[few]) for run, few in zip(self._runs, picked, strict=True)]
+        self._trials = HomeTrials(robot.name, sample_times)
         self._failed = Counter[str]()
 
     def home(self) -> Array | None:

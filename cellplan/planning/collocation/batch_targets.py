@@ -29,10 +29,10 @@ class BatchTargets:
 
     def in_windows(self, windows: Sequence[Window]) -> list[Reference]:
         """Targets at the times of each window; each sees corners from inside its panels."""
-        times = np.concatenate([window.instants for window in windows])
+        times = np.concatenate([window.sample_times for window in windows])
         begins, ends = (np.concatenate(parts) for parts in zip(*(window.stretches for window in windows), strict=True))
         desired = self.at(times, begins, ends)
-        cuts = np.cumsum([0, *(len(window.instants) for window in windows)]).tolist()
+        cuts = np.cumsum([0, *(len(window.sample_times) for window in windows)]).tolist()
         return [desired.between(low, high) for low, high in pairwise(cuts)]
 
     def at(self, times: Array, begins: Array, ends: Array) -> Reference:
@@ -43,9 +43,9 @@ class BatchTargets:
         """The same, as if all tools stood on their paths at the start."""
         return _in_batches([path.at(times, (begins, ends)) for path in self._timed.paths], self._grasps)
 
-    def sampled(self, schedule: Schedule, instants: slice) -> Reference:
+    def sampled(self, schedule: Schedule, samples: slice) -> Reference:
         """Targets at some samples of the clock, from the sampled tasks."""
-        return self._from_start(schedule.times[instants], sampled(schedule, instants, self._grasps))
+        return self._from_start(schedule.times[samples], sampled(schedule, samples, self._grasps))
 
     def _from_start(self, times: Array, desired: Reference) -> Reference:
         """Targets moved so that they begin where the tools are."""
@@ -54,9 +54,9 @@ class BatchTargets:
         return Reference(*self._offset.applied(times, desired.R, desired.p, desired.twists))
 
 
-def sampled(schedule: Schedule, instants: slice, grasps: Sequence[Grasp]) -> Reference:
+def sampled(schedule: Schedule, samples: slice, grasps: Sequence[Grasp]) -> Reference:
     """Desired tool poses at some samples of the clock: scheduled tasks, then further holders."""
-    return _in_batches([(task.X_PT[instants], task.V_PT_P[instants]) for task in schedule.tasks], grasps)
+    return _in_batches([(task.X_PT[samples], task.V_PT_P[samples]) for task in schedule.tasks], grasps)
 
 
 def _in_batches(tasks: Sequence[tuple[Array, Array]], grasps: Sequence[Grasp]) -> Reference:

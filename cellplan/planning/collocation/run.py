@@ -140,8 +140,8 @@ class AccurateRun:
 def _paced(drift: Array, begin: float, end: float) -> Drift:
     """Speeds at times in [s] that begin and end with rest, for mean ones of shape (nq,)."""
 
-    def speeds(instants: Array) -> Array:
-        return drift[:, None] * drift_pace((instants - begin) / (end - begin))
+    def speeds(sample_times: Array) -> Array:
+        return drift[:, None] * drift_pace((sample_times - begin) / (end - begin))
 
     return speeds
 

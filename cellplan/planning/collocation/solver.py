@@ -172,7 +172,7 @@ class Collocation:
         self.sweeps += 1
         self.solves += q.shape[1] * q.shape[2]
         linear = self._tasks.linearise(q.reshape(len(q), -1), desired, placement, mobile=self._mobile)
-        drift = None if self._drift is None else np.tile(self._drift(window.instants[: window.count]), q.shape[1])
+        drift = None if self._drift is None else np.tile(self._drift(window.sample_times[: window.count]), q.shape[1])
         speeds = linear.speeds(drift).reshape(q.shape)
         picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
         moved: Array = (picard + linear.correction(picard)).reshape(q.shape)
@@ -187,10 +187,10 @@ class Collocation:
         twice, up to degree ``4 n / 3``. The error of interpolation begins with degree ``n + 1`` and falls from there.
         """
         everywhere = np.concatenate([q, q @ window.between.T], axis=2)
-        cells, instants = everywhere.shape[1:]
-        errors = self._tasks.errors(everywhere.reshape(len(q), -1), desired, placement.repeated(instants))
+        cells, count = everywhere.shape[1:]
+        errors = self._tasks.errors(everywhere.reshape(len(q), -1), desired, placement.repeated(count))
         by_panel = np.zeros((len(window.panels), cells))
-        np.maximum.at(by_panel, window.panel_of, largest(errors).reshape(cells, instants).T)
+        np.maximum.at(by_panel, window.panel_of, largest(errors).reshape(cells, count).T)
         return OVERSHOOT * by_panel
 
 

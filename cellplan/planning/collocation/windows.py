@@ -87,7 +87,7 @@ class Window:
         return sum(panel.degree + 1 for panel in self.panels)
 
     @cached_property
-    def instants(self) -> Array:
+    def sample_times(self) -> Array:
         """The nodes, then the points between them at which the error is checked, in [s]."""
         nodes = [panel.begin + panel.length * chebyshev(panel.degree).nodes for panel in self.panels]
         looks = [panel.begin + panel.length * panel.looks for panel in self.panels]
@@ -111,7 +111,7 @@ class Window:
     @cached_property
     def between(self) -> Array:
         """Values at the points between the nodes, shape (points, nodes)."""
-        matrix = np.zeros((len(self.instants) - self.count, self.count))
+        matrix = np.zeros((len(self.sample_times) - self.count, self.count))
         first = 0
         for panel, place in zip(self.panels, self.places, strict=True):
             basis = chebyshev(panel.degree)
@@ -178,10 +178,10 @@ def windows_between(
     return grouped(panels, longest=longest)
 
 
-def _groups(instants: Sequence[float], *, fine: float, longest: float) -> list[tuple[float, ...]]:
+def _groups(sample_times: Sequence[float], *, fine: float, longest: float) -> list[tuple[float, ...]]:
     """Neighbouring times, those together that follow each other closely; groups meet at their ends."""
     groups: list[list[float]] = []
-    for low, high in pairwise(instants):
+    for low, high in pairwise(sample_times):
         last = groups[-1] if groups else []
         is_fine = high - low < fine and len(last) > 1 and last[1] - last[0] < fine
         if is_fine and len(last) < MOST_KNOTS + 2 and high - last[0] <= longest:
@@ -191,11 +191,11 @@ def _groups(instants: Sequence[float], *, fine: float, longest: float) -> list[t
     return [tuple(group) for group in groups]
 
 
-def _over(instants: Sequence[float]) -> tuple[Panel, ...]:
+def _over(sample_times: Sequence[float]) -> tuple[Panel, ...]:
     """One panel over many times, or one between each two where they are few."""
-    if len(instants) - 2 < FEWEST_KNOTS:
-        return tuple(Panel(low, high, DEGREES[0]) for low, high in pairwise(instants))
-    return (Panel(instants[0], instants[-1], DEGREES[-1], tuple(instants[1:-1])),)
+    if len(sample_times) - 2 < FEWEST_KNOTS:
+        return tuple(Panel(low, high, DEGREES[0]) for low, high in pairwise(sample_times))
+    return (Panel(sample_times[0], sample_times[-1], DEGREES[-1], tuple(sample_times[1:-1])),)
 
 
 def _even(begin: float, end: float, *, whole: float, longest: float, highest: int) -> list[Panel]:

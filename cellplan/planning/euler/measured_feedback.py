@@ -41,12 +41,12 @@ def corrected_references(desired: Schedule, references: Schedule, measured: Sequ
         references: What the model was given in the last pass.
         measured: Measured tool poses of that pass, shape (N, 4, 4) for each task.
     """
-    told = zip(desired.tasks, references.tasks, measured, strict=True)
+    reported = zip(desired.tasks, references.tasks, measured, strict=True)
     return Schedule(
         times=desired.times,
         tasks=tuple(
             _with_poses(reference, displaced(task.task, task.X_PT, seen, nominal=reference.X_PT), desired.times)
-            for task, reference, seen in told
+            for task, reference, seen in reported
         ),
     )
 
@@ -120,8 +120,10 @@ def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
         state = problem.state(q[k])
         nominal = inverse(problem.constraints.reference_frames(state.X_WP)) @ state.X_WT[problem.constraints.operators]
         for place, (scheduled, X_seen) in enumerate(zip(desired.tasks, measure(q[k : k + 1]), strict=True)):
-            seen, told = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
-            problem.desired[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=told)
+            seen, reported = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
+            problem.desired[k : k + 2, place] = displaced(
+                scheduled.task, targets[k : k + 2, place], seen, nominal=reported
+            )
         try:
             step = advance(k, q[k])
             refuse_long_step(cell, q[k], step)

@@ -42,7 +42,9 @@ def project_path(path: PathCurve, task: Task, part: Part, origin: Origin) -> Pat
         case Mesh():
             return _project_onto_mesh(path, task.project, part, where=where, mesh=part.shape)
         case Capsule():
-            raise InputError(f"{where}: expected a box, cylinder, sphere or mesh to lay the path on, got a capsule")
+            raise InputError(
+                f"{where}: expected a box, cylinder, sphere or mesh to project the path onto, got a capsule"
+            )
         case Box() | Cylinder() | Sphere():
             patches = patches_facing(part.shape, part.X_PS, task.project)
             return _project_onto_patch(path, task.project, patches, part=part, where=where)

@@ -6,7 +6,7 @@ from typing import Final
 
 Picks = tuple[int, ...]
 
-MOST_LOOKS: Final = 20_000  # partial combinations looked at before the search is given up: a second of work
+MOST_LOOKS: Final = 20_000  # partial combinations evaluated before the search is given up: a second of work
 
 
 def best_combinations(scores: Sequence[Sequence[float]], is_ruled_out: Callable[[Picks], bool]) -> Iterator[Picks]:

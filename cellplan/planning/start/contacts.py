@@ -25,7 +25,7 @@ class Contact:
     """Two bodies that touch.
 
     Attributes:
-        robot: The robot whose configurations were looked at.
+        robot: The robot whose configurations were evaluated.
         bodies: The body of that robot first.
         count: In how many of them they touch.
         of: How many there were.

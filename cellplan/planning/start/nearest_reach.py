@@ -36,10 +36,10 @@ def nearest_reach(
         X_PT: Reference tool tip in P, shape (4, 4).
         X_WP: The part, shape (4, 4).
         seeds: Configurations to start from, shape (B, n).
-        tip_only: Whether the direction of the tool is left aside.
+        tip_only: Whether the direction of the tool is ignored.
 
     Returns:
-        Distance of the tip in [m] and angle in [rad] that are left; the angle is nil when it is left aside.
+        Distance of the tip in [m] and angle in [rad] that are left; the angle is nil when it is ignored.
     """
     chain, (lower, upper) = ScrewChain(robot), finite_limits(robot.model)
     rows = constraint_rows(relation, X_PT[None])[0]

@@ -197,8 +197,8 @@ class StartTrials:
 
         A grip that leaves components free and is too deep in the part at the start counts as well.
         """
-        instants = np.linspace(0, len(q) - 1, TOUCH_INSTANTS).astype(int)
-        placed = self._order.as_listed(standing(self._cell, phase, q[instants]))
+        sample_times = np.linspace(0, len(q) - 1, TOUCH_INSTANTS).astype(int)
+        placed = self._order.as_listed(standing(self._cell, phase, q[sample_times]))
         among = self.open_pairs & present_pairs(self._scene, phase)
         if any(grip.depth > grip.pair.limit for grip in mounted_depths(self._open_grips, placed[:1])):
             return True
@@ -217,7 +217,7 @@ class StartTrials:
         return self._schedules[key]
 
     def _cell_alone(self, robot: str) -> Cell:
-        """The cell with the first holder and one operator; all robots stay where goals may look at them."""
+        """The cell with the first holder and one operator; all robots stay where goals may evaluate them."""
         if robot not in self._alone:
             whole = self._cell
             kept = {robot, *whole.positioners[:1]} if not whole.solver.goals else {each.name for each in whole.robots}

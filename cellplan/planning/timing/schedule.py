@@ -118,7 +118,7 @@ def _examine_end(cell: Cell, path: ClockedPath) -> None:
     if task.feed is not None:
         key, why = "feed_mm_s", f" ({1e3 * length:.4g} mm at up to {1e3 * task.feed:g} mm/s)"
     elif isinstance(path.toolpath, Trajectory):
-        key, why = "path", " (by the instants of its file)"
+        key, why = "path", " (by the times of its file)"
     raise InputError(
         f"{cell.origin.at(f'tasks.{task.name}.{key}')}: expected an end within the clock of {clock:g} s "
         f"(motion.duration_s), got an end at {path.over:.6g} s{why}; give the clock at least "

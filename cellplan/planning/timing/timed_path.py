@@ -235,9 +235,9 @@ class TimedTasks:
         return np.concatenate([[0.0], inner, [end]])
 
 
-def distinct(instants: Array) -> Array:
+def distinct(sample_times: Array) -> Array:
     """Times in increasing order, one for those that are nearer to each other than rounding, shape (n,)."""
-    ordered = np.sort(instants)
+    ordered = np.sort(sample_times)
     return ordered[np.diff(ordered, prepend=-np.inf) > INSTANT_ROOM]
 
 

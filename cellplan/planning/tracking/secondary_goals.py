@@ -34,7 +34,7 @@ FADE_SHARE: Final = 0.25  # [-] of the whole motion that this may take at most
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stance:
-    """The cell at one sample and configuration, as goals look at it.
+    """The cell at one sample and configuration, as goals evaluate it.
 
     Attributes:
         q: Stacked joint vector, shape (nq,), in [rad] or [m].

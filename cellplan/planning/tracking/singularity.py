@@ -10,8 +10,8 @@ from cellplan.planning.tracking.problem import TrackingProblem
 def nearest_to_singular(problem: TrackingProblem, k: int, q: Array) -> NearestSingular | None:
     """The robot whose own Jacobian, with the rows that its task or grasp constrains, is nearest to losing a row.
 
-    Joints that stand still are left out; so are robots that cannot move. Metres and radians stand side by side as they
-    come.
+    Joints that stand still are left out; so are robots that cannot move. Units are mixed:
+    metres and radians.
 
     Args:
         problem: The tasks.

@@ -169,11 +169,11 @@ def test_long_motions_are_worked_through_in_pieces_with_the_same_result(monkeypa
 
 
 def test_progress_rises_to_one() -> None:
-    told: list[float] = []
+    reported: list[float] = []
 
     check_clearance(
-        Scene.from_cell(two_arms()), schedule(50), swinging(0, 50), progress=lambda _, share: told.append(share)
+        Scene.from_cell(two_arms()), schedule(50), swinging(0, 50), progress=lambda _, share: reported.append(share)
     )
 
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    assert reported == sorted(reported)
+    assert reported[-1] == 1.0

@@ -63,7 +63,7 @@ def test_between_two_samples_a_joint_moves_evenly():
 def test_tasks_that_do_not_come_back_together_make_one_cycle_of_the_run():
     found = repeatability(CELL, clocked((1.0, 2.0, 3.0, 4.0), (2.0, 4.0)), positions(b_turn=0.01 * TIMES))
 
-    assert found.instants.tolist() == [0.0, 4.0]
+    assert found.sample_times.tolist() == [0.0, 4.0]
     assert found.drifts[2].drift == pytest.approx([0.04], abs=1e-15)
 
 
@@ -73,7 +73,7 @@ def test_one_cycle_of_the_run_lasts_from_the_first_start_to_the_last_end():
 
     found = repeatability(CELL, replace(timed, tasks=(late, timed.tasks[1])), positions())
 
-    assert found.instants.tolist() == [0.0, 4.0]
+    assert found.sample_times.tolist() == [0.0, 4.0]
 
 
 def test_an_open_task_or_none_leaves_nothing_to_say():
@@ -86,7 +86,7 @@ def test_cycles_that_begin_while_the_tool_settles_are_left_out():
 
     found = repeatability(CELL, clocked((1.0, 2.0, 3.0, 4.0), settle=0.7), positions(a_turn=transient))
 
-    assert found.instants.tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert found.sample_times.tolist() == [1.0, 2.0, 3.0, 4.0]
     assert found.closes
     assert repeatability(CELL, clocked((4.0,), settle=0.7), positions()) is None
 

@@ -81,27 +81,27 @@ def accuracy_checks(*locks, jump_at=None):
     errors = task_accuracy(scheduled, chains["arm"], q=motion.q, X_WP=X_WP)
     checks = check_accuracy(schedule, errors, scheduled.task)
     tolerance = scheduled.task.tolerance
-    told = with_locked_joints(checks, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
-    return list(checks), told
+    reported = with_locked_joints(checks, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
+    return list(checks), reported
 
 
 def test_other_joints_take_over_and_nothing_is_added():
-    before, told = accuracy_checks(("q2", 0.3))
-    assert all(check.passed for check in told)
-    assert told == before
+    before, reported = accuracy_checks(("q2", 0.3))
+    assert all(check.passed for check in reported)
+    assert reported == before
 
 
 def test_a_lost_task_names_all_joints_that_had_failed():
-    before, told = accuracy_checks(("q2", 0.3), ("q3", 0.4), ("q1", 0.5), ("q4", 0.9))
-    assert not told[0].passed
-    assert told[0].message == (
+    before, reported = accuracy_checks(("q2", 0.3), ("q3", 0.4), ("q1", 0.5), ("q4", 0.9))
+    assert not reported[0].passed
+    assert reported[0].message == (
         f"{before[0].message}, after arm/q2 locked at 0.300 s and arm/q3 locked at 0.400 s and arm/q1 locked at "
         "0.500 s: the other joints cannot make up for it"
     )
-    assert told[1] == before[1]
+    assert reported[1] == before[1]
 
 
 def test_a_task_lost_before_the_failure_does_not_blame_it():
-    before, told = accuracy_checks(("q2", 0.5), jump_at=0.4)
-    assert not told[0].passed
-    assert told == before
+    before, reported = accuracy_checks(("q2", 0.5), jump_at=0.4)
+    assert not reported[0].passed
+    assert reported == before

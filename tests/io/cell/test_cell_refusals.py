@@ -233,7 +233,7 @@ def test_a_mistake_in_a_cell_is_named_with_its_line_key_and_cure(
 
 
 def test_all_findings_come_at_once_in_the_order_of_the_file(refuse: Refuse) -> None:
-    told = refuse(
+    reported = refuse(
         ("start_deg: [0, -93, 108, 0, -15, 0]", "start_deg: [0, 010, 108]"),
         ("weights: [1, 1, 1, 1, 1, 1]", "weights: [1, 1]"),
         ("radius_mm: 250, length", "radius_mm: -250, length"),
@@ -241,7 +241,7 @@ def test_all_findings_come_at_once_in_the_order_of_the_file(refuse: Refuse) -> N
         ("duration_s: 4", "duratoin_s: 4"),
     )
 
-    assert told == [
+    assert reported == [
         "c:6: robots.holder.start_deg[1]: expected a number without leading zeros, got 010; it can be read as octal",
         "c:11: robots.worker.weights: expected 6 weights, one per joint (A3, B3, C3, D3, E3, F3), got 2",
         "c:13: part.geometry.cylinder.radius_mm: expected a positive number of millimetres, got -250",
@@ -253,10 +253,10 @@ def test_all_findings_come_at_once_in_the_order_of_the_file(refuse: Refuse) -> N
 
 
 def test_a_flood_of_findings_is_cut_short(refuse: Refuse) -> None:
-    told = refuse(("name: pair\n", "name: pair\n" + "".join(f"key_{k}: 1\n" for k in range(150))))
+    reported = refuse(("name: pair\n", "name: pair\n" + "".join(f"key_{k}: 1\n" for k in range(150))))
 
-    assert len(told) == 101
-    assert told[-1] == "c: and more than 49 other findings"
+    assert len(reported) == 101
+    assert reported[-1] == "c: and more than 49 other findings"
 
 
 def test_the_robot_limit_is_named(refuse: Refuse) -> None:
@@ -268,9 +268,9 @@ def test_the_robot_limit_is_named(refuse: Refuse) -> None:
 def test_findings_about_a_robot_table_follow_those_about_the_cell(refuse: Refuse, tmp_path: Path) -> None:
     (tmp_path / "arm.yaml").write_text("robot: arm\nflange: {}\njoints: {A: {type: revolute}}\n", encoding="utf-8")
 
-    told = refuse(("model: abb_irb1600", "model: arm.yaml"), ("duration_s: 4", "duration_s: -4"))
+    reported = refuse(("model: abb_irb1600", "model: arm.yaml"), ("duration_s: 4", "duration_s: -4"))
 
-    assert told == [
+    assert reported == [
         "c:21: motion.duration_s: expected a positive number of seconds, got -4",
         "arm.yaml:3: joints.A.axis: missing, expected unit direction of the axis",
     ]

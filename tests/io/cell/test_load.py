@@ -227,10 +227,10 @@ def test_acceleration_limits_of_the_cell_may_not_widen_those_of_the_model(
     model, weights = ("model: abb_irb1600", "model: rail.yaml"), "weights: [1, 1, 1, 1, 1, 1]"
 
     joint = load(model, (weights, "limits: {rail: {acceleration_mm_s2: 600}}")).robot("worker").model.joints[0]
-    told = refuse(model, (weights, "limits: {rail: {acceleration_mm_s2: 1000}}"))
+    reported = refuse(model, (weights, "limits: {rail: {acceleration_mm_s2: 1000}}"))
 
     assert joint.acceleration == pytest.approx(0.6)
-    assert told == [
+    assert reported == [
         "c:11: robots.worker.limits.rail.acceleration_mm_s2: expected at most 900, the limit of the model, got 1000"
     ]
 
@@ -280,17 +280,17 @@ def test_files_elsewhere_need_leave_also_through_links(load: Load, refuse: Refus
 def test_a_damaged_mesh_is_told_with_the_line_that_names_it(refuse: Refuse, tmp_path: Path) -> None:
     (tmp_path / "part.stl").write_bytes(b"\x89PNG")
 
-    told = refuse(("{cylinder: {radius_mm: 250, length_mm: 500, axis: x}}", "{mesh: part.stl, unit: mm}"))
+    reported = refuse(("{cylinder: {radius_mm: 250, length_mm: 500, axis: x}}", "{mesh: part.stl, unit: mm}"))
 
-    assert [line.startswith("c:13: part.geometry.mesh: part.stl: expected ") for line in told] == [True]
+    assert [line.startswith("c:13: part.geometry.mesh: part.stl: expected ") for line in reported] == [True]
 
 
 def test_a_pipe_named_as_mesh_is_refused(load: Load, refuse: Refuse, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "part.stl")
 
-    told = refuse(("{cylinder: {radius_mm: 250, length_mm: 500, axis: x}}", "{mesh: part.stl, unit: mm}"))
+    reported = refuse(("{cylinder: {radius_mm: 250, length_mm: 500, axis: x}}", "{mesh: part.stl, unit: mm}"))
 
-    assert told == ["c:13: part.geometry.mesh: expected a regular file, got a folder, a pipe or a device"]
+    assert reported == ["c:13: part.geometry.mesh: expected a regular file, got a folder, a pipe or a device"]
 
 
 def test_a_rail_takes_its_start_by_name_and_unit(load: Load, refuse: Refuse, tmp_path: Path) -> None:
@@ -306,10 +306,10 @@ def test_a_rail_takes_its_start_by_name_and_unit(load: Load, refuse: Refuse, tmp
     weights = "weights: [1, 1, 1, 1, 1, 1]"
 
     start = load(model, (weights, "start: {turn_deg: 45, rail_mm: 500}")).robot("worker").start
-    told = refuse(model, (weights, "start_deg: [0, 0]"))
+    reported = refuse(model, (weights, "start_deg: [0, 0]"))
 
     np.testing.assert_allclose(start, [0.5, math.pi / 4])
-    assert told == [
+    assert reported == [
         "c:11: robots.worker.start_deg: unexpected key, 'rail' is a prismatic joint: "
         "use start: {rail_mm: …, turn_deg: …}"
     ]
@@ -332,12 +332,12 @@ def test_real_arms_load_from_their_urdf(
     model = ("model: abb_irb1600", f"model: {urdf}")
 
     cell = load(model, allow_dirs=(shared_robots,))
-    told = refuse(model)
+    reported = refuse(model)
 
     assert len(cell.robot("worker").model.joints) == joints
     assert str(urdf) in cell.inputs
     assert sum(name.endswith((".stl", ".STL", ".obj", ".dae")) for name in cell.inputs) > 0
-    assert told[0].startswith("c:8: robots.worker.model: expected a path below the folder of the cell file, got ")
+    assert reported[0].startswith("c:8: robots.worker.model: expected a path below the folder of the cell file, got ")
 
 
 def test_further_holders_may_leave_components_open(load: Callable[..., Cell]) -> None:

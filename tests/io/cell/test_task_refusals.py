@@ -235,9 +235,9 @@ def test_a_mistake_in_a_task_is_named_with_its_line_key_and_cure(
 def test_a_file_without_axes_gives_no_normal(refuse: Refuse, tmp_path: Path) -> None:
     (tmp_path / "path.csv").write_text("x_mm,y_mm,z_mm\n0,0,0\n10,0,0\n", encoding="utf-8")
 
-    told = refuse(("{circle: {radius_mm: 100, plane: xy}, project: +z}", "{csv: path.csv}"))
+    reported = refuse(("{circle: {radius_mm: 100, plane: xy}, project: +z}", "{csv: path.csv}"))
 
-    assert told == [
+    assert reported == [
         "c:20: tasks.ring.tool_axis: tool_axis: normal requires axes or quaternions in the file, or a path that "
         "is projected onto "
         "the part: add columns i,j,k, add project: +z (or another side), or give tool_axis a direction"

@@ -26,14 +26,14 @@ def run(tmp_path: Path, load: Any) -> tuple[Path, Manifest]:
     return folder, parse_manifest(text.encode(), "manifest.json")
 
 
-def told(folder: Path, manifest: Manifest) -> list[str]:
+def reported(folder: Path, manifest: Manifest) -> list[str]:
     return [str(error).removeprefix(f"{folder}/") for error in file_findings(folder, manifest).values()]
 
 
 def test_an_untouched_folder_gives_no_finding(run: tuple[Path, Manifest]) -> None:
     folder, manifest = run
 
-    assert told(folder, manifest) == []
+    assert reported(folder, manifest) == []
     assert list(manifest.files) == ["report.json", "tables/a.csv", "tables/b.csv"]
     assert (manifest.status, manifest.cell_file, manifest.own_inputs) == ("passed", "c", ())
 
@@ -44,7 +44,7 @@ def test_what_is_made_from_a_run_later_is_no_part_of_it(run: tuple[Path, Manifes
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text("later")
 
-    assert told(folder, manifest) == []
+    assert reported(folder, manifest) == []
 
 
 def test_every_difference_is_told_by_name(run: tuple[Path, Manifest]) -> None:
@@ -56,7 +56,7 @@ def test_every_difference_is_told_by_name(run: tuple[Path, Manifest]) -> None:
     (folder / "more" / "c.csv").write_text("new")
 
     size = manifest.files["tables/b.csv"].size
-    assert told(folder, manifest) == [
+    assert reported(folder, manifest) == [
         "more/c.csv: not part of the run; remove it, or solve the cell again",
         "report.json: missing; the run was written with it",
         "tables/a.csv: holds what was written as 'tables/b.csv'; solve the cell again",
@@ -71,7 +71,7 @@ def test_links_and_pipes_are_never_followed(run: tuple[Path, Manifest], tmp_path
     (folder / "tables" / "a.csv").unlink()
     os.mkfifo(folder / "tables" / "a.csv")
 
-    assert told(folder, manifest) == [
+    assert reported(folder, manifest) == [
         "report.json: expected a file or folder of the run, got a symbolic link",
         "tables/a.csv: expected a regular file, got a pipe or a device",
     ]
@@ -82,7 +82,7 @@ def test_a_folder_that_became_a_link_is_told_once(run: tuple[Path, Manifest], tm
     (folder / "tables").rename(tmp_path / "aside")
     (folder / "tables").symlink_to(tmp_path / "aside")
 
-    assert told(folder, manifest) == ["tables: expected a file or folder of the run, got a symbolic link"]
+    assert reported(folder, manifest) == ["tables: expected a file or folder of the run, got a symbolic link"]
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_a_manifest_of_another_form_is_refused(run: tuple[Path, Manifest], chang
 def test_a_manifest_laid_out_by_somebody_else_is_refused(run: tuple[Path, Manifest]) -> None:
     data = (run[0] / "manifest.json").read_bytes()
 
-    with pytest.raises(InputError, match="it is not laid out as cellplan does"):
+    with pytest.raises(InputError, match="its layout is not that of cellplan"):
         parse_manifest(data.replace(b"\n", b"\r\n"), "m")
 
 

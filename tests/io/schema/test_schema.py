@@ -49,7 +49,7 @@ def owner(document: Any, place: Place) -> Any:
     return document
 
 
-def told(text: str) -> list[str]:
+def reported(text: str) -> list[str]:
     """Findings about a cell; none when it is accepted. Anything but our own error fails the test."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cell.yaml"
@@ -72,7 +72,7 @@ def test_a_dropped_key_is_a_default_or_a_located_finding(place: Place) -> None:
 
     text = yaml_text(document)
 
-    assert all(1 <= line <= len(text.splitlines()) for line in lines_of(told(text)))
+    assert all(1 <= line <= len(text.splitlines()) for line in lines_of(reported(text)))
 
 
 @given(place=st.sampled_from([place for place in PLACES if isinstance(place[-1], str)]))
@@ -85,7 +85,7 @@ def test_a_renamed_key_is_named_with_its_own_line(place: Place) -> None:
     new_place = (*place[:-1], f"{place[-1]}q")
 
     text = yaml_text(document)
-    findings = told(text)
+    findings = reported(text)
 
     names = {("robots",), ("tasks",), ("environment",)}
     if place[:-1] not in names:  # names are free; elsewhere the key is unknown
@@ -102,7 +102,7 @@ def test_a_value_of_another_kind_is_fine_or_named_with_its_line(place: Place, wr
     owner(document, place)[place[-1]] = wrong
 
     text = yaml_text(document)
-    findings = told(text)
+    findings = reported(text)
 
     assert all(1 <= line <= len(text.splitlines()) for line in lines_of(findings))
     assert all("Input should" not in found and "<" not in found for found in findings)
@@ -124,7 +124,7 @@ def test_words_that_are_no_number_are_refused_where_they_stand(place: Place, wor
     text = yaml_text(document)
     line = parse_yaml(text.encode(), file="cell").line(place)
 
-    findings = told(text.replace("987654321", word))
+    findings = reported(text.replace("987654321", word))
 
     named = [found for found in findings if f": {key_text(place)}: " in found]
     assert named

@@ -16,7 +16,7 @@ def findings(text: str) -> list[str]:
     return [str(finding.to_error("f.yaml")) for finding in document.findings]
 
 
-def told(data: bytes) -> list[str]:
+def reported(data: bytes) -> list[str]:
     try:
         return [finding.text for finding in parse_yaml(data, file="f.yaml").findings]
     except InputError as error:
@@ -77,7 +77,7 @@ def test_plain_values_mean_what_they_say(text: str, value: object) -> None:
         ("a: -.inf", "f.yaml:1: a: expected a finite number, got -.inf"),
         ("a: NaN", "f.yaml:1: a: expected a finite number, got NaN"),
         ("a: 1e400", "f.yaml:1: a: expected a finite number, got 1e400"),
-        ("a: 1e-400", "f.yaml:1: a: expected a number that can be told from zero, got 1e-400"),
+        ("a: 1e-400", "f.yaml:1: a: expected a number that can be distinguished from zero, got 1e-400"),
         ("a: no", "f.yaml:1: a: 'no' can be read as a truth value; write true or false, or put it in quotes"),
         ("a: On", "f.yaml:1: a: 'On' can be read as a truth value; write true or false, or put it in quotes"),
         ("a: TRUE", "f.yaml:1: a: 'TRUE' can be read as a truth value; write true or false, or put it in quotes"),
@@ -178,13 +178,13 @@ def test_a_folder_and_a_missing_file_are_refused(tmp_path: Path) -> None:
 @settings(max_examples=300, deadline=None)
 @given(st.one_of(st.binary(max_size=60), st.text(max_size=60).map(lambda text: text.encode("utf-8", "replace"))))
 def test_no_bytes_bring_down_the_reader(data: bytes) -> None:
-    assert all("\n" not in line for line in told(data))
+    assert all("\n" not in line for line in reported(data))
 
 
 @settings(max_examples=300, deadline=None)
 @given(st.text(alphabet="a1:-[]{},&*!|>'\"%@`?# \n0.e~<_", max_size=40))
 def test_no_yaml_like_text_brings_down_the_reader(text: str) -> None:
-    assert all("\n" not in line for line in told(text.encode()))
+    assert all("\n" not in line for line in reported(text.encode()))
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))

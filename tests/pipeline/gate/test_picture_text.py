@@ -51,5 +51,5 @@ def test_other_figures_and_curves_are_taken_for_rounding(old: str, new: str) -> 
         ("stroke-linejoin: round", "display: none", "display"),
     ],
 )
-def test_words_elements_and_attributes_of_others_are_named(old: str, new: str, told: str) -> None:
-    assert told in str(foreign_piece(DRAWN.replace(old, new, 1), DRAWN))
+def test_words_elements_and_attributes_of_others_are_named(old: str, new: str, reported: str) -> None:
+    assert reported in str(foreign_piece(DRAWN.replace(old, new, 1), DRAWN))

@@ -43,10 +43,10 @@ def why_no_start(folder: Path, *, base_mm: float, offset_mm: float) -> str:
 def test_a_fault_of_the_cell_is_named_before_the_search(
     tmp_path: Path, base_mm: float, offset_mm: float, first: str
 ) -> None:
-    told = why_no_start(tmp_path, base_mm=base_mm, offset_mm=offset_mm)
+    reported = why_no_start(tmp_path, base_mm=base_mm, offset_mm=offset_mm)
 
-    assert told.startswith(first)
-    assert "; with that no start was found: cell.yaml:5: robots.pen.start_deg: no configuration" in told
+    assert reported.startswith(first)
+    assert "; with that no start was found: cell.yaml:5: robots.pen.start_deg: no configuration" in reported
 
 
 def test_a_fixed_part_in_a_foot_is_named(tmp_path: Path) -> None:
@@ -97,6 +97,6 @@ def test_a_free_grasp_that_is_stated_too_deep_is_named(tmp_path: Path, tip_mm: f
     with pytest.raises(StartNotFoundError) as caught:
         check(load_cell(file))
 
-    told = str(caught.value).replace(str(file), "cell.yaml")
+    reported = str(caught.value).replace(str(file), "cell.yaml")
     deep = "cell.yaml:11: part.held_by[1].at: right/tool is 15 mm deep in part at this pose, at most 2 mm: is the grasp"
-    assert told.startswith(deep if is_deep else "cell.yaml:6: robots.right.start_deg: no configuration")
+    assert reported.startswith(deep if is_deep else "cell.yaml:6: robots.right.start_deg: no configuration")

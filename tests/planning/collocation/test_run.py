@@ -203,8 +203,8 @@ def test_a_motion_goes_on_from_anywhere() -> None:
 
 
 def test_progress_is_told_from_zero_to_one() -> None:
-    case, told = triangles(CELLS["single"]), []
-    run = AccurateRun(case.task, progress=lambda _stage, share: told.append(share))
+    case, reported = triangles(CELLS["single"]), []
+    run = AccurateRun(case.task, progress=lambda _stage, share: reported.append(share))
     run.path(case.start, begin=0.0, end=1.0)
-    assert told == sorted(told)
-    assert told[-1] == pytest.approx(1.0)
+    assert reported == sorted(reported)
+    assert reported[-1] == pytest.approx(1.0)

@@ -116,7 +116,7 @@ def test_an_attempt_that_does_not_settle_says_so_in_silence() -> None:
     """Even where no robot may move and the tools are desired elsewhere; no warning is let out."""
     found = collocation(CELL, mobile=np.zeros(CELL.cell.joint_count))
     window = Window((Panel(0.0, 1.0 / 3.0, 12),))
-    times, (begins, ends) = window.instants, window.stretches
+    times, (begins, ends) = window.sample_times, window.stretches
     desired = BatchTargets(CELL.timed, ()).at(times, begins, ends)
 
     attempt = found.attempt(
@@ -148,7 +148,7 @@ def test_targets_of_windows_are_those_of_the_tasks(name: str) -> None:
     for window, desired in zip(windows, found, strict=True):
         assert isinstance(desired, Reference)
         for index, path in enumerate(case.timed.paths):
-            X, V = path.at(window.instants, window.stretches)
+            X, V = path.at(window.sample_times, window.stretches)
             np.testing.assert_array_equal(np.moveaxis(desired.R[:, :, index], -1, 0), X[:, :3, :3])
             np.testing.assert_array_equal(desired.p[:, index].T, X[:, :3, 3])
             np.testing.assert_array_equal(desired.twists[:, index].T, V)

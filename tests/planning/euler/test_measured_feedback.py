@@ -42,12 +42,12 @@ def test_an_error_that_stays_with_the_part_is_corrected_at_once():
 
 def test_references_of_a_later_pass_are_moved_on_from_those_of_the_last():
     rng = np.random.default_rng(3)
-    desired, told, seen = poses(rng), poses(rng), poses(rng)
+    desired, reported, seen = poses(rng), poses(rng), poses(rng)
     task = make_task("arm")
 
-    corrected = corrected_references(schedule_of(task, desired), schedule_of(task, told), [seen])
+    corrected = corrected_references(schedule_of(task, desired), schedule_of(task, reported), [seen])
 
-    np.testing.assert_allclose(corrected.tasks[0].X_PT, desired @ inverse(seen) @ told, atol=10 * ROUNDING)
+    np.testing.assert_allclose(corrected.tasks[0].X_PT, desired @ inverse(seen) @ reported, atol=10 * ROUNDING)
 
 
 def test_twists_lead_from_each_reference_to_the_next():

@@ -243,10 +243,10 @@ def test_a_task_too_short_to_be_judged_by_its_samples_is_refused(words: Any, got
     with pytest.raises(InputError) as caught:
         clock_paths(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])
 
-    told = str(caught.value)
+    reported = str(caught.value)
     desired = "expected a task of at least 0.01 s (10 times motion.step_s), got "
-    assert told.startswith(f"cell.yaml:7: tasks.a.{key}: {desired}{got or ''}")
-    assert told.endswith("; slow the task down or shorten the step")
+    assert reported.startswith(f"cell.yaml:7: tasks.a.{key}: {desired}{got or ''}")
+    assert reported.endswith("; slow the task down or shorten the step")
 
 
 def test_ten_steps_are_enough() -> None:

@@ -228,7 +228,7 @@ def test_joints_that_do_not_come_back_have_a_table(passed_run: Any) -> None:
     drift = JointDrift(
         robot="kuka", joint="B2", is_revolute=True, drift=np.array([0.01, -0.02]), worst=0.02, at_cycle=2
     )
-    found = Repeatability(instants=np.array([0.0, 1.0, 2.0]), drifts=(drift,), closes=False)
+    found = Repeatability(sample_times=np.array([0.0, 1.0, 2.0]), drifts=(drift,), closes=False)
     run = replace(passed_run, report=replace(passed_run.report, repeatability=found))
 
     text = page_of(run)

@@ -304,7 +304,7 @@ def drifting(run: Any) -> Any:
         )
         for use in run.report.joints
     )
-    found = Repeatability(instants=np.array([0.0, 1.0, 2.0, 3.0]), drifts=drifts, closes=False)
+    found = Repeatability(sample_times=np.array([0.0, 1.0, 2.0, 3.0]), drifts=drifts, closes=False)
     return replace(run, report=replace(run.report, repeatability=found))
 
 

@@ -61,10 +61,10 @@ def test_a_method_of_ones_own_choice_and_what_it_gave_up_are_told(record: dict[s
 
 def test_where_the_accurate_mode_gave_up_is_told(record: dict[str, Any], tmp_path: Path) -> None:
     record["solver"] |= {"integrator": "accurate", "resolution": {"panels": 3, "euler_from_s": 1.25, "lost": None}}
-    told = summary_lines(record, tmp_path)
+    reported = summary_lines(record, tmp_path)
     record["solver"]["resolution"]["euler_from_s"] = None
 
-    assert [line for line in told if line not in summary_lines(record, tmp_path)] == [
+    assert [line for line in reported if line not in summary_lines(record, tmp_path)] == [
         "  collocation failed at 1.250 s; continued with Euler steps"
     ]
 
