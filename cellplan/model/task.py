@@ -197,8 +197,8 @@ class Task:
         name: Name of the task.
         robot: Name of the operator.
         path: The path as written.
-        project: Unit direction in P naming the side of the part onto which the path is projected (the outward normal there),
-            shape (3,); None when the path is used where it stands.
+        project: Unit direction in P naming the side of the part onto which the path is projected (the outward normal
+            there), shape (3,); None when the path is used where it stands.
         plane_offset: Position of an unprojected planar path along the plane's normal axis in [m].
         tool_axis: ``None`` for the inward surface normal (or the axes of the file), else a unit direction in P.
         tool_x: Direction in P that the tool's x axis leans to, shape (3,).
