@@ -29,7 +29,7 @@ def plane_axes(plane: PlaneName) -> tuple[Array, Array, Array]:
 
 
 def outside_of(task: Task, normal: Array) -> Array:
-    """Direction that a path is seen from: the side it is projected onto from, else against the tool axis, else ``normal``.
+    """Direction that a path is seen from: the side of its projection, else against the tool axis, else ``normal``.
 
     Args:
         task: The task.
@@ -80,7 +80,7 @@ def _listed(task: Task) -> tuple[Array, Array | None]:
 
 
 def _outside_of_file(task: Task, path: SampledPath | TimedPath) -> Array | None:
-    """The side that a path from a file is seen from: where it is projected onto from, else against its mean tool axis."""
+    """The side that a path from a file is seen from: that of its projection, else against its mean tool axis."""
     if task.project is not None:
         return task.project
     if task.tool_axis is not None:

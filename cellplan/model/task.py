@@ -80,7 +80,7 @@ class SampledPath:
         points: Tool tip positions in [m], shape (N, 3), expressed in P.
         axes: Unit tool axes pointing into the part, shape (N, 3), or None.
         rotations: Tool orientations, shape (N, 3, 3), or None; at most one of axes and rotations is given.
-        is_smooth: Whether a smooth curve passes the points instead of straight sides.
+        is_smooth: Whether a curve is interpolated through the points instead of straight sides.
         is_closed: Whether the last point is joined to the first.
     """
 
@@ -94,7 +94,7 @@ class SampledPath:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TimedPath:
-    """Trajectory from a file: desired tool poses with the times at which they are passed.
+    """Trajectory from a file: tool targets with the times at which they are passed.
 
     Attributes:
         source: File name for messages.
@@ -127,7 +127,7 @@ class TimedPath:
 
     @property
     def is_smooth(self) -> bool:
-        """Whether a smooth curve passes the points: always, a trajectory has a speed everywhere."""
+        """Whether a curve is interpolated through the points: always, a trajectory has a speed everywhere."""
         return True
 
 
@@ -198,8 +198,8 @@ class Task:
         name: Name of the task.
         robot: Name of the operator.
         path: The path as written.
-        project: Unit direction in P from the part to the side that the path is projected from, shape (3,); None when
-            the path is used where it stands.
+        project: Unit direction in P naming the side of the part onto which the path is projected (the outward normal
+            there), shape (3,); None when the path is used where it stands.
         plane_offset: Position of an unprojected planar path along the plane's normal axis in [m].
         tool_axis: ``None`` for the inward surface normal (or the axes of the file), else a unit direction in P.
         tool_x: Direction in P that the tool's x axis leans to, shape (3,).

@@ -96,7 +96,7 @@ def parse_manifest(data: bytes, file: str) -> Manifest:
     if unknown:
         raise InputError(f"{file}: {unknown[0][:40]}: unexpected key; allowed are {', '.join(KEYS)}")
     if _as_text(record).encode() != data:
-        raise InputError(f"{file}: changed since the run was written: it is not laid out as cellplan does")
+        raise InputError(f"{file}: changed since the run was written: its layout is not that of cellplan")
     texts = {key: required(record, key, str, file=file) for key in ("cell", "status", "cell_file")}
     if texts["status"] not in {"passed", "failed"}:
         raise InputError(f"{file}: status: expected passed or failed, got {shown(texts['status'])}")

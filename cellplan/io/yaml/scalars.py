@@ -67,7 +67,7 @@ def _number(text: str) -> int | float:
     if not math.isfinite(value):
         raise SurpriseError(f"expected a finite number, got {_short(text)}")
     if value == 0.0 and text.lower().partition("e")[0].strip("+-0."):
-        raise SurpriseError(f"expected a number that can be told from zero, got {_short(text)}")
+        raise SurpriseError(f"expected a number that can be distinguished from zero, got {_short(text)}")
     return value
 
 

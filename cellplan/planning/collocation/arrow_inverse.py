@@ -68,8 +68,8 @@ class ArrowInverse:
 def eliminated(M: Array, *beside: Array) -> Array:
     """Inverse ``F`` of the lower Cholesky factors of symmetric positive matrices, and ``F`` times what stands beside.
 
-    Gauss's elimination on ``[M, I, B]`` with the pivots shared between both sides: ``M^-1 = F^T F``. Batch entries that are not
-    positive give what is not a number.
+    Gauss's elimination on ``[M, I, B]`` with the pivots shared between both sides: ``M^-1 = F^T F``. Matrices that are
+    not positive definite give NaN.
 
     Args:
         M: The matrices, shape (k, k, ...).

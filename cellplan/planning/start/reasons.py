@@ -102,7 +102,7 @@ def _frequent_words(search: StartSearch) -> str:
     named = ", ".join(f"'{first}' touches '{second}' in {count}" for (first, second), count in counted)
     return (
         f"{search.cell.origin.at('robots')}: found no start configurations that reach the tasks without contact: of "
-        f"{len(tried)} combinations looked at, {named}: move the bases apart, or change a tool"
+        f"{len(tried)} combinations tried, {named}: move the bases apart, or change a tool"
     )
 
 

@@ -115,7 +115,7 @@ def test_a_manifest_of_another_form_is_refused(run: tuple[Path, Manifest], chang
 def test_a_manifest_laid_out_by_somebody_else_is_refused(run: tuple[Path, Manifest]) -> None:
     data = (run[0] / "manifest.json").read_bytes()
 
-    with pytest.raises(InputError, match="it is not laid out as cellplan does"):
+    with pytest.raises(InputError, match="its layout is not that of cellplan"):
         parse_manifest(data.replace(b"\n", b"\r\n"), "m")
 
 

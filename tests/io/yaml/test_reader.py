@@ -77,7 +77,7 @@ def test_plain_values_mean_what_they_say(text: str, value: object) -> None:
         ("a: -.inf", "f.yaml:1: a: expected a finite number, got -.inf"),
         ("a: NaN", "f.yaml:1: a: expected a finite number, got NaN"),
         ("a: 1e400", "f.yaml:1: a: expected a finite number, got 1e400"),
-        ("a: 1e-400", "f.yaml:1: a: expected a number that can be told from zero, got 1e-400"),
+        ("a: 1e-400", "f.yaml:1: a: expected a number that can be distinguished from zero, got 1e-400"),
         ("a: no", "f.yaml:1: a: 'no' can be read as a truth value; write true or false, or put it in quotes"),
         ("a: On", "f.yaml:1: a: 'On' can be read as a truth value; write true or false, or put it in quotes"),
         ("a: TRUE", "f.yaml:1: a: 'TRUE' can be read as a truth value; write true or false, or put it in quotes"),
