@@ -18,6 +18,7 @@ from multiprocessing import get_context
 from typing import Final
 
 import numpy as np
+from cellplan.planning.timing.timed_path import TimedTasks
 from options import benchmark_options
 from reference_job import CELL
 from sections import Goal, Section, digits, table
@@ -27,7 +28,6 @@ from cellplan.geometry.transforms import rotation_about
 from cellplan.planning.layout_screening import AT_ONCE, Candidates, Screening, screen_layouts
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
-from cellplan.planning.timing.timed_path import TimedTasks
 
 COUNT: Final = 256  # [-] candidates
 ALONE: Final = 8  # [-] of them that are screened one by one as well

@@ -2,10 +2,9 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
 from cellplan.model.joint_limits import JointLimits
 from cellplan.model.mounting import Pedestal
+from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Frame, Task
@@ -26,45 +26,6 @@ class Mode(StrEnum):
     SIMULTANEOUS = "simultaneous"
     PAIRWISE = "pairwise"
     PART_AT_REST = "part_at_rest"
-
-
-class CellSource(Protocol):
-    """The document that a cell was read from; a reader of files provides it, so that the model needs none."""
-
-    def with_values(self, cell: "Cell", values: Mapping[str, object]) -> "Cell":
-        """The cell of the document with other values; see ``Cell.with_values``."""
-
-
-@dataclass(frozen=True, slots=True)
-class Origin:
-    """The document of a cell: source lines for located errors, and what is needed to write or to change it.
-
-    Attributes:
-        file: File name as the user gave it.
-        lines: Line number, from 1, of each key path (``robots.kuka.start_deg``) that the file gives.
-        document: The file as plain values in the file's units, every default filled in: what a written copy is made of.
-        changes: Values set by ``Cell.with_values``, by address, in the order in which they were set.
-        changed: What to print for each changed key path: ``motion.duration_s = 2.5``.
-        source: Reads the document again with other values; None for a cell that was built in Python.
-    """
-
-    file: str = "<cell>"
-    lines: Mapping[str, int] = field(default_factory=dict)
-    document: Mapping[str, object] = field(default_factory=dict)
-    changes: Mapping[str, object] = field(default_factory=dict)
-    changed: Mapping[str, str] = field(default_factory=dict)
-    source: CellSource | None = None
-
-    def at(self, key: str) -> str:
-        """``file:line: key`` for a key path; the nearest enclosing key gives the line when the key is a default."""
-        enclosing = key
-        while enclosing not in self.lines and enclosing not in self.changed and "." in enclosing:
-            enclosing = enclosing.rpartition(".")[0]
-        inside = (f"{key}.", f"{key}[")
-        changes = [text for path, text in self.changed.items() if path == enclosing or path.startswith(inside)]
-        line = self.lines.get(enclosing)
-        where = f"{self.file}:{line}" if line else self.file
-        return f"{where} with {', '.join(changes)}: {key}" if changes else f"{where}: {key}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,18 +1,18 @@
 """Schedule, motion and program: desired tool poses, joint positions of all robots, and the tables as text."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.clocked_path import ClockedPath, distinct
 from cellplan.model.phase import Phase
 from cellplan.model.plan import Plan, rows_of
 from cellplan.model.solver import Integrator
-from cellplan.model.task import Task
+from cellplan.model.task import INSTANT_ROOM, Task
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,40 +41,52 @@ class TaskSchedule:
     stops: tuple[float, ...] = ()
 
 
-class DesiredMotion(Protocol):
-    """Desired tool poses at any time, not at the samples only."""
-
-    @property
-    def times(self) -> Array:
-        """Times of the samples in [s], shape (N,)."""
-
-    @property
-    def jumps(self) -> Array:
-        """Times in [s], increasing, at which the speed of a tool may jump, or its rate."""
-
-    def poses(self, times: Array) -> tuple[Array, ...]:
-        """Reference tool tips in P of all tasks at times in [s], shape (M,), shape (M, 4, 4) each."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Schedule:
     """All tasks on one clock.
 
     Attributes:
         times: Times of the samples in [s], evenly spaced from 0, shape (N,).
-        tasks: The tasks that are worked on.
-        desired: Desired tool poses between these times; None where they are unknown, and errors are computed at the
-            samples only.
+        tasks: The tasks that are worked on, at the samples.
+        paths: The same tasks at any time; empty where they are known at the samples only.
+        extra_breaks: Further times in [s] that count as jumps: ends of panels where errors were too large, shape (K,).
     """
 
     times: Array
     tasks: tuple[TaskSchedule, ...]
-    desired: DesiredMotion | None = None
+    paths: tuple[ClockedPath, ...] = ()
+    extra_breaks: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def step(self) -> float:
         """Time between two samples in [s]."""
         return float(self.times[-1] / (len(self.times) - 1))
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether the desired poses are known between the samples too."""
+        return len(self.paths) == len(self.tasks)
+
+    @property
+    def breaks(self) -> Array:
+        """Times in [s], from zero to the end of the clock, between which the motion of all tools is smooth."""
+        return self._within_clock([path.breaks for path in self.paths])
+
+    @property
+    def jumps(self) -> Array:
+        """Those of them that do not come from knots of the paths, which join pieces smoothly."""
+        return self._within_clock([path.jumps for path in self.paths])
+
+    def poses(self, times: Array) -> tuple[Array, ...]:
+        """Reference poses X_PT of all tasks at times in [s], shape (M,), shape (M, 4, 4) each."""
+        return tuple(path.poses(times) for path in self.paths)
+
+    def _within_clock(self, found: Sequence[Array]) -> Array:
+        """Times of all paths within the clock, and its ends."""
+        end = float(self.times[-1])
+        every = np.concatenate([self.extra_breaks, *found])
+        inner = distinct(every[(every > INSTANT_ROOM) & (every < end - INSTANT_ROOM)])
+        return np.concatenate([[0.0], inner, [end]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

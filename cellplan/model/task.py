@@ -1,12 +1,13 @@
 """Task: what one operator does on the part, as the user wrote it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.origin import Origin
 
 INSTANT_ROOM: Final = 1e-9  # [s] times nearer than this are the same: rounding of sums of durations
 
@@ -221,6 +222,7 @@ class Task:
         relative_to: Frame that path and axes are given in. In the world, the first holder's task says where the part
             is carried; P then reads W in everything that is said of the task.
         tool_depth: Largest depth in [m] that the tool may have in the part, along its axis.
+        origin: File and lines that the task was read from; empty for a task made in Python.
     """
 
     name: str
@@ -245,6 +247,17 @@ class Task:
     retract: StraightMove | None = None
     relative_to: Frame = Frame.PART
     tool_depth: float = 1e-3
+    origin: Origin = field(default_factory=Origin, compare=False, repr=False)
+
+    def where(self, key: str = "", *, shared: str = "") -> str:
+        """Place of one of the task's keys in its file, ``file:line: tasks.name.key``, for findings.
+
+        Args:
+            key: The key below the task; empty for the task itself.
+            shared: Key of the cell that gives the value where the task has none of its own; empty for none.
+        """
+        own = f"tasks.{self.name}.{key}" if key else f"tasks.{self.name}"
+        return self.origin.at(shared if shared in self.origin.lines and own not in self.origin.lines else own)
 
     @property
     def leaving(self) -> float:
@@ -263,7 +276,7 @@ class Task:
 
     @property
     def judged_from(self) -> float:
-        """Instant in [s] from which on errors are judged: all along, unless the tool needs time to settle."""
+        """Time in [s] from which on errors are judged: all along, unless the tool needs time to settle."""
         return self.start + self.settle if self.settle > 0.0 else 0.0
 
     def first_judged(self, times: Array) -> int:

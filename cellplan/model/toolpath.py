@@ -28,6 +28,8 @@ class Toolpath:
         is_closed: Whether the last piece ends in the pose in which the first starts, but for the turn.
         runs_on: Whether the closed path passes its start without a corner and without a stop.
         stand_off: Distance in [m], against the tool's axis, from which the tool comes to its start.
+        is_timed: Whether the parameter of both curves is the time in [s] since the start: a trajectory keeps its own
+            times and may stand still.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Toolpath:
     is_closed: bool
     runs_on: bool = False
     stand_off: float = 0.0
+    is_timed: bool = False
 
     def __repr__(self) -> str:
         """One line without arrays."""
@@ -50,9 +53,20 @@ class Toolpath:
         return self.arc.total
 
     @property
+    def duration(self) -> float:
+        """Time for one cycle of a trajectory in [s]."""
+        return float(self.stops[-1])
+
+    @property
     def behind(self) -> Array:
         """Length in [m] behind each stop, from zero to the whole length, shape (pieces + 1,)."""
         return self.arc.behind_knots(self.stops)
+
+    @property
+    def knots(self) -> Array:
+        """Parameters at which the tip curve or the orientation is joined, the ends included, shape (K,)."""
+        knots: Array = np.unique(np.concatenate([self.tip.knots, self.orientation.knots, self.stops]))
+        return knots[(knots >= self.stops[0]) & (knots <= self.stops[-1])]
 
     @property
     def pieces(self) -> "tuple[Piece, ...]":
@@ -64,12 +78,22 @@ class Toolpath:
     @property
     def X_PT_start(self) -> Array:
         """Tool tip pose at the start, that of an approach if there is one, shape (4, 4)."""
-        return self._backed_off(self.poses(np.zeros(1))[0])
-
-    def _backed_off(self, X_PT: Array) -> Array:
-        """A pose from which the tool has gone back along its axis by the stand-off."""
+        X_PT = self.spread(1)[0]
         X_PT[:3, 3] -= self.stand_off * X_PT[:3, 2]
         return X_PT
+
+    def spread(self, count: int) -> Array:
+        """Tool tip poses X_PT evenly over the time of a trajectory, else over the length, shape (count, 4, 4)."""
+        if self.is_timed:
+            return self.at(np.linspace(0.0, self.duration, count))[0]
+        return self.poses(np.linspace(0.0, self.length, count))
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """Poses X_PT, shape (N, 4, 4), and twists in P, shape (N, 6), of a trajectory at times of shape (N,)."""
+        interval = (float(self.stops[0]), float(self.stops[-1]))
+        p, v = self.tip.evaluate(t, interval)
+        R, w = self.orientation.frames(t, interval, p=p, dp=v)
+        return pose_from(R, p), np.concatenate([v, w], axis=1)
 
     def poses(self, s: Array) -> Array:
         """Tool tip poses X_PT, shape (N, 4, 4), at lengths in [m] from the start of the path, shape (N,)."""
@@ -99,28 +123,6 @@ class Toolpath:
             R = R @ rotation_about(TOOL_Z, self.turn / self.length * np.clip(s, 0.0, self.length))
             twists[:, 3:] += self.turn / self.length * R[:, :, 2]
         return pose_from(R, p), twists
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Trajectory(Toolpath):
-    """Toolpath whose parameter is the time in [s] since its start: it brings its own clock and may stand still."""
-
-    @property
-    def duration(self) -> float:
-        """Time for one cycle in [s]."""
-        return float(self.stops[-1])
-
-    @property
-    def X_PT_start(self) -> Array:
-        """Tool tip pose at the start, that of an approach if there is one, shape (4, 4)."""
-        return self._backed_off(self.at(np.zeros(1))[0][0])
-
-    def at(self, t: Array) -> tuple[Array, Array]:
-        """Tool poses X_PT, shape (N, 4, 4), and twists in P, linear first, shape (N, 6), at times of shape (N,)."""
-        interval = (float(self.stops[0]), float(self.stops[-1]))
-        p, v = self.tip.evaluate(t, interval)
-        R, w = self.orientation.frames(t, interval, p=p, dp=v)
-        return pose_from(R, p), np.concatenate([v, w], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

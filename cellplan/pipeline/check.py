@@ -56,7 +56,7 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
         NoSolutionError: No start posture was found.
     """
     scene = Scene.from_cell(cell)
-    toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     paths = clock_paths(cell, toolpaths.values())
     examine_given_starts(cell, toolpaths)
     choice = chosen_start(scene, paths, progress=progress)

@@ -6,7 +6,7 @@ from cellplan.model.cell import Cell
 from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.schedule import clock_paths, time_tasks
+from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 
 
 def screen(cell: Cell, candidates: Candidates, *, task: str | None = None, accuracy: float = 1e-5) -> Screening:
@@ -25,11 +25,11 @@ def screen(cell: Cell, candidates: Candidates, *, task: str | None = None, accur
         InputError: The cell cannot be worked with, or there is no such task.
         ValueError: The candidates are not cells of these robots.
     """
-    paths = clock_paths(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     runs = [
         screen_layouts(
             cell,
-            time_tasks(cell, [paths[name] for name in phase.tasks]),
+            schedule_paths(cell, [paths[name] for name in phase.tasks]),
             candidates,
             moving=phase.moving,
             accuracy=accuracy,

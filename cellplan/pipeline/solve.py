@@ -68,7 +68,7 @@ def _solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[
     """All phases, verified but for their clearance, and the scene of the solved cell."""
     refuse_clock_name(cell)
     scene = Scene.from_cell(cell)
-    toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     paths = clock_paths(cell, toolpaths.values())
     examine_given_starts(cell, toolpaths)
     choice = chosen_start(scene, paths, progress=progress)

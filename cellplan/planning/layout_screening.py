@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.batched import Placement
 from cellplan.model.cell import Cell
+from cellplan.model.motion import Schedule
 from cellplan.model.task import Frame
-from cellplan.planning.collocation.batch_targets import BatchTargets
+from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
-from cellplan.planning.collocation.solver import Collocation, Indices, Precision
+from cellplan.planning.collocation.solver import Collocation, Indices, Precision, repeated
 from cellplan.planning.collocation.windows import Window, windows_between
-from cellplan.planning.timing.timed_path import TimedTasks
 from cellplan.planning.tracking.motion_task import closures
 
 AT_ONCE: Final = 32  # candidates that are resolved together: enough for NumPy, and their arrays stay in the cache
@@ -119,7 +119,7 @@ class Screening:
 
 
 def screen_layouts(
-    cell: Cell, timed: TimedTasks, candidates: Candidates, *, moving: Sequence[str], accuracy: float = 1e-5
+    cell: Cell, schedule: Schedule, candidates: Candidates, *, moving: Sequence[str], accuracy: float = 1e-5
 ) -> Screening:
     """Resolve the job of a cell in many candidates for it.
 
@@ -130,7 +130,7 @@ def screen_layouts(
 
     Args:
         cell: The cell: its robots, part, weights and limits.
-        timed: Its tasks on the common clock.
+        schedule: Its tasks on the common clock.
         candidates: What differs.
         moving: Names of the robots that may move.
         accuracy: Largest tool error that is let pass, in [m] and [rad].
@@ -140,7 +140,7 @@ def screen_layouts(
     """
     if candidates.X_WB.shape[1] != len(cell.robots) or candidates.start.shape[1] != cell.joint_count:
         raise ValueError(f"candidates: expected {len(cell.robots)} robots with {cell.joint_count} joints in all")
-    screen = _Screen(cell, timed, moving=moving, accuracy=accuracy)
+    screen = _Screen(cell, schedule, moving=moving, accuracy=accuracy)
     groups = [slice(first, first + AT_ONCE) for first in range(0, len(candidates.start), AT_ONCE)]
     parts = [screen.of(candidates.X_WB[group], candidates.X_FT[group], candidates.start[group]) for group in groups]
     return parts[0].joined(parts[1:]) if parts else Screening.unknown(candidates.start)
@@ -149,16 +149,16 @@ def screen_layouts(
 class _Screen:
     """What all candidates share."""
 
-    def __init__(self, cell: Cell, timed: TimedTasks, *, moving: Sequence[str], accuracy: float) -> None:
+    def __init__(self, cell: Cell, schedule: Schedule, *, moving: Sequence[str], accuracy: float) -> None:
         """Prepare the tasks, the windows that all go through, and the limits."""
         grasps = closures(cell, moving)
-        self._tasks = BatchTasks(cell, [*(path.task for path in timed.paths), *grasps], moving)
-        self._targets, self._accuracy = BatchTargets(timed, grasps), accuracy
+        self._tasks = BatchTasks(cell, [*(path.task for path in schedule.paths), *grasps], moving)
+        self._desired_at, self._accuracy = desired_motion(schedule.paths, grasps), accuracy
         self._precision = Precision(accuracy=accuracy, shortest=cell.motion.step)
-        breaks, jumps = timed.breaks, timed.jumps
-        self._at_start = self._targets.at(breaks[:1], breaks[:1], breaks[1:2])
+        breaks, jumps = schedule.breaks, schedule.jumps
+        self._at_start = self._desired_at(breaks[:1], breaks[:1], breaks[1:2])
         self._windows = windows_between(jumps, whole=float(breaks[-1]), knots=breaks, highest=FIRST_DEGREE)
-        at_rest = cell.positioners[:1] if all(path.task.relative_to is Frame.PART for path in timed.paths) else ()
+        at_rest = cell.positioners[:1] if all(path.task.relative_to is Frame.PART for path in schedule.paths) else ()
         self._settling = np.concatenate([np.full(len(r.model.joints), r.name not in at_rest) for r in cell.robots])
         self._limits = cell.joint_limits
 
@@ -168,7 +168,7 @@ class _Screen:
         q, arrived = self._settled(start.T.copy(), placement)
         found = Screening.unknown(q.T.copy())
         found.lost_at[arrived] = 0.0
-        collocation = Collocation(self._tasks, self._targets, placement, self._precision)
+        collocation = Collocation(self._tasks, self._desired_at, placement, self._precision)
 
         def record(window: Window, cells: Indices, nodes: Array, errors: Array) -> None:
             everywhere = np.concatenate([nodes, nodes @ window.between.T], axis=2)
@@ -186,12 +186,12 @@ class _Screen:
     def _settled(self, q: Array, placement: Placement) -> tuple[Array, NDArray[np.bool_]]:
         """Start postures, shape (nq, cells), with the tools brought to their paths, and which of them came there."""
         cells = q.shape[1]
-        desired, still = self._at_start.repeated(cells), np.zeros_like(q)
+        desired, still = repeated(self._at_start, cells), np.zeros_like(q)
         for _ in range(NEWTON_STEPS):
             step = self._tasks.linearise(q, desired, placement, mobile=self._settling).correction(still)
             longest = np.abs(step).max(axis=0)
             if not np.any(longest > QUIET * self._accuracy):
                 break
             q = q + step * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, LARGEST_STEP))
-        errors = np.abs(self._tasks.errors(q, desired, placement)).max(axis=(0, 1))
+        errors = np.abs(self._tasks.errors(q, desired[0], placement)).max(axis=(0, 1))
         return q, errors <= self._accuracy

@@ -82,6 +82,6 @@ def _refuse_carrying_at_rest(cell: Cell, tasks: Sequence[Task]) -> None:
     for task in tasks:
         if cell.motion.mode is Mode.PART_AT_REST and task.robot in cell.positioners:
             raise InputError(
-                f"{cell.origin.at(f'tasks.{task.name}.robot')}: expected a robot that does not hold the part in the "
+                f"{task.where('robot')}: expected a robot that does not hold the part in the "
                 f"mode part_at_rest, got the positioner '{task.robot}'; choose another mode or leave the task out"
             )

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.clocked_path import distinct
 from cellplan.model.motion import Motion
 from cellplan.model.name_order import NameOrder
 from cellplan.model.progress import Progress, silent
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.plan_motion import plan_motion
-from cellplan.planning.timing.timed_path import distinct
 from cellplan.planning.tracking.motion_task import MotionTask
 
 MAX_PLANS: Final = 4  # each with more nodes than the one before
@@ -31,15 +31,16 @@ def plan_within_accuracy(task: MotionTask, *, progress: Progress = silent) -> Mo
     The arguments and errors are those of `plan_motion`.
     """
     order = NameOrder.of(task.cell)
-    schedule = replace(task.schedule, tasks=tuple(sorted(task.schedule.tasks, key=lambda each: each.task.name)))
-    timed = replace(task.timed, paths=tuple(sorted(task.timed.paths, key=lambda path: path.task.name)))
+    tasks = tuple(sorted(task.schedule.tasks, key=lambda each: each.task.name))
+    paths = tuple(sorted(task.schedule.paths, key=lambda path: path.task.name))
+    schedule = replace(task.schedule, tasks=tasks, paths=paths)
     start = order.sorted(task.start)
     for _ in range(MAX_PLANS):
-        task = MotionTask(order.cell, replace(schedule, desired=timed), task.moving, start)
+        task = MotionTask(order.cell, schedule, task.moving, start)
         motion, rough = _with_errors(plan_motion(task, progress=progress), task)
         if not len(rough):
             break
-        timed = replace(timed, extra_breaks=distinct(np.concatenate([timed.extra_breaks, rough])))
+        schedule = replace(schedule, extra_breaks=distinct(np.concatenate([schedule.extra_breaks, rough])))
     return replace(motion, q=order.as_listed(motion.q))
 
 

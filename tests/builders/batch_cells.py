@@ -11,7 +11,7 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Relation
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import Frame
-from cellplan.planning.collocation.batch_tasks import Reference
+from cellplan.planning.collocation.batch_tasks import Desired
 
 
 def side_arm(model: RobotModel) -> RobotModel:
@@ -96,12 +96,12 @@ def configurations(cell: Cell, lanes: int, *, seed: int = 0) -> Array:
     return np.random.default_rng(seed).uniform(-1.5, 1.5, size=(cell.joint_count, lanes))
 
 
-def random_desired(count: int, lanes: int, *, seed: int = 0) -> tuple[Reference, Array]:
+def random_desired(count: int, lanes: int, *, seed: int = 0) -> tuple[Desired, Array]:
     """Random poses and twists, and the poses as matrices, shape (lanes, tasks, 4, 4)."""
     rng = np.random.default_rng(seed)
     X = np.array([[random_pose(rng) for _ in range(count)] for _ in range(lanes)])
     twists = rng.normal(size=(6, count, lanes))
-    return Reference(np.moveaxis(X[..., :3, :3], (0, 1), (3, 2)), np.moveaxis(X[..., :3, 3], (0, 1), (2, 1)), twists), X
+    return (np.moveaxis(X, (0, 1), (3, 2)), twists), X
 
 
 def seen_poses(cell: Cell, q: Array) -> Array:

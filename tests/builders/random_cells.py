@@ -12,11 +12,11 @@ from cellplan.model.cell import (
     Grasp,
     Mode,
     MotionSettings,
-    Origin,
     Part,
     Robot,
     Tool,
 )
+from cellplan.model.origin import Origin
 from cellplan.model.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, Frame, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance

@@ -11,9 +11,9 @@ from cellplan.model.cell import (
     CheckSettings,
     Mode,
     MotionSettings,
-    Origin,
     Part,
 )
+from cellplan.model.origin import Origin
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import (
     CirclePath,
@@ -59,6 +59,7 @@ def task_on(path: PathSpec, **words: Any) -> Task:
         "feed": None,
         "time_law": TimeLaw(kind=TimeLawKind.QUINTIC),
         "blend": None,
+        "origin": ORIGIN,
     }
     return Task(path=path, **(plain | words))
 

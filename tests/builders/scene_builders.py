@@ -13,12 +13,12 @@ from cellplan.model.cell import (
     Mode,
     MotionSettings,
     Obstacle,
-    Origin,
     Part,
     Robot,
     Tool,
 )
 from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, Joint, JointKind, RobotModel
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance

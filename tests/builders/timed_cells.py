@@ -13,6 +13,7 @@ from cellplan.checks.tools.tracking import errors_on_part
 from cellplan.geometry.transforms import Array
 from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell, Grasp
+from cellplan.model.clocked_path import distinct
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.solver import Integrator
 from cellplan.model.task import SpacePolylinePath
@@ -22,8 +23,7 @@ from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.plan_motion import plan_motion
 from cellplan.planning.start.search import choose_start
-from cellplan.planning.timing.schedule import clock_paths, sample, time_tasks
-from cellplan.planning.timing.timed_path import TimedTasks, clock_path, distinct
+from cellplan.planning.timing.schedule import clock_path, clock_paths, schedule_paths
 from cellplan.planning.tracking.motion_task import MotionTask, closures
 from cellplan.scene.scene import Scene
 
@@ -36,14 +36,10 @@ class Case:
     """A cell, its tasks on the clock, who moves, and where it starts; every motion of it is planned once."""
 
     cell: Cell
-    timed: TimedTasks
+    schedule: Schedule
     moving: tuple[str, ...]
     start: Array
     _planned: dict[Any, Any] = field(init=False, repr=False, compare=False, default_factory=dict)
-
-    @property
-    def schedule(self) -> Schedule:
-        return sample(self.timed)
 
     @property
     def task(self) -> MotionTask:
@@ -76,12 +72,10 @@ def case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | N
 
 def _case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | None = None) -> Case:
     cell = replace(cell, solver=replace(cell.solver, integrator=Integrator.ACCURATE))
-    timed = time_tasks(
-        cell, [clock_path(cell, task, build_toolpath(task, cell.part, cell.origin)) for task in cell.tasks]
-    )
+    schedule = schedule_paths(cell, [clock_path(cell, task, build_toolpath(task, cell.part)) for task in cell.tasks])
     if start is None:
         start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
-    return Case(cell, timed, tuple(everyone(cell) if moving is None else moving), start)
+    return Case(cell, schedule, tuple(everyone(cell) if moving is None else moving), start)
 
 
 _SHARED: dict[tuple[str, int], tuple[Cell, Case]] = {}
@@ -120,13 +114,13 @@ def largest_error(case: Case, path: CollocatedPath, times: Array) -> float:
 
     The times must increase and keep off the breaks, at which a target may have two values.
     """
-    breaks = case.timed.breaks
+    breaks = case.schedule.breaks
     place = np.clip(np.searchsorted(breaks, times, side="right"), 1, len(breaks) - 1)
     within = (breaks[place - 1], breaks[place])
     seen = seen_poses(case.cell, path.at(times))
-    desired = [each.at(times, within)[0] for each in case.timed.paths]
+    desired = [each.at(times, within)[0] for each in case.schedule.paths]
     desired += [np.broadcast_to(grasp.X_PT, (len(times), 4, 4)) for grasp in closures(case.cell, case.moving)]
-    names = [each.task.name for each in case.timed.paths]
+    names = [each.task.name for each in case.schedule.paths]
     judged = [task for task in relations(case.cell) if isinstance(task, Grasp) or task.name in names]
     worst = 0.0
     for index, (task, poses) in enumerate(zip(judged, desired, strict=True)):
@@ -137,7 +131,7 @@ def largest_error(case: Case, path: CollocatedPath, times: Array) -> float:
 
 def between_samples(case: Case, path: CollocatedPath, *, count: int = 10) -> Array:
     """Instants strictly between all samples of the clock and the panels of a path, so many in each gap."""
-    ends = distinct(np.concatenate([case.timed.times, case.timed.breaks, [panel.end for panel in path.panels]]))
+    ends = distinct(np.concatenate([case.schedule.times, case.schedule.breaks, [panel.end for panel in path.panels]]))
     shares = (np.arange(count) + 0.5) / count
     return (ends[:-1, None] + np.diff(ends)[:, None] * shares).ravel()
 

@@ -11,7 +11,7 @@ from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell, Mode
 from cellplan.pipeline.solve import solve
 from cellplan.planning.timing import schedule
-from cellplan.planning.timing.timed_path import clock_path
+from cellplan.planning.timing.schedule import clock_path
 
 CELL = Path(__file__).parents[2] / "cells" / "planar_pair.yaml"
 

@@ -81,7 +81,7 @@ def test_starts_motion_and_verdict_are_the_same_to_the_last_digit(tmp_path: Path
 
 def start_by_robot(cell: Cell) -> Mapping[str, Array]:
     """The start that is found, by robot."""
-    toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     q = found_start(Scene.from_cell(cell), toolpaths)
     return {robot.name: q[cell.columns(robot.name)] for robot in cell.robots}
 

@@ -12,8 +12,7 @@ from cellplan.io.cell.load import load_cell
 from cellplan.planning.layout_screening import AT_ONCE, Candidates, screen_layouts
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.plan_motion import plan_motion
-from cellplan.planning.timing.schedule import sample, time_tasks
-from cellplan.planning.timing.timed_path import clock_path
+from cellplan.planning.timing.schedule import clock_path, schedule_paths
 from cellplan.planning.tracking.motion_task import MotionTask
 
 CELL = Path(__file__).resolve().parents[2] / "cells" / "four_robots.yaml"
@@ -23,11 +22,9 @@ FAR = 20.0  # [m] out of reach of any arm
 @pytest.fixture(scope="module")
 def job() -> SimpleNamespace:
     cell = load_cell(CELL)
-    timed = time_tasks(
-        cell, [clock_path(cell, task, build_toolpath(task, cell.part, cell.origin)) for task in cell.tasks]
-    )
+    schedule = schedule_paths(cell, [clock_path(cell, task, build_toolpath(task, cell.part)) for task in cell.tasks])
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
-    return SimpleNamespace(cell=cell, timed=timed, start=start, moving=[robot.name for robot in cell.robots])
+    return SimpleNamespace(cell=cell, schedule=schedule, start=start, moving=[robot.name for robot in cell.robots])
 
 
 def candidates(job: SimpleNamespace, shifts: Array) -> Candidates:
@@ -46,13 +43,13 @@ def shifts(count: int, largest: float) -> Array:
 def test_a_candidate_has_the_figures_of_the_cell_resolved_alone(job: SimpleNamespace) -> None:
     asked = candidates(job, shifts(3, 0.1))
 
-    found = screen_layouts(job.cell, job.timed, asked, moving=job.moving, accuracy=1e-6)
+    found = screen_layouts(job.cell, job.schedule, asked, moving=job.moving, accuracy=1e-6)
 
     assert found.is_feasible.all()
     for k in range(3):
         robots = tuple(replace(robot, X_WB=X_WB) for robot, X_WB in zip(job.cell.robots, asked.X_WB[k], strict=True))
         cell = replace(job.cell, robots=robots)
-        motion = plan_motion(MotionTask(cell, sample(job.timed), job.moving, found.start[k]))
+        motion = plan_motion(MotionTask(cell, job.schedule, job.moving, found.start[k]))
         joints = [joint for robot in robots for joint in robot.model.joints]
         room = np.minimum(
             motion.q.min(axis=0) - [joint.lower for joint in joints],
@@ -68,8 +65,8 @@ def test_it_does_not_matter_who_else_is_screened(job: SimpleNamespace) -> None:
     everywhere = shifts(AT_ONCE + 3, 0.05)
     chosen = [0, 7, AT_ONCE + 1]
 
-    among_others = screen_layouts(job.cell, job.timed, candidates(job, everywhere), moving=job.moving)
-    few = screen_layouts(job.cell, job.timed, candidates(job, everywhere[chosen]), moving=job.moving)
+    among_others = screen_layouts(job.cell, job.schedule, candidates(job, everywhere), moving=job.moving)
+    few = screen_layouts(job.cell, job.schedule, candidates(job, everywhere[chosen]), moving=job.moving)
 
     np.testing.assert_allclose(among_others.margins[chosen], few.margins, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(among_others.speed_ratios[chosen], few.speed_ratios, rtol=0.0, atol=1e-8)
@@ -80,7 +77,7 @@ def test_a_cell_moved_as_a_whole_keeps_its_figures(job: SimpleNamespace) -> None
     here = candidates(job, shifts(2, 0.05))
     moved = Candidates(X_WB=pose((3.0, -2.0, 1.0), (0.1, 0.2, 2.0)) @ here.X_WB, X_FT=here.X_FT, start=here.start)
 
-    before, after = (screen_layouts(job.cell, job.timed, each, moving=job.moving) for each in (here, moved))
+    before, after = (screen_layouts(job.cell, job.schedule, each, moving=job.moving) for each in (here, moved))
 
     np.testing.assert_allclose(after.margins, before.margins, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(after.speed_ratios, before.speed_ratios, rtol=0.0, atol=1e-8)
@@ -91,7 +88,7 @@ def test_a_longer_tool_changes_the_start_of_its_own_robot_only(job: SimpleNamesp
     X_FT = here.X_FT.copy()
     X_FT[1, 1] = X_FT[1, 1] @ pose((0.0, 0.0, 0.03))
 
-    found = screen_layouts(job.cell, job.timed, replace(here, X_FT=X_FT), moving=job.moving)
+    found = screen_layouts(job.cell, job.schedule, replace(here, X_FT=X_FT), moving=job.moving)
 
     assert found.is_followed.all()
     kuka = job.cell.columns("kuka")
@@ -104,9 +101,9 @@ def test_a_longer_tool_changes_the_start_of_its_own_robot_only(job: SimpleNamesp
 def test_what_is_out_of_reach_is_lost_and_harms_nobody(job: SimpleNamespace) -> None:
     places = shifts(4, 0.05)
     places[2, 1] += FAR
-    alone = screen_layouts(job.cell, job.timed, candidates(job, places[[0, 1, 3]]), moving=job.moving)
+    alone = screen_layouts(job.cell, job.schedule, candidates(job, places[[0, 1, 3]]), moving=job.moving)
 
-    found = screen_layouts(job.cell, job.timed, candidates(job, places), moving=job.moving)
+    found = screen_layouts(job.cell, job.schedule, candidates(job, places), moving=job.moving)
 
     assert found.lost_at[2] == -np.inf
     assert found.is_followed.tolist() == [True, True, False, True]
@@ -118,11 +115,11 @@ def test_a_tool_that_cannot_follow_is_lost_on_the_way(job: SimpleNamespace) -> N
     places = np.zeros((41, 3, 3))
     places[:, 0, 1] = np.linspace(0.0, 0.8, 41)  # the first operator stands farther and farther away
 
-    found = screen_layouts(job.cell, job.timed, candidates(job, places), moving=job.moving[1:])  # the part at rest
+    found = screen_layouts(job.cell, job.schedule, candidates(job, places), moving=job.moving[1:])  # the part at rest
 
     lost = np.flatnonzero((found.lost_at >= 0.0) & ~found.is_followed)
     assert len(lost) > 0
-    assert np.all(found.lost_at[lost] < job.timed.times[-1])
+    assert np.all(found.lost_at[lost] < job.schedule.times[-1])
     assert found.is_followed[0]
 
 
@@ -130,7 +127,7 @@ def test_candidates_must_fit_the_cell(job: SimpleNamespace) -> None:
     here = candidates(job, np.zeros((1, 3, 3)))
 
     with pytest.raises(ValueError, match="expected 4 robots with 24 joints in all"):
-        screen_layouts(job.cell, job.timed, replace(here, start=here.start[:, :5]), moving=job.moving)
+        screen_layouts(job.cell, job.schedule, replace(here, start=here.start[:, :5]), moving=job.moving)
     with pytest.raises(ValueError, match="expected X_WB and X_FT of shape"):
         replace(here, X_FT=here.X_FT[:, :2])
     with pytest.raises(ValueError, match="not finite"):
@@ -141,7 +138,7 @@ def test_no_candidates_give_no_figures(job: SimpleNamespace) -> None:
     none = candidates(job, np.zeros((1, 3, 3)))
     none = Candidates(X_WB=none.X_WB[:0], X_FT=none.X_FT[:0], start=none.start[:0])
 
-    found = screen_layouts(job.cell, job.timed, none, moving=job.moving)
+    found = screen_layouts(job.cell, job.schedule, none, moving=job.moving)
 
     assert found.margins.shape == (0, job.cell.joint_count)
     assert not len(found.is_feasible)

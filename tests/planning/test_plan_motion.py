@@ -115,7 +115,7 @@ def test_through_a_singularity_steps_lead_on_to_the_end(points: Any, start: Any,
     taken = time.perf_counter() - begun
 
     assert motion.resolution.euler_from is None or 0.0 <= motion.resolution.euler_from < 1.0
-    assert len(motion.q) == len(case.timed.times)
+    assert len(motion.q) == len(case.schedule.times)
     assert np.all(np.isfinite(motion.q))
     assert np.linalg.norm(tips(case, motion.q)[-1] - points[-1]) < 0.05
     assert taken < 10.0  # a second or so: nothing is halved without end
@@ -148,7 +148,7 @@ def test_what_is_just_out_of_reach_is_followed_as_far_as_it_goes() -> None:
     case = arm([(2.1, 0.0)], [0.5, 0.9])
     motion = case.resolved()
     assert 0.5 < motion.resolution.euler_from < 1.0
-    before = case.timed.times <= motion.resolution.euler_from
+    before = case.schedule.times <= motion.resolution.euler_from
     assert np.linalg.norm(tips(case, motion.q)[before], axis=1).max() <= 2.0
     assert 1.9 < np.linalg.norm(tips(case, motion.q)[-1]) <= 2.0  # Euler's steps swing where nothing can be reached
 

@@ -13,7 +13,7 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.motion import Motion
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.refine_motion import plan_within_accuracy
-from cellplan.planning.timing.schedule import sample
+from cellplan.planning.timing.schedule import schedule_paths
 
 DENT = 2e-5  # [m] depth
 DENT_AT, DENT_WIDTH = 2.9, 0.004  # [rad] along a circle of 0.1 m: narrower than the distance of two nodes
@@ -47,7 +47,7 @@ def seen_by_the_checks(case: Case, q: Array) -> Array:
     positions = {robot.name: q[:, case.cell.columns(robot.name)] for robot in case.cell.robots}
     X_WP = part_poses(case.cell, chains, positions)
     worst = np.zeros(len(q))
-    for task in sample(case.timed).tasks:
+    for task in case.schedule.tasks:
         found = task_accuracy(task, chains[task.task.robot], q=positions[task.task.robot], X_WP=X_WP)
         for error in (found.position_error, found.orientation_error):
             worst = np.maximum(worst, np.linalg.norm(error, axis=1))
@@ -56,9 +56,9 @@ def seen_by_the_checks(case: Case, q: Array) -> Array:
 
 def test_errors_at_the_clock_s_instants_are_those_of_the_checks() -> None:
     case = case_of(shipped("four_robots"))
-    q = closely(case).q + 1e-5 * np.random.default_rng(0).normal(size=(len(case.timed.times), case.cell.joint_count))
+    q = closely(case).q + 1e-5 * np.random.default_rng(0).normal(size=(len(case.schedule.times), case.cell.joint_count))
 
-    errors = AccurateRun(case.task).errors(sample(case.timed), q)
+    errors = AccurateRun(case.task).errors(case.schedule, q)
 
     np.testing.assert_allclose(errors, seen_by_the_checks(case, q), rtol=1e-6, atol=NOISE)
 
@@ -79,7 +79,7 @@ def test_an_instant_that_is_looked_at_becomes_an_end_of_panels() -> None:
     case = case_of(shipped("four_robots"))
     looked_at = 0.377  # [s] nothing happens there by itself
 
-    closer = replace(case, timed=replace(case.timed, extra_breaks=np.array([looked_at])))
+    closer = replace(case, schedule=replace(case.schedule, extra_breaks=np.array([looked_at])))
 
     assert looked_at not in [panel.end for panel in case.path().panels]
     assert looked_at in [panel.end for panel in closer.path().panels]
@@ -88,9 +88,9 @@ def test_an_instant_that_is_looked_at_becomes_an_end_of_panels() -> None:
 
 def test_what_the_nodes_and_the_points_between_them_miss_is_found_and_resolved() -> None:
     case = case_of(shipped("four_robots"))
-    circle, *others = case.timed.paths
+    circle, *others = case.schedule.paths
     dented = replace(circle, toolpath=replace(circle.toolpath, tip=Dented(circle.toolpath.tip)))
-    case = replace(case, timed=replace(case.timed, paths=(dented, *others)))
+    case = replace(case, schedule=schedule_paths(case.cell, (dented, *others)))
     allowed = case.cell.solver.accuracy
 
     missed, found = case.resolved(), closely(case)

@@ -16,11 +16,11 @@ from cellplan.model.cell import (
     Grasp,
     Mode,
     MotionSettings,
-    Origin,
     Part,
     Robot,
     Tool,
 )
+from cellplan.model.origin import Origin
 from cellplan.model.report import (
     Check,
     ClearanceClass,

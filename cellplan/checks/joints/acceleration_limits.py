@@ -46,7 +46,7 @@ def motion_accelerations(
     X_WT = {robot.name: chains[robot.name].tool_poses(q[robot.name]) for robot in cell.robots}
     cycles = {robot.name: robot.controller_cycle for robot in cell.robots}
     judged = _judged(cell, times)
-    jumps_at = NO_TIMES if schedule.desired is None else desired_jumps(schedule.desired)
+    jumps_at = desired_jumps(schedule) if schedule.is_continuous else NO_TIMES
     joints = (_joints(robot, times, q[robot.name], judged=judged, jumps_at=jumps_at) for robot in cell.robots)
     return MotionAccelerations(
         joints=tuple(use for uses in joints for use in uses),

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array, rotation_vector
-from cellplan.model.motion import DesiredMotion
+from cellplan.model.motion import Schedule
 
 SIDE_S: Final = 1e-6  # [s] before and after an instant: the speeds on its two sides
 JUMP_TOL: Final = 1e-4  # [m/s] or [rad/s]: a smaller change of a tool's speed is no jump
@@ -13,15 +13,15 @@ ROW_TOL: Final = 1e-6  # [-] of a step: nearer times are those of the row
 NO_TIMES: Final = np.zeros(0)
 
 
-def desired_jumps(desired: DesiredMotion) -> Array:
+def desired_jumps(schedule: Schedule) -> Array:
     """Times in [s] at which the desired speed of a tool jumps, shape (J,).
 
     So it does where a constant law starts, passes a corner or ends, and where a trajectory starts or ends at speed.
     """
-    sample_times = desired.jumps
+    sample_times = schedule.jumps
     beside = np.concatenate([sample_times - SIDE_S, sample_times, sample_times + SIDE_S])
     is_jump = np.zeros(len(sample_times), dtype=bool)
-    for X_PT in desired.poses(np.clip(beside, 0.0, float(desired.times[-1]))):
+    for X_PT in schedule.poses(np.clip(beside, 0.0, float(schedule.times[-1]))):
         before, at, after = np.split(X_PT, 3)
         change = (after[:, :3, 3] - 2.0 * at[:, :3, 3] + before[:, :3, 3]) / SIDE_S
         turn = (_turns(at, after) - _turns(before, at)) / SIDE_S

@@ -34,9 +34,9 @@ def look_between(
         accuracy: Errors of the tasks at the rows.
         closures: Errors of the closures at the rows.
     """
-    if schedule.desired is None or not (accuracy or closures):
+    if not schedule.is_continuous or not (accuracy or closures):
         return tuple(accuracy), tuple(closures)
-    program = ErrorsBetweenRows(scene, schedule, schedule.desired, q)
+    program = ErrorsBetweenRows(scene, schedule, q)
     of_tasks, of_closures = program.errors_between(accuracy, closures)
     return (
         tuple(replace(errors, between=between) for errors, between in zip(accuracy, of_tasks, strict=True)),

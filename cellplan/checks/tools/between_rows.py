@@ -26,7 +26,7 @@ from cellplan.geometry.arrays import Indices
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.between_rows import BetweenError, BetweenRows
 from cellplan.model.cell import Relation
-from cellplan.model.motion import DesiredMotion, Schedule
+from cellplan.model.motion import Schedule
 from cellplan.model.report import ClosureAccuracy, TaskAccuracy
 from cellplan.model.task import INSTANT_ROOM, Frame, Task
 from cellplan.scene.scene import Scene
@@ -63,27 +63,26 @@ class _Tool:
 class ErrorsBetweenRows:
     """A program between its rows."""
 
-    def __init__(self, scene: Scene, schedule: Schedule, desired: DesiredMotion, q: Mapping[str, Array]) -> None:
+    def __init__(self, scene: Scene, schedule: Schedule, q: Mapping[str, Array]) -> None:
         """Store the program.
 
         Args:
             scene: The cell made computable.
-            schedule: The desired poses at the rows.
-            desired: The desired poses at any instant.
+            schedule: The desired poses at the rows and between them.
             q: Positions by robot in [rad] or [m], shape (N, n) each.
         """
-        self._scene, self._schedule, self._desired, self._q = scene, schedule, desired, q
+        self._scene, self._schedule, self._q = scene, schedule, q
         stacked = np.concatenate([q[robot.name] for robot in scene.cell.robots], axis=1)
         self._arms = LeverArms(scene, stacked)
         self._moved = self._arms.steps(stacked)
-        self._jumped, self._share = _within_steps(desired.times, desired.jumps)
+        self._jumped, self._share = _within_steps(schedule.times, schedule.jumps)
 
     def errors_between(
         self, accuracy: Sequence[TaskAccuracy], closures: Sequence[ClosureAccuracy]
     ) -> tuple[list[BetweenRows], list[BetweenRows]]:
         """Largest errors between the rows of every task and of every closure."""
         tools = [*self._task_tools(accuracy), *self._closure_tools(closures)]
-        count = len(self._desired.times) - 1
+        count = len(self._schedule.times) - 1
         middle, sag = self._middles(tools, count)
         bounds = [self._bounds(tool, middle[:, place], sag[:, place]) for place, tool in enumerate(tools)]
         chosen = np.zeros(count, dtype=bool)
@@ -101,8 +100,8 @@ class ErrorsBetweenRows:
         ]
         every = [self._worst(one, kind) for one in found for kind in range(2)]
         step = min((error.longest_step for error in every if error.longest_step is not None), default=None)
-        if step is not None and _stops_at_once(tools, corners[sample_times > self._desired.times[-1] - INSTANT_ROOM]):
-            step = _fitting(step, float(self._desired.times[-1]))
+        if step is not None and _stops_at_once(tools, corners[sample_times > self._schedule.times[-1] - INSTANT_ROOM]):
+            step = _fitting(step, float(self._schedule.times[-1]))
         every = [error if error.longest_step is None else replace(error, longest_step=step) for error in every]
         results = [BetweenRows(position=a, orientation=b) for a, b in zip(every[::2], every[1::2], strict=True)]
         return results[: len(accuracy)], results[len(accuracy) :]
@@ -152,8 +151,8 @@ class ErrorsBetweenRows:
 
     def _desired_poses(self, k: Indices, s: Array) -> tuple[Array, ...]:
         """Desired poses of all tasks at shares s of steps k, shape (M, 4, 4) each."""
-        times = self._desired.times
-        return self._desired.poses(times[k] + s * (times[k + 1] - times[k]))
+        times = self._schedule.times
+        return self._schedule.poses(times[k] + s * (times[k + 1] - times[k]))
 
     def _errors_of(self, tools: Sequence[_Tool], k: Indices, s: Array, poses_desired: Sequence[Array]) -> Array:
         """Errors of all tools against desired poses, shape (M, tools, 2)."""
@@ -200,11 +199,11 @@ class ErrorsBetweenRows:
         Returns:
             Times in [s], shape (J,), and errors with the present step in [m] and [rad], shape (J, tools, 2).
         """
-        times, step = self._desired.times, self._schedule.step
-        sample_times = self._desired.jumps
+        times, step = self._schedule.times, self._schedule.step
+        sample_times = self._schedule.jumps
         sample_times = sample_times[(sample_times > times[0] + INSTANT_ROOM) & (sample_times <= times[-1])]
         errors = np.zeros((len(sample_times), len(tools), 2))
-        around = [self._desired.poses(np.clip(sample_times + shift * step, times[0], times[-1])) for shift in SIDES]
+        around = [self._schedule.poses(np.clip(sample_times + shift * step, times[0], times[-1])) for shift in SIDES]
         for place, tool in enumerate(tools):
             if tool.place is not None:
                 before, at, after = (poses[tool.place] for poses in around)

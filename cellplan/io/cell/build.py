@@ -36,6 +36,7 @@ from cellplan.model.cell import (
     Robot,
     Tool,
 )
+from cellplan.model.origin import Origin
 from cellplan.model.robot import BASE, Body, RobotModel
 from cellplan.model.task import (
     CirclePath,
@@ -132,7 +133,7 @@ def build_obstacle(name: str, entry: ObstacleEntry, read_mesh: MeshReader) -> Ob
     return Obstacle(name=name, shape=shape, X_WS=X_WS)
 
 
-def build_task(name: str, document: CellDocument, read_targets: TargetReader) -> Task:
+def build_task(name: str, document: CellDocument, read_targets: TargetReader, origin: Origin) -> Task:
     """One operator's work, with the motion's settings where it has none of its own."""
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
@@ -162,6 +163,7 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
         retract=_straight_move(entry.retract_mm, entry.retract_s),
         relative_to=Frame(entry.relative_to),
         tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm) / MM,
+        origin=origin,
     )
 
 

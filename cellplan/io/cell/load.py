@@ -34,7 +34,8 @@ from cellplan.io.schema.mounting import AttachmentEntry
 from cellplan.io.schema.partial import Pieces, read_pieces
 from cellplan.io.schema.shapes import ObstacleEntry, ToolBodyEntry, ToolShapeEntry
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
-from cellplan.model.cell import Cell, Origin
+from cellplan.model.cell import Cell
+from cellplan.model.origin import Origin
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import TimedPath
 
@@ -217,22 +218,23 @@ def _cell(
         return found
 
     timed = {name for name, path in targets.items() if isinstance(path, TimedPath)}
+    origin = Origin(
+        file=document.file,
+        lines=document.lines(),
+        document=resolved_document(whole, timed=timed),
+        changes=source.changes,
+        changed={key_text(path): text for path, text in document.changes.items()},
+    )
     cell = Cell(
         name=whole.name,
         robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
         part=build_part(whole.part, mesh),
-        tasks=tuple(build_task(name, whole, targets.__getitem__) for name in whole.tasks),
+        tasks=tuple(build_task(name, whole, targets.__getitem__, origin) for name in whole.tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),
         motion=build_motion(whole.motion),
         solver=build_solver(whole.solver, whole.motion.step_s, models),
         checks=build_checks(whole.checks),
-        origin=Origin(
-            file=document.file,
-            lines=document.lines(),
-            document=resolved_document(whole, timed=timed),
-            changes=source.changes,
-            changed={key_text(path): text for path, text in document.changes.items()},
-        ),
+        origin=origin,
         inputs=dict(sorted(sources.inputs.items())),
     )
     parts = {key: getattr(cell, key) for key in PARTS}

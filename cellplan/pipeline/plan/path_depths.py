@@ -3,13 +3,10 @@
 from collections.abc import Mapping
 from typing import Final
 
-import numpy as np
-
 from cellplan.checks.clearance.tool_depth import check_depths, path_depth
-from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check
-from cellplan.model.toolpath import Toolpath, Trajectory
+from cellplan.model.toolpath import Toolpath
 
 POSES: Final = 1001  # [-] poses of each path at which the depth of the tool's axis is computed
 
@@ -21,13 +18,6 @@ def depths_on_paths(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> list[Check
         cell: The cell.
         toolpaths: The path of each task by its name.
     """
-    found = [path_depth(cell, cell.task(name), _poses(toolpath)) for name, toolpath in toolpaths.items()]
+    found = [path_depth(cell, cell.task(name), toolpath.spread(POSES)) for name, toolpath in toolpaths.items()]
     checks = check_depths(cell, [depth for depth in found if depth is not None])
     return [check for check in checks if not check.passed]
-
-
-def _poses(toolpath: Toolpath) -> Array:
-    """Desired tool poses spread over a path, shape (POSES, 4, 4)."""
-    if isinstance(toolpath, Trajectory):
-        return toolpath.at(np.linspace(0.0, toolpath.duration, POSES))[0]
-    return toolpath.poses(np.linspace(0.0, toolpath.length, POSES))

@@ -61,7 +61,7 @@ class ProgramClock:
         """The clock of a program as its cell demands it; nothing of it is taken from a run."""
         schedules = []
         for phase in plan.program:
-            toolpaths = [build_toolpath(cell.task(name), cell.part, cell.origin) for name in phase.tasks]
+            toolpaths = [build_toolpath(cell.task(name), cell.part) for name in phase.tasks]
             schedules.append(schedule_tasks(cell, toolpaths))
         return cls.of(cell, plan, schedules)
 

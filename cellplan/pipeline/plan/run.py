@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from cellplan.model.cell import Cell
+from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.phase import Phase
 from cellplan.model.progress import Progress, silent
 from cellplan.planning.modes import standing
 from cellplan.planning.refine_motion import plan_within_accuracy
-from cellplan.planning.timing.schedule import sample, time_tasks
-from cellplan.planning.timing.timed_path import ClockedPath
+from cellplan.planning.timing.schedule import schedule_paths
 from cellplan.planning.tracking.motion_task import MotionTask
 
 
@@ -43,7 +43,7 @@ def plan_run(cell: Cell, paths: Mapping[str, ClockedPath], phase: Phase, *, prog
     Raises:
         NoSolutionError: A tool lost its path.
     """
-    schedule = sample(time_tasks(cell, [paths[name] for name in phase.tasks]))
+    schedule = schedule_paths(cell, [paths[name] for name in phase.tasks])
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     at = standing(cell, phase, start)
     motion = plan_within_accuracy(MotionTask(cell, schedule, phase.moving, at), progress=progress)

@@ -8,12 +8,12 @@ import numpy as np
 from cellplan.checks.clearance.mounting import CURES, check_mounting
 from cellplan.errors import StartNotFoundError
 from cellplan.model.cell import Cell
+from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
 from cellplan.model.toolpath import Toolpath
 from cellplan.pipeline.plan.path_depths import depths_on_paths
 from cellplan.planning.start.search import StartChoice, choose_start
-from cellplan.planning.timing.timed_path import ClockedPath
 from cellplan.scene.bodies import Kind
 from cellplan.scene.grips import closed_depth
 from cellplan.scene.mounting import Mount, MountedPair

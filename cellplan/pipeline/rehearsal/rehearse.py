@@ -211,7 +211,7 @@ def _iso_figures(job: Pass, trials: Sequence[tuple[TaskAccuracy, ...]]) -> dict[
         errors = np.stack(
             [np.concatenate([made[place].position_error, made[place].orientation_error], axis=1) for made in trials]
         )
-        behind = build_toolpath(scheduled.task, job.cell.part, job.cell.origin).behind
+        behind = build_toolpath(scheduled.task, job.cell.part).behind
         stops = [max(int(np.argmin(np.abs(scheduled.travelled - length))), first) for length in behind]
         figures[name] = IsoFigures(
             poses=tuple(pose_figures(errors[:, k], float(times[k])) for k in dict.fromkeys(stops)),

@@ -29,17 +29,17 @@ def brought_onto_tasks(motion: MotionTask, q: Array) -> Array:
     cell, schedule, grasps = motion.cell, motion.schedule, motion.grasps
     if cell.motion.locked:
         return q
-    tasks = BatchTasks(cell, [*(each.task for each in schedule.tasks), *grasps], motion.moving)
+    tasks = BatchTasks(cell, motion.relations, motion.moving)
     placement, everything = tasks.chains.placement(cell), np.ones(cell.joint_count)
     brought = q.copy()
     for first in range(0, len(q), IN_CACHE):
         some = slice(first, first + IN_CACHE)
         desired, at = sampled(schedule, some, grasps), q[some].T
-        still, before = np.zeros_like(at), largest(tasks.errors(at, desired, placement))
+        still, before = np.zeros_like(at), largest(tasks.errors(at, desired[0], placement))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # what is not a number is left out below
             for _ in range(STEPS):
                 at = at + tasks.linearise(at, desired, placement, mobile=everything).correction(still)
-            is_better = largest(tasks.errors(at, desired, placement)) < before
+            is_better = largest(tasks.errors(at, desired[0], placement)) < before
         is_better &= np.abs(at - q[some].T).max(axis=0) <= SMALL
         brought[some][is_better] = at.T[is_better]
     return brought

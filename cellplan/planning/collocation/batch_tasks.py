@@ -11,30 +11,9 @@ from cellplan.model.cell import Cell, Relation
 from cellplan.planning.collocation.arrow_inverse import ArrowInverse
 from cellplan.planning.tracking.task_constraints import TaskConstraints
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Reference:
-    """References of the tools, one sample per entry of the batch, in the frame that each task is relative to.
-
-    Attributes:
-        R: Reference tool orientations, shape (3, 3, tasks, batch).
-        p: Reference tool tips in [m], shape (3, tasks, batch).
-        twists: Reference tool twists, linear first, shape (6, tasks, batch).
-    """
-
-    R: Array
-    p: Array
-    twists: Array
-
-    def between(self, low: int, high: int) -> "Reference":
-        """The samples from one number up to another."""
-        return Reference(*(part[..., low:high].copy() for part in (self.R, self.p, self.twists)))
-
-    def repeated(self, count: int) -> "Reference":
-        """The same samples for so many cells, one cell after the other."""
-        if count == 1:
-            return self
-        return Reference(*(np.concatenate([part] * count, axis=-1) for part in (self.R, self.p, self.twists)))
+# Desired tool poses, shape (4, 4, tasks, batch), and twists, linear first, shape (6, tasks, batch), in the frames that
+# the tasks are relative to.
+Desired = tuple[Array, Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,19 +56,19 @@ class BatchTasks:
         self._weights = np.concatenate([robot.weights for robot in cell.robots])
         self._may_move = constraints.may_move
 
-    def linearise(self, q: Array, desired: Reference, placement: Placement, *, mobile: Array) -> "Linearisation":
+    def linearise(self, q: Array, desired: Desired, placement: Placement, *, mobile: Array) -> "Linearisation":
         """The tasks at stacked joint vectors, shape (nq, batch), to first order.
 
         Args:
             q: The configurations.
-            desired: References of the tools.
+            desired: Desired poses and twists of the tools.
             placement: Where the robots stand.
             mobile: 1 for joints that are not locked, shape (nq,).
         """
         state = self.chains.state(q, placement)
-        seen = self._seen(state)
+        seen, (X, V) = self._seen(state), desired
         mobile = mobile * self._may_move
-        columns, count = self._columns(state, seen, desired), len(self._robots)
+        columns, count = self._columns(state, seen, X), len(self._robots)
         shared = mobile[self._shared_columns][:, None, None]
         arrow = ArrowInverse(
             columns[:, :, :count],
@@ -99,20 +78,20 @@ class BatchTasks:
             idle=1.0 - self._kept,
         )
         rows = seen.R_WR if self._is_whole else None
-        errors = self._errors(seen, desired)
-        return Linearisation(self, arrow, errors=errors, rows=rows, desired=self._twists(desired), mobile=mobile)
+        errors = self._errors(seen, X)
+        return Linearisation(self, arrow, errors=errors, rows=rows, desired=self._twists(X, V), mobile=mobile)
 
-    def errors(self, q: Array, desired: Reference, placement: Placement) -> Array:
-        """Pose errors, desired minus actual, as `cooperation.pose_errors` has them, shape (6, tasks, batch).
+    def errors(self, q: Array, X: Array, placement: Placement) -> Array:
+        """Pose errors, desired X minus actual, as `cooperation.pose_errors` has them, shape (6, tasks, batch).
 
         Components that a task leaves open are zero. With free spin the rotation is given in the desired tool frame.
         """
-        return self._errors(self._seen(self.chains.state(q, placement)), desired)
+        return self._errors(self._seen(self.chains.state(q, placement)), X)
 
-    def task_errors(self, q: Array, desired: Reference, placement: Placement) -> Array:
+    def task_errors(self, q: Array, X: Array, placement: Placement) -> Array:
         """Pose errors with all rotations in the frames of the tasks, shape (6, tasks, batch)."""
-        errors, free = self.errors(q, desired, placement), self._is_spin_free
-        errors[3:, free] = np.einsum("ijtb,jtb->itb", desired.R[:, :, free], errors[3:, free])
+        errors, free = self.errors(q, X, placement), self._is_spin_free
+        errors[3:, free] = np.einsum("ijtb,jtb->itb", X[:3, :3, free], errors[3:, free])
         return errors
 
     def stacked(self, own: Array, shared: Array) -> Array:
@@ -145,31 +124,31 @@ class BatchTasks:
         p = np.einsum("jitb,jtb->itb", R_WR, p_WT - p_WR)
         return ToolPoses(R_WR, R, p, p_WT)
 
-    def _errors(self, seen: ToolPoses, desired: Reference) -> Array:
+    def _errors(self, seen: ToolPoses, X: Array) -> Array:
         """See `errors`."""
         errors = np.empty((6, *seen.p.shape[1:]))
-        errors[:3] = desired.p - seen.p
-        between = np.einsum("ijtb,kjtb->iktb", desired.R, seen.R)
+        errors[:3] = X[:3, 3] - seen.p
+        between = np.einsum("ijtb,kjtb->iktb", X[:3, :3], seen.R)
         across = between[[2, 0, 1], [1, 2, 0]] - between[[1, 2, 0], [2, 0, 1]]
         errors[3:] = _rotation(0.5 * across, 0.5 * (np.einsum("iitb->tb", between) - 1.0))
         if self._is_spin_free.any():
             free = self._is_spin_free
-            z, goal = seen.R[:, 2, free], desired.R[:, 2, free]
-            across_tool = np.einsum("jitb,jtb->itb", desired.R[:, :, free], _cross(z, goal))
+            z, goal = seen.R[:, 2, free], X[:3, 2, free]
+            across_tool = np.einsum("jitb,jtb->itb", X[:3, :3, free], _cross(z, goal))
             errors[3:, free] = _rotation(across_tool, np.einsum("itb,itb->tb", z, goal))
         return errors if self._is_whole else errors * self._kept
 
-    def _twists(self, desired: Reference) -> Array:
-        """Reference twists of the constrained components, in the frames of `errors`, shape (6, tasks, batch)."""
+    def _twists(self, X: Array, V: Array) -> Array:
+        """Desired twists of the constrained components, in the frames of `errors`, shape (6, tasks, batch)."""
         if self._is_whole:
-            return desired.twists
-        twists = desired.twists.copy()
+            return V
+        twists = V.copy()
         free = self._is_spin_free
-        twists[3:, free] = np.einsum("jitb,jtb->itb", desired.R[:, :, free], twists[3:, free])
+        twists[3:, free] = np.einsum("jitb,jtb->itb", X[:3, :3, free], twists[3:, free])
         twists *= self._kept
         return twists
 
-    def _columns(self, state: BatchState, seen: ToolPoses, desired: Reference) -> Array:
+    def _columns(self, state: BatchState, seen: ToolPoses, X: Array) -> Array:
         """Tool twists per unit speed of joints: of each task's own robot, then of the positioner at each tip.
 
         Shape (6, joints, 2 tasks, batch), expressed in W, or in the frames of `errors` where a task leaves components
@@ -188,12 +167,12 @@ class BatchTasks:
             columns[3:] *= turning
         if not chains.is_plain:
             columns = np.einsum("iltb,ljt->ijtb", columns, chains.to_joints[:, :, robots])
-        return columns if self._is_whole else self._in_rows(columns, seen, desired)
+        return columns if self._is_whole else self._in_rows(columns, seen, X)
 
-    def _in_rows(self, columns: Array, seen: ToolPoses, desired: Reference) -> Array:
+    def _in_rows(self, columns: Array, seen: ToolPoses, X: Array) -> Array:
         """Columns in the frames of `errors`, zero in the rows that a task leaves open."""
         R, turned, free = seen.R_WR, seen.R_WR.copy(), self._is_spin_free
-        turned[:, :, free] = np.einsum("ijtb,jktb->iktb", R[:, :, free], desired.R[:, :, free])
+        turned[:, :, free] = np.einsum("ijtb,jktb->iktb", R[:, :, free], X[:3, :3, free])
         rows = np.empty_like(columns)
         for half in (slice(None, len(free)), slice(len(free), None)):
             rows[:3, :, half] = np.einsum("jitb,jltb->iltb", R, columns[:3, :, half])

@@ -8,17 +8,17 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.batched import IN_CACHE
 from cellplan.model.cell import Cell
+from cellplan.model.clocked_path import distinct
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import INSTANT_ROOM
-from cellplan.planning.collocation.batch_targets import BatchTargets
+from cellplan.planning.collocation.batch_targets import desired_motion, in_windows, sampled
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath
 from cellplan.planning.collocation.solver import Collocation, Drift, Indices, Precision, largest
 from cellplan.planning.collocation.start_offset import start_offset
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
 from cellplan.planning.euler.cycle_closing import SAME_POSE, drift_pace
-from cellplan.planning.timing.timed_path import TimedTasks, distinct
 from cellplan.planning.tracking.locked_joints import locked_since
 from cellplan.planning.tracking.motion_task import MotionTask
 
@@ -46,14 +46,20 @@ class AccurateRun:
         Args:
             motion: The tasks, the robots that move and their start.
             progress: Called with the stage and the fraction done.
+
+        Raises:
+            TypeError: The desired motion is known at the samples only.
         """
-        cell, timed, grasps = motion.cell, motion.timed, motion.grasps
+        cell, schedule, grasps = motion.cell, motion.schedule, motion.grasps
+        if not schedule.is_continuous:
+            raise TypeError("accurate run: expected a desired motion between samples, got none")
         accuracy = min(cell.solver.accuracy, TO_CLOSE) if cell.motion.cyclic else cell.solver.accuracy
-        tasks = BatchTasks(cell, [*(path.task for path in timed.paths), *grasps], motion.moving)
-        placement, self.end = tasks.chains.placement(cell), float(timed.times[-1])
-        breaks, jumps = timed.breaks, timed.jumps
-        until, first = _settled(cell, timed, len(grasps)), breaks[:2]
-        desired = BatchTargets(timed, grasps).at(first[:1], first[:1], first[1:])
+        tasks = BatchTasks(cell, motion.relations, motion.moving)
+        placement, self.end = tasks.chains.placement(cell), float(schedule.times[-1])
+        breaks, jumps = schedule.breaks, schedule.jumps
+        until, first = _settled(cell, schedule, len(grasps)), breaks[:2]
+        on_paths = desired_motion(schedule.paths, grasps)
+        desired = on_paths(first[:1], first[:1], first[1:])
         offset = start_offset(tasks, desired, placement, start=motion.start, until=until, accuracy=accuracy)
         self._precision = Precision(
             accuracy=accuracy,
@@ -61,7 +67,8 @@ class AccurateRun:
             shortest=min(cell.motion.step, SHORTEST_SHARE * self.end),
         )
         self.sweeps = self.solves = 0
-        self._tasks, self._targets, self._placement = tasks, BatchTargets(timed, grasps, offset), placement
+        self._tasks, self._placement, self._grasps, self._offset = tasks, placement, grasps, offset
+        self._on_paths, self._desired_at = on_paths, desired_motion(schedule.paths, grasps, offset)
         self._locked_since, self._progress = locked_since(cell), progress
         inner = np.concatenate([jumps, self._locked_since, *([] if offset is None else [until])])
         self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
@@ -92,7 +99,7 @@ class AccurateRun:
         for breaks in self._stretches(begin, end):
             mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
             collocation = Collocation(
-                self._tasks, self._targets, self._placement, self._precision, mobile=mobile, drift=paced
+                self._tasks, self._desired_at, self._placement, self._precision, mobile=mobile, drift=paced
             )
             windows = windows_between(breaks, whole=self.end, knots=self._knots)
             arrived = collocation.carry(windows, at, ONLY, record)
@@ -104,17 +111,16 @@ class AccurateRun:
     def gaps(self, begin: float, end: float) -> Array:
         """How far each tool is desired at one time from where it is desired at a later one, in pose entries."""
         inside = np.array([begin, end - INSTANT_ROOM])
-        desired = self._targets.on_path(np.array([begin, end]), inside, inside + INSTANT_ROOM)
-        turned = np.abs(np.diff(desired.R))[..., 0].max(axis=(0, 1))
-        return np.maximum(turned, np.abs(np.diff(desired.p))[..., 0].max(axis=0))
+        X, _ = self._on_paths(np.array([begin, end]), inside, inside + INSTANT_ROOM)
+        return np.abs(np.diff(X[:3]))[..., 0].max(axis=(0, 1))
 
     def errors(self, schedule: Schedule, q: Array) -> Array:
         """Largest tool errors in [m] or [rad] at the first N samples, at configurations of shape (N, nq)."""
         worst = np.empty(len(q))
         for first in range(0, len(q), IN_CACHE):
             some = slice(first, min(first + IN_CACHE, len(q)))
-            desired = self._targets.sampled(schedule, some)
-            worst[some] = largest(self._tasks.errors(q[some].T, desired, self._placement))
+            X, _ = sampled(schedule, some, self._grasps, self._offset)
+            worst[some] = largest(self._tasks.errors(q[some].T, X, self._placement))
         return worst
 
     def repeated(self, cycle: CollocatedPath, *, begin: float) -> CollocatedPath | None:
@@ -122,9 +128,9 @@ class AccurateRun:
         again = cycle.shifted(begin - cycle.begin)
         if np.any((self._locked_since > cycle.begin) & (self._locked_since < again.end)):
             return None
-        here, there = (self._targets.in_windows([Window(tuple(path.panels))])[0] for path in (cycle, again))
-        gap = max(float(np.abs(here.R - there.R).max()), float(np.abs(here.p - there.p).max()))
-        return again if gap <= SAME_POSE else None
+        windows = [Window(tuple(path.panels)) for path in (cycle, again)]
+        (here, _), (there, _) = (in_windows(self._desired_at, [window])[0] for window in windows)
+        return again if np.abs(here - there).max() <= SAME_POSE else None
 
     def _stretches(self, begin: float, end: float) -> list[Array]:
         """Breaks between two times, cut where a joint fails; none when there is no time between them."""
@@ -140,14 +146,14 @@ class AccurateRun:
 def _paced(drift: Array, begin: float, end: float) -> Drift:
     """Speeds at times in [s] that begin and end with rest, for mean ones of shape (nq,)."""
 
-    def speeds(sample_times: Array) -> Array:
-        return drift[:, None] * drift_pace((sample_times - begin) / (end - begin))
+    def speeds(times: Array) -> Array:
+        return drift[:, None] * drift_pace((times - begin) / (end - begin))
 
     return speeds
 
 
-def _settled(cell: Cell, timed: TimedTasks, grasps: int) -> Array:
+def _settled(cell: Cell, schedule: Schedule, grasps: int) -> Array:
     """Times in [s] until which each tool, and that of each further holder, may be on its way to where it belongs."""
-    given = [path.task.start + path.task.settle if path.task.settle else 0.0 for path in timed.paths]
-    soon = min(SETTLING_STEPS * cell.motion.step, 0.5 * float(timed.times[-1]))
+    given = [path.task.start + path.task.settle if path.task.settle else 0.0 for path in schedule.paths]
+    soon = min(SETTLING_STEPS * cell.motion.step, 0.5 * float(schedule.times[-1]))
     return np.maximum(np.array(given + [0.0] * grasps), soon)

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.batched import Placement
-from cellplan.planning.collocation.batch_targets import BatchTargets
-from cellplan.planning.collocation.batch_tasks import BatchTasks, Reference
+from cellplan.planning.collocation.batch_targets import DesiredAt, in_windows
+from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired
 from cellplan.planning.collocation.windows import Window
 
 Indices = NDArray[np.intp]
@@ -81,7 +81,7 @@ class Collocation:
     def __init__(
         self,
         tasks: BatchTasks,
-        targets: BatchTargets,
+        desired_at: DesiredAt,
         placement: Placement,
         precision: Precision,
         *,
@@ -92,13 +92,13 @@ class Collocation:
 
         Args:
             tasks: The tasks of the run.
-            targets: References of the tools.
+            desired_at: Desired motion of the tools.
             placement: Where the robots of the cells stand; one for all, or one per cell.
             precision: How exact the motion has to be.
             mobile: 1 for joints that are not locked, 0 for those that are, shape (nq,); None for all free.
             drift: Joint velocities that are added in the null space of the tasks; None for none.
         """
-        self._tasks, self._targets, self._placement = tasks, targets, placement
+        self._tasks, self._desired_at, self._placement = tasks, desired_at, placement
         self._accuracy, self._shortest, tolerance = precision.accuracy, precision.shortest, precision.configuration_tol
         self._configuration_tol = CONFIGURATION_SHARE * precision.accuracy if tolerance is None else tolerance
         self._mobile = np.ones(tasks.joint_count) if mobile is None else mobile
@@ -116,13 +116,13 @@ class Collocation:
         """
         for first in range(0, len(windows), AT_ONCE):
             batch = windows[first : first + AT_ONCE]
-            for window, desired in zip(batch, self._targets.in_windows(batch), strict=True):
+            for window, desired in zip(batch, in_windows(self._desired_at, batch), strict=True):
                 if not len(cells):
                     return cells
                 cells = self._carry_on(window, desired, q, cells, record=record)
         return cells
 
-    def _carry_on(self, window: Window, desired: Reference, q: Array, cells: Indices, *, record: Record) -> Indices:
+    def _carry_on(self, window: Window, desired: Desired, q: Array, cells: Indices, *, record: Record) -> Indices:
         """Carry cells through one window; those for which it is too coarse go through finer ones."""
         attempt = self.attempt(window, desired, q[:, cells], self._placement.of(cells))
         is_exact = attempt.is_settled & np.all(attempt.errors <= self._accuracy, axis=0)
@@ -142,14 +142,15 @@ class Collocation:
         return np.sort(np.concatenate(arrived))
 
     @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # what is not a number does not settle
-    def attempt(self, window: Window, desired: Reference, q0: Array, placement: Placement) -> Attempt:
+    def attempt(self, window: Window, desired: Desired, q0: Array, placement: Placement) -> Attempt:
         """Resolve one window from start postures, shape (nq, cells)."""
         cells, nodes = q0.shape[1], window.count
         q = np.repeat(q0[:, :, None], nodes, axis=2)
         is_settled, before = np.zeros(cells, dtype=bool), np.full(cells, np.inf)
         going = np.arange(cells)
         for number in range(MOST_PASSES):
-            at_nodes, spread = desired.between(0, nodes).repeated(len(going)), placement.of(going).repeated(nodes)
+            at_nodes = repeated((desired[0][..., :nodes], desired[1][..., :nodes]), len(going))
+            spread = placement.of(going).repeated(nodes)
             moved, errors = self._pass(window, at_nodes, q[:, going], spread, q0=q0[:, going])
             q[:, going] += moved
             change = np.abs(moved).max(axis=(0, 2))
@@ -163,23 +164,23 @@ class Collocation:
             going = going[~is_there & ~is_lost]
             if not len(going):
                 break
-        return Attempt(q, is_settled, self._errors(window, desired.repeated(cells), q, placement))
+        return Attempt(q, is_settled, self._errors(window, repeated(desired, cells)[0], q, placement))
 
     def _pass(
-        self, window: Window, desired: Reference, q: Array, placement: Placement, *, q0: Array
+        self, window: Window, desired: Desired, q: Array, placement: Placement, *, q0: Array
     ) -> tuple[Array, Array]:
         """Corrections of q at the nodes in one pass, (nq, cells, nodes), and tool errors before it, (cells,)."""
         self.sweeps += 1
         self.solves += q.shape[1] * q.shape[2]
         linear = self._tasks.linearise(q.reshape(len(q), -1), desired, placement, mobile=self._mobile)
-        drift = None if self._drift is None else np.tile(self._drift(window.sample_times[: window.count]), q.shape[1])
+        drift = None if self._drift is None else np.tile(self._drift(window.times[: window.count]), q.shape[1])
         speeds = linear.speeds(drift).reshape(q.shape)
         picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
         moved: Array = (picard + linear.correction(picard)).reshape(q.shape)
         moved[:, :, 0] = 0.0
         return moved, np.abs(linear.errors).max(axis=(0, 1)).reshape(q.shape[1:]).max(axis=1)
 
-    def _errors(self, window: Window, desired: Reference, q: Array, placement: Placement) -> Array:
+    def _errors(self, window: Window, X: Array, q: Array, placement: Placement) -> Array:
         r"""Bounds of the tool errors at the nodes and between them, by panel, shape (panels, cells).
 
         The nodes of a panel and the points between them are ``2 n + 1`` Chebyshev points. A polynomial of degree ``m``
@@ -187,11 +188,17 @@ class Collocation:
         twice, up to degree ``4 n / 3``. The error of interpolation begins with degree ``n + 1`` and falls from there.
         """
         everywhere = np.concatenate([q, q @ window.between.T], axis=2)
-        cells, count = everywhere.shape[1:]
-        errors = self._tasks.errors(everywhere.reshape(len(q), -1), desired, placement.repeated(count))
+        cells, points = everywhere.shape[1:]
+        errors = self._tasks.errors(everywhere.reshape(len(q), -1), X, placement.repeated(points))
         by_panel = np.zeros((len(window.panels), cells))
-        np.maximum.at(by_panel, window.panel_of, largest(errors).reshape(cells, count).T)
+        np.maximum.at(by_panel, window.panel_of, largest(errors).reshape(cells, points).T)
         return OVERSHOOT * by_panel
+
+
+def repeated(desired: Desired, count: int) -> Desired:
+    """The same samples for so many cells, one cell after the other."""
+    X, V = (np.concatenate([part] * count, axis=-1) for part in desired)
+    return X, V
 
 
 def largest(errors: Array) -> Array:

@@ -7,9 +7,9 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, rotation_exp
 from cellplan.kinematics.batched import Placement
-from cellplan.planning.collocation.batch_tasks import BatchTasks, Reference
-from cellplan.planning.timing.approach_retract import REST_TO_REST
-from cellplan.planning.timing.time_law import advance
+from cellplan.model.approach_retract import REST_TO_REST
+from cellplan.model.time_law import advance
+from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired
 
 QUIET: Final = 0.1  # share of the accuracy up to which a start counts as on its path
 ROUNDS: Final = 8  # of projecting the offset through the components that a task keeps; the first is nearly right
@@ -23,7 +23,7 @@ class StartOffset:
     path, from rest to rest.
 
     Attributes:
-        linear: Reference tip minus actual one at the start in the frame of each task, in [m], shape (3, tasks).
+        linear: Desired tip minus actual one at the start in the frame of each task, in [m], shape (3, tasks).
         angular: Rotation vector from the actual to the desired orientation, in [rad], shape (3, tasks).
         until: Times in [s] from which on nothing is left of it, shape (tasks,).
     """
@@ -32,32 +32,33 @@ class StartOffset:
     angular: Array
     until: Array
 
-    def applied(self, times: Array, R: Array, p: Array, twists: Array) -> tuple[Array, Array, Array]:
+    def applied(self, times: Array, X: Array, V: Array) -> Desired:
         """Targets moved so that they begin where the tools are.
 
         Args:
             times: Times in [s], shape (N,).
-            R: Reference orientations, shape (3, 3, tasks, N).
-            p: Reference tips, shape (3, tasks, N).
-            twists: Reference twists, shape (6, tasks, N).
+            X: Desired poses, shape (4, 4, tasks, N).
+            V: Desired twists, shape (6, tasks, N).
         """
         law = advance(REST_TO_REST, np.clip(times / self.until[:, None], 0.0, 1.0))
         left, rate = 1.0 - law.share, law.rate / self.until[:, None]
         back = np.moveaxis(rotation_exp(-np.moveaxis(self.angular[:, :, None] * left, 0, -1)), (-2, -1), (0, 1))
-        turned = twists.copy()
+        moved, turned = X.copy(), V.copy()
         turned[:3] += self.linear[:, :, None] * rate
-        turned[3:] = np.einsum("ijtb,jtb->itb", back, twists[3:]) + self.angular[:, :, None] * rate
-        return np.einsum("ijtb,jktb->iktb", back, R), p - self.linear[:, :, None] * left, turned
+        turned[3:] = np.einsum("ijtb,jtb->itb", back, V[3:]) + self.angular[:, :, None] * rate
+        moved[:3, :3] = np.einsum("ijtb,jktb->iktb", back, X[:3, :3])
+        moved[:3, 3] -= self.linear[:, :, None] * left
+        return moved, turned
 
 
 def start_offset(
-    tasks: BatchTasks, desired: Reference, placement: Placement, *, start: Array, until: Array, accuracy: float
+    tasks: BatchTasks, desired: Desired, placement: Placement, *, start: Array, until: Array, accuracy: float
 ) -> StartOffset | None:
     """How far the tools stand beside their paths at the start; None when they stand on them.
 
     Args:
         tasks: The tasks.
-        desired: References of the tools at first, a batch of one.
+        desired: Desired poses and twists of the tools at first, a batch of one.
         placement: Where the robots stand.
         start: Stacked start posture, shape (nq,).
         until: Times in [s] from which on they have to be there, shape (tasks,).
@@ -66,8 +67,8 @@ def start_offset(
     offset = StartOffset(np.zeros((3, len(until))), np.zeros((3, len(until))), until)
     at_start = np.zeros(1)
     for number in range(ROUNDS):
-        moved = Reference(*offset.applied(at_start, desired.R, desired.p, desired.twists))
-        error = tasks.task_errors(start[:, None], moved, placement)[:, :, 0]
+        X, _ = offset.applied(at_start, *desired)
+        error = tasks.task_errors(start[:, None], X, placement)[:, :, 0]
         if np.max(np.abs(error), initial=0.0) <= QUIET * accuracy:
             return offset if number else None
         offset = StartOffset(offset.linear + error[:3], offset.angular + error[3:], until)

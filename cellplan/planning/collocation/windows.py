@@ -41,7 +41,7 @@ class Panel:
         return self.end - self.begin
 
     @cached_property
-    def looks(self) -> Array:
+    def points(self) -> Array:
         """Points of 0..1 at which the error is checked: between the nodes, and the knots, shape (points,)."""
         return np.append(chebyshev(self.degree).gaps, (np.array(self.knots) - self.begin) / self.length)
 
@@ -87,11 +87,11 @@ class Window:
         return sum(panel.degree + 1 for panel in self.panels)
 
     @cached_property
-    def sample_times(self) -> Array:
+    def times(self) -> Array:
         """The nodes, then the points between them at which the error is checked, in [s]."""
         nodes = [panel.begin + panel.length * chebyshev(panel.degree).nodes for panel in self.panels]
-        looks = [panel.begin + panel.length * panel.looks for panel in self.panels]
-        return np.concatenate([*nodes, *looks])
+        points = [panel.begin + panel.length * panel.points for panel in self.panels]
+        return np.concatenate([*nodes, *points])
 
     @cached_property
     def stretches(self) -> tuple[Array, Array]:
@@ -111,15 +111,15 @@ class Window:
     @cached_property
     def between(self) -> Array:
         """Values at the points between the nodes, shape (points, nodes)."""
-        matrix = np.zeros((len(self.sample_times) - self.count, self.count))
+        matrix = np.zeros((len(self.times) - self.count, self.count))
         first = 0
         for panel, place in zip(self.panels, self.places, strict=True):
             basis = chebyshev(panel.degree)
-            block = matrix[first : first + len(panel.looks), place]
+            block = matrix[first : first + len(panel.points), place]
             block[: panel.degree] = basis.at_gaps
             if panel.knots:
-                block[panel.degree :] = basis.values(panel.looks[panel.degree :])
-            first += len(panel.looks)
+                block[panel.degree :] = basis.values(panel.points[panel.degree :])
+            first += len(panel.points)
         return matrix
 
     @cached_property
@@ -133,7 +133,7 @@ class Window:
     @cached_property
     def panel_of(self) -> NDArray[np.intp]:
         """Number of the panel that each of the times belongs to."""
-        counts = [panel.degree + 1 for panel in self.panels] + [len(panel.looks) for panel in self.panels]
+        counts = [panel.degree + 1 for panel in self.panels] + [len(panel.points) for panel in self.panels]
         return np.repeat(np.tile(np.arange(len(self.panels)), 2), counts)
 
     def refined(self, is_rough: Sequence[bool], *, shortest: float) -> "tuple[Window, ...]":
@@ -178,10 +178,10 @@ def windows_between(
     return grouped(panels, longest=longest)
 
 
-def _groups(sample_times: Sequence[float], *, fine: float, longest: float) -> list[tuple[float, ...]]:
+def _groups(times: Sequence[float], *, fine: float, longest: float) -> list[tuple[float, ...]]:
     """Neighbouring times, those together that follow each other closely; groups meet at their ends."""
     groups: list[list[float]] = []
-    for low, high in pairwise(sample_times):
+    for low, high in pairwise(times):
         last = groups[-1] if groups else []
         is_fine = high - low < fine and len(last) > 1 and last[1] - last[0] < fine
         if is_fine and len(last) < MOST_KNOTS + 2 and high - last[0] <= longest:
@@ -191,11 +191,11 @@ def _groups(sample_times: Sequence[float], *, fine: float, longest: float) -> li
     return [tuple(group) for group in groups]
 
 
-def _over(sample_times: Sequence[float]) -> tuple[Panel, ...]:
+def _over(times: Sequence[float]) -> tuple[Panel, ...]:
     """One panel over many times, or one between each two where they are few."""
-    if len(sample_times) - 2 < FEWEST_KNOTS:
-        return tuple(Panel(low, high, DEGREES[0]) for low, high in pairwise(sample_times))
-    return (Panel(sample_times[0], sample_times[-1], DEGREES[-1], tuple(sample_times[1:-1])),)
+    if len(times) - 2 < FEWEST_KNOTS:
+        return tuple(Panel(low, high, DEGREES[0]) for low, high in pairwise(times))
+    return (Panel(times[0], times[-1], DEGREES[-1], tuple(times[1:-1])),)
 
 
 def _even(begin: float, end: float, *, whole: float, longest: float, highest: int) -> list[Panel]:

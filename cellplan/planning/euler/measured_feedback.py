@@ -41,12 +41,12 @@ def corrected_references(desired: Schedule, references: Schedule, measured: Sequ
         references: What the model was given in the last pass.
         measured: Measured tool poses of that pass, shape (N, 4, 4) for each task.
     """
-    reported = zip(desired.tasks, references.tasks, measured, strict=True)
+    passed = zip(desired.tasks, references.tasks, measured, strict=True)
     return Schedule(
         times=desired.times,
         tasks=tuple(
             _with_poses(reference, displaced(task.task, task.X_PT, seen, nominal=reference.X_PT), desired.times)
-            for task, reference, seen in reported
+            for task, reference, seen in passed
         ),
     )
 
@@ -111,19 +111,18 @@ def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
         NoSolutionError: A tool lost its path, or the method found no step.
     """
     cell, desired = motion.cell, motion.schedule
-    problem = TrackingProblem(motion)
+    targets, _ = motion.references()
+    references = targets.copy()
+    problem = TrackingProblem(motion, references=references)
     advance = method_named(cell.solver.method)(problem)
-    targets = problem.desired.copy()
     q = np.empty((len(desired.times), cell.joint_count))
     q[0] = motion.start
     for k in range(len(q) - 1):
         state = problem.state(q[k])
         nominal = inverse(problem.constraints.reference_frames(state.X_WP)) @ state.X_WT[problem.constraints.operators]
         for place, (scheduled, X_seen) in enumerate(zip(desired.tasks, measure(q[k : k + 1]), strict=True)):
-            seen, reported = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
-            problem.desired[k : k + 2, place] = displaced(
-                scheduled.task, targets[k : k + 2, place], seen, nominal=reported
-            )
+            seen, model = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
+            references[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=model)
         try:
             step = advance(k, q[k])
             refuse_long_step(cell, q[k], step)

@@ -28,7 +28,8 @@ def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     tool stays: rounding alone would turn it by any angle.
     """
     tolerance = problem.cell.solver.search.tolerance
-    search = ConfigurationSearch(problem, lambda cost: _best_first(cost, tolerance**2))
+    search = ConfigurationSearch(problem)
+    improve = _best_first(search.cost, tolerance**2)
     before: dict[int, Array] = {}  # configuration at the time before the last one, by that one's number
 
     def advance(k: int, q: Array) -> Advance:
@@ -36,7 +37,8 @@ def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
         last = before.pop(k, None)
         before.clear()
         before[k + 1] = q
-        return search.advance(k, q, position_bounds(problem, q), momentum=None if last is None else q - last)
+        momentum = None if last is None else q - last
+        return search.advance(k, q, position_bounds(problem, q), improve, momentum=momentum)
 
     return advance
 

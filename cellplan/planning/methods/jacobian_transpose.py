@@ -12,7 +12,7 @@ SHORTENED: Final = 0.9  # of the step after which the error would be smallest: a
 LEFT_OPEN: Final = 1e-3  # share of the desired correction below which it counts as made
 LONGEST_PULL: Final = 1.0 / 0.02**2  # sum of all steps: what has a smaller singular value than 0.02 is not followed
 MOST_STEPS: Final = 200  # of the law within one look; four robots need about ninety
-LONGEST_MOVE: Final = 0.1  # [rad] or [m] of a joint between two looks: the first order holds to about a hundredth
+LONGEST_MOVE: Final = 0.1  # [rad] or [m] of a joint between two evaluations: the first order holds to about a hundredth
 MOST_LOOKS: Final = 8  # within one sample; what is left is left to the next
 
 

@@ -52,13 +52,13 @@ def recursive_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
 
     def advance(k: int, q: Array) -> Advance:
         weights = problem.first_order(k, q).weights[sequence]  # refuses a lost path
-        rounds.shares = weights.min(initial=np.inf) / weights
-        bounds = speed_bounds(problem, k, q)
-        return search.advance(k, q, Bounds(np.where(stands, q, bounds.lowest), np.where(stands, q, bounds.highest)))
+        limits = speed_bounds(problem, k, q)
+        bounds = Bounds(np.where(stands, q, limits.lowest), np.where(stands, q, limits.highest))
+        return search.advance(k, q, bounds, rounds.on(search.cost, weights.min(initial=np.inf) / weights))
 
     stands = ~np.isin(np.arange(problem.cell.joint_count), sequence)
     rounds = _Rounds(problem.cell, sequence)
-    search = ConfigurationSearch(problem, rounds.on)
+    search = ConfigurationSearch(problem)
     return advance
 
 
@@ -74,15 +74,10 @@ def _sequence(cell: Cell) -> Indices:
 
 
 class _Rounds:
-    """Rounds over the sequence.
-
-    Attributes:
-        shares: Share of each joint's best move that it makes, in the order of the sequence.
-    """
+    """Rounds over the sequence."""
 
     def __init__(self, cell: Cell, sequence: Indices) -> None:
         """Take limits for the brakes and the tolerance."""
-        self.shares = np.ones(len(sequence))
         self._sequence = sequence
         self._lower = cell.joint_limits.lower[sequence]
         self._upper = cell.joint_limits.upper[sequence]
@@ -90,8 +85,13 @@ class _Rounds:
         self._has_brakes = cell.solver.search.brakes
         self._target = AIM * cell.solver.search.tolerance**2
 
-    def on(self, cost: SearchCost) -> Pass:
-        """Rounds on one expansion after another, for one cost."""
+    def on(self, cost: SearchCost, shares: Array) -> Pass:
+        """Rounds on one expansion after another.
+
+        Args:
+            cost: The cost that is expanded.
+            shares: Share of each joint's best move that it makes, in the order of the sequence.
+        """
 
         def improve(expansion: Expansion, bounds: Bounds, rounds: int) -> tuple[Expansion, int]:
             trust, used = SMALL_ANGLE, 0
@@ -99,7 +99,7 @@ class _Rounds:
                 near = Bounds(
                     np.maximum(bounds.lowest, expansion.q - trust), np.minimum(bounds.highest, expansion.q + trust)
                 )
-                q, spent = self._to_first_order(expansion, near, min(rounds - used, ROUNDS_ON_A_LOOK))
+                q, spent = self._to_first_order(expansion, near, shares, min(rounds - used, ROUNDS_ON_A_LOOK))
                 used += spent
                 found = cost.expand(q)
                 if found.cost < expansion.cost:
@@ -109,7 +109,7 @@ class _Rounds:
 
         return improve
 
-    def _to_first_order(self, expansion: Expansion, bounds: Bounds, rounds: int) -> tuple[Array, int]:
+    def _to_first_order(self, expansion: Expansion, bounds: Bounds, shares: Array, rounds: int) -> tuple[Array, int]:
         """Rounds over the sequence on one expansion: the configuration they lead to and how many they were."""
         chosen = self._sequence
         a, e, q = expansion.a[:, chosen], expansion.e, expansion.q[chosen]
@@ -117,7 +117,7 @@ class _Rounds:
         moves = k0 > NO_EFFECT * k0.max(initial=0.0)
         chosen, a, q, k0 = chosen[moves], a[:, moves], q[moves], k0[moves]
         lowest, highest = bounds.lowest[chosen], bounds.highest[chosen]
-        shares = self.shares[moves]
+        shares = shares[moves]
         at_once = np.linalg.inv(np.tril(a.T @ a, -1) + np.diag(k0 / shares))
         cost, used = float(e @ e), 0
         while used < rounds and cost > self._target:

@@ -9,9 +9,9 @@ from cellplan.geometry.curves.arc_length import ArcLength, measure
 from cellplan.geometry.curves.curve import Curve
 from cellplan.geometry.curves.orientation import Orientation
 from cellplan.geometry.transforms import Array, is_rigid, pose_from
-from cellplan.model.cell import Origin, Part
+from cellplan.model.cell import Part
 from cellplan.model.task import Task, TimedPath
-from cellplan.model.toolpath import Toolpath, Trajectory
+from cellplan.model.toolpath import Toolpath
 from cellplan.planning.path.curve import path_curve
 from cellplan.planning.path.formatting import in_mm
 from cellplan.planning.path.plausible_size import refuse_unlikely_path
@@ -23,32 +23,31 @@ SAME_POSE: Final = 1e-9  # [m], [-] entries of poses that differ by less are tho
 PROBES: Final = 257  # poses checked before a toolpath is handed on
 
 
-def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
+def build_toolpath(task: Task, part: Part) -> Toolpath:
     """The toolpath of a task: its curve, projected onto the part, with the tool's orientation along it and its stops.
 
     Args:
         task: The task.
         part: The part it works on.
-        origin: Where the words of the task stand, for findings.
 
     Raises:
         InputError: The path cannot be drawn, misses the part, runs over an edge, leaves the tool's turn open, or is to
             be gone through again and does not come back to its start.
     """
-    curve = project_path(path_curve(task, origin), task, part, origin)
+    curve = project_path(path_curve(task), task, part)
     arc = measure(curve.curve)
-    refuse_unlikely_path(curve.curve, arc, task=task, part=part, where=origin.at(f"tasks.{task.name}.path"))
-    orientation = orient_tool(task, curve, origin)
+    refuse_unlikely_path(curve.curve, arc, task=task, part=part)
+    orientation = orient_tool(task, curve)
     is_timed = isinstance(task.path, TimedPath)
     if not is_timed:
-        _refuse_standstill(curve.curve, arc, origin.at(f"tasks.{task.name}.path"))
+        _refuse_standstill(curve.curve, arc, task.where("path"))
     is_closed = curve.is_closed and _comes_back(curve.curve, orientation, curve.stops)
     if task.repeat > 1 and not is_closed:
         raise InputError(
-            f"{origin.at(f'tasks.{task.name}.repeat')}: expected 1 for a path that does not end in the pose of its "
+            f"{task.where('repeat')}: expected 1 for a path that does not end in the pose of its "
             f"start, got {task.repeat}; close the path"
         )
-    toolpath = (Trajectory if is_timed else Toolpath)(
+    toolpath = Toolpath(
         name=task.name,
         tip=curve.curve,
         orientation=orientation,
@@ -58,8 +57,9 @@ def build_toolpath(task: Task, part: Part, origin: Origin) -> Toolpath:
         is_closed=is_closed,
         runs_on=curve.runs_on,
         stand_off=task.approach.distance if task.approach else 0.0,
+        is_timed=is_timed,
     )
-    if not is_rigid(_probe(toolpath)):
+    if not is_rigid(toolpath.spread(PROBES)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")
     return toolpath
 
@@ -72,13 +72,6 @@ def _comes_back(tip: Curve, orientation: Orientation, stops: Array) -> bool:
         R, _ = orientation.frames(u, interval, p=p, dp=dp)
         poses.append(pose_from(R, p)[0])
     return bool(np.abs(poses[1] - poses[0]).max() <= SAME_POSE)
-
-
-def _probe(toolpath: Toolpath) -> Array:
-    """Poses spread over a toolpath, shape (N, 4, 4)."""
-    if isinstance(toolpath, Trajectory):
-        return toolpath.at(np.linspace(0.0, toolpath.duration, PROBES))[0]
-    return toolpath.poses(np.linspace(0.0, toolpath.length, PROBES))
 
 
 def _refuse_standstill(tip: Curve, arc: ArcLength, where: str) -> None:

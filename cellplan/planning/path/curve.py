@@ -19,7 +19,6 @@ from cellplan.geometry.curves.curve import (
 from cellplan.geometry.curves.spline import spline_through
 from cellplan.geometry.curves.surface_patch import Patch
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Origin
 from cellplan.model.path_direction import outside_of, plane_axes
 from cellplan.model.task import CirclePath, PolygonPath, RunDirection, SampledPath, SpacePolylinePath, Task, TimedPath
 from cellplan.planning.path.formatting import direction_name, in_mm, length
@@ -53,7 +52,7 @@ class PathCurve:
     inward: BezierCurve | None = None
 
 
-def path_curve(task: Task, origin: Origin) -> PathCurve:
+def path_curve(task: Task) -> PathCurve:
     """Draw the path of a task in the part frame.
 
     Listed points are passed in their order; shapes that have none run the way round that their task says.
@@ -62,19 +61,19 @@ def path_curve(task: Task, origin: Origin) -> PathCurve:
         InputError: The points do not make a path, or a corner cannot be rounded as stated.
     """
     path = task.path
-    where = origin.at(f"tasks.{task.name}.path")
+    where = task.where("path")
     match path:
         case CirclePath():
             return _circle(path, task, where)
         case PolygonPath():
-            return _sides(_polygon_points(path, task, where), task, origin)
+            return _sides(_polygon_points(path, task, where), task)
         case SpacePolylinePath():
             _refuse_poor_points(np.asarray(path.points), path.is_closed, where=where)
-            return _sides(_closed(np.asarray(path.points, dtype=float), path.is_closed), task, origin)
+            return _sides(_closed(np.asarray(path.points, dtype=float), path.is_closed), task)
         case SampledPath():
             _refuse_poor_points(path.points, path.is_closed, where=where, source=path.source)
             points = _closed(path.points, path.is_closed)
-            return _smooth(points, path.is_closed) if path.is_smooth else _sides(points, task, origin)
+            return _smooth(points, path.is_closed) if path.is_smooth else _sides(points, task)
         case TimedPath():
             return _timed(path)
 
@@ -175,20 +174,22 @@ def _timed(path: TimedPath) -> PathCurve:
     )
 
 
-def _sides(points: Array, task: Task, origin: Origin) -> PathCurve:
+def _sides(points: Array, task: Task) -> PathCurve:
     """Straight sides that stop at every corner, or rounded corners without a stop."""
     given = chord_lengths(points)
     is_closed = bool(np.linalg.norm(points[-1] - points[0]) <= SAME_POINT)
     angles = _turns(points)
     is_corner = np.concatenate([[True], angles > STRAIGHT_ON, [True]])
     if task.project is not None:
-        _refuse_hidden_sides(points, task.project, origin.at(f"tasks.{task.name}.path"))
+        _refuse_hidden_sides(points, task.project, task.where("path"))
     if task.blend is None:
         curve = straight_sides(given, points)
         return PathCurve(curve=curve, stops=given[is_corner], given=given, is_closed=is_closed)
     corners, at = points[is_corner], given[is_corner]
     seen = corners if task.project is None else corners - np.outer(corners @ task.project, task.project)
-    _refuse_blend(corners, np.maximum(_turns(corners), _turns(seen)), task.blend, _corners_at(task, origin))
+    _refuse_blend(
+        corners, np.maximum(_turns(corners), _turns(seen)), task.blend, task.where("corners", shared="motion.corners")
+    )
     rounded: BezierCurve = rounded_sides(at, corners, task.blend)
     return PathCurve(curve=rounded, stops=given[[0, -1]], given=given, is_closed=is_closed)
 
@@ -212,12 +213,6 @@ def _turns(points: Array) -> Array:
     t = sides / np.linalg.norm(sides, axis=1, keepdims=True)
     sine = np.linalg.norm(np.cross(t[:-1], t[1:]), axis=1)
     return np.arctan2(sine, np.sum(t[:-1] * t[1:], axis=1))
-
-
-def _corners_at(task: Task, origin: Origin) -> str:
-    """Where the words on corners stand: with the task, else with the motion."""
-    own = f"tasks.{task.name}.corners"
-    return origin.at(own if own in origin.lines or "motion.corners" not in origin.lines else "motion.corners")
 
 
 def _refuse_blend(corners: Array, angles: Array, blend: float, where: str) -> None:

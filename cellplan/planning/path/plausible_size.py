@@ -18,7 +18,7 @@ FARTHEST: Final = 10.0  # [m] from the box round the part, of a path on the part
 LOOKED_AT: Final = 1025  # points of a path, beside its knots
 
 
-def refuse_unlikely_path(tip: Curve, arc: ArcLength, *, task: Task, part: Part, where: str) -> None:
+def refuse_unlikely_path(tip: Curve, arc: ArcLength, *, task: Task, part: Part) -> None:
     """Refuse a path that is shorter than anybody works, or far from the part that it is given on.
 
     Args:
@@ -26,14 +26,13 @@ def refuse_unlikely_path(tip: Curve, arc: ArcLength, *, task: Task, part: Part, 
         arc: Its length.
         task: The task.
         part: The part.
-        where: Where the path stands in the file.
 
     Raises:
         InputError: With the length, or the farthest point and its distance from the part.
     """
     if not isinstance(task.path, TimedPath) and arc.total < SHORTEST:
         raise InputError(
-            f"{where}: expected a path of at least {length(SHORTEST)} mm, got {length(arc.total)} mm; "
+            f"{task.where('path')}: expected a path of at least {length(SHORTEST)} mm, got {length(arc.total)} mm; "
             "is the unit right?"
         )
     if task.relative_to is not Frame.PART:
@@ -47,6 +46,6 @@ def refuse_unlikely_path(tip: Curve, arc: ArcLength, *, task: Task, part: Part, 
     k = int(np.argmax(away))
     if not away[k] <= FARTHEST:
         raise InputError(
-            f"{where}: expected a path within {FARTHEST:g} m of the part, got the point {in_mm(p_PT[k])}, "
+            f"{task.where('path')}: expected a path within {FARTHEST:g} m of the part, got the point {in_mm(p_PT[k])}, "
             f"{away[k]:.3g} m from it; is the unit right?"
         )

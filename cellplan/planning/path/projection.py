@@ -13,7 +13,7 @@ from cellplan.geometry.curves.surface_patch import Patch, ProjectedCurve, patche
 from cellplan.geometry.mesh.load import corner_normals, ray_hits
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere, bounding_sphere, support
 from cellplan.geometry.transforms import Array, inverse, transform_points
-from cellplan.model.cell import Origin, Part
+from cellplan.model.cell import Part
 from cellplan.model.task import Task
 from cellplan.planning.path.curve import PathCurve
 from cellplan.planning.path.formatting import AXIS_NAMES, direction_name, in_mm, length
@@ -29,7 +29,7 @@ SHARPEST_EDGE: Final = np.deg2rad(30.0)  # [rad] normals of neighbouring rays th
 AXIS_ALIGNED: Final = 1e-9  # [-] a direction this near to an axis leaves the other two coordinates alone
 
 
-def project_path(path: PathCurve, task: Task, part: Part, origin: Origin) -> PathCurve:
+def project_path(path: PathCurve, task: Task, part: Part) -> PathCurve:
     """Project a path onto the part from the side its task names; a path without a side stays where it is.
 
     Raises:
@@ -37,14 +37,12 @@ def project_path(path: PathCurve, task: Task, part: Part, origin: Origin) -> Pat
     """
     if task.project is None:
         return path
-    where = origin.at(f"tasks.{task.name}.path")
+    where = task.where("path")
     match part.shape:
         case Mesh():
             return _project_onto_mesh(path, task.project, part, where=where, mesh=part.shape)
         case Capsule():
-            raise InputError(
-                f"{where}: expected a box, cylinder, sphere or mesh to project the path onto, got a capsule"
-            )
+            raise InputError(f"{where}: expected a box, cylinder, sphere or mesh to project on, got a capsule")
         case Box() | Cylinder() | Sphere():
             patches = patches_facing(part.shape, part.X_PS, task.project)
             return _project_onto_patch(path, task.project, patches, part=part, where=where)

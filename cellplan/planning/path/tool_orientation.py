@@ -9,7 +9,6 @@ from cellplan.geometry.curves.curve import smooth_through
 from cellplan.geometry.curves.orientation import AxisFrame, FixedFrame, NormalFrame, Orientation, rotations_through
 from cellplan.geometry.curves.spline import spline_through
 from cellplan.geometry.transforms import Array, frame_from_axes, is_rigid, pose_from, rotation_vector
-from cellplan.model.cell import Origin
 from cellplan.model.task import SampledPath, Task, TimedPath
 from cellplan.planning.path.curve import PathCurve
 from cellplan.planning.path.formatting import direction_name, in_mm
@@ -23,7 +22,7 @@ UNIT: Final = 1e-6  # [-] room for axes and rotations that were computed elsewhe
 _CHOICES: Final = tuple(sign * axis for axis in np.eye(3) for sign in (1.0, -1.0))
 
 
-def orient_tool(task: Task, curve: PathCurve, origin: Origin) -> Orientation:
+def orient_tool(task: Task, curve: PathCurve) -> Orientation:
     """Tool frames along a path: z is the tool axis, x leans to the task's ``tool_x``.
 
     Rotations of a file are taken as they are. Between points of a file, axes and rotations are interpolated with
@@ -33,26 +32,26 @@ def orient_tool(task: Task, curve: PathCurve, origin: Origin) -> Orientation:
         InputError: No orientation or two are given, neighbouring ones differ too much, or ``tool_x`` runs along the
             tool axis.
     """
-    where = origin.at(f"tasks.{task.name}.tool_axis")
+    where = task.where("tool_axis")
     path = task.path
     if isinstance(path, SampledPath | TimedPath) and (path.axes is not None or path.rotations is not None):
         if task.project is not None or task.tool_axis is not None:
             other = "tool_axis" if task.tool_axis is not None else "path.project"
             raise InputError(
-                f"{origin.at(f'tasks.{task.name}.{other}')}: {path.source} gives the tool's orientation already; "
+                f"{task.where(other)}: {path.source} gives the tool's orientation already; "
                 f"leave {other.removeprefix('path.')} out, or the columns of the orientation"
             )
-        return _from_file(path, task, curve, origin=origin)
+        return _from_file(path, task, curve)
     if task.tool_axis is not None:
-        _refuse_parallel(task.tool_axis[None], np.zeros((1, 3)), task, origin)
+        _refuse_parallel(task.tool_axis[None], np.zeros((1, 3)), task)
         return FixedFrame(R=frame_from_axes(task.tool_axis, task.tool_x))
     u = along(curve.curve)
     p, _ = curve.curve.evaluate(u, (u[0], u[-1]))
     if curve.patch is not None:
-        _refuse_parallel(-curve.patch.normals(p), p, task, origin)
+        _refuse_parallel(-curve.patch.normals(p), p, task)
         return NormalFrame(patch=curve.patch, x_hint=task.tool_x)
     if curve.inward is not None:
-        _refuse_parallel(_unit(curve.inward.evaluate(u, (u[0], u[-1]))[0]), p, task, origin)
+        _refuse_parallel(_unit(curve.inward.evaluate(u, (u[0], u[-1]))[0]), p, task)
         return AxisFrame(axes=curve.inward, x_hint=task.tool_x)
     raise InputError(
         f"{where}: 'normal' needs a surface: expected a path with project, a file with axes or rotations, or a "
@@ -60,9 +59,9 @@ def orient_tool(task: Task, curve: PathCurve, origin: Origin) -> Orientation:
     )
 
 
-def _from_file(path: SampledPath | TimedPath, task: Task, drawing: PathCurve, *, origin: Origin) -> Orientation:
+def _from_file(path: SampledPath | TimedPath, task: Task, drawing: PathCurve) -> Orientation:
     """Interpolate the axes or rotations of a file over the parameters of its points."""
-    where = origin.at(f"tasks.{task.name}.path")
+    where = task.where("path")
     breaks = np.isin(drawing.given, drawing.stops)
     if path.is_smooth and path.is_closed:
         breaks[[0, -1]] = False
@@ -84,7 +83,7 @@ def _from_file(path: SampledPath | TimedPath, task: Task, drawing: PathCurve, *,
         curve = smooth_through(drawing.given, axes, breaks=breaks)
     u = along(curve)
     p, _ = drawing.curve.evaluate(u, (u[0], u[-1]))
-    _refuse_parallel(_unit(curve.evaluate(u, (u[0], u[-1]))[0]), p, task, origin)
+    _refuse_parallel(_unit(curve.evaluate(u, (u[0], u[-1]))[0]), p, task)
     return AxisFrame(axes=curve, x_hint=task.tool_x)
 
 
@@ -119,7 +118,7 @@ def _room(z: Array, direction: Array) -> Array:
     return np.minimum(lean, np.append(lean[1:], lean[-1:])) - 0.5 * moved
 
 
-def _refuse_parallel(z: Array, p: Array, task: Task, origin: Origin) -> None:
+def _refuse_parallel(z: Array, p: Array, task: Task) -> None:
     """Refuse a ``tool_x`` that runs along the tool axis somewhere, and name the best direction instead."""
     room = _room(z, task.tool_x)
     k = int(np.argmin(room))
@@ -127,6 +126,6 @@ def _refuse_parallel(z: Array, p: Array, task: Task, origin: Origin) -> None:
         best = max(_CHOICES, key=lambda choice: (round(float(_room(z, choice).min()), 6), float(choice.sum())))
         place = f" at {in_mm(p[k])}" if len(z) > 1 else ""
         raise InputError(
-            f"{origin.at(f'tasks.{task.name}.tool_x')}: expected a direction across the tool axis, but "
+            f"{task.where('tool_x')}: expected a direction across the tool axis, but "
             f"{direction_name(task.tool_x)} runs along it{place}; write tool_x: {direction_name(best)}"
         )

@@ -10,6 +10,7 @@ import numpy as np
 from cellplan.errors import StartNotFoundError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
+from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.name_order import NameOrder
 from cellplan.model.progress import Progress, silent
 from cellplan.model.seeds import generator
@@ -19,7 +20,6 @@ from cellplan.planning.start.failures import Failures
 from cellplan.planning.start.near_ties import best_first, levels
 from cellplan.planning.start.reasons import why_nothing
 from cellplan.planning.start.trial_motion import StartTrials, Trial
-from cellplan.planning.timing.timed_path import ClockedPath
 from cellplan.scene.scene import Scene
 
 CANDIDATES: Final = 10  # configurations of the whole cell that are tried out at first

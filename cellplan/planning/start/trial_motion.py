@@ -12,6 +12,7 @@ from cellplan.certify.depths import mounted_depths
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
+from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.motion import Schedule
 from cellplan.model.name_order import NameOrder
 from cellplan.model.phase import Phase
@@ -22,8 +23,7 @@ from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.start.near_ties import ALIKE
 from cellplan.planning.start.present_pairs import present_pairs
-from cellplan.planning.timing.schedule import sample, time_tasks
-from cellplan.planning.timing.timed_path import ClockedPath, clock_path
+from cellplan.planning.timing.schedule import clock_path, clock_times, schedule_paths
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.mounting import Mount
 from cellplan.scene.scene import Scene
@@ -96,7 +96,7 @@ class StartTrials:
         self._once = replace(once, tasks=tasks, motion=replace(once.motion, duration=None))
         self._scene = scene
         self._paths = {task.name: _once_through(self._once, task, paths[task.name]) for task in tasks}
-        end = time_tasks(self._once, self._paths_of([task.name for task in tasks])).times[-1]
+        end = clock_times(self._once, self._paths_of([task.name for task in tasks]))[-1]
         self._step = float(max(once.motion.step, end / SAMPLES))
         self._schedules: dict[tuple[str, ...], Schedule] = {}
         # which joint fails is not known beforehand
@@ -150,19 +150,19 @@ class StartTrials:
         cell = self._once
         if len(trials) < 2 or not cell.solver.is_accurate:
             return list(trials)
-        timed = [time_tasks(cell, self._paths_of(run.tasks)) for run in self._phases]
-        if max(len(each.breaks) for each in timed) > MOST_BREAKS:
+        schedules = [schedule_paths(cell, self._paths_of(run.tasks)) for run in self._phases]
+        if max(len(each.breaks) for each in schedules) > MOST_BREAKS:
             return list(trials)
         candidates = Candidates.of([cell] * len(trials), np.array([trial.start for trial in trials]))
         runs = [
             screen_layouts(
                 cell,
-                clocked,
+                schedule,
                 candidates,
                 moving=run.moving,
                 accuracy=CLOSE_ENOUGH,
             )
-            for run, clocked in zip(self._phases, timed, strict=True)
+            for run, schedule in zip(self._phases, schedules, strict=True)
         ]
         found = reduce(Screening.worst, runs)
         ranges = _range_shares(cell, found.margins)
@@ -213,7 +213,7 @@ class StartTrials:
         paths = self._paths_of(names)
         key = tuple(path.task.name for path in paths)
         if key not in self._schedules:
-            self._schedules[key] = sample(time_tasks(self._cell, paths))
+            self._schedules[key] = schedule_paths(self._cell, paths)
         return self._schedules[key]
 
     def _cell_alone(self, robot: str) -> Cell:

@@ -6,16 +6,18 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
+from cellplan.geometry.curves.arc_length import quickly
 from cellplan.geometry.transforms import Array, rotation_vector
+from cellplan.model.approach_retract import stand_off
 from cellplan.model.cell import Cell
+from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.task import INSTANT_ROOM, Task
-from cellplan.model.toolpath import Toolpath, Trajectory
-from cellplan.planning.timing.approach_retract import stand_off
+from cellplan.model.time_law import peak_rate, reached_at
+from cellplan.model.toolpath import Toolpath
 from cellplan.planning.timing.sample_memory import require_room
-from cellplan.planning.timing.time_law import reached_at
-from cellplan.planning.timing.timed_path import MOST_SAMPLES, ClockedPath, TimedTasks, clock_path
 
+MOST_SAMPLES: Final = 2_000_000  # tables longer than this fill disks, not controllers
 ROTATIONS: Final = 3  # components of a task from here on are rotations
 FEWEST_STEPS: Final = 10  # a task of fewer has so few samples that checks at them say nothing about its path
 STEP_ROOM: Final = 1e-9  # [-] share of a step by which the last task may outlast the clock: rounding of a quotient
@@ -24,35 +26,33 @@ TIME_DECIMALS: Final = 12  # decimals kept of k * step, so that 0.001 * 3 reads 
 
 
 def schedule_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> Schedule:
-    """Put toolpaths on the common clock and sample them: see `time_tasks` and `sample`."""
-    return sample(time_tasks(cell, [clock_path(cell, cell.task(toolpath.name), toolpath) for toolpath in toolpaths]))
+    """Put toolpaths on the common clock and sample them: see `clock_path` and `schedule_paths`."""
+    return schedule_paths(cell, [clock_path(cell, cell.task(toolpath.name), toolpath) for toolpath in toolpaths])
 
 
-def time_tasks(cell: Cell, paths: Sequence[ClockedPath]) -> TimedTasks:
-    """Clocked paths with their common clock ``t = k step``, k = 0..n, which is as long as the cell says.
+def schedule_paths(cell: Cell, paths: Sequence[ClockedPath]) -> Schedule:
+    """Clocked paths with their common clock, sampled at its times.
+
+    Raises:
+        InputError: As `clock_times` does.
+    """
+    times = clock_times(cell, paths)
+    return Schedule(times=times, tasks=tuple(_on_clock(times, path) for path in paths), paths=tuple(paths))
+
+
+def clock_times(cell: Cell, paths: Sequence[ClockedPath]) -> Array:
+    """Samples ``t = k step``, k = 0..n, of the common clock, which is as long as the cell says, shape (n + 1,).
 
     A cell that gives no duration has a clock that ends with its last task.
 
-    Each stretch between two stops takes its own start and stop of the task's time law: with a duration given in
-    proportion to its length, with a feed in the time that brings its fastest moment to the feed. A path that is gone
-    through several times stops where it has corners; without any, all cycles are one stretch. A trajectory keeps its
-    own times. Before its start and after its end a tool rests on the part, or off it where the task says so.
-
     Args:
-        cell: The cell; its tasks give times and laws, its motion the step and the length of the clock.
+        cell: The cell; its motion gives the step and the length of the clock.
         paths: The paths to work on.
 
     Raises:
         InputError: A task does not fit the clock, or the clock would have more than two million samples.
     """
-    times = np.round(np.arange(_step_count(cell, paths) + 1) * cell.motion.step, TIME_DECIMALS)
-    return TimedTasks(times=times, paths=tuple(paths))
-
-
-def sample(timed: TimedTasks) -> Schedule:
-    """Sample all tasks at the times of their clock."""
-    tasks = tuple(_on_clock(timed.times, path) for path in timed.paths)
-    return Schedule(times=timed.times, tasks=tasks, desired=timed)
+    return np.round(np.arange(_step_count(cell, paths) + 1) * cell.motion.step, TIME_DECIMALS)
 
 
 def clock_paths(cell: Cell, toolpaths: Iterable[Toolpath]) -> dict[str, ClockedPath]:
@@ -65,6 +65,26 @@ def clock_paths(cell: Cell, toolpaths: Iterable[Toolpath]) -> dict[str, ClockedP
     found = {each.name: clock_path(cell, cell.task(each.name), each) for each in toolpaths}
     _refuse_poor_sampling(cell, tuple(found.values()))
     return found
+
+
+def clock_path(cell: Cell, task: Task, toolpath: Toolpath) -> ClockedPath:
+    """Put a toolpath on the common clock.
+
+    Each stretch between two stops takes its own start and stop of the task's time law: with a duration given in
+    proportion to its length, with a feed in the time that brings its fastest moment to the feed. A path that is gone
+    through several times stops where it has corners; without any, all cycles are one stretch. A trajectory keeps its
+    own times. Before its start and after its end a tool rests on the part, or off it where the task says so.
+
+    Raises:
+        InputError: The task has no time left, or more stops than anybody counts.
+    """
+    return ClockedPath(
+        task=task,
+        toolpath=toolpath,
+        corners=_corner_times(cell, task, toolpath),
+        behind=toolpath.behind,
+        quick=quickly(toolpath.arc),
+    )
 
 
 def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
@@ -80,15 +100,15 @@ def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
         duration = whole / task.repeat
         if duration < least * (1.0 - STEP_ROOM) - INSTANT_ROOM:
             key = "duration_s" if task.feed is None else "feed_mm_s"
-            own = "path" if isinstance(path.toolpath, Trajectory) else key
+            own = "path" if path.toolpath.is_timed else key
             what = "a task" if task.repeat == 1 else "a cycle"
             raise InputError(
-                f"{cell.origin.at(f'tasks.{task.name}.{own}')}: expected {what} of at least {least:g} s "
+                f"{task.where(own)}: expected {what} of at least {least:g} s "
                 f"({FEWEST_STEPS} times motion.step_s), got {duration:g} s; slow the task down or shorten the step"
             )
         if task.settle > whole - least * (1.0 - STEP_ROOM) + INSTANT_ROOM:
             raise InputError(
-                f"{cell.origin.at(f'tasks.{task.name}.settle_s')}: expected a time that leaves at least {least:g} s "
+                f"{task.where('settle_s')}: expected a time that leaves at least {least:g} s "
                 f"({FEWEST_STEPS} times motion.step_s) of the task's {whole:g} s to be judged, got {task.settle:g}"
             )
 
@@ -117,10 +137,10 @@ def _examine_end(cell: Cell, path: ClockedPath) -> None:
     key, why = "duration_s", ""
     if task.feed is not None:
         key, why = "feed_mm_s", f" ({1e3 * length:.4g} mm at up to {1e3 * task.feed:g} mm/s)"
-    elif isinstance(path.toolpath, Trajectory):
+    elif path.toolpath.is_timed:
         key, why = "path", " (by the times of its file)"
     raise InputError(
-        f"{cell.origin.at(f'tasks.{task.name}.{key}')}: expected an end within the clock of {clock:g} s "
+        f"{task.where(key)}: expected an end within the clock of {clock:g} s "
         f"(motion.duration_s), got an end at {path.over:.6g} s{why}; give the clock at least "
         f"{_rounded_up(path.over):g} s, or leave motion.duration_s out and it ends with the last task"
     )
@@ -134,8 +154,8 @@ def _rounded_up(seconds: float) -> float:
 def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
     """Reference pose and twist of one tool at each sample; at a corner the later side counts, at the end the rest."""
     task, corners = path.task, path.corners
-    X_PT, V_PT_P, travelled = path.targets(times, path.stretches(times + INSTANT_ROOM))
-    corners = corners[[0, -1]] if isinstance(path.toolpath, Trajectory) else corners
+    X_PT, V_PT_P, travelled = path.targets(times)
+    corners = corners[[0, -1]] if path.toolpath.is_timed else corners
     rests = (times < corners[0] - INSTANT_ROOM) | (times > corners[-1] - INSTANT_ROOM)
     V_PT_P[rests] = 0.0
     _even_out_jumps(times, corners, X_PT, V_PT_P=V_PT_P)
@@ -159,7 +179,7 @@ def _cycle_ends(task: Task, toolpath: Toolpath, corners: Array) -> tuple[float, 
     if not toolpath.is_closed or is_turned:
         return ()
     shares = np.arange(1, task.repeat + 1) / task.repeat
-    if toolpath.runs_on and not isinstance(toolpath, Trajectory):
+    if toolpath.runs_on and not toolpath.is_timed:
         shares = reached_at(task.time_law, shares)
     return tuple((corners[0] + shares * (corners[-1] - corners[0])).tolist())
 
@@ -177,3 +197,40 @@ def _even_out_jumps(times: Array, corners: Array, X_PT: Array, *, V_PT_P: Array)
     turns = X_PT[k + 1, :3, :3] @ np.swapaxes(X_PT[k, :3, :3], 1, 2)
     V_PT_P[k, :3] = (X_PT[k + 1, :3, 3] - X_PT[k, :3, 3]) / step
     V_PT_P[k, 3:] = rotation_vector(turns) / step
+
+
+def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
+    """Times in [s] at which the stretches of a path begin, and the one at which the last ends."""
+    if toolpath.is_timed:
+        return task.start + toolpath.duration * np.arange(task.repeat + 1.0)
+    behind = _stops(task, toolpath)
+    if task.feed is not None:
+        return task.start + peak_rate(task.time_law) / task.feed * behind
+    duration = task.time_for_path(cell.motion.duration)
+    if duration is None:
+        raise InputError(
+            f"{task.where()}: missing duration_s: expected duration_s or feed_mm_s, as "
+            "motion.duration_s is not given either"
+        )
+    if not duration > 0.0:
+        raise InputError(
+            f"{task.where('start_s')}: expected a start before the end of the clock at "
+            f"{cell.motion.duration:g} s, got {task.start:g}; make motion.duration_s longer"
+        )
+    return task.start + duration * (behind / behind[-1])
+
+
+def _stops(task: Task, toolpath: Toolpath) -> Array:
+    """Length in [m] behind each stop of all cycles, from zero to the whole way."""
+    if task.repeat == 1:
+        return toolpath.behind
+    if toolpath.runs_on:
+        return np.array([0.0, task.repeat * toolpath.length])
+    behind = toolpath.behind
+    if task.repeat * len(behind) > MOST_SAMPLES:
+        raise InputError(
+            f"{task.where('repeat')}: expected at most {MOST_SAMPLES // len(behind)} cycles of "
+            f"a path with {len(behind) - 1} stops, got {task.repeat}"
+        )
+    cycles = np.arange(task.repeat)[:, None] * toolpath.length
+    return np.append((cycles + behind[:-1]).ravel(), task.repeat * toolpath.length)

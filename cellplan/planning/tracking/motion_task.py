@@ -8,7 +8,6 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Grasp, Relation
 from cellplan.model.motion import Schedule
-from cellplan.planning.timing.timed_path import TimedTasks
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -17,8 +16,7 @@ class MotionTask:
 
     Attributes:
         cell: The cell; its solver names method and integrator.
-        schedule: The tasks, sampled at the times of the clock, and where that is known their desired motion between
-            these times.
+        schedule: The tasks on the clock.
         moving: Names of the robots that carry the part or work on it; all others stand still.
         start: Stacked configuration at the first sample, shape (nq,), in [rad] or [m].
     """
@@ -27,18 +25,6 @@ class MotionTask:
     schedule: Schedule
     moving: Sequence[str]
     start: Array
-
-    @property
-    def timed(self) -> TimedTasks:
-        """The desired motion at any time.
-
-        Raises:
-            TypeError: It is known at the samples only.
-        """
-        desired = self.schedule.desired
-        if not isinstance(desired, TimedTasks):
-            raise TypeError("motion task: expected a desired motion between samples, got none")
-        return desired
 
     @property
     def grasps(self) -> tuple[Grasp, ...]:

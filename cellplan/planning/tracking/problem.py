@@ -86,7 +86,7 @@ class TrackingProblem:
         times: Samples of the clock in [s], shape (N,).
         tasks: The tasks, then the grasps of further holders, one block row each.
         constraints: What they constrain, in which frames and by which joints.
-        desired: Reference tool poses X_PT, shape (N, tasks, 4, 4).
+        desired: Reference tool poses X_PT, shape (N, tasks, 4, 4); those of a feedback where there is one.
         twists: Reference tool twists in P, linear first, shape (N, tasks, 6).
         signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
         gain: Error feedback gain in [1/s].
@@ -95,20 +95,21 @@ class TrackingProblem:
             closes a cycle.
     """
 
-    def __init__(self, motion: MotionTask, drift: Drift | None = None) -> None:
+    def __init__(self, motion: MotionTask, drift: Drift | None = None, references: Array | None = None) -> None:
         """Gather what stays the same from step to step.
 
         Args:
             motion: The tasks and the robots that move for them; goals may lead back to its start.
             drift: Joint velocities in the null space of the tasks that close a cycle; None for none.
+            references: Poses that replace the desired ones, shape (N, tasks, 4, 4): a feedback corrects those of each
+                step before it; None to use the desired ones.
         """
         cell, schedule = motion.cell, motion.schedule
-        tasks, (self.desired, self.twists) = motion.relations, motion.references()
+        tasks, (desired, self.twists) = motion.relations, motion.references()
         self._model = CombinedModel(cell)
-        self._rows = [
-            constraint_rows(task, X_RT) for task, X_RT in zip(tasks, self.desired.swapaxes(0, 1), strict=True)
-        ]
+        self._rows = [constraint_rows(task, X_RT) for task, X_RT in zip(tasks, desired.swapaxes(0, 1), strict=True)]
         self.constraints = TaskConstraints.of(cell, tasks, motion.moving)
+        self.desired = desired if references is None else references
         self._is_on_part = bool(self.constraints.is_on_part.all())
         self._lost = np.array([max(LOST_DISTANCE, 2.0 * _tolerance(cell, task)) for task in tasks])
         self._settled = np.array([_settled_from(task) for task in tasks])
@@ -205,10 +206,10 @@ class TrackingProblem:
             signs=signs,
             mobility=np.any(signs != 0.0, axis=0) / first.weights,
         )
-        asked = self._goals.speeds(k, stance)
+        secondary = self._goals.speeds(k, stance)
         if first.secondary is not None:
-            asked = asked + first.secondary
-        return replace(first, secondary=asked, bounds=self._goals.bounds(q))
+            secondary = secondary + first.secondary
+        return replace(first, secondary=secondary, bounds=self._goals.bounds(q))
 
     def _refuse_lost_path(self, k: int, error: Array) -> None:
         """Stop where going on would be meaningless; not a number counts as lost.
@@ -229,7 +230,7 @@ class TrackingProblem:
 
 
 def _place(task: Relation) -> str:
-    """Where a tool should be, in words."""
+    """Where a tool should be, for messages."""
     return "its grasp on the part" if isinstance(task, Grasp) else f"task '{task.name}'"
 
 

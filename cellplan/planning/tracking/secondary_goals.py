@@ -102,12 +102,12 @@ class SecondaryGoals:
         more than a joint can do: its speeds are scaled together, so their direction stays. The goals set in and leave
         off smoothly, so that the cell starts and ends at rest.
         """
-        asked = np.zeros_like(stance.q)
+        total = np.zeros_like(stance.q)
         for gain, pull in self._pulls:
             slope = pull(stance)
             speeds = gain / (1.0 + gain * self._step * slope.curvature) * slope.gradient * stance.mobility
-            asked += speeds / max(1.0, float(np.max(np.abs(speeds) / self._limits, initial=0.0)))
-        return self._fade[k] * asked
+            total += speeds / max(1.0, float(np.max(np.abs(speeds) / self._limits, initial=0.0)))
+        return self._fade[k] * total
 
     def bounds(self, q: Array) -> tuple[Array, Array]:
         """Lowest and highest joint speeds that a goal may lead to at a configuration, shape (nq,) each."""

@@ -30,19 +30,25 @@ def swinger() -> RobotModel:
     return RobotModel(name="swinger", source="test", joints=(joint("a", -1),), flange_link=0, X_BF=X_BF, bodies=())
 
 
-@dataclass(frozen=True, kw_only=True)
-class Reference:
-    """A tool that is desired where the arm is at the rows and on straight lines between them, or late by a corner."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Known(Schedule):
+    """Its one tool is desired at the poses of the rows and on straight lines between them, or late by a corner."""
 
-    times: Array
-    jumps: Array
-    rows: Array
+    sample_times: Array
     corner: float = 0.0
+
+    @property
+    def is_continuous(self) -> bool:
+        return True
+
+    @property
+    def jumps(self) -> Array:
+        return self.sample_times
 
     def poses(self, times: Array) -> tuple[Array, ...]:
         desired = np.tile(np.eye(4), (len(times), 1, 1))
         for axis in range(3):
-            desired[:, axis, 3] = np.interp(times, self.times, self.rows[:, axis, 3])
+            desired[:, axis, 3] = np.interp(times, self.times, self.tasks[0].X_PT[:, axis, 3])
         step = self.times[1]
         inside = 1.0 - np.abs(times - self.jumps[0]) / (0.5 * step) if len(self.jumps) else np.zeros(len(times))
         desired[:, 2, 3] += self.corner * np.clip(inside, 0.0, 1.0)
@@ -60,8 +66,7 @@ def looked(
     plain = schedule(ROWS, task)
     scheduled = replace(plain.tasks[0], X_PT=rows)
     sample_times = np.array([0.35] if corner else jumps)
-    desired = Reference(times=plain.times, jumps=sample_times, rows=rows, corner=corner)
-    known = Schedule(times=plain.times, tasks=(scheduled,), desired=desired)
+    known = Known(times=plain.times, tasks=(scheduled,), sample_times=sample_times, corner=corner)
     accuracy = task_accuracy(scheduled, scene.chains["arm"], q=q, X_WP=part_poses(cell, scene.chains, {"arm": q}))
     ((found,), _) = look_between(scene, known, {"arm": q}, accuracy=(accuracy,), closures=())
     assert found.between is not None
@@ -153,8 +158,7 @@ def test_no_instant_is_worse_than_the_bound(seed: int) -> None:
         cell, tasks=tuple(replace(task, tolerance=Tolerance(position=1.0, orientation=3.0)) for task in cell.tasks)
     )
     (run,) = solve(cell).runs
-    desired, report = run.schedule.desired, run.report
-    assert desired is not None
+    desired, report = run.schedule, run.report
     fine = np.linspace(0.0, report.times[-1], 23 * (len(report.times) - 1) + 1)
     q = {
         name: np.stack([np.interp(fine, report.times, column) for column in rows.T], axis=1)

@@ -64,6 +64,11 @@ def test_the_cell_remembers_its_lines_and_the_digests_of_its_files(load: Load) -
 
     assert cell.origin.at("robots.worker.weights") == "c:11: robots.worker.weights"
     assert cell.origin.at("motion.step_s") == "c:21: motion.step_s"
+    ring = cell.task("ring")
+    assert ring.where("path") == cell.origin.at("tasks.ring.path")
+    assert ring.where() == cell.origin.at("tasks.ring")
+    assert ring.where().startswith("c:")
+    assert "origin" not in repr(ring)
     assert list(cell.inputs) == ["bundled:abb_irb1600", "bundled:kuka_kr6", "c"]
     assert all(len(digest) == 64 for digest in cell.inputs.values())
 
@@ -168,10 +173,10 @@ def test_a_clock_without_a_length_follows_tasks_with_times_of_their_own(load: Lo
 def test_a_cell_without_any_time_can_be_read_as_the_command_line_may_give_one(load: Load) -> None:
     cell = load(("{duration_s: 4}", "{step_s: 0.01}"))
     with pytest.raises(InputError, match=r"c:\d+: tasks\.ring: missing duration_s: expected duration_s or feed_mm_s"):
-        schedule_tasks(cell, [build_toolpath(cell.tasks[0], cell.part, cell.origin)])
+        schedule_tasks(cell, [build_toolpath(cell.tasks[0], cell.part)])
 
     cell = with_overrides(cell, duration=4.0)
-    (ring,) = schedule_tasks(cell, [build_toolpath(cell.tasks[0], cell.part, cell.origin)]).tasks
+    (ring,) = schedule_tasks(cell, [build_toolpath(cell.tasks[0], cell.part)]).tasks
     assert ring.end == 4.0
 
 

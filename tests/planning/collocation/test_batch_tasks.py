@@ -10,7 +10,7 @@ from builders.batch_cells import CELLS, configurations, everyone, random_desired
 from cellplan.geometry.transforms import Array, inverse, rotation_exp, rotation_vector
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Cell
-from cellplan.planning.collocation.batch_tasks import BatchTasks, Linearisation, Reference
+from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired, Linearisation
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
@@ -47,7 +47,7 @@ class Dense:
 
 
 def looked(
-    cell: Cell, q: Array, desired: Reference, *, moving: list[str] | None = None, mobile: Array | None = None
+    cell: Cell, q: Array, desired: Desired, *, moving: list[str] | None = None, mobile: Array | None = None
 ) -> Linearisation:
     tasks = BatchTasks(cell, relations(cell), moving or everyone(cell))
     mobile = np.ones(cell.joint_count) if mobile is None else mobile
@@ -60,7 +60,7 @@ def test_errors_are_those_of_the_planner_in_the_rows_that_a_task_keeps(name: str
     q, tasks = configurations(cell, LANES), BatchTasks(cell, relations(cell), everyone(cell))
     desired, X = random_desired(len(relations(cell)), LANES)
 
-    found = tasks.task_errors(q, desired, tasks.chains.placement(cell))
+    found = tasks.task_errors(q, desired[0], tasks.chains.placement(cell))
 
     seen = seen_poses(cell, q.T)
     for lane in range(LANES):
@@ -84,7 +84,7 @@ def test_speeds_are_the_smallest_weighted_ones_and_the_drift_that_no_task_notice
     plain, drifting = linear.speeds(), linear.speeds(drift)
 
     for lane in range(LANES):
-        dense = Dense(cell, q[:, lane], X[lane], desired.twists[..., lane], moving=everyone(cell), mobile=ONES[name])
+        dense = Dense(cell, q[:, lane], X[lane], desired[1][..., lane], moving=everyone(cell), mobile=ONES[name])
         assert dense.rank == len(dense.J), "drawn so that all tasks can be done"
         expected = dense.inverse.speeds(dense.twist, 0.0)
         room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2  # damping of 1e-10, some ten rows
@@ -99,11 +99,7 @@ def test_corrections_lead_onto_the_tasks_in_quadratic_steps(name: str) -> None:
     cell = CELLS[name]
     goal = configurations(cell, LANES)
     X = seen_poses(cell, goal.T)
-    desired = Reference(
-        np.moveaxis(X[..., :3, :3], (0, 1), (3, 2)),
-        np.moveaxis(X[..., :3, 3], (0, 1), (2, 1)),
-        np.zeros((6, X.shape[1], LANES)),
-    )
+    desired = np.moveaxis(X, (0, 1), (3, 2)), np.zeros((6, X.shape[1], LANES))
     q = goal + 2e-4 * configurations(cell, LANES, seed=9)
     found = []
     for _ in range(6):
@@ -126,7 +122,7 @@ def test_a_correction_allows_for_what_the_posture_moves_anyway(name: str) -> Non
     total = d + looked(cell, q, desired).correction(d)
 
     for lane in range(LANES):
-        dense = Dense(cell, q[:, lane], X[lane], desired.twists[..., lane], moving=everyone(cell), mobile=ONES[name])
+        dense = Dense(cell, q[:, lane], X[lane], desired[1][..., lane], moving=everyone(cell), mobile=ONES[name])
         room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2
         np.testing.assert_allclose(dense.J @ total[:, lane], dense.error, atol=room * 10.0)
 
@@ -145,7 +141,7 @@ def test_a_part_at_rest_is_left_to_the_operators(name: str) -> None:
     for robot in cell.robots:
         assert robot.name in operators or not speeds[cell.columns(robot.name)].any()
     for lane in range(LANES):
-        twists = desired.twists[..., lane]
+        twists = desired[1][..., lane]
         dense = Dense(at_rest, q[:, lane], X[lane], twists, moving=operators, mobile=ONES[name])
         expected = np.linalg.pinv(dense.J / np.sqrt(dense.weights), rcond=1e-9) @ dense.twist / np.sqrt(dense.weights)
         if dense.rank == len(dense.J):
@@ -166,7 +162,7 @@ def test_locked_joints_get_exactly_nothing_and_the_others_make_up_for_it(name: s
     for found in (linear.speeds(), linear.speeds(drift), linear.correction(np.zeros_like(q))):
         assert not found[mobile == 0.0].any()
     for lane in range(LANES):
-        dense = Dense(cell, q[:, lane], X[lane], desired.twists[..., lane], moving=everyone(cell), mobile=mobile)
+        dense = Dense(cell, q[:, lane], X[lane], desired[1][..., lane], moving=everyone(cell), mobile=mobile)
         if dense.rank == len(dense.J):
             room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2
             expected = dense.inverse.speeds(dense.twist, 0.0)
@@ -186,7 +182,7 @@ def test_speeds_move_the_tools_as_desired(name: str) -> None:
     linear = (ahead - behind)[..., :3, 3] / (2.0 * H)
     angular = rotation_vector(ahead[..., :3, :3] @ np.swapaxes(behind[..., :3, :3], -1, -2)) / (2.0 * H)
     found = np.moveaxis(np.concatenate([linear, angular], axis=-1), -1, 0)
-    expected = np.swapaxes(desired.twists, 1, 2)
+    expected = np.swapaxes(desired[1], 1, 2)
     scale = np.abs(speeds).max()
     np.testing.assert_allclose(found, expected, atol=1e-7 * max(scale, 1.0) ** 2)  # damping, and eps / H of rounding
 
@@ -208,18 +204,9 @@ def test_errors_of_any_size_are_seen(name: str, angle: float) -> None:
     q, tasks = configurations(cell, 1), BatchTasks(cell, relations(cell), everyone(cell))
     X = seen_poses(cell, q.T)[0]
     axis = np.array([0.6, -0.8, 0.0])  # across the tool's axis, so that free spin does not hide it
-    R = X[:, :3, :3] @ rotation_exp(angle * axis)
-    desired = Reference(np.moveaxis(R, 0, -1)[..., None], X[:, :3, 3].T[..., None], np.zeros((6, len(X), 1)))
+    X[:, :3, :3] = X[:, :3, :3] @ rotation_exp(angle * axis)
 
-    found = tasks.errors(q, desired, tasks.chains.placement(cell))
+    found = tasks.errors(q, np.moveaxis(X, 0, -1)[..., None], tasks.chains.placement(cell))
 
     np.testing.assert_allclose(np.linalg.norm(found[3:, :, 0], axis=0), angle, atol=1e-9)
     np.testing.assert_allclose(found[:3], 0.0, atol=1e-12)
-
-
-def test_desired_poses_are_cut_and_repeated() -> None:
-    desired, _ = random_desired(2, 6)
-    part = desired.between(2, 5)
-    assert np.array_equal(part.R, desired.R[..., 2:5])
-    assert desired.repeated(1) is desired
-    assert np.array_equal(part.repeated(2).twists, np.concatenate([part.twists, part.twists], axis=-1))

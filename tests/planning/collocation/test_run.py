@@ -30,7 +30,7 @@ LAWS = {
 def assert_on_tasks(case: Case, *, count: int = 3, accuracy: float = ACCURACY) -> None:
     """Between all samples of the clock and at the nodes of the clock itself."""
     path = case.path()
-    assert path.end == pytest.approx(case.timed.times[-1], abs=1e-9)
+    assert path.end == pytest.approx(case.schedule.times[-1], abs=1e-9)
     assert largest_error(case, path, between_samples(case, path, count=count)) <= accuracy + SAME
     assert path.worst <= accuracy
 
@@ -117,7 +117,7 @@ def test_each_mode_moves_its_robots_and_no_others(mode: Mode) -> None:
     for plan in plan_phases(cell).program:
         case = case_of(replace(cell, tasks=tuple(cell.task(name) for name in plan.tasks)), moving=plan.moving)
         assert_on_tasks(case)
-        q = case.path().at(case.timed.times)
+        q = case.path().at(case.schedule.times)
         for robot in cell.robots:
             assert (np.ptp(q[:, cell.columns(robot.name)]) == 0.0) <= (robot.name not in plan.moving)
             if robot.name not in plan.moving:
@@ -128,7 +128,7 @@ def test_a_part_that_rests_needs_no_further_holder() -> None:
     case = triangles(CELLS["closed"])
     moving = tuple(task.robot for task in case.cell.tasks)
     path = replace(case, moving=moving).path()
-    q = path.at(case.timed.times)
+    q = path.at(case.schedule.times)
     for grasp in case.cell.part.held_by:
         columns = case.cell.columns(grasp.robot)
         assert np.array_equal(q[:, columns], np.tile(case.start[columns], (len(q), 1)))
@@ -177,7 +177,7 @@ def test_a_path_on_a_mesh_takes_fewer_panels_than_rays() -> None:
     meshed = case_of(replace(cell, part=replace(cell.part, shape=tessellate(Cylinder(0.25, 0.5)))))
     meshed = replace(meshed, cell=replace(meshed.cell, motion=replace(cell.motion, step=0.01)))
     path = meshed.path()
-    assert len(path.panels) < 0.05 * len(meshed.timed.breaks)
+    assert len(path.panels) < 0.05 * len(meshed.schedule.breaks)
     assert path.end == 4.0
     settled = SETTLING_STEPS * 0.01  # the start posture is that on the cylinder itself
     times = np.linspace(settled, 4.0, 40_001)[1:-1]
@@ -208,3 +208,13 @@ def test_progress_is_told_from_zero_to_one() -> None:
     run.path(case.start, begin=0.0, end=1.0)
     assert reported == sorted(reported)
     assert reported[-1] == pytest.approx(1.0)
+
+
+def test_a_motion_known_at_samples_only_is_refused() -> None:
+    case = case_of(shipped("four_robots"))
+    samples = replace(case.schedule, paths=())
+
+    assert case.schedule.is_continuous
+    assert not samples.is_continuous
+    with pytest.raises(TypeError, match=r"^accurate run: expected a desired motion between samples, got none$"):
+        AccurateRun(replace(case.task, schedule=samples))

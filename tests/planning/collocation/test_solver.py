@@ -4,16 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders.batch_cells import CELLS, everyone
+from builders.batch_cells import CELLS, everyone, random_desired
 from builders.timed_cells import Case, triangles
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array, pose_from, rotation_exp
 from cellplan.kinematics.batched import Placement
 from cellplan.model.cell import Cell
-from cellplan.planning.collocation.batch_targets import BatchTargets
-from cellplan.planning.collocation.batch_tasks import BatchTasks, Reference
-from cellplan.planning.collocation.solver import Collocation, Precision
+from cellplan.planning.collocation.batch_targets import desired_motion, in_windows
+from cellplan.planning.collocation.batch_tasks import BatchTasks
+from cellplan.planning.collocation.solver import Collocation, Precision, repeated
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
 from cellplan.planning.tracking.motion_task import closures
 
@@ -33,7 +33,7 @@ def collocation(
     tasks = BatchTasks(case.cell, [*case.cell.tasks, *grasps], case.moving)
     placed = tasks.chains.placement(case.cell) if placement is None else placement
     precision = Precision(accuracy=accuracy, shortest=shortest)
-    return Collocation(tasks, BatchTargets(case.timed, grasps), placed, precision, mobile=mobile)
+    return Collocation(tasks, desired_motion(case.schedule.paths, grasps), placed, precision, mobile=mobile)
 
 
 def moved_bases(cell: Cell, count: int) -> list[Cell]:
@@ -62,7 +62,7 @@ def carried_through(found: Collocation, case: Case, q: Array, cells: NDArray[np.
             passed[cell].extend(window.panels)
 
     last = q.copy()
-    windows = windows_between(case.timed.breaks, whole=float(case.timed.times[-1]))
+    windows = windows_between(case.schedule.breaks, whole=float(case.schedule.times[-1]))
     arrived = found.carry(windows, last, cells, record)
     return last, arrived.tolist(), passed
 
@@ -116,8 +116,8 @@ def test_an_attempt_that_does_not_settle_says_so_in_silence() -> None:
     """Even where no robot may move and the tools are desired elsewhere; no warning is let out."""
     found = collocation(CELL, mobile=np.zeros(CELL.cell.joint_count))
     window = Window((Panel(0.0, 1.0 / 3.0, 12),))
-    times, (begins, ends) = window.sample_times, window.stretches
-    desired = BatchTargets(CELL.timed, ()).at(times, begins, ends)
+    times, (begins, ends) = window.times, window.stretches
+    desired = desired_motion(CELL.schedule.paths, ())(times, begins, ends)
 
     attempt = found.attempt(
         window,
@@ -140,18 +140,22 @@ def test_work_is_counted() -> None:
 def test_targets_of_windows_are_those_of_the_tasks(name: str) -> None:
     case = triangles(CELLS[name])
     grasps = closures(case.cell, case.moving)
-    targets = BatchTargets(case.timed, grasps)
-    windows = windows_between(case.timed.breaks, whole=1.0)
+    windows = windows_between(case.schedule.breaks, whole=1.0)
 
-    found = targets.in_windows(windows)
+    found = in_windows(desired_motion(case.schedule.paths, grasps), windows)
 
-    for window, desired in zip(windows, found, strict=True):
-        assert isinstance(desired, Reference)
-        for index, path in enumerate(case.timed.paths):
-            X, V = path.at(window.sample_times, window.stretches)
-            np.testing.assert_array_equal(np.moveaxis(desired.R[:, :, index], -1, 0), X[:, :3, :3])
-            np.testing.assert_array_equal(desired.p[:, index].T, X[:, :3, 3])
-            np.testing.assert_array_equal(desired.twists[:, index].T, V)
-        for index, grasp in enumerate(grasps, start=len(case.timed.paths)):
-            assert np.all(desired.p[:, index] == grasp.X_PT[:3, 3, None])
-            assert not desired.twists[:, index].any()
+    for window, (desired, twists) in zip(windows, found, strict=True):
+        for index, path in enumerate(case.schedule.paths):
+            X, V = path.at(window.times, window.stretches)
+            np.testing.assert_array_equal(np.moveaxis(desired[:, :, index], -1, 0), X)
+            np.testing.assert_array_equal(twists[:, index].T, V)
+        for index, grasp in enumerate(grasps, start=len(case.schedule.paths)):
+            assert np.all(desired[:, :, index] == grasp.X_PT[:, :, None])
+            assert not twists[:, index].any()
+
+
+def test_desired_poses_are_repeated_for_each_cell() -> None:
+    X, V = random_desired(2, 3)[0]
+    X_twice, V_twice = repeated((X, V), 2)
+    assert np.array_equal(X_twice, np.concatenate([X, X], axis=-1))
+    assert np.array_equal(V_twice, np.concatenate([V, V], axis=-1))

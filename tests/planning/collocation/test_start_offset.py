@@ -7,42 +7,40 @@ import pytest
 from builders.batch_cells import CELLS, configurations, everyone, relations, seen_poses
 
 from cellplan.geometry.transforms import rotation_exp, rotation_vector
-from cellplan.planning.collocation.batch_tasks import BatchTasks, Reference
+from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired
 from cellplan.planning.collocation.start_offset import StartOffset, start_offset
 
 ACCURACY = 1e-7
 H = 1e-5  # [s]
 
 
-def desired_beside(name: str, distance: float) -> tuple[BatchTasks, Reference, np.ndarray]:
+def desired_beside(name: str, distance: float) -> tuple[BatchTasks, Desired, np.ndarray]:
     """Targets that turn and move evenly, beside the tools at first by so many metres and radians."""
     cell, rng = CELLS[name], np.random.default_rng(3)
     q = configurations(cell, 1)
     X = seen_poses(cell, q.T)[0]
     count = len(X)
-    R = rotation_exp(distance * rng.normal(size=(count, 3))) @ X[:, :3, :3]
-    p = X[:, :3, 3] + distance * rng.normal(size=(count, 3))
+    X[:, :3, :3] = rotation_exp(distance * rng.normal(size=(count, 3))) @ X[:, :3, :3]
+    X[:, :3, 3] += distance * rng.normal(size=(count, 3))
     twists = rng.normal(size=(6, count, 1))
     tasks = BatchTasks(cell, relations(cell), everyone(cell))
-    return tasks, Reference(np.moveaxis(R, 0, -1)[..., None], p.T[..., None], twists), q[:, 0]
+    return tasks, (np.moveaxis(X, 0, -1)[..., None], twists), q[:, 0]
 
 
-def found(
-    name: str, distance: float, until: float = 0.5
-) -> tuple[BatchTasks, Reference, np.ndarray, StartOffset | None]:
+def found(name: str, distance: float, until: float = 0.5) -> tuple[BatchTasks, Desired, np.ndarray, StartOffset | None]:
     tasks, desired, start = desired_beside(name, distance)
-    count = desired.p.shape[1]
+    count = desired[0].shape[2]
     placement = tasks.chains.placement(CELLS[name])
     offset = start_offset(tasks, desired, placement, start=start, until=np.full(count, until), accuracy=ACCURACY)
     return tasks, desired, start, offset
 
 
-def even(desired: Reference, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def even(desired: Desired, t: np.ndarray) -> Desired:
     """Targets that go on from the first with their twists."""
-    twists = np.broadcast_to(desired.twists, (*desired.twists.shape[:2], len(t)))
-    p = desired.p + twists[:3] * t
-    turn = rotation_exp(np.moveaxis(desired.twists[3:] * t, 0, -1))
-    return np.einsum("tbij,jkt->iktb", turn, desired.R[..., 0]), p, twists
+    X, V = (np.repeat(part, len(t), axis=-1) for part in desired)
+    X[:3, 3] += V[:3] * t
+    X[:3, :3] = np.einsum("tbij,jktb->iktb", rotation_exp(np.moveaxis(V[3:] * t, 0, -1)), X[:3, :3])
+    return X, V
 
 
 @pytest.mark.parametrize("name", CELLS)
@@ -51,11 +49,11 @@ def test_targets_begin_where_the_tools_are(name: str, distance: float) -> None:
     tasks, desired, start, offset = found(name, distance)
     assert offset is not None
 
-    moved = Reference(*offset.applied(np.zeros(1), desired.R, desired.p, desired.twists))
+    X, V = offset.applied(np.zeros(1), *desired)
 
     placement = tasks.chains.placement(CELLS[name])
-    assert np.abs(tasks.errors(start[:, None], moved, placement)).max() <= 0.1 * ACCURACY
-    np.testing.assert_array_equal(moved.twists[:3], desired.twists[:3])  # at rest beside the moving target
+    assert np.abs(tasks.errors(start[:, None], X, placement)).max() <= 0.1 * ACCURACY
+    np.testing.assert_array_equal(V[:3], desired[1][:3])  # at rest beside the moving target
 
 
 @pytest.mark.parametrize("name", ["plain", "spin", "partial", "world"])
@@ -64,11 +62,10 @@ def test_twists_are_the_derivatives_of_the_poses(name: str) -> None:
     assert offset is not None
     t = np.linspace(0.03, 0.47, 9)
 
-    (R0, p0, _), (R, _, twists), (R1, p1, _) = (
-        offset.applied(t + shift, *even(desired, t + shift)) for shift in (-H, 0.0, H)
-    )
+    (X0, _), (X, twists), (X1, _) = (offset.applied(t + shift, *even(desired, t + shift)) for shift in (-H, 0.0, H))
 
-    np.testing.assert_allclose((p1 - p0) / (2 * H), twists[:3], atol=1e-6)  # H^2 times the third derivative
+    R0, R, R1 = (each[:3, :3] for each in (X0, X, X1))
+    np.testing.assert_allclose((X1[:3, 3] - X0[:3, 3]) / (2 * H), twists[:3], atol=1e-6)  # H^2
     turn = np.einsum("ijtb,kjtb->tbik", R1, R0)
     np.testing.assert_allclose(np.moveaxis(rotation_vector(turn), -1, 0) / (2 * H), twists[3:], atol=1e-6)
     np.testing.assert_allclose(np.einsum("ijtb,ijtb->tb", R, R), 3.0, atol=1e-12)
@@ -101,6 +98,6 @@ def test_each_task_has_its_own_time() -> None:
     offset = replace(offset, until=np.array([0.2, 0.8]))
     t = np.array([0.3])
     moved = offset.applied(t, *even(desired, t))
-    p = even(desired, t)[1]
-    assert np.array_equal(moved[1][:, 0], p[:, 0])
-    assert np.linalg.norm(moved[1][:, 1] - p[:, 1]) > 0.01
+    X = even(desired, t)[0]
+    assert np.array_equal(moved[0][:, :, 0], X[:, :, 0])
+    assert np.linalg.norm(moved[0][:3, 3, 1] - X[:3, 3, 1]) > 0.01

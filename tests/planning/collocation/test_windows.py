@@ -51,7 +51,7 @@ def test_short_stretches_begin_with_lower_degrees() -> None:
 
 def test_integrals_are_exact_for_polynomials_with_jumps_between_panels() -> None:
     begins, ends = (part[: WINDOW.count] for part in WINDOW.stretches)
-    t = WINDOW.sample_times[: WINDOW.count]
+    t = WINDOW.times[: WINDOW.count]
 
     found = WINDOW.integral @ cubics(t, begins)
 
@@ -66,7 +66,7 @@ def test_integrals_are_exact_for_polynomials_with_jumps_between_panels() -> None
 
 def test_values_between_the_nodes_are_exact_for_polynomials() -> None:
     begins, _ = WINDOW.stretches
-    t, count = WINDOW.sample_times, WINDOW.count
+    t, count = WINDOW.times, WINDOW.count
     np.testing.assert_allclose(
         WINDOW.between @ cubics(t[:count], begins[:count]), cubics(t[count:], begins[count:]), atol=1e-14
     )
@@ -74,10 +74,10 @@ def test_values_between_the_nodes_are_exact_for_polynomials() -> None:
 
 def test_instants_lie_within_their_panels_and_every_panel_has_both_ends() -> None:
     begins, ends = WINDOW.stretches
-    assert np.all((WINDOW.sample_times >= begins) & (WINDOW.sample_times <= ends))
+    assert np.all((WINDOW.times >= begins) & (WINDOW.times <= ends))
     assert [WINDOW.panels[k].begin for k in WINDOW.panel_of] == begins.tolist()
     for panel, place in zip(WINDOW.panels, WINDOW.places, strict=True):
-        assert WINDOW.sample_times[place][[0, -1]] == pytest.approx([panel.begin, panel.end], abs=1e-16)
+        assert WINDOW.times[place][[0, -1]] == pytest.approx([panel.begin, panel.end], abs=1e-16)
 
 
 def test_rough_panels_get_higher_degrees_and_are_halved_at_the_last() -> None:
@@ -154,7 +154,7 @@ def test_the_error_is_looked_at_in_every_knot() -> None:
     knots = (0.11, 0.2, 0.35, 0.5, 0.6)
     window = Window((Panel(0.0, 0.1, 6), Panel(0.1, 0.7, 24, knots), Panel(0.7, 1.0, 6)))
     begins, _ = window.stretches
-    t, count = window.sample_times, window.count
+    t, count = window.times, window.count
     assert all(np.abs(t[count:] - knot).min() < 1e-15 for knot in knots)
     np.testing.assert_allclose(
         window.between @ cubics(t[:count], begins[:count]), cubics(t[count:], begins[count:]), atol=1e-14

@@ -19,7 +19,7 @@ FOLDER = Path(__file__).parents[3] / "cells"
 
 
 def planned(cell: Cell, start: np.ndarray) -> tuple[Schedule, Motion]:
-    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     moving = tuple(robot.name for robot in cell.robots)
     return schedule, integrate_schedule(MotionTask(cell, schedule, moving, start))
 
@@ -58,7 +58,7 @@ def test_a_closed_motion_follows_the_tasks_as_well_as_an_open_one() -> None:
 
 def test_a_path_that_does_not_come_back_is_refused_by_name() -> None:
     cell, start = four_robots(cyclic=True)
-    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     half = len(schedule.times) // 2
     cut = replace(
         schedule,

@@ -7,12 +7,12 @@ import pytest
 from builders.roller_paths import ON_ROLLER, RECTANGLE, RHOMBUS, ROLLER, circle, clocked, sampled, task_on
 
 from cellplan.errors import InputError
-from cellplan.model.cell import Origin
 from cellplan.model.motion import TaskSchedule
+from cellplan.model.origin import Origin
 from cellplan.model.task import PolygonPath, SpacePolylinePath, Task, TimeLaw, TimeLawKind
+from cellplan.model.time_law import advance, reached_at
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
-from cellplan.planning.timing.time_law import advance, reached_at
 
 ORIGIN = Origin(file="cell.yaml", lines={"tasks.ring.repeat": 12, "tasks.ring.settle_s": 13})
 CONSTANT, QUINTIC = TimeLaw(kind=TimeLawKind.CONSTANT), TimeLaw(kind=TimeLawKind.QUINTIC)
@@ -20,7 +20,7 @@ DOWN = -np.eye(3)[2]
 
 
 def on_clock(task: Task, *, duration: float | None = 4.0, step: float = 0.01) -> TaskSchedule:
-    (one,) = schedule_tasks(clocked(task, duration=duration, step=step), [build_toolpath(task, ROLLER, ORIGIN)]).tasks
+    (one,) = schedule_tasks(clocked(task, duration=duration, step=step), [build_toolpath(task, ROLLER)]).tasks
     return one
 
 
@@ -130,7 +130,7 @@ def test_closed_files_and_rounded_corners_are_repeated() -> None:
 )
 def test_an_open_path_is_not_repeated(path: PolygonPath | SpacePolylinePath) -> None:
     with pytest.raises(InputError) as caught:
-        build_toolpath(task_on(path, tool_axis=DOWN, repeat=5), ROLLER, ORIGIN)
+        build_toolpath(task_on(path, tool_axis=DOWN, repeat=5, origin=ORIGIN), ROLLER)
 
     assert str(caught.value) == (
         "cell.yaml:12: tasks.ring.repeat: expected 1 for a path that does not end in the pose of its start, got 5; "
@@ -142,19 +142,19 @@ def test_a_file_that_comes_back_to_its_point_in_another_orientation_is_not_close
     points = [[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0, 0]]
     axes = np.array([[0, 0, -1.0], [0, 0, -1], [0, 0, -1], [0, 0.6, -0.8]])
     for changed in (axes, axes[[0, 1, 2, 0]]):
-        path = build_toolpath(task_on(sampled(points, axes=changed)), ROLLER, ORIGIN)
+        path = build_toolpath(task_on(sampled(points, axes=changed)), ROLLER)
         assert path.is_closed == (changed is not axes)
 
 
 def test_cycles_too_short_and_stops_too_many_are_refused() -> None:
     short = replace(ON_ROLLER["circle"], repeat=100)
-    many = replace(ON_ROLLER["circle"], path=many_sided(), project=None, tool_axis=DOWN, repeat=10_000)
+    many = replace(ON_ROLLER["circle"], path=many_sided(), project=None, tool_axis=DOWN, repeat=10_000, origin=ORIGIN)
     with pytest.raises(InputError, match=r"expected a cycle of at least 0.1 s .*, got 0.04 s; slow the task down"):
-        clock_paths(clocked(short, step=0.01), [build_toolpath(short, ROLLER, ORIGIN)])
+        clock_paths(clocked(short, step=0.01), [build_toolpath(short, ROLLER)])
     with pytest.raises(
         InputError, match=r"cell.yaml:12: tasks.ring.repeat: expected at most 6644 cycles of a path with"
     ):
-        clock_paths(replace(clocked(many), origin=ORIGIN), [build_toolpath(many, ROLLER, ORIGIN)])
+        clock_paths(clocked(many), [build_toolpath(many, ROLLER)])
 
 
 def many_sided() -> SpacePolylinePath:
@@ -163,14 +163,14 @@ def many_sided() -> SpacePolylinePath:
 
 
 def test_a_time_to_settle_that_leaves_nothing_to_judge_is_refused() -> None:
-    task = replace(ON_ROLLER["circle"], settle=3.95)
-    cell = replace(clocked(task, step=0.01), origin=ORIGIN)
+    task = replace(ON_ROLLER["circle"], settle=3.95, origin=ORIGIN)
+    cell = clocked(task, step=0.01)
     with pytest.raises(InputError) as caught:
-        clock_paths(cell, [build_toolpath(task, ROLLER, ORIGIN)])
+        clock_paths(cell, [build_toolpath(task, ROLLER)])
 
     assert str(caught.value) == (
         "cell.yaml:13: tasks.ring.settle_s: expected a time that leaves at least 0.1 s (10 times motion.step_s) of the "
         "task's 4 s to be judged, got 3.95"
     )
     shorter = replace(task, settle=3.9)
-    clock_paths(clocked(shorter, step=0.01), [build_toolpath(shorter, ROLLER, ORIGIN)])
+    clock_paths(clocked(shorter, step=0.01), [build_toolpath(shorter, ROLLER)])

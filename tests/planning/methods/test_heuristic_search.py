@@ -23,8 +23,9 @@ from builders.search_arms import (
 from cellplan.errors import DivergedError, InputError
 from cellplan.geometry.transforms import inverse, pose_from, rotation_exp
 from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import LockedJoint, Origin
+from cellplan.model.cell import LockedJoint
 from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.origin import Origin
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
 
@@ -216,7 +217,8 @@ def test_planar_turn_alone_is_reached(method):
 @pytest.mark.parametrize("axes", [(0, 1, 5), (0, 1, 2, 3, 4)])
 def test_rotations_that_cannot_be_taken_apart_are_refused_with_their_place(method, axes):
     cell = arm_cell(dh_arm(PUMA), method=method, axes=axes)
-    cell = replace(cell, origin=Origin(file="cell.yaml", lines={"tasks.task_arm.axes": 14}))
+    origin = Origin(file="cell.yaml", lines={"tasks.task_arm.axes": 14})
+    cell = replace(cell, tasks=tuple(replace(task, origin=origin) for task in cell.tasks))
     X = tool_poses(cell, np.full((1, 6), 0.5))
     schedule = schedule_of(cell, np.array([0.0, 1.0]), np.tile(X, (2, 1, 1)))
     with pytest.raises(InputError, match=rf"^cell\.yaml:14: tasks\.task_arm\.axes: method '{method}' expected all of"):

@@ -11,7 +11,6 @@ from builders.roller_paths import (
     EY,
     EZ,
     ON_ROLLER,
-    ORIGIN,
     ROLLER,
     circle,
     part_of,
@@ -31,7 +30,7 @@ from cellplan.planning.path.build import build_toolpath
 
 
 def test_paths_of_the_four_robots_start_where_they_should() -> None:
-    starts = {name: build_toolpath(task, ROLLER, ORIGIN).X_PT_start for name, task in ON_ROLLER.items()}
+    starts = {name: build_toolpath(task, ROLLER).X_PT_start for name, task in ON_ROLLER.items()}
     depth = np.sqrt(0.25**2 - 0.125**2)
 
     assert np.allclose(starts["circle"][:3, 3], [0.1, 0.0, 0.25], atol=1e-15)
@@ -43,7 +42,7 @@ def test_paths_of_the_four_robots_start_where_they_should() -> None:
 
 
 def test_circle_laid_on_a_cylinder_lies_on_it_with_the_exact_normal() -> None:
-    path = build_toolpath(ON_ROLLER["circle"], ROLLER, ORIGIN)
+    path = build_toolpath(ON_ROLLER["circle"], ROLLER)
 
     X = path.poses(np.linspace(0.0, path.length, 1001))
     x, y, z = X[:, :3, 3].T
@@ -56,7 +55,7 @@ def test_circle_laid_on_a_cylinder_lies_on_it_with_the_exact_normal() -> None:
 
 
 def test_length_on_the_surface_agrees_with_an_independent_quadrature() -> None:
-    path = build_toolpath(ON_ROLLER["circle"], ROLLER, ORIGIN)
+    path = build_toolpath(ON_ROLLER["circle"], ROLLER)
     u = 2.0 * np.pi * np.arange(400) / 400  # the trapezoid rule converges geometrically on a periodic function
     y, dx, dy = 0.1 * np.sin(u), -0.1 * np.sin(u), 0.1 * np.cos(u)
     speed = np.sqrt(dx**2 + dy**2 + (y * dy) ** 2 / (0.25**2 - y**2))
@@ -65,7 +64,7 @@ def test_length_on_the_surface_agrees_with_an_independent_quadrature() -> None:
 
 
 def test_sides_on_a_cylinder_have_the_length_of_their_arcs() -> None:
-    path = build_toolpath(ON_ROLLER["rectangle"], ROLLER, ORIGIN)
+    path = build_toolpath(ON_ROLLER["rectangle"], ROLLER)
 
     arc = 2.0 * 0.25 * np.arcsin(0.5)
 
@@ -74,7 +73,7 @@ def test_sides_on_a_cylinder_have_the_length_of_their_arcs() -> None:
 
 @pytest.mark.parametrize("name", ON_ROLLER)
 def test_equal_steps_along_the_path_are_equal_lengths(name: str) -> None:
-    path = build_toolpath(ON_ROLLER[name], ROLLER, ORIGIN)
+    path = build_toolpath(ON_ROLLER[name], ROLLER)
     for piece in path.pieces:
         fine = piece.poses(np.linspace(0.0, piece.length, 200 * 40 + 1))[:, :3, 3]
         chords = np.linalg.norm(np.diff(fine, axis=0), axis=1).reshape(40, 200).sum(axis=1)
@@ -85,7 +84,7 @@ def test_equal_steps_along_the_path_are_equal_lengths(name: str) -> None:
 def test_twists_are_the_derivative_of_poses_on_the_cylinder(name: str) -> None:
     task = replace(ON_ROLLER[name], turn=2.0)
 
-    assert residual_of_twists(build_toolpath(task, ROLLER, ORIGIN)) <= 1e-8  # differences: 6e-10
+    assert residual_of_twists(build_toolpath(task, ROLLER)) <= 1e-8  # differences: 6e-10
 
 
 @pytest.mark.parametrize(
@@ -96,7 +95,7 @@ def test_twists_are_the_derivative_of_poses_seen_from_askew(shape: Solid, X_PS: 
     side = np.array([0.36, 0.48, 0.8])
     task = task_on(circle(0.04), project=side, tool_x=-EY, turn=-1.0)
 
-    path = build_toolpath(task, part_of(shape, X_PS), ORIGIN)
+    path = build_toolpath(task, part_of(shape, X_PS))
 
     assert residual_of_twists(path) <= 1e-8  # path of radius 0.04 m: h^2/6 times 1/r^3 with h = 3e-6 m
     assert np.allclose(
@@ -105,7 +104,7 @@ def test_twists_are_the_derivative_of_poses_seen_from_askew(shape: Solid, X_PS: 
 
 
 def test_integrated_twists_return_after_a_full_turn() -> None:
-    piece = build_toolpath(ON_ROLLER["circle"], ROLLER, ORIGIN).pieces[0]
+    piece = build_toolpath(ON_ROLLER["circle"], ROLLER).pieces[0]
     n = 2000
     h = piece.length / n
     middle = piece.twists_per_length((np.arange(n) + 0.5) * h)
@@ -191,7 +190,7 @@ def test_what_makes_no_path_is_refused_by_name(name: str) -> None:
     task, words = REFUSED[name]
 
     with pytest.raises(InputError) as caught:
-        build_toolpath(task, ROLLER, ORIGIN)
+        build_toolpath(task, ROLLER)
 
     assert words in str(caught.value)
     assert str(caught.value).startswith("cell.yaml:")
@@ -202,10 +201,10 @@ def test_a_path_over_the_edge_of_a_box_is_refused_also_on_its_mesh() -> None:
     block, task = Box((0.4, 0.4, 0.4)), task_on(circle(0.15, center=(0.1, 0.0)), project=np.array([0.6, 0.0, 0.8]))
     for part in (part_of(block), part_of(tessellate(block))):
         with pytest.raises(InputError, match=r"runs over an edge at \(200, 141\."):
-            build_toolpath(task, part, ORIGIN)
+            build_toolpath(task, part)
 
 
 def test_a_path_up_to_the_edge_of_a_box_is_allowed() -> None:
-    path = build_toolpath(task_on(circle(0.2), project=EZ), part_of(Box((0.4, 0.4, 0.4))), ORIGIN)
+    path = build_toolpath(task_on(circle(0.2), project=EZ), part_of(Box((0.4, 0.4, 0.4))))
 
     assert path.length == pytest.approx(0.4 * np.pi, rel=1e-13)

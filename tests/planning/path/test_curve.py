@@ -9,7 +9,6 @@ from builders.roller_paths import (
     EX,
     EZ,
     ON_ROLLER,
-    ORIGIN,
     PLANES,
     ROLLER,
     circle,
@@ -35,7 +34,7 @@ def test_shapes_run_the_way_round_that_is_asked_for_seen_from_every_side(axis: i
     for drawn, direction in product((circle(0.1, plane), square), RunDirection):
         path = replace(drawn, direction=direction)
         task = task_on(path, project=side, tool_x=first)
-        toolpath = build_toolpath(task, block, ORIGIN)
+        toolpath = build_toolpath(task, block)
         p = toolpath.poses(np.linspace(0.0, toolpath.length, 401))[:, :3, 3]
         area = 0.5 * np.cross(p[:-1], p[1:]).sum(axis=0) @ side
         assert (area > 0.0) == (direction is RunDirection.COUNTERCLOCKWISE)
@@ -48,7 +47,7 @@ def test_shapes_run_the_way_round_that_is_asked_for_seen_from_every_side(axis: i
 def test_a_circle_starts_where_it_is_told_and_runs_on_from_there() -> None:
     path = replace(circle(0.1, PlaneName.XY), start=(0.6, -0.8), direction=RunDirection.CLOCKWISE)
 
-    toolpath = build_toolpath(task_on(path, tool_axis=-EZ), ROLLER, ORIGIN)
+    toolpath = build_toolpath(task_on(path, tool_axis=-EZ), ROLLER)
 
     quarter = toolpath.poses(np.array([0.0, 0.25, 0.5]) * toolpath.length)[:, :3, 3]
     assert np.allclose(quarter, [[0.06, -0.08, 0], [-0.08, -0.06, 0], [-0.06, 0.08, 0]], atol=1e-12)
@@ -65,7 +64,7 @@ def test_closed_lists_of_points_run_as_listed_from_every_side(side: np.ndarray, 
         tool_x=EZ,
     )
 
-    toolpath = build_toolpath(task, part_of(Box((0.6, 0.6, 0.6))), ORIGIN)
+    toolpath = build_toolpath(task, part_of(Box((0.6, 0.6, 0.6))))
 
     passed = toolpath.poses(toolpath.behind)[:, 1:3, 3]
     assert np.allclose(passed, [*listed, listed[0]], atol=1e-12)
@@ -88,7 +87,7 @@ def test_without_projection_the_outside_is_against_the_tool_axis(plane: PlaneNam
     normal = np.cross(first, second)
     for axis in (normal, -normal):
         task = task_on(circle(0.1, plane), tool_axis=axis, tool_x=first, plane_offset=0.05)
-        path = build_toolpath(task, ROLLER, ORIGIN)
+        path = build_toolpath(task, ROLLER)
         p = path.poses(np.linspace(0.0, path.length, 101))[:, :3, 3]
         assert np.allclose(p @ normal, 0.05, atol=1e-15)
         assert 0.5 * np.cross(p[:-1], p[1:]).sum(axis=0) @ -axis > 0.0
@@ -98,7 +97,7 @@ def test_without_projection_the_outside_is_against_the_tool_axis(plane: PlaneNam
 def test_open_paths_run_as_listed() -> None:
     path = PolygonPath(plane=PlaneName.XY, corners=((0.1, 0.0), (0.1, 0.1), (0.0, 0.1)), is_closed=False)
 
-    toolpath = build_toolpath(task_on(path, tool_axis=EZ), ROLLER, ORIGIN)
+    toolpath = build_toolpath(task_on(path, tool_axis=EZ), ROLLER)
 
     assert np.allclose(toolpath.poses(np.array([0.0, 0.1, 0.2]))[:, :3, 3], [[0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]])
 
@@ -106,7 +105,7 @@ def test_open_paths_run_as_listed() -> None:
 def test_the_tool_stops_at_corners_but_not_at_points_of_a_straight_side() -> None:
     points = ((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.3, 0.0, 0.0), (0.3, 0.2, 0.0))
 
-    path = build_toolpath(task_on(SpacePolylinePath(points=points, is_closed=False), tool_axis=-EZ), ROLLER, ORIGIN)
+    path = build_toolpath(task_on(SpacePolylinePath(points=points, is_closed=False), tool_axis=-EZ), ROLLER)
 
     assert [piece.length for piece in path.pieces] == pytest.approx([0.3, 0.2], abs=1e-15)
 
@@ -114,13 +113,13 @@ def test_the_tool_stops_at_corners_but_not_at_points_of_a_straight_side() -> Non
 def test_turning_back_is_a_corner() -> None:
     points = ((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.1, 0.0, 0.0))
 
-    path = build_toolpath(task_on(SpacePolylinePath(points=points, is_closed=False), tool_axis=-EZ), ROLLER, ORIGIN)
+    path = build_toolpath(task_on(SpacePolylinePath(points=points, is_closed=False), tool_axis=-EZ), ROLLER)
 
     assert [piece.length for piece in path.pieces] == pytest.approx([0.3, 0.2], abs=1e-15)
 
 
 def test_pieces_join_and_leave_a_corner_in_their_own_direction() -> None:
-    path = build_toolpath(ON_ROLLER["rectangle"], ROLLER, ORIGIN)
+    path = build_toolpath(ON_ROLLER["rectangle"], ROLLER)
     ends = [piece.poses(np.array([piece.length]))[0] for piece in path.pieces]
     starts = [piece.poses(np.zeros(1))[0] for piece in path.pieces]
 
@@ -132,7 +131,7 @@ def test_pieces_join_and_leave_a_corner_in_their_own_direction() -> None:
 @pytest.mark.parametrize("name", ["rhombus", "rectangle"])
 def test_blended_paths_are_one_piece_near_the_corners(name: str) -> None:
     task, blend = ON_ROLLER[name], 0.01
-    sharp, round_ = build_toolpath(task, ROLLER, ORIGIN), build_toolpath(replace(task, blend=blend), ROLLER, ORIGIN)
+    sharp, round_ = build_toolpath(task, ROLLER), build_toolpath(replace(task, blend=blend), ROLLER)
 
     p = round_.poses(np.linspace(0.0, round_.length, 4001))[:, :3, 3]
     q = sharp.poses(np.linspace(0.0, sharp.length, 8001))[:, :3, 3]
@@ -148,7 +147,7 @@ def test_blended_paths_are_one_piece_near_the_corners(name: str) -> None:
 
 def test_a_rounding_longer_than_half_a_side_is_refused_with_numbers() -> None:
     with pytest.raises(InputError) as caught:
-        build_toolpath(replace(ON_ROLLER["rectangle"], blend=0.13), ROLLER, ORIGIN)
+        build_toolpath(replace(ON_ROLLER["rectangle"], blend=0.13), ROLLER)
 
     assert str(caught.value) == (
         "cell.yaml:30: motion.corners: expected a rounding of at most 125 mm, half of the shorter side at the corner "
@@ -160,7 +159,7 @@ def test_a_path_that_turns_back_cannot_be_rounded() -> None:
     path = SpacePolylinePath(points=((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.1, 0.0, 0.0)), is_closed=False)
 
     with pytest.raises(InputError, match=r"got 180 deg at \(300, 0, 0\) mm; write corners: stop"):
-        build_toolpath(task_on(path, tool_axis=-EZ, blend=0.01), ROLLER, ORIGIN)
+        build_toolpath(task_on(path, tool_axis=-EZ, blend=0.01), ROLLER)
 
 
 def test_a_corner_that_turns_back_in_the_view_cannot_be_rounded_either() -> None:
@@ -168,4 +167,4 @@ def test_a_corner_that_turns_back_in_the_view_cannot_be_rounded_either() -> None
     path = SpacePolylinePath(points=points, is_closed=False)
 
     with pytest.raises(InputError, match=r"got 180 deg at \(100, 0, 400\) mm; write corners: stop"):
-        build_toolpath(task_on(path, project=EZ, blend=0.01), ROLLER, ORIGIN)
+        build_toolpath(task_on(path, project=EZ, blend=0.01), ROLLER)

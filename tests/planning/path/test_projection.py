@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from builders.roller_paths import ALONG_X, CYLINDER, EZ, ON_ROLLER, ORIGIN, ROLLER, circle, part_of, task_on
+from builders.roller_paths import ALONG_X, CYLINDER, EZ, ON_ROLLER, ROLLER, circle, part_of, task_on
 
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.tessellation import tessellate
@@ -13,7 +13,7 @@ from cellplan.planning.path.build import build_toolpath
 @pytest.mark.parametrize("name", ON_ROLLER)
 def test_a_fine_mesh_gives_the_path_of_the_closed_form(name: str) -> None:
     fine = part_of(tessellate(CYLINDER, 256), ALONG_X)
-    exact, path = build_toolpath(ON_ROLLER[name], ROLLER, ORIGIN), build_toolpath(ON_ROLLER[name], fine, ORIGIN)
+    exact, path = build_toolpath(ON_ROLLER[name], ROLLER), build_toolpath(ON_ROLLER[name], fine)
     shares = np.linspace(0.0, 1.0, 301)
 
     X, Y = exact.poses(shares * exact.length), path.poses(shares * path.length)
@@ -26,7 +26,7 @@ def test_a_fine_mesh_gives_the_path_of_the_closed_form(name: str) -> None:
 
 
 def test_twists_on_a_mesh_are_the_derivative_of_its_poses() -> None:
-    path = build_toolpath(ON_ROLLER["circle"], part_of(tessellate(CYLINDER, 64), ALONG_X), ORIGIN)
+    path = build_toolpath(ON_ROLLER["circle"], part_of(tessellate(CYLINDER, 64), ALONG_X))
     knots = path.arc.behind_knots(path.tip.knots)
     s = 0.5 * (knots[1:] + knots[:-1])
     h = 0.05 * np.diff(knots).min()
@@ -41,7 +41,7 @@ def test_a_mesh_of_a_box_behaves_like_the_box() -> None:
     block = Box((0.4, 0.4, 0.4))
     task = task_on(circle(0.1, center=(0.05, -0.02)), project=EZ)
 
-    exact, path = build_toolpath(task, part_of(block), ORIGIN), build_toolpath(task, part_of(tessellate(block)), ORIGIN)
+    exact, path = build_toolpath(task, part_of(block)), build_toolpath(task, part_of(tessellate(block)))
     shares = np.linspace(0.0, 1.0, 97)
 
     assert np.abs(exact.poses(shares * exact.length) - path.poses(shares * path.length)).max() <= 1e-9
@@ -58,4 +58,4 @@ def stair() -> Mesh:
 
 def test_a_step_between_parallel_faces_of_a_mesh_is_an_edge() -> None:
     with pytest.raises(InputError, match=r"runs over an edge at \((100|99\.\d+|100\.\d+), "):
-        build_toolpath(task_on(circle(0.05, center=(0.1, 0.0)), project=EZ), part_of(stair()), ORIGIN)
+        build_toolpath(task_on(circle(0.05, center=(0.1, 0.0)), project=EZ), part_of(stair()))

@@ -45,9 +45,7 @@ def test_the_tool_stands_on_the_part_as_the_grasp_says(tmp_path: Path) -> None:
     cell = load_cell(file)
     scene = Scene.from_cell(cell)
 
-    choice = choose_start(
-        scene, clock_paths(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
-    )
+    choice = choose_start(scene, clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks]))
 
     X_WT = {name: chain.tool_poses(choice.start[None, cell.columns(name)])[0] for name, chain in scene.chains.items()}
     first, further = cell.part.held_by

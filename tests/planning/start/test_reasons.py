@@ -32,7 +32,7 @@ def choice_of(folder: Path, *, place: float = 1100.0, seconds: float = 4.0, more
     path = folder / "cell.yaml"
     path.write_text(text, encoding="utf-8")
     cell = load_cell(path)
-    toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     return choose_start(Scene.from_cell(cell), clock_paths(cell, toolpaths.values()))
 
 
@@ -103,7 +103,7 @@ def test_a_column_through_one_arm_comes_before_the_arms_that_touch_each_other_ev
         path = tmp_path / "cell.yaml"
         path.write_text(TWO_ARMS + more, encoding="utf-8")
         cell = load_cell(path)
-        toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+        toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
         with pytest.raises(StartNotFoundError) as caught:
             choose_start(Scene.from_cell(cell), clock_paths(cell, toolpaths.values()))
         texts.append(str(caught.value))
@@ -152,7 +152,7 @@ def test_a_second_given_start_that_no_configuration_of_the_positioner_suits_says
     path = tmp_path / "cell.yaml"
     path.write_text(text, encoding="utf-8")
     cell = load_cell(path)
-    toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     with pytest.raises(StartNotFoundError, match=r"start_deg: the tool of 'upper' is at best \d+\.\d+ mm and \d") as e:
         choose_start(Scene.from_cell(cell), clock_paths(cell, toolpaths.values()))
     assert "from the start of task 'line', allowed are" in str(e.value)

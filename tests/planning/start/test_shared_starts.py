@@ -26,7 +26,7 @@ def planar(cells):
 
 
 def toolpaths_of(cell):
-    return {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    return {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
 
 
 def with_starts(cell, q, *names):

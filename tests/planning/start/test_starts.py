@@ -33,7 +33,7 @@ def cell(cells):
 
 
 def toolpaths_of(cell):
-    return {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    return {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
 
 
 def with_start(cell, name, start):

@@ -24,7 +24,7 @@ def cell(cells):
 
 
 def trials_of(cell):
-    toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     return StartTrials(Scene.from_cell(cell), clock_paths(cell, toolpaths.values()))
 
 

@@ -36,7 +36,7 @@ def cell() -> Cell:
 
 
 def scheduled(cell: Cell) -> tuple[np.ndarray, TaskSchedule]:
-    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     return schedule.times, schedule.tasks[0]
 
 

@@ -31,7 +31,7 @@ def test_what_fits_is_taken_and_one_sample_more_is_not() -> None:
 
 def test_a_clock_that_is_too_fine_is_refused_before_it_is_made_and_the_cure_helps() -> None:
     cell = load_cell(SHIPPED)
-    paths = [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks]
+    paths = [build_toolpath(task, cell.part) for task in cell.tasks]
 
     with pytest.raises(InputError) as caught:
         clock_paths(with_step(cell, 6.5e-6), paths)

@@ -10,8 +10,9 @@ from builders.roller_paths import clocked
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import pose, rotation_exp
-from cellplan.model.cell import Origin, Part
+from cellplan.model.cell import Part
 from cellplan.model.motion import Schedule
+from cellplan.model.origin import Origin
 from cellplan.model.task import (
     CirclePath,
     PathSpec,
@@ -54,13 +55,14 @@ def task(name: str, path: PathSpec, **words: Any) -> Task:
         "feed": None,
         "time_law": QUINTIC,
         "blend": None,
+        "origin": ORIGIN,
     }
     return Task(name=name, path=path, **(plain | words))
 
 
 def scheduled(*tasks: Task, duration: float | None = 4.0, step: float = 0.001) -> Schedule:
     cell = clocked(*tasks, duration=duration, step=step, origin=ORIGIN)
-    return schedule_tasks(cell, [build_toolpath(one, ROLLER, ORIGIN) for one in tasks])
+    return schedule_tasks(cell, [build_toolpath(one, ROLLER) for one in tasks])
 
 
 def on_roller(name: str = "a", path: PathSpec = CIRCLE, **words: Any) -> Task:
@@ -241,7 +243,7 @@ def test_a_task_too_short_to_be_judged_by_its_samples_is_refused(words: Any, got
     one = on_roller(**words)
 
     with pytest.raises(InputError) as caught:
-        clock_paths(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])
+        clock_paths(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER)])
 
     reported = str(caught.value)
     desired = "expected a task of at least 0.01 s (10 times motion.step_s), got "
@@ -252,4 +254,4 @@ def test_a_task_too_short_to_be_judged_by_its_samples_is_refused(words: Any, got
 def test_ten_steps_are_enough() -> None:
     one = on_roller(duration=0.01)
 
-    assert len(clock_paths(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER, ORIGIN)])) == 1
+    assert len(clock_paths(clocked(one, origin=ORIGIN), [build_toolpath(one, ROLLER)])) == 1

@@ -4,14 +4,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders.roller_paths import ROLLER, clocked, task_on
+from builders.roller_paths import ROLLER, clocked, sampled, task_on
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, rotation_exp, rotation_vector
-from cellplan.model.cell import Origin
 from cellplan.model.motion import TaskSchedule
+from cellplan.model.origin import Origin
 from cellplan.model.task import Task, TimedPath
-from cellplan.model.toolpath import Trajectory
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
 
@@ -53,7 +52,7 @@ def ellipse(samples: int = 41, **words: Any) -> TimedPath:
 
 
 def on_clock(task: Task, *, duration: float = 4.0, step: float = 0.01) -> TaskSchedule:
-    (one,) = schedule_tasks(clocked(task, duration=duration, step=step), [build_toolpath(task, ROLLER, ORIGIN)]).tasks
+    (one,) = schedule_tasks(clocked(task, duration=duration, step=step), [build_toolpath(task, ROLLER)]).tasks
     return one
 
 
@@ -84,8 +83,8 @@ def test_twists_are_the_derivatives_of_the_poses(kind: str) -> None:
         "fixed": {},
     }[kind]
     task = task_on(timed(t, points, **words), tool_axis=DOWN if kind == "fixed" else None)
-    path = build_toolpath(task, ROLLER, ORIGIN)
-    assert isinstance(path, Trajectory)
+    path = build_toolpath(task, ROLLER)
+    assert path.is_timed
     h = 1e-6
     u = np.linspace(h, path.duration - h, 300)
 
@@ -103,7 +102,7 @@ def test_a_trajectory_is_shifted_by_its_start_and_rests_before_and_after() -> No
     task = task_on(timed(t, np.outer(t, [0.3, 0.0, 0.0])), tool_axis=DOWN, start=0.5)
     other = task_on(ellipse(), tool_axis=DOWN, name="other")
     cell = clocked(task, other, step=0.01)
-    one = schedule_tasks(cell, [build_toolpath(task, ROLLER, ORIGIN), build_toolpath(other, ROLLER, ORIGIN)]).tasks[0]
+    one = schedule_tasks(cell, [build_toolpath(task, ROLLER), build_toolpath(other, ROLLER)]).tasks[0]
 
     assert one.end == pytest.approx(1.5, abs=1e-15)
     assert np.allclose(one.X_PT[[0, 50, 100, 150, 152], 0, 3], [0.0, 0.0, 0.15, 0.3, 0.3], atol=1e-14)
@@ -144,7 +143,7 @@ def test_length_is_that_of_the_curve() -> None:
     u = 2.0 * np.pi * np.arange(200) / 200  # the trapezoid rule converges geometrically on a periodic function
     exact = 2.0 * np.pi * float(np.hypot(a * np.sin(u), b * np.cos(u)).mean())
 
-    path = build_toolpath(task_on(ellipse(401), tool_axis=DOWN), ROLLER, ORIGIN)
+    path = build_toolpath(task_on(ellipse(401), tool_axis=DOWN), ROLLER)
 
     assert path.length == pytest.approx(exact, rel=1e-8)
 
@@ -152,7 +151,7 @@ def test_length_is_that_of_the_curve() -> None:
 def test_an_open_trajectory_is_not_repeated() -> None:
     t = np.linspace(0.0, 1.0, 11)
     with pytest.raises(InputError) as caught:
-        build_toolpath(task_on(timed(t, np.outer(t, [1, 0, 0])), tool_axis=DOWN, repeat=2), ROLLER, ORIGIN)
+        build_toolpath(task_on(timed(t, np.outer(t, [1, 0, 0])), tool_axis=DOWN, repeat=2, origin=ORIGIN), ROLLER)
 
     assert str(caught.value) == (
         "cell.yaml:12: tasks.ring.repeat: expected 1 for a path that does not end in the pose of its start, got 2; "
@@ -164,10 +163,21 @@ def test_a_trajectory_needs_ten_steps_and_some_time_to_be_judged() -> None:
     short, settling = task_on(ellipse(), tool_axis=DOWN), task_on(ellipse(), tool_axis=DOWN, settle=PERIOD)
     for task, step, key in ((short, 0.3, "path"), (settling, 0.01, "settle_s")):
         with pytest.raises(InputError, match=f"tasks.ring.{key}: expected a t"):
-            clock_paths(clocked(task, step=step), [build_toolpath(task, ROLLER, ORIGIN)])
+            clock_paths(clocked(task, step=step), [build_toolpath(task, ROLLER)])
 
 
 @pytest.mark.parametrize("times", [[0.1, 0.2], [0.0, 0.0], [0.0, np.nan], [0.0]])
 def test_times_that_do_not_go_on_are_refused_at_the_door(times: list[float]) -> None:
     with pytest.raises(ValueError, match=r"trajectory 'loop.csv': expected"):
         timed(np.array(times), np.zeros((len(times), 3)))
+
+
+def test_poses_are_spread_over_the_time_of_a_trajectory_and_over_the_length_of_a_path() -> None:
+    t = np.array([0.0, 0.1, 1.0])
+    uneven = timed(t, np.outer(t**2, [0.3, 0.0, 0.0]))
+    trajectory = build_toolpath(task_on(uneven, tool_axis=DOWN), ROLLER)
+    path = build_toolpath(task_on(sampled(uneven.points), tool_axis=DOWN), ROLLER)
+
+    assert np.array_equal(trajectory.spread(7), trajectory.at(np.linspace(0.0, 1.0, 7))[0])
+    assert np.allclose(path.spread(4)[:, 0, 3], [0.0, 0.1, 0.2, 0.3], atol=1e-12)
+    assert np.array_equal(trajectory.spread(1)[0], trajectory.X_PT_start)

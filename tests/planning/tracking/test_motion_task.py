@@ -81,14 +81,12 @@ def test_the_reference_of_a_closure_is_its_grasp_at_all_times_without_twist():
 def test_only_the_kept_components_of_a_closure_become_rows():
     cell = sharing(random_cell(43, operators=2), 2, axes=(0, 1, 5))
     q = np.random.default_rng(4).uniform(-1.5, 1.5, cell.joint_count)
-    problem = TrackingProblem(
-        MotionTask(cell, STILL, tuple(robot.name for robot in cell.robots), np.zeros(cell.joint_count))
-    )
+    motion = MotionTask(cell, STILL, tuple(robot.name for robot in cell.robots), np.zeros(cell.joint_count))
+    references = np.broadcast_to(relative_poses(cell, q), motion.references()[0].shape)
 
     with pytest.raises(DivergedError, match="from its grasp on the part"):
-        problem.first_order(0, q)
-    problem.desired[:] = relative_poses(cell, q)
-    tasks = problem.first_order(0, q)
+        TrackingProblem(motion).first_order(0, q)
+    tasks = TrackingProblem(motion, references=references).first_order(0, q)
 
     np.testing.assert_allclose(tasks.J, planners_jacobian(cell, q)[:, [0, 1, 5]].reshape(6, -1), atol=1e-12)
     assert np.abs(tasks.error).max() < 1e-12

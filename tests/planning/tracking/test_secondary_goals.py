@@ -56,7 +56,7 @@ def planar_pair() -> tuple[Cell, np.ndarray]:
 
 
 def planned(cell: Cell, start: np.ndarray) -> tuple[Schedule, Motion]:
-    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     return schedule, integrate_schedule(MotionTask(cell, schedule, names(cell), start))
 
 

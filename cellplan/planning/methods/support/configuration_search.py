@@ -1,4 +1,4 @@
-"""Posture search: from one configuration to one that reaches the tasks, pass by pass, within bounds."""
+"""Configuration search: from one configuration to one that reaches the tasks, pass by pass, within bounds."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -48,54 +48,57 @@ class ConfigurationSearch:
     The only singular situation ([Nicolato2007]_ 3.2.2) is an arm stretched out towards a goal on its own line: no joint
     alone can gain anything there. The configuration is then disturbed a little, always in the same way, and searched
     from again; the disturbance is forgotten if it led nowhere, as with a goal out of reach.
+
+    Attributes:
+        cost: The cost that is searched for its least value.
     """
 
-    def __init__(self, problem: TrackingProblem, improve: Callable[[SearchCost], Pass]) -> None:
-        """Take the tasks and the method's pass."""
+    def __init__(self, problem: TrackingProblem) -> None:
+        """Take the tasks and the settings of the search."""
         settings = problem.cell.solver.search
         self._problem = problem
-        self._cost = SearchCost(problem)
-        self._improve = improve(self._cost)
+        self.cost = SearchCost(problem)
         self._target = settings.tolerance**2
         self._rounds = settings.rounds
 
-    def advance(self, k: int, start: Array, bounds: Bounds, *, momentum: Array | None = None) -> Advance:
+    def advance(self, k: int, start: Array, bounds: Bounds, improve: Pass, *, momentum: Array | None = None) -> Advance:
         """Search for the configuration at the sample after k.
 
         Args:
             k: The sample.
             start: Configuration there, shape (nq,); it sets which joints may move and which way tools lean.
             bounds: Where the joints may go.
+            improve: The method's pass over the joints, on this cost.
             momentum: What the joints moved in the step before, shape (nq,): the search begins as far along it as
                 brings the tools nearest, at most as far as it went, if that costs less than the start.
 
         Returns:
             The best configuration found; its slack is the root of the cost that is left over the step.
         """
-        self._cost.aim(k + 1, start)
-        expansion = self._cost.expand(start)
+        self.cost.aim(k + 1, start)
+        expansion = self.cost.expand(start)
         if momentum is not None and expansion.cost > self._target:
             moved = expansion.q + _scaled(expansion, momentum) * self._problem.mobile(k)
-            expansion = cheaper(expansion, self._cost.expand(bounds.held(moved)))
-        expansion, used = self._repeat(expansion, bounds, self._rounds)
+            expansion = cheaper(expansion, self.cost.expand(bounds.held(moved)))
+        expansion, used = self._repeat(expansion, bounds, improve, self._rounds)
         if expansion.cost > self._target and used < self._rounds:
-            nudged = self._cost.expand(bounds.held(expansion.q + self._nudge(k)))
-            found, more = self._repeat(nudged, bounds, self._rounds - used)
+            nudged = self.cost.expand(bounds.held(expansion.q + self._nudge(k)))
+            found, more = self._repeat(nudged, bounds, improve, self._rounds - used)
             used += more
             expansion = found if found.cost < (1.0 - WORTH_IT) * expansion.cost else expansion
         left = np.sqrt(expansion.cost) / self._problem.step(k) if expansion.cost > self._target else 0.0
         return Advance(q=expansion.q, iterations=used, slack=float(left))
 
-    def _repeat(self, expansion: Expansion, bounds: Bounds, rounds: int) -> tuple[Expansion, int]:
+    def _repeat(self, expansion: Expansion, bounds: Bounds, improve: Pass, rounds: int) -> tuple[Expansion, int]:
         """Pass after pass; the best expansion and the rounds used."""
         used = 0
         ways: list[Array] = []
         while expansion.cost > self._target and used < rounds:
-            better, spent = self._improve(expansion, bounds, rounds - used)
+            better, spent = improve(expansion, bounds, rounds - used)
             used += spent
             if max(self._target, SLOW * expansion.cost) < better.cost < expansion.cost:
                 moves = np.stack([*ways, better.q - expansion.q], axis=1)
-                better = cheaper(better, self._cost.expand(bounds.held(better.q + _carried_on(better, moves))))
+                better = cheaper(better, self.cost.expand(bounds.held(better.q + _carried_on(better, moves))))
             ways = [*ways[1 - WAYS :], better.q - expansion.q]
             has_stalled = not better.cost < (1.0 - STALLED) * expansion.cost
             expansion = cheaper(expansion, better)

@@ -86,14 +86,14 @@ class FilteredMotion:
             DivergedError: No sub-step is short enough.
         """
         step, moves = self._problem.step(k), self._reach & (self._problem.mobile(k) > 0.0)
-        passed, looks = 0.0, 0  # shares of the step are binary fractions: they add up to 1 exactly
+        passed, evaluations = 0.0, 0  # shares of the step are binary fractions: they add up to 1 exactly
         while passed < 1.0:
             tasks = self._problem.first_order(k, q)
             xdot = tasks.twist + self._problem.gain * (tasks.error + passed * step * tasks.twist)
             share, speeds = self._sub_step(tasks, xdot, moves, longest=1.0 - passed, step=step)
             q = q + speeds * (share * step)
-            passed, looks = passed + share, looks + 1
-        return Advance(q=q, iterations=looks)
+            passed, evaluations = passed + share, evaluations + 1
+        return Advance(q=q, iterations=evaluations)
 
     def _sub_step(
         self, tasks: FirstOrder, xdot: Array, moves: Array, *, longest: float, step: float

@@ -1,27 +1,22 @@
-"""Timing: when each tool is where on its path, at any time, and at which times its motion is not smooth."""
+"""Clocked path: the desired motion of one tool at any time, and the times at which it is not smooth."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
-from cellplan.geometry.curves.arc_length import QuickParameters, quickly
+from cellplan.geometry.curves.arc_length import QuickParameters
 from cellplan.geometry.curves.curve import Interval
 from cellplan.geometry.transforms import Array, rotation_about
-from cellplan.model.cell import Cell
+from cellplan.model.approach_retract import stand_off
 from cellplan.model.task import INSTANT_ROOM, Task, TimeLawKind
-from cellplan.model.toolpath import TOOL_Z, Toolpath, Trajectory
-from cellplan.planning.timing.approach_retract import stand_off
-from cellplan.planning.timing.time_law import advance, peak_rate, reached_at
+from cellplan.model.time_law import advance, reached_at
+from cellplan.model.toolpath import TOOL_Z, Toolpath
 
-MOST_SAMPLES: Final = 2_000_000  # tables longer than this fill disks, not controllers
 SAME_PLACE: Final = 1e-12  # [-] of the whole length: knots nearer to a stop lie on it
-MOST_BREAKS: Final = (
-    2_000_000  # smooth stretches of a motion beyond which integration from one to the next takes too long
-)
+MOST_BREAKS: Final = 2_000_000  # smooth stretches of a motion; integration over more of them takes too long
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,7 +30,6 @@ class ClockedPath:
             start and stop of the time law. The cycles of a trajectory are its stretches.
         behind: Length in [m] behind each stop of one cycle, shape (pieces + 1,).
         quick: Way from lengths to parameters of the path for a few times at a time.
-        where: Place of the path in the cell file, for findings.
     """
 
     task: Task
@@ -43,7 +37,6 @@ class ClockedPath:
     corners: Array
     behind: Array
     quick: QuickParameters
-    where: str
 
     @property
     def start(self) -> float:
@@ -72,11 +65,11 @@ class ClockedPath:
         Raises:
             InputError: There are more than two million.
         """
-        knots = self._knots()
+        knots = self.toolpath.knots
         if self.task.repeat * len(knots) > MOST_BREAKS:
             raise InputError(
-                f"{self.where}: expected at most {MOST_BREAKS} knots of the path in all cycles, got {len(knots)} in "
-                f"each of {self.task.repeat}; repeat it less often, or write solver.integrator: euler"
+                f"{self.task.where('path')}: expected at most {MOST_BREAKS} knots of the path in all cycles, got "
+                f"{len(knots)} in each of {self.task.repeat}; repeat it less often, or write solver.integrator: euler"
             )
         return distinct(np.concatenate([self.jumps, self._instants(knots)]))
 
@@ -86,7 +79,7 @@ class ClockedPath:
         found = [self.corners, np.array([self.over])]
         if self.task.approach is not None:
             found.append(np.array([self.start - self.task.approach.duration]))
-        if self.task.time_law.kind is TimeLawKind.TRAPEZOID and not isinstance(self.toolpath, Trajectory):
+        if self.task.time_law.kind is TimeLawKind.TRAPEZOID and not self.toolpath.is_timed:
             ramp = self.task.time_law.ramp * np.diff(self.corners)
             found += [self.corners[:-1] + ramp, self.corners[1:] - ramp]
         return distinct(np.concatenate(found))
@@ -106,35 +99,41 @@ class ClockedPath:
         low, high = within
         inside = np.clip(times, low, high)
         middle = np.broadcast_to(np.asarray(0.5 * (low + high)), inside.shape)
-        if isinstance(self.toolpath, Trajectory):
+        if self.toolpath.is_timed:
             X_PT, V_PT_P = self.toolpath.at(self._own_times(inside, self.toolpath.duration)[1])
         else:
-            X_PT, V_PT_P, _ = self._by_time_law(inside, self.stretches(middle), quick=self.quick)
+            X_PT, V_PT_P, _ = self._by_time_law(inside, self._stretches(middle), quick=self.quick)
         V_PT_P[(middle < self.corners[0]) | (middle > self.corners[-1])] = 0.0
         stand_off(inside, self.task, X_PT, V_PT_P=V_PT_P, end=self.end)
         return X_PT, V_PT_P
 
-    def stretches(self, times: Array) -> NDArray[np.intp]:
-        """Number of the stretch that times in [s] fall into, shape (N,); the nearest before and after all."""
-        stretch = np.searchsorted(self.corners, times, side="right") - 1
-        return np.clip(stretch, 0, len(self.corners) - 2)
+    def poses(self, times: Array) -> Array:
+        """Reference poses X_PT with approach and retreat at times in [s], shape (M,), shape (M, 4, 4)."""
+        X_PT, V_PT_P, _ = self.targets(times)
+        stand_off(times, self.task, X_PT, V_PT_P=V_PT_P, end=self.end)
+        return X_PT
 
-    def targets(self, times: Array, stretch: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+    def targets(self, times: Array) -> tuple[Array, Array, Array]:
         """Poses, twists and lengths behind the tool while it follows its path, without approach and retreat.
 
         Args:
-            times: Times in [s], shape (N,); beyond its stretch the nearer end is taken.
-            stretch: Stretch that each belongs to, shape (N,): it says which side counts at a corner.
+            times: Times in [s], shape (N,); before and after the path its nearer end is taken, at a corner the later
+                side.
 
         Returns:
             Poses X_PT, shape (N, 4, 4), twists V_PT_P, shape (N, 6), and lengths in [m] that grow from cycle to cycle,
             shape (N,).
         """
         path = self.toolpath
-        if isinstance(path, Trajectory):
+        if path.is_timed:
             cycle, t = self._own_times(times, path.duration)
             return *path.at(t), cycle * path.length + path.arc.lengths(t)
-        return self._by_time_law(times, stretch)
+        return self._by_time_law(times, self._stretches(times + INSTANT_ROOM))
+
+    def _stretches(self, times: Array) -> NDArray[np.intp]:
+        """Number of the stretch that times in [s] fall into, shape (N,); the nearest before and after all."""
+        stretch = np.searchsorted(self.corners, times, side="right") - 1
+        return np.clip(stretch, 0, len(self.corners) - 2)
 
     def _own_times(self, times: Array, period: float) -> tuple[Array, Array]:
         """Cycles of a trajectory and times within them, shape (N,); it passes from one to the next smoothly."""
@@ -146,7 +145,7 @@ class ClockedPath:
     def _by_time_law(
         self, times: Array, stretch: NDArray[np.intp], *, quick: QuickParameters | None = None
     ) -> tuple[Array, Array, Array]:
-        """See `targets`, where each stretch takes its own start and stop of the time law."""
+        """See `targets`; the stretch says which side counts at a corner."""
         task, toolpath, behind = self.task, self.toolpath, self.behind
         begin, duration = self.corners[stretch], self.corners[stretch + 1] - self.corners[stretch]
         elapsed = np.clip(times - begin, 0.0, duration)
@@ -168,17 +167,11 @@ class ClockedPath:
             X_PT[:, :3, :3] = X_PT[:, :3, :3] @ rotation_about(TOOL_Z, cycle * toolpath.turn)
         return X_PT, twists * (law.rate * length / duration)[:, None], cycle * behind[-1] + s
 
-    def _knots(self) -> Array:
-        """Parameters of the path at which its tip or its orientation is joined, the ends included, shape (K,)."""
-        path = self.toolpath
-        knots: Array = np.unique(np.concatenate([path.tip.knots, path.orientation.knots, path.stops]))
-        return knots[(knots >= path.stops[0]) & (knots <= path.stops[-1])]
-
     def _instants(self, knots: Array) -> Array:
         """Times in [s] at which the path passes its knots, of all cycles, shape (N,)."""
         path, law = self.toolpath, self.task.time_law
         cycles = np.arange(self.task.repeat)[:, None]
-        if isinstance(path, Trajectory):
+        if path.is_timed:
             return (self.corners[:-1, None] + knots).ravel()
         pieces = len(self.behind) - 1
         s = path.arc.lengths(knots)
@@ -194,101 +187,7 @@ class ClockedPath:
         return (self.corners[stretch] + np.diff(self.corners)[stretch] * tau).ravel()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TimedTasks:
-    """All tasks on the common clock, before they are sampled.
-
-    Attributes:
-        times: Times of the clock in [s], evenly spaced from 0, shape (N,).
-        paths: The paths of the tasks that are worked on.
-        extra_breaks: Further times in [s] that count as jumps: ends of panels where errors were too large, shape (K,).
-    """
-
-    times: Array
-    paths: tuple[ClockedPath, ...]
-    extra_breaks: Array = field(default_factory=lambda: np.zeros(0))
-
-    @property
-    def breaks(self) -> Array:
-        """Times in [s], from zero to the end of the clock, between which the motion of all tools is smooth."""
-        return self._within([path.breaks for path in self.paths])
-
-    @property
-    def jumps(self) -> Array:
-        """Those of them that do not come from knots of the paths, which join pieces smoothly."""
-        return self._within([path.jumps for path in self.paths])
-
-    def poses(self, times: Array) -> tuple[Array, ...]:
-        """Reference poses X_PT of all tasks at times in [s], shape (M,), shape (M, 4, 4) each."""
-        found = []
-        for path in self.paths:
-            X_PT, V_PT_P, _ = path.targets(times, path.stretches(times + INSTANT_ROOM))
-            stand_off(times, path.task, X_PT, V_PT_P=V_PT_P, end=path.end)
-            found.append(X_PT)
-        return tuple(found)
-
-    def _within(self, found: Sequence[Array]) -> Array:
-        """Times of all paths within the clock, and its ends."""
-        end = float(self.times[-1])
-        every = np.concatenate([self.extra_breaks, *found])
-        inner = distinct(every[(every > INSTANT_ROOM) & (every < end - INSTANT_ROOM)])
-        return np.concatenate([[0.0], inner, [end]])
-
-
-def distinct(sample_times: Array) -> Array:
+def distinct(times: Array) -> Array:
     """Times in increasing order, one for those that are nearer to each other than rounding, shape (n,)."""
-    ordered = np.sort(sample_times)
+    ordered = np.sort(times)
     return ordered[np.diff(ordered, prepend=-np.inf) > INSTANT_ROOM]
-
-
-def clock_path(cell: Cell, task: Task, toolpath: Toolpath) -> ClockedPath:
-    """Put a toolpath on the common clock.
-
-    Raises:
-        InputError: The task has no time left, or more stops than anybody counts.
-    """
-    return ClockedPath(
-        task=task,
-        toolpath=toolpath,
-        corners=_corner_times(cell, task, toolpath),
-        behind=toolpath.behind,
-        quick=quickly(toolpath.arc),
-        where=cell.origin.at(f"tasks.{task.name}.path"),
-    )
-
-
-def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
-    """Times in [s] at which the stretches of a path begin, and the one at which the last ends."""
-    if isinstance(toolpath, Trajectory):
-        return task.start + toolpath.duration * np.arange(task.repeat + 1.0)
-    behind = _stops(cell, task, toolpath)
-    if task.feed is not None:
-        return task.start + peak_rate(task.time_law) / task.feed * behind
-    duration = task.time_for_path(cell.motion.duration)
-    if duration is None:
-        raise InputError(
-            f"{cell.origin.at(f'tasks.{task.name}')}: missing duration_s: expected duration_s or feed_mm_s, as "
-            "motion.duration_s is not given either"
-        )
-    if not duration > 0.0:
-        raise InputError(
-            f"{cell.origin.at(f'tasks.{task.name}.start_s')}: expected a start before the end of the clock at "
-            f"{cell.motion.duration:g} s, got {task.start:g}; make motion.duration_s longer"
-        )
-    return task.start + duration * (behind / behind[-1])
-
-
-def _stops(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
-    """Length in [m] behind each stop of all cycles, from zero to the whole way."""
-    if task.repeat == 1:
-        return toolpath.behind
-    if toolpath.runs_on:
-        return np.array([0.0, task.repeat * toolpath.length])
-    behind = toolpath.behind
-    if task.repeat * len(behind) > MOST_SAMPLES:
-        raise InputError(
-            f"{cell.origin.at(f'tasks.{task.name}.repeat')}: expected at most {MOST_SAMPLES // len(behind)} cycles of "
-            f"a path with {len(behind) - 1} stops, got {task.repeat}"
-        )
-    cycles = np.arange(task.repeat)[:, None] * toolpath.length
-    return np.append((cycles + behind[:-1]).ravel(), task.repeat * toolpath.length)

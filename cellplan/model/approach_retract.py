@@ -4,7 +4,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.task import Task, TimeLaw, TimeLawKind
-from cellplan.planning.timing.time_law import advance
+from cellplan.model.time_law import advance
 
 REST_TO_REST = TimeLaw(kind=TimeLawKind.QUINTIC)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cellplan.model.task import TimeLaw, TimeLawKind
-from cellplan.planning.timing.time_law import advance, peak_rate
+from cellplan.model.time_law import advance, peak_rate
 
 LAWS = [
     TimeLaw(kind=TimeLawKind.CONSTANT),

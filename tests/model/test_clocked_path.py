@@ -27,12 +27,12 @@ from cellplan.errors import InputError
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import Array, rotation_exp, rotation_vector
-from cellplan.model.cell import Cell, Part
+from cellplan.model.cell import Part
+from cellplan.model.clocked_path import ClockedPath, distinct
+from cellplan.model.motion import Schedule
 from cellplan.model.task import INSTANT_ROOM, SpacePolylinePath, StraightMove, Task, TimedPath, TimeLaw, TimeLawKind
-from cellplan.model.toolpath import Toolpath
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.schedule import sample, time_tasks
-from cellplan.planning.timing.timed_path import ClockedPath, TimedTasks, clock_path, distinct
+from cellplan.planning.timing.schedule import clock_path, schedule_tasks
 
 DEGREE = 16
 SMOOTH = 2e-13  # [m], [rad] the arc length is known to about twelve digits
@@ -95,17 +95,13 @@ CASES = {
 }
 
 
-def on_clock(cell: Cell, toolpaths: list[Toolpath]) -> TimedTasks:
-    return time_tasks(cell, [clock_path(cell, cell.task(each.name), each) for each in toolpaths])
-
-
-def clock(task: Task, part: Part = ROLLER, *, step: float = 0.01) -> TimedTasks:
+def clock(task: Task, part: Part = ROLLER, *, step: float = 0.01) -> Schedule:
     task = replace(task, duration=task.time_for_path(5.0))
-    return on_clock(clocked(task, duration=None, step=step), [build_toolpath(task, part, clocked().origin)])
+    return schedule_tasks(clocked(task, duration=None, step=step), [build_toolpath(task, part)])
 
 
 @cache
-def case(name: str) -> TimedTasks:
+def case(name: str) -> Schedule:
     return clock(*CASES[name])
 
 
@@ -156,7 +152,7 @@ def tails(coefficients: Array) -> Array:
 @pytest.mark.parametrize("name", CASES)
 def test_at_the_instants_of_the_clock_it_is_the_schedule(name: str) -> None:
     tasks = case(name)
-    (path,), (one,) = tasks.paths, sample(tasks).tasks
+    (path,), (one,) = tasks.paths, tasks.tasks
 
     X, V = path.at(tasks.times, around(tasks.breaks, tasks.times))
 
@@ -275,7 +271,7 @@ def test_breaks_of_all_tasks_are_joined_within_the_clock() -> None:
     first = task_on(ELL, tool_axis=-EZ, name="first", start=1.0, duration=1.0, **MOVES)
     second = task_on(circle(), project=EZ, name="second", start=0.0, duration=2.0000000001)
     cell = clocked(first, second, duration=None, step=0.35)
-    tasks = on_clock(cell, [build_toolpath(task, ROLLER, cell.origin) for task in (first, second)])
+    tasks = schedule_tasks(cell, [build_toolpath(task, ROLLER) for task in (first, second)])
 
     assert tasks.times[-1] == pytest.approx(2.45)
     inner = tasks.paths[0].corners[1:3]
@@ -284,7 +280,7 @@ def test_breaks_of_all_tasks_are_joined_within_the_clock() -> None:
 
 
 def test_without_tasks_the_clock_is_one_interval() -> None:
-    assert time_tasks(clocked(duration=2.0), []).breaks.tolist() == [0.0, 2.0]
+    assert schedule_tasks(clocked(duration=2.0), []).breaks.tolist() == [0.0, 2.0]
 
 
 def test_instants_nearer_than_rounding_are_one() -> None:
@@ -293,7 +289,8 @@ def test_instants_nearer_than_rounding_are_one() -> None:
 
 def test_knots_that_nobody_counts_are_refused() -> None:
     task = task_on(sampled(RING[:-1], is_smooth=True, is_closed=True), tool_axis=-EZ, repeat=200_000)
-    (path,) = clock(replace(task, duration=1e3), step=1e-3).paths
+    task = replace(task, duration=1e3)
+    path = clock_path(clocked(task), task, build_toolpath(task, ROLLER))
 
     with pytest.raises(InputError) as caught:
         _ = path.breaks
@@ -309,11 +306,11 @@ def test_jumps_are_the_breaks_that_no_knot_of_the_path_makes() -> None:
     for name in ("circle on a mesh", "smooth file"):
         task, part = PATHS[name]
         cell = replace(clocked(task, duration=2.0), part=part)
-        timed_tasks = on_clock(cell, [build_toolpath(task, part, cell.origin)])
+        timed_tasks = schedule_tasks(cell, [build_toolpath(task, part)])
         assert timed_tasks.jumps.tolist() == [0.0, 2.0]
         assert len(timed_tasks.breaks) > 5
     task = replace(ON_ROLLER["rectangle"], time_law=LAWS["trapezoid"], **MOVES)
     cell = clocked(replace(task, start=0.3), duration=4.0)
-    timed_tasks = on_clock(cell, [build_toolpath(cell.tasks[0], ROLLER, cell.origin)])
+    timed_tasks = schedule_tasks(cell, [build_toolpath(cell.tasks[0], ROLLER)])
     assert set(timed_tasks.jumps) <= set(timed_tasks.breaks)
     assert np.array_equal(timed_tasks.jumps, timed_tasks.breaks)  # its sides meet at stops
