@@ -23,7 +23,8 @@ from cellplan.io.schema.task import (
     ToleranceEntry,
     TrapezoidEntry,
 )
-from cellplan.io.shapes import MM, MeshReader, centred_solid, obstacle_shape, pose_from_entry, tool_solid
+from cellplan.io.schema.units import Mm, in_si, si_or_none
+from cellplan.io.shapes import MeshReader, centred_solid, obstacle_shape, pose_from_entry, tool_solid
 from cellplan.model.cell import (
     CheckSettings,
     Exclusion,
@@ -97,12 +98,12 @@ def _tool(entry: ToolEntry, read_mesh: MeshReader) -> Tool:
         Body(name="tool" if number == 1 else f"tool_{number}", link=BASE, shape=solid, X_BS=X_FS)
         for number, (solid, X_FS) in enumerate(placed, start=1)
     ]
-    return Tool(X_FT=X_FT, bodies=tuple(bodies), mass=entry.mass_kg, centre=_centre(entry.centre_mm))
-
-
-def _centre(centre_mm: tuple[float, float, float] | None) -> Array | None:
-    """A centre of mass in [m]."""
-    return None if centre_mm is None else np.divide(centre_mm, MM)
+    return Tool(
+        X_FT=X_FT,
+        bodies=tuple(bodies),
+        mass=entry.mass_kg,
+        centre=None if entry.centre_mm is None else in_si(entry.centre_mm),
+    )
 
 
 def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
@@ -116,13 +117,13 @@ def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
                 robot=grasp.robot,
                 X_PT=pose_from_entry(grasp.at),
                 axes=_axis_numbers(grasp.axes),
-                depth=grasp.depth_mm / MM,
+                depth=grasp.depth_mm.si,
             )
             for grasp in entry.held_by
         ),
         X_WP=None if entry.at is None else pose_from_entry(entry.at),
         mass=entry.mass_kg,
-        centre=_centre(entry.centre_mm),
+        centre=None if entry.centre_mm is None else in_si(entry.centre_mm),
     )
 
 
@@ -144,30 +145,30 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader) ->
         robot=entry.robot,
         path=path,
         project=None if entry.path.project is None else direction(entry.path.project),
-        plane_offset=(entry.path.offset_mm or 0.0) / MM,
+        plane_offset=(entry.path.offset_mm or Mm(0.0)).si,
         tool_axis=None if tool_axis is None else direction(tool_axis),
         tool_x=direction(tool_x),
-        turn=float(np.deg2rad(entry.tool_turn_deg)),
+        turn=entry.tool_turn_deg.si,
         axes=_axis_numbers(entry.axes),
         is_spin_free="spin" in entry.free,
         tolerance=_tolerance(entry.tolerance),
         start=entry.begins_s,
         duration=entry.duration_s,
-        feed=None if entry.feed_mm_s is None else entry.feed_mm_s / MM,
+        feed=si_or_none(entry.feed_mm_s),
         time_law=_time_law(law),
-        blend=corners.blend_mm / MM if isinstance(corners, BlendEntry) else None,
+        blend=corners.blend_mm.si if isinstance(corners, BlendEntry) else None,
         settle=entry.settle_s,
         repeat=entry.repeat,
         approach=_straight_move(entry.approach_mm, entry.approach_s),
         retract=_straight_move(entry.retract_mm, entry.retract_s),
         relative_to=Frame(entry.relative_to),
-        tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm) / MM,
+        tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm).si,
     )
 
 
-def _straight_move(distance_mm: float, duration: float) -> StraightMove | None:
+def _straight_move(distance: Mm, duration: float) -> StraightMove | None:
     """An approach or a retreat; none over no distance."""
-    return StraightMove(distance=distance_mm / MM, duration=duration) if distance_mm else None
+    return StraightMove(distance=distance.si, duration=duration) if distance else None
 
 
 def _axis_numbers(words: Sequence[str]) -> tuple[int, ...]:
@@ -208,10 +209,10 @@ def direction(written: Direction) -> Array:
 def _tolerance(entry: ToleranceEntry) -> Tolerance:
     """Allowed tool errors in [m] and [rad]."""
     return Tolerance(
-        position=entry.position_mm / MM,
-        orientation=float(np.deg2rad(entry.orientation_deg)),
-        position_between=(entry.between_rows_mm or entry.position_mm) / MM,
-        orientation_between=float(np.deg2rad(entry.between_rows_deg or entry.orientation_deg)),
+        position=entry.position_mm.si,
+        orientation=entry.orientation_deg.si,
+        position_between=(entry.between_rows_mm or entry.position_mm).si,
+        orientation_between=(entry.between_rows_deg or entry.orientation_deg).si,
     )
 
 
@@ -265,8 +266,8 @@ def _circle(entry: CircleEntry) -> CirclePath:
     size = float(np.hypot(*toward))
     return CirclePath(
         plane=PlaneName(entry.plane),
-        center=(u / MM, v / MM),
-        radius=entry.radius_mm / MM,
+        center=(u.si, v.si),
+        radius=entry.radius_mm.si,
         start=(toward[0] / size, toward[1] / size),
         direction=RunDirection(entry.direction),
     )
@@ -279,12 +280,12 @@ def _polygon(
     start = tuple(int(np.sign(part)) for part in start_direction(entry.start_at, entry.plane))
     first = signs.index((start[0], start[1]))
     signs = (*signs[first:], *signs[:first])
-    angle = np.deg2rad(entry.angle_deg)
+    angle = entry.angle_deg.si
     R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     corners = np.array(signs) * (0.5 * np.array(extents_mm)) @ R.T + np.array(entry.center_mm)
     return PolygonPath(
         plane=PlaneName(entry.plane),
-        corners=tuple((float(u) / MM, float(v) / MM) for u, v in corners),
+        corners=tuple((Mm(u).si, Mm(v).si) for u, v in corners),
         is_closed=True,
         direction=RunDirection(entry.direction),
     )
@@ -292,7 +293,7 @@ def _polygon(
 
 def _polyline(entry: PolylineEntry) -> PathSpec:
     """Points in a plane or in space."""
-    points = [tuple(value / MM for value in point) for point in entry.points_mm]
+    points = [tuple(value.si for value in point) for point in entry.points_mm]
     if entry.plane is None:
         return SpacePolylinePath(points=tuple((x, y, z) for x, y, z in points), is_closed=entry.closed)
     return PolygonPath(plane=PlaneName(entry.plane), corners=tuple((u, v) for u, v in points), is_closed=entry.closed)
@@ -319,12 +320,12 @@ def build_motion(entry: MotionEntry) -> MotionSettings:
 def build_checks(entry: ChecksEntry) -> CheckSettings:
     """Requirements of the checks."""
     return CheckSettings(
-        clearance=entry.clearance_mm / MM,
+        clearance=entry.clearance_mm.si,
         adds_accuracy=entry.body_accuracy == "add",
-        contact_zone=entry.contact_zone_mm / MM,
+        contact_zone=entry.contact_zone_mm.si,
         exclusions=tuple(Exclusion(bodies=pair.bodies, reason=pair.reason) for pair in entry.exclude),
-        closure_position=entry.closure_mm / MM,
-        closure_orientation=float(np.deg2rad(entry.closure_deg)),
-        standing_depth=entry.standing_depth_mm / MM,
+        closure_position=entry.closure_mm.si,
+        closure_orientation=entry.closure_deg.si,
+        standing_depth=entry.standing_depth_mm.si,
         part_acceleration=entry.part_acceleration_m_s2,
     )

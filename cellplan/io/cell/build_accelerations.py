@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 from cellplan.io.input.findings import Finding, KeyPath, key_text, listed
 from cellplan.io.schema.acceleration import AccelerationChoice, AccelerationRuleEntry
@@ -13,8 +13,6 @@ from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.acceleration import USUAL_ACCELERATION, AccelerationRule
 from cellplan.model.cell import Robot
 from cellplan.model.robot import RobotModel
-
-MS: Final = 1000.0  # [ms/s]
 
 
 def acceleration_rule(entry: RobotEntry, cell: AccelerationChoice | None, *, joints: int) -> AccelerationRule:
@@ -38,7 +36,7 @@ def _chosen(choice: AccelerationChoice | None) -> AccelerationRule:
 def controller_cycle(entry: RobotEntry, document: CellDocument) -> float:
     """Cycle of a robot's controller in [s]."""
     own = entry.controller_cycle_ms
-    return (document.motion.controller_cycle_ms if own is None else own) / MS
+    return (document.motion.controller_cycle_ms if own is None else own).si
 
 
 def written_rule(robot: Robot) -> Any:

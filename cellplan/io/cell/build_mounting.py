@@ -4,12 +4,13 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
-from cellplan.io.input.findings import Finding, did_you_mean, listed, shown
+from cellplan.io.input.findings import Finding, listed, unknown_name
 from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
 from cellplan.io.schema.partial import Pieces
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry
-from cellplan.io.shapes import MM, MeshReader, centred_solid, pose_from_entry
+from cellplan.io.schema.units import Mm
+from cellplan.io.shapes import MeshReader, centred_solid, pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.mounting import Pedestal
 from cellplan.model.robot import Body, RobotModel
@@ -25,16 +26,16 @@ def build_pedestal(entry: RobotEntry, environment: Mapping[str, ObstacleEntry]) 
     if pedestal is None:
         return None
     floor = floor_height_mm(entry, environment)
-    size = None if pedestal.box is None else (pedestal.box.size_mm[0] / MM, pedestal.box.size_mm[1] / MM)
+    size = None if pedestal.box is None else (pedestal.box.size_mm[0].si, pedestal.box.size_mm[1].si)
     return Pedestal(
-        radius=None if pedestal.cylinder is None else pedestal.cylinder.radius_mm / MM,
+        radius=None if pedestal.cylinder is None else pedestal.cylinder.radius_mm.si,
         size=size,
-        floor=(floor or 0.0) / MM,
+        floor=(floor or Mm(0.0)).si,
     )
 
 
-def floor_height_mm(entry: RobotEntry, environment: Mapping[str, ObstacleEntry]) -> float | None:
-    """Height in [mm] of the floor that a pedestal stands on: as stated, or the highest plane not above the base."""
+def floor_height_mm(entry: RobotEntry, environment: Mapping[str, ObstacleEntry]) -> Mm | None:
+    """Height of the floor that a pedestal stands on: as stated, or the highest plane not above the base."""
     if entry.pedestal is not None and entry.pedestal.floor_z_mm is not None:
         return entry.pedestal.floor_z_mm
     planes = [thing.plane.z_mm for thing in environment.values() if thing.plane is not None]
@@ -92,8 +93,7 @@ def _attachment_findings(name: str, entry: RobotEntry, model: RobotModel, docume
     for index, attachment in enumerate(entry.attachments):
         path = ("robots", name, "attachments", index)
         if attachment.link not in links:
-            hint = did_you_mean(attachment.link, links)
-            text = f"expected a link of the robot ({listed(links)}), got {shown(attachment.link)}{hint}"
+            text = unknown_name("a link of the robot", attachment.link, links)
             yield document.finding((*path, "link"), text)
         own = attachment.name
         if own is None:

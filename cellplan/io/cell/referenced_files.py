@@ -6,8 +6,6 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from functools import partial
 from pathlib import Path, PurePosixPath
 
-import numpy as np
-
 from cellplan.cache import as_here
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.load import read_mesh
@@ -23,6 +21,7 @@ from cellplan.io.robots.rules import limits_in_si, tightened
 from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot, load_urdf
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import CsvEntry
+from cellplan.io.schema.units import Deg, Mm
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import SampledPath, TimedPath
@@ -221,4 +220,4 @@ def _locked_in_si(entry: RobotEntry) -> Iterator[tuple[str, float]]:
     """Positions of locked joints in [rad] or [m], by joint name."""
     for key, value in entry.locked.items():
         joint, _, unit = key.rpartition("_")
-        yield joint, float(np.deg2rad(value)) if unit == "deg" else value / 1000.0
+        yield joint, Deg(value).si if unit == "deg" else Mm(value).si

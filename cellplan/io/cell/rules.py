@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from cellplan.io.cell.solver_rules import accurate_findings, feedback_findings
-from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown
+from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, unknown_name
 from cellplan.io.schema.partial import Pieces
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
@@ -106,8 +106,7 @@ def _known_robot(robot: str, pieces: Pieces, document: YamlDocument, path: KeyPa
     """A robot that the cell has."""
     known = pieces.names["robots"]
     if robot not in known:
-        hint = did_you_mean(robot, known)
-        yield document.finding(path, f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{hint}")
+        yield document.finding(path, unknown_name("a robot of this cell", robot, known))
 
 
 def _times(pieces: Pieces, document: YamlDocument, name: str) -> Iterator[Finding]:
@@ -157,10 +156,6 @@ def _layout(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
             text = f"expected ROBOT.base, ROBOT.start_deg or ROBOT.start{did_you_mean(what, ANGLE_RANGES)}"
             yield document.key_finding(path, text)
         elif robot not in pieces.names["robots"]:
-            known = pieces.names["robots"]
-            hint = did_you_mean(robot, known)
-            yield document.key_finding(
-                path, f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{hint}"
-            )
+            yield document.key_finding(path, unknown_name("a robot of this cell", robot, pieces.names["robots"]))
         elif (what == "base") == (value is True):
             yield document.finding(path, "expected ranges for a base and true for a start posture")

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown
-from cellplan.io.robots.rules import start_keys
+from cellplan.io.input.findings import Finding, KeyPath, listed, shown, unknown_name
+from cellplan.io.robots.rules import configuration_findings
 from cellplan.io.schema.partial import Pieces
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.yaml.reader import YamlDocument
@@ -100,12 +100,10 @@ def _joint(
     """A named joint is one of the cell."""
     known = pieces.names["robots"]
     if robot not in known:
-        text = f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{did_you_mean(robot, known)}"
-        yield document.finding((*path, "robot"), text)
+        yield document.finding((*path, "robot"), unknown_name("a robot of this cell", robot, known))
     elif robot in models and joint not in models[robot].joint_names:
         names = models[robot].joint_names
-        text = f"expected a joint of '{robot}' ({listed(names)}), got {shown(joint)}{did_you_mean(joint, names)}"
-        yield document.finding((*path, "joint"), text)
+        yield document.finding((*path, "joint"), unknown_name(f"a joint of '{robot}'", joint, names))
 
 
 def _configurations(
@@ -117,16 +115,6 @@ def _configurations(
         path = ("solver", "secondary", "posture", "at", robot)
         known = pieces.names["robots"]
         if robot not in known:
-            text = f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{did_you_mean(robot, known)}"
-            yield document.key_finding(path, text)
-            continue
-        if robot not in models:
-            continue
-        keys = start_keys(models[robot])
-        for key in given:
-            if key not in keys:
-                text = f"unknown key{did_you_mean(key, keys)}; allowed: {listed(keys)}"
-                yield document.key_finding((*path, key), text)
-        missing = [key for key in keys if key not in given]
-        if missing:
-            yield document.finding(path, f"missing, expected one value per joint: add {listed(missing)}")
+            yield document.key_finding(path, unknown_name("a robot of this cell", robot, known))
+        elif robot in models:
+            yield from configuration_findings(path, given, models[robot], document)

@@ -73,6 +73,12 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f", did you mean '{near[0]}'?" if near else ""
 
 
+def unknown_name(what: str, name: object, known: Iterable[str]) -> str:
+    """Text of a finding about a name that does not exist: ``expected a robot of this cell (kuka, abb), got 'kuke'``."""
+    known = tuple(known)
+    return f"expected {what} ({listed(known)}), got {shown(name)}{did_you_mean(str(name), known)}"
+
+
 def listed(words: Iterable[str]) -> str:
     """Label joined by commas, or ``none``; of very many only the first."""
     words = list(words)

@@ -4,14 +4,24 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from cellplan.io.schema.common import Angle, Entry, PlaneCoordinates, SignedAxis, Size, by_kind, rule
+from cellplan.io.schema.common import (
+    ORIGIN,
+    SHORTEST_DIRECTION,
+    Angle,
+    Component,
+    Entry,
+    PlaneCoordinates,
+    SignedAxis,
+    Size,
+    by_kind,
+    rule,
+)
+from cellplan.io.schema.units import Deg
 
 PlaneWord = Literal["xy", "yz", "xz"]
-Component = Annotated[float, Field(ge=-1e6, le=1e6)]
 PlaneDirection = tuple[Component, Component]
 
 START_WORDS: Final = "+x, -x, +y, -y, +z, -z or a direction [u, v] on the plane's axes"
-SHORTEST_START: Final = 1e-6  # [-] a shorter vector has no direction
 
 StartChoice = Annotated[
     Annotated[SignedAxis, Tag(f"<{START_WORDS}>")] | Annotated[PlaneDirection, Tag("<list>")],
@@ -23,7 +33,7 @@ class ClosedShapeEntry(Entry):
     """What all closed shapes share: a plane, a centre, and the way round."""
 
     plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field(default=(0.0, 0.0), description="Centre on the plane's two axes.")
+    center_mm: PlaneCoordinates = Field(default=ORIGIN[:2], description="Centre on the plane's two axes.")
     direction: Literal["counterclockwise", "clockwise"] = Field(
         default="counterclockwise",
         description="Way round, seen from outside the surface: from the side that the path is projected from; for a "
@@ -52,7 +62,7 @@ class RectangleEntry(ClosedShapeEntry):
     """A rectangle."""
 
     sides_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
-    angle_deg: Angle = Field(default=0.0, description="Turn in the plane, from the first axis towards the second.")
+    angle_deg: Angle = Field(default=Deg(0.0), description="Turn in the plane, from the first axis towards the second.")
     start_at: PlaneDirection = Field(
         default=(1.0, 1.0),
         description="Corner of the start by the signs of its place before the rectangle is turned: [1, 1], [-1, 1], "
@@ -72,7 +82,7 @@ class RhombusEntry(ClosedShapeEntry):
     """A rhombus."""
 
     diagonals_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
-    angle_deg: Angle = Field(default=0.0, description="Turn in the plane, from the first axis towards the second.")
+    angle_deg: Angle = Field(default=Deg(0.0), description="Turn in the plane, from the first axis towards the second.")
     start_at: StartChoice = Field(
         default=(1.0, 0.0),
         description="Corner of the start before the rhombus is turned: an axis of the plane, or [u, v] along one of "
@@ -91,7 +101,7 @@ class RhombusEntry(ClosedShapeEntry):
 def start_direction(written: str | PlaneDirection, plane: str) -> PlaneDirection:
     """Components on the plane's axes of a start that is written as an axis or as a direction."""
     if not isinstance(written, str):
-        if max(abs(written[0]), abs(written[1])) < SHORTEST_START:
+        if max(abs(written[0]), abs(written[1])) < SHORTEST_DIRECTION:
             raise rule("expected a direction that is not zero, got a vector of no length", "start_at")
         return written
     if written[1] not in plane:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, Tag, ValidationError
 from cellplan.io.input.findings import Finding, KeyPath
 from cellplan.io.schema.common import Entry
 from cellplan.io.schema.mismatch import Kind, Mismatch, mismatch_text
+from cellplan.io.schema.units import Quantity
 from cellplan.io.yaml.reader import YamlDocument
 
 UNITS: Final[Mapping[str, str]] = {
@@ -189,14 +190,14 @@ def fields_of(annotation: Any) -> Mapping[str, Any]:
 
 
 def _bare(annotation: Any) -> Any:
-    """Annotation without metadata and without "or nothing"."""
+    """Annotation without metadata, without "or nothing" and without the unit of a number."""
     while True:
         if get_origin(annotation) is Annotated:
             annotation = get_args(annotation)[0]
             continue
         arms = [arm for arm in _arms(annotation) if arm is not NoneType]
         if len(arms) != 1 or arms[0] is annotation:
-            return annotation
+            return float if isinstance(annotation, type) and issubclass(annotation, Quantity) else annotation
         annotation = arms[0]
 
 
