@@ -192,10 +192,10 @@ def _read_meshes(pieces: Pieces, sources: Sources) -> None:
         shapes += [((*place, "geometry"), robot.tool.geometry)] if robot.tool.geometry is not None else []
     part = pieces.part.geometry if pieces.part is not None else None
     if part is not None and part.mesh is not None and part.unit is not None:
-        sources.mesh(part.mesh, part.unit, ("part", "geometry", "mesh"), demand=require_solid)
+        sources.mesh(part.mesh, part.unit, ("part", "geometry", "mesh"), requirement=require_solid)
     for path, shape in shapes:
         if shape.mesh is not None and shape.unit is not None:
-            sources.mesh(shape.mesh, shape.unit, (*path, "mesh"), demand=None if shape.open else require_enclosing)
+            sources.mesh(shape.mesh, shape.unit, (*path, "mesh"), requirement=None if shape.open else require_enclosing)
 
 
 def _cell(

@@ -50,15 +50,15 @@ class Sources:
         self.errors: list[InputError] = []
 
     def mesh(
-        self, written: str, unit: str, path: KeyPath, *, demand: Callable[[Mesh], None] | None = None
+        self, written: str, unit: str, path: KeyPath, *, requirement: Callable[[Mesh], None] | None = None
     ) -> Mesh | None:
         """Mesh in [m] that meets a requirement, which raises an input error otherwise; None after a finding."""
         if (written, unit) not in self._meshes:
             self._meshes[written, unit] = self._read_mesh(written, unit, path)
         mesh = self._meshes[written, unit]
         try:
-            if mesh is not None and demand is not None:
-                demand(mesh)
+            if mesh is not None and requirement is not None:
+                requirement(mesh)
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))
             return None
@@ -94,7 +94,7 @@ class Sources:
         return None if findings else model
 
     def look_for_model(self, name: str, written: str) -> None:
-        """Complain about a model that does not exist, for a robot that is not understood for other reasons."""
+        """Note a model that does not exist, for a robot that is not understood for other reasons."""
         path = ("robots", name, "model")
         if PurePosixPath(written).suffix.lower() in URDF_SUFFIXES | TABLE_SUFFIXES:
             self._file(written, path)

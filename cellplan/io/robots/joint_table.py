@@ -114,10 +114,6 @@ class _Meshes:
             return self._read[written, unit]
         try:
             path = self._folders.file(written)
-        except InputError as error:
-            self.findings.append(self._document.finding((*self._place, index, "mesh", "file"), str(error)))
-            return None
-        try:
             guard = Guard(file=written, worker="the mesh reader")
             mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), path, guard=guard)
         except InputError as error:
