@@ -96,7 +96,7 @@ def _wrong_joints(
 
 
 def _mapping(root: Mapping[str, object], key: str) -> Mapping[str, object]:
-    """A section by name; nothing when it is something else: the format has complained already."""
+    """A section by name; empty when it is no mapping, which validation has reported already."""
     section = root.get(key)
     return section if isinstance(section, dict) else {}
 

@@ -62,7 +62,7 @@ TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> i
 
 
 def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh: MeshReader) -> Robot:
-    """A robot placed in the cell, with the cell's settings where it has none of its own.
+    """A robot placed in the cell; settings that it does not state are those of the cell.
 
     The home of a robot that has nothing to do in the cell, and of which nothing but the start is given, is its start.
     """
@@ -134,7 +134,7 @@ def build_obstacle(name: str, entry: ObstacleEntry, read_mesh: MeshReader) -> Ob
 
 
 def build_task(name: str, document: CellDocument, read_targets: TargetReader) -> Task:
-    """One operator's work, with the motion's settings where it has none of its own."""
+    """The task of one operator; settings that it does not state are those of the motion."""
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
     path = _path(name, entry.path, read_targets)
@@ -180,7 +180,7 @@ Direction = str | tuple[float, float, float]
 
 
 def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
-    """Tool axis (None for the normal) and tool x of a task, as words or vectors.
+    """Tool axis (None for the normal) and tool x of a task, as names or vectors.
 
     A task that prescribes positions only, on a path that is not projected, needs no axis; the tool then points against
     the normal of the path's plane.

@@ -94,7 +94,7 @@ class Sources:
         return None if findings else model
 
     def look_for_model(self, name: str, written: str) -> None:
-        """Note a model that does not exist, for a robot that is not understood for other reasons."""
+        """Note a model that does not exist, of a robot that is invalid for other reasons too."""
         path = ("robots", name, "model")
         if PurePosixPath(written).suffix.lower() in URDF_SUFFIXES | TABLE_SUFFIXES:
             self._file(written, path)

@@ -137,7 +137,7 @@ def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:
 
 
 def _pose(entry: Mapping[str, Any], X: Array) -> dict[str, Any]:
-    """A pose in the words of the file; in new words where it was changed since."""
+    """A pose with the numbers of the file; with new numbers if it was changed since."""
     if np.array_equal(pose(in_si(map(Mm, entry["xyz_mm"])), in_si(map(Deg, entry["rpy_deg"]))), X):
         return dict(entry)
     xyz_mm = [_file_number(float(value), is_revolute=False) for value in X[:3, 3]]

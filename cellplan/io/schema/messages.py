@@ -38,7 +38,7 @@ def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | 
     """Read a whole file.
 
     Args:
-        model: What should stand there.
+        model: The expected kind of file.
         document: The file.
 
     Returns:
@@ -53,8 +53,8 @@ def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | 
     return None, list(dict.fromkeys(located))
 
 
-def understood(model: type[AnyEntry], document: YamlDocument, path: KeyPath) -> AnyEntry | None:
-    """One part of a file; None when it is not as it should be."""
+def valid_entry(model: type[AnyEntry], document: YamlDocument, path: KeyPath) -> AnyEntry | None:
+    """One entry of a file; None when it is invalid."""
     try:
         return model.model_validate(value_at(document.root, path))
     except ValidationError:
@@ -96,7 +96,7 @@ class _Reader:
 
     @property
     def value(self) -> Any:
-        """What stands at the place of the finding."""
+        """The value at the place of the finding."""
         return value_at(self.document.root, self.path)
 
     def mismatch(self) -> Mismatch | None:
@@ -242,7 +242,7 @@ def _is_fixed_list(annotation: Any) -> bool:
 
 
 def _phrase(annotation: Any) -> str:
-    """What may stand at a place, in words."""
+    """The kinds of value allowed at a place, as a phrase."""
     if get_origin(annotation) is Literal:
         words = [str(word) for word in get_args(annotation)]
         return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
