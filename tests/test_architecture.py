@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path, PurePosixPath
 
 import pytest
@@ -117,6 +118,26 @@ def test_no_file_is_an_empty_placeholder() -> None:
 
 def any_other_module(folder: Path) -> bool:
     return any(path.name != "__init__.py" for path in folder.rglob("*.py"))
+
+
+def test_no_import_closes_a_circle() -> None:
+    """Imports inside functions count as well; those for type checkers do not."""
+    modules = {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in SOURCES}
+    arrows = {name: {other for other in module_imports(path) if other in modules} for name, path in modules.items()}
+
+    order = list(TopologicalSorter(arrows).static_order())  # raises CycleError, which names the circle
+
+    assert sorted(order) == sorted(modules)
+
+
+def module_imports(path: Path) -> set[str]:
+    """Modules from which a file imports names, without those that it imports for type checkers only."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            node.body = []
+    found = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module]
+    return {node.module for node in found} | {f"{node.module}.{alias.name}" for node in found for alias in node.names}
 
 
 def test_every_engine_has_one_door() -> None:

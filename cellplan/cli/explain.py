@@ -3,8 +3,6 @@
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Settings
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.errors import ExitStatus
-from cellplan.report.record.structure import structure_record
-from cellplan.report.text.structure import structure_lines
 
 SCHEMA = "cellplan.explain/1"
 
@@ -18,6 +16,8 @@ def explain(cell: CellFile, settings: Settings = None, as_json: AsJson = False, 
         from cellplan.io.cell.load import load_cell
         from cellplan.pipeline.explain import explain as explain_cell
         from cellplan.pipeline.overrides import with_overrides
+        from cellplan.report.record.structure import structure_record
+        from cellplan.report.text.structure import structure_lines
 
         record = structure_record(
             explain_cell(with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), settings or ()))

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 from cellplan.cli.options import AsJson
 from cellplan.cli.output import json_failure, say, say_json
-from cellplan.report.record.joint_limits import joint_record, limits_text
 
 if TYPE_CHECKING:
     from cellplan.model.robot import RobotModel
@@ -29,6 +28,7 @@ def robots(as_json: AsJson = False) -> None:
 def _record(name: str, model: RobotModel) -> dict[str, Any]:
     """One robot in printed units."""
     from cellplan.kinematics.reach import arm_reach
+    from cellplan.report.record.joint_limits import joint_record
 
     return {
         "name": name,
@@ -41,6 +41,8 @@ def _record(name: str, model: RobotModel) -> dict[str, Any]:
 
 def _lines(record: dict[str, Any]) -> list[str]:
     """One robot as text: joint, range, largest speed."""
+    from cellplan.report.record.joint_limits import limits_text
+
     lines = [record["name"], f"  reach {record['reach_mm']:g} mm from the first axis; {record['source']}"]
     for joint in record["joints"]:
         limits, speed = limits_text(joint)

@@ -366,11 +366,6 @@ class Cell:
             first = last
         raise KeyError(robot)
 
-    def joint_at(self, column: int) -> tuple[str, str]:
-        """Names of the robot and of its joint at a place in the stacked joint vector."""
-        names = [(robot.name, joint) for robot in self.robots for joint in robot.model.joint_names]
-        return names[column]
-
     @property
     def joint_count(self) -> int:
         """Length of the stacked joint vector."""
@@ -380,3 +375,8 @@ class Cell:
         """One line without arrays."""
         robots, tasks = (", ".join(each.name for each in named) for named in (self.robots, self.tasks))
         return f"<Cell '{self.name}': robots {robots}; tasks {tasks}; {self.motion.mode}>"
+
+
+def joint_at(cell: Cell, column: int) -> tuple[str, str]:
+    """Names of the robot and of its joint at a place in the stacked joint vector of a cell."""
+    return [(robot.name, joint) for robot in cell.robots for joint in robot.model.joint_names][column]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from builders.commands import is_plain, run_command, run_script
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + sorted(
@@ -47,6 +48,11 @@ def run_shell(text: str, folder: Path) -> str:
         if not line.strip() or line.startswith("#"):
             continue
         expected = int(match[1]) if (match := EXIT_STATUS.search(line)) else 0
+        if is_plain(line):
+            status, out, err = run_command(line, folder)
+            assert status == expected, f"{line}\n{out}\n{err}"
+            output += out + err
+            continue
         command = PROGRAM + re.sub(r"^make\b", f"make --dry-run -C '{ROOT}'", line)
         run = subprocess.run(
             ["bash", "-c", command],
@@ -86,16 +92,7 @@ def test_every_block_of_a_page_runs(page: Path, tmp_path: Path) -> None:
         elif block.kind == "sh":
             output = run_shell(block.text, tmp_path)
         elif block.kind == "python":
-            run = subprocess.run(
-                [sys.executable, "-c", block.text],
-                check=False,
-                cwd=tmp_path,
-                capture_output=True,
-                text=True,
-                timeout=COMMAND_LIMIT_S,
-            )
-            assert run.returncode == 0, run.stderr
-            output = run.stdout
+            output = run_script(block.text, tmp_path)
         elif block.kind == "yaml":
             yaml.safe_load(block.text)
         else:

@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Grasp, Relation
+from cellplan.model.cell import Cell, Grasp, Relation, joint_at
 from cellplan.model.motion import Schedule
 from cellplan.planning.timing.common_cycles import SAME_PERIOD, common_cycles
 from cellplan.planning.tracking.problem import TrackingProblem
@@ -104,7 +104,7 @@ def closing_drift(
         B += np.outer(change - B @ gained, change @ B) / (change @ B @ gained)
         u, drift = u + change, found
     left = np.abs(N @ drift)
-    robot, joint = problem.cell.joint_at(int(np.argmax(left)))
+    robot, joint = joint_at(problem.cell, int(np.argmax(left)))
     raise NoSolutionError(
         f"{problem.cell.origin.at('motion.cyclic')}: the joint motion does not close, joint '{joint}' of '{robot}' is "
         f"still {np.degrees(left.max(initial=0.0)):.3g} deg away after {ROUNDS} tries"

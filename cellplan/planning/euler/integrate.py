@@ -6,7 +6,7 @@ import numpy as np
 
 from cellplan.errors import DivergedError, NoSolutionError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, joint_at
 from cellplan.model.motion import Motion
 from cellplan.model.progress import Progress, silent
 from cellplan.planning.euler.cycle_closing import closed
@@ -72,7 +72,7 @@ def refuse_long_step(cell: Cell, q: Array, step: Advance) -> None:
     """
     moves = np.abs(step.q - q)
     if not float(np.max(moves, initial=0.0)) < LARGEST_STEP:  # also for what is not a number
-        robot, joint = cell.joint_at(int(np.argmax(np.where(np.isfinite(moves), moves, np.inf))))
+        robot, joint = joint_at(cell, int(np.argmax(np.where(np.isfinite(moves), moves, np.inf))))
         raise DivergedError(
             f"joint '{joint}' of '{robot}' would move by half a turn or more in one step: shorten motion.step_s, lower "
             "the gain or allow damping (auto)"
