@@ -1,7 +1,6 @@
 """Toolpath tables: tool positions on the part, with axes or quaternions, from a CSV file."""
 
 import re
-import stat
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, quaternion_to_rotation
+from cellplan.io.input.files import read_regular_file
 from cellplan.io.input.findings import Finding, did_you_mean, listed, raise_findings, shown
 from cellplan.model.task import SampledPath, TimedPath
 
@@ -103,16 +103,7 @@ def read_toolpath_csv(
 
 def _read_text(path: Path, name: str) -> str:
     """Content of a regular file of sensible size, as text without control characters."""
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{name}: expected a regular file")
-        if status.st_size > MOST_BYTES:
-            raise InputError(f"{name}: expected at most {MOST_BYTES} bytes, got {status.st_size}")
-        data = path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "not a file name"
-        raise InputError(f"{name}: cannot be read: {str(reason).lower()}") from None
+    data = read_regular_file(path, file=name, limit=MOST_BYTES)
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

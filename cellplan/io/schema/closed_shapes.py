@@ -4,22 +4,12 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from cellplan.io.schema.common import (
-    ORIGIN,
-    SHORTEST_DIRECTION,
-    Angle,
-    Component,
-    Entry,
-    PlaneCoordinates,
-    SignedAxis,
-    Size,
-    by_kind,
-    rule,
-)
-from cellplan.io.schema.units import Deg
+from cellplan.io.schema.common import Angle, Component, Entry, PlaneCoordinates, SignedAxis, Size, by_kind, rule
+from cellplan.io.schema.units import Deg, Mm
 
 PlaneWord = Literal["xy", "yz", "xz"]
 PlaneDirection = tuple[Component, Component]
+SHORTEST_START: Final = 1e-6  # [-] a shorter vector has no direction
 
 START_WORDS: Final = "+x, -x, +y, -y, +z, -z or a direction [u, v] on the plane's axes"
 
@@ -33,7 +23,7 @@ class ClosedShapeEntry(Entry):
     """What all closed shapes share: a plane, a centre, and the way round."""
 
     plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field(default=ORIGIN[:2], description="Centre on the plane's two axes.")
+    center_mm: PlaneCoordinates = Field(default=(Mm(0.0), Mm(0.0)), description="Centre on the plane's two axes.")
     direction: Literal["counterclockwise", "clockwise"] = Field(
         default="counterclockwise",
         description="Way round, seen from outside the surface: from the side that the path is projected from; for a "
@@ -101,7 +91,7 @@ class RhombusEntry(ClosedShapeEntry):
 def start_direction(written: str | PlaneDirection, plane: str) -> PlaneDirection:
     """Components on the plane's axes of a start that is written as an axis or as a direction."""
     if not isinstance(written, str):
-        if max(abs(written[0]), abs(written[1])) < SHORTEST_DIRECTION:
+        if max(abs(written[0]), abs(written[1])) < SHORTEST_START:
             raise rule("expected a direction that is not zero, got a vector of no length", "start_at")
         return written
     if written[1] not in plane:
