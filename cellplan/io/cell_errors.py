@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, raise_findings, shown
+from cellplan.io.input.findings import Finding, KeyPath, raise_findings, unknown_name
 from cellplan.io.schema.cell_errors import (
     ErrorsDocument,
     PoseErrorEntry,
@@ -16,13 +15,11 @@ from cellplan.io.schema.cell_errors import (
     TurnSpreadEntry,
 )
 from cellplan.io.schema.messages import validate
-from cellplan.io.shapes import MM
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
 from cellplan.model.cell import Cell
 from cellplan.model.cell_errors import SHORTEST_LINK, Amount, CellErrors, PoseAmounts, RobotErrors, Spread, link_vector
 from cellplan.model.robot import RobotModel
-
-DEG: Final = float(np.rad2deg(1.0))  # [deg/rad]
+from cellplan.model.units import DEG, MM
 
 Written = float | ShiftSpreadEntry | TurnSpreadEntry
 
@@ -65,13 +62,12 @@ def _unknown_names(document: YamlDocument, cell: Cell) -> Iterator[Finding]:
     for name, written in _mapping(document.root, "robots").items():
         place: KeyPath = ("robots", name)
         if name not in models:
-            yield document.key_finding(place, _unknown("a robot of this cell", name, list(models)))
+            yield document.key_finding(place, unknown_name("a robot of this cell", name, models))
         elif isinstance(written, dict):
             yield from _wrong_joints(document, place, written, models[name])
     for name in _mapping(document.root, "grasp"):
         if name not in cell.positioners:
-            holders = list(cell.positioners)
-            text = _unknown("a robot that holds the part", name, holders)
+            text = unknown_name("a robot that holds the part", name, cell.positioners)
             yield document.key_finding(("grasp", name), text)
 
 
@@ -84,7 +80,7 @@ def _wrong_joints(
         for name in _mapping(written, key):
             path = (*place, key, name)
             if name not in model.joint_names:
-                text = _unknown(f"a joint of '{place[-1]}'", name, list(model.joint_names))
+                text = unknown_name(f"a joint of '{place[-1]}'", name, model.joint_names)
                 yield document.key_finding(path, text)
                 continue
             joint = model.joint_names.index(name)
@@ -99,13 +95,8 @@ def _wrong_joints(
                 yield document.key_finding(path, text)
 
 
-def _unknown(what: str, name: str, known: list[str]) -> str:
-    """A name that does not exist."""
-    return f"expected {what} ({listed(known)}), got {shown(name)}{did_you_mean(name, known)}"
-
-
 def _mapping(root: Mapping[str, object], key: str) -> Mapping[str, object]:
-    """A section by name; nothing when it is something else: the format has complained already."""
+    """A section by name; empty when it is no mapping, which validation has reported already."""
     section = root.get(key)
     return section if isinstance(section, dict) else {}
 

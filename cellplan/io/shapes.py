@@ -22,8 +22,8 @@ from cellplan.io.schema.shapes import (
     ToolRoundEntry,
     ToolShapeEntry,
 )
+from cellplan.io.schema.units import Mm, in_si
 
-MM: Final = 1000.0  # [mm/m]; dividing by it rounds once only
 ALONG: Final = {
     "x": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     "y": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
@@ -37,7 +37,7 @@ def pose_from_entry(entry: PoseEntry | None) -> Array:
     """Pose in [m] and [rad]; the identity for an absent entry."""
     if entry is None:
         return np.eye(4)
-    return pose(np.divide(entry.xyz_mm, MM), np.deg2rad(entry.rpy_deg))
+    return pose(in_si(entry.xyz_mm), in_si(entry.rpy_deg))
 
 
 def centred_solid(
@@ -59,7 +59,7 @@ def centred_solid(
 def obstacle_shape(entry: ObstacleEntry, read_mesh: MeshReader) -> tuple[Shape, Array]:
     """Shape of a fixed thing and its pose in the world."""
     if entry.plane is not None:
-        return HalfSpace(), pose((0.0, 0.0, entry.plane.z_mm / MM))
+        return HalfSpace(), pose((0.0, 0.0, entry.plane.z_mm.si))
     solid, X_AS = centred_solid(entry, read_mesh)
     return solid, pose_from_entry(entry.at) @ X_AS
 
@@ -78,9 +78,9 @@ def link_solid(entry: LinkBodyEntry, read_mesh: MeshReader) -> tuple[Solid, Arra
         return read_mesh(entry.mesh.file, entry.mesh.unit), pose_from_entry(entry.mesh.at)
     if entry.box is not None:
         placed = PoseEntry(xyz_mm=entry.box.center_mm, rpy_deg=entry.box.rpy_deg)
-        return Box(_metres(entry.box.size_mm)), pose_from_entry(placed)
+        return _box(entry.box.size_mm), pose_from_entry(placed)
     if entry.sphere is not None:
-        return Sphere(entry.sphere.radius_mm / MM), pose(np.divide(entry.sphere.center_mm, MM))
+        return Sphere(entry.sphere.radius_mm.si), pose(in_si(entry.sphere.center_mm))
     segment = entry.capsule or entry.cylinder
     if segment is None:
         raise ValueError("a link body without a shape")
@@ -91,14 +91,14 @@ def _primitive(entry: BoxEntry | CylinderEntry | CapsuleEntry | ToolRoundEntry |
     """Solid in its own frame; capsules are measured from end to end in files and between centres here."""
     match entry:
         case BoxEntry():
-            return Box(_metres(entry.size_mm))
+            return _box(entry.size_mm)
         case CapsuleEntry() | ToolCapsuleEntry():
-            length = (entry.length_mm - 2.0 * entry.radius_mm) / MM
-            return Capsule(entry.radius_mm / MM, length) if length > 0.0 else Sphere(entry.radius_mm / MM)
+            length = Mm(entry.length_mm - 2.0 * entry.radius_mm).si
+            return Capsule(entry.radius_mm.si, length) if length > 0.0 else Sphere(entry.radius_mm.si)
         case CylinderEntry() | ToolRoundEntry():
-            return Cylinder(entry.radius_mm / MM, entry.length_mm / MM)
+            return Cylinder(entry.radius_mm.si, entry.length_mm.si)
         case SphereEntry():
-            return Sphere(entry.radius_mm / MM)
+            return Sphere(entry.radius_mm.si)
     raise ValueError("an entry without a shape")
 
 
@@ -119,8 +119,8 @@ def _half_length(solid: Solid) -> float:
 
 def _along_segment(entry: SegmentEntry, *, is_capsule: bool) -> tuple[Solid, Array]:
     """Round solid along a segment; a capsule without length is a ball."""
-    start, end = np.divide(entry.from_mm, MM), np.divide(entry.to_mm, MM)
-    radius, length = entry.radius_mm / MM, float(np.linalg.norm(end - start))
+    start, end = in_si(entry.from_mm), in_si(entry.to_mm)
+    radius, length = entry.radius_mm.si, float(np.linalg.norm(end - start))
     X = pose(0.5 * (start + end))
     if length == 0.0:
         return Sphere(radius), X
@@ -137,6 +137,7 @@ def _z_along(z: Array) -> Array:
     return np.column_stack([x, y / np.linalg.norm(y), z])
 
 
-def _metres(size_mm: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Edge lengths in [m]."""
-    return (size_mm[0] / MM, size_mm[1] / MM, size_mm[2] / MM)
+def _box(size: tuple[Mm, Mm, Mm]) -> Box:
+    """A cuboid of these edge lengths."""
+    x, y, z = size
+    return Box((x.si, y.si, z.si))

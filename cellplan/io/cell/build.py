@@ -23,7 +23,8 @@ from cellplan.io.schema.task import (
     ToleranceEntry,
     TrapezoidEntry,
 )
-from cellplan.io.shapes import MM, MeshReader, centred_solid, obstacle_shape, pose_from_entry, tool_solid
+from cellplan.io.schema.units import Mm, in_si, si_or_none
+from cellplan.io.shapes import MeshReader, centred_solid, obstacle_shape, pose_from_entry, tool_solid
 from cellplan.model.cell import (
     CheckSettings,
     Exclusion,
@@ -62,7 +63,7 @@ TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> i
 
 
 def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh: MeshReader) -> Robot:
-    """A robot placed in the cell, with the cell's settings where it has none of its own.
+    """A robot placed in the cell; settings that it does not state are those of the cell.
 
     The home of a robot that has nothing to do in the cell, and of which nothing but the start is given, is its start.
     """
@@ -98,12 +99,12 @@ def _tool(entry: ToolEntry, read_mesh: MeshReader) -> Tool:
         Body(name="tool" if number == 1 else f"tool_{number}", link=BASE, shape=solid, X_BS=X_FS)
         for number, (solid, X_FS) in enumerate(placed, start=1)
     ]
-    return Tool(X_FT=X_FT, bodies=tuple(bodies), mass=entry.mass_kg, centre=_centre(entry.centre_mm))
-
-
-def _centre(centre_mm: tuple[float, float, float] | None) -> Array | None:
-    """A centre of mass in [m]."""
-    return None if centre_mm is None else np.divide(centre_mm, MM)
+    return Tool(
+        X_FT=X_FT,
+        bodies=tuple(bodies),
+        mass=entry.mass_kg,
+        centre=None if entry.centre_mm is None else in_si(entry.centre_mm),
+    )
 
 
 def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
@@ -117,13 +118,13 @@ def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
                 robot=grasp.robot,
                 X_PT=pose_from_entry(grasp.at),
                 axes=_axis_numbers(grasp.axes),
-                depth=grasp.depth_mm / MM,
+                depth=grasp.depth_mm.si,
             )
             for grasp in entry.held_by
         ),
         X_WP=None if entry.at is None else pose_from_entry(entry.at),
         mass=entry.mass_kg,
-        centre=_centre(entry.centre_mm),
+        centre=None if entry.centre_mm is None else in_si(entry.centre_mm),
     )
 
 
@@ -134,7 +135,7 @@ def build_obstacle(name: str, entry: ObstacleEntry, read_mesh: MeshReader) -> Ob
 
 
 def build_task(name: str, document: CellDocument, read_targets: TargetReader, origin: Origin) -> Task:
-    """One operator's work, with the motion's settings where it has none of its own."""
+    """The task of one operator; settings that it does not state are those of the motion."""
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
     path = _path(name, entry.path, read_targets)
@@ -145,31 +146,31 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader, or
         robot=entry.robot,
         path=path,
         project=None if entry.path.project is None else direction(entry.path.project),
-        plane_offset=(entry.path.offset_mm or 0.0) / MM,
+        plane_offset=(entry.path.offset_mm or Mm(0.0)).si,
         tool_axis=None if tool_axis is None else direction(tool_axis),
         tool_x=direction(tool_x),
-        turn=float(np.deg2rad(entry.tool_turn_deg)),
+        turn=entry.tool_turn_deg.si,
         axes=_axis_numbers(entry.axes),
         is_spin_free="spin" in entry.free,
         tolerance=_tolerance(entry.tolerance),
         start=entry.begins_s,
         duration=entry.duration_s,
-        feed=None if entry.feed_mm_s is None else entry.feed_mm_s / MM,
+        feed=si_or_none(entry.feed_mm_s),
         time_law=_time_law(law),
-        blend=corners.blend_mm / MM if isinstance(corners, BlendEntry) else None,
+        blend=corners.blend_mm.si if isinstance(corners, BlendEntry) else None,
         settle=entry.settle_s,
         repeat=entry.repeat,
         approach=_straight_move(entry.approach_mm, entry.approach_s),
         retract=_straight_move(entry.retract_mm, entry.retract_s),
         relative_to=Frame(entry.relative_to),
-        tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm) / MM,
+        tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm).si,
         origin=origin,
     )
 
 
-def _straight_move(distance_mm: float, duration: float) -> StraightMove | None:
+def _straight_move(distance: Mm, duration: float) -> StraightMove | None:
     """An approach or a retreat; none over no distance."""
-    return StraightMove(distance=distance_mm / MM, duration=duration) if distance_mm else None
+    return StraightMove(distance=distance.si, duration=duration) if distance else None
 
 
 def _axis_numbers(words: Sequence[str]) -> tuple[int, ...]:
@@ -181,7 +182,7 @@ Direction = str | tuple[float, float, float]
 
 
 def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
-    """Tool axis (None for the normal) and tool x of a task, as words or vectors.
+    """Tool axis (None for the normal) and tool x of a task, as names or vectors.
 
     A task that prescribes positions only, on a path that is not projected, needs no axis; the tool then points against
     the normal of the path's plane.
@@ -210,10 +211,10 @@ def direction(written: Direction) -> Array:
 def _tolerance(entry: ToleranceEntry) -> Tolerance:
     """Allowed tool errors in [m] and [rad]."""
     return Tolerance(
-        position=entry.position_mm / MM,
-        orientation=float(np.deg2rad(entry.orientation_deg)),
-        position_between=(entry.between_rows_mm or entry.position_mm) / MM,
-        orientation_between=float(np.deg2rad(entry.between_rows_deg or entry.orientation_deg)),
+        position=entry.position_mm.si,
+        orientation=entry.orientation_deg.si,
+        position_between=(entry.between_rows_mm or entry.position_mm).si,
+        orientation_between=(entry.between_rows_deg or entry.orientation_deg).si,
     )
 
 
@@ -267,8 +268,8 @@ def _circle(entry: CircleEntry) -> CirclePath:
     size = float(np.hypot(*toward))
     return CirclePath(
         plane=PlaneName(entry.plane),
-        center=(u / MM, v / MM),
-        radius=entry.radius_mm / MM,
+        center=(u.si, v.si),
+        radius=entry.radius_mm.si,
         start=(toward[0] / size, toward[1] / size),
         direction=RunDirection(entry.direction),
     )
@@ -281,12 +282,12 @@ def _polygon(
     start = tuple(int(np.sign(part)) for part in start_direction(entry.start_at, entry.plane))
     first = signs.index((start[0], start[1]))
     signs = (*signs[first:], *signs[:first])
-    angle = np.deg2rad(entry.angle_deg)
+    angle = entry.angle_deg.si
     R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     corners = np.array(signs) * (0.5 * np.array(extents_mm)) @ R.T + np.array(entry.center_mm)
     return PolygonPath(
         plane=PlaneName(entry.plane),
-        corners=tuple((float(u) / MM, float(v) / MM) for u, v in corners),
+        corners=tuple((Mm(u).si, Mm(v).si) for u, v in corners),
         is_closed=True,
         direction=RunDirection(entry.direction),
     )
@@ -294,7 +295,7 @@ def _polygon(
 
 def _polyline(entry: PolylineEntry) -> PathSpec:
     """Points in a plane or in space."""
-    points = [tuple(value / MM for value in point) for point in entry.points_mm]
+    points = [tuple(value.si for value in point) for point in entry.points_mm]
     if entry.plane is None:
         return SpacePolylinePath(points=tuple((x, y, z) for x, y, z in points), is_closed=entry.closed)
     return PolygonPath(plane=PlaneName(entry.plane), corners=tuple((u, v) for u, v in points), is_closed=entry.closed)
@@ -321,12 +322,12 @@ def build_motion(entry: MotionEntry) -> MotionSettings:
 def build_checks(entry: ChecksEntry) -> CheckSettings:
     """Requirements of the checks."""
     return CheckSettings(
-        clearance=entry.clearance_mm / MM,
+        clearance=entry.clearance_mm.si,
         adds_accuracy=entry.body_accuracy == "add",
-        contact_zone=entry.contact_zone_mm / MM,
+        contact_zone=entry.contact_zone_mm.si,
         exclusions=tuple(Exclusion(bodies=pair.bodies, reason=pair.reason) for pair in entry.exclude),
-        closure_position=entry.closure_mm / MM,
-        closure_orientation=float(np.deg2rad(entry.closure_deg)),
-        standing_depth=entry.standing_depth_mm / MM,
+        closure_position=entry.closure_mm.si,
+        closure_orientation=entry.closure_deg.si,
+        standing_depth=entry.standing_depth_mm.si,
         part_acceleration=entry.part_acceleration_m_s2,
     )

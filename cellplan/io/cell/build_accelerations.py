@@ -2,19 +2,17 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 from cellplan.io.input.findings import Finding, KeyPath, key_text, listed
 from cellplan.io.schema.acceleration import AccelerationChoice, AccelerationRuleEntry
 from cellplan.io.schema.cell import CellDocument
-from cellplan.io.schema.partial import Pieces
+from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.acceleration import USUAL_ACCELERATION, AccelerationRule
 from cellplan.model.cell import Robot
 from cellplan.model.robot import RobotModel
-
-MS: Final = 1000.0  # [ms/s]
 
 
 def acceleration_rule(entry: RobotEntry, cell: AccelerationChoice | None, *, joints: int) -> AccelerationRule:
@@ -38,11 +36,11 @@ def _chosen(choice: AccelerationChoice | None) -> AccelerationRule:
 def controller_cycle(entry: RobotEntry, document: CellDocument) -> float:
     """Cycle of a robot's controller in [s]."""
     own = entry.controller_cycle_ms
-    return (document.motion.controller_cycle_ms if own is None else own) / MS
+    return (document.motion.controller_cycle_ms if own is None else own).si
 
 
 def written_rule(robot: Robot) -> Any:
-    """The rule of a robot in the words of a cell file."""
+    """The rule of a robot as a value of a cell file."""
     rule = robot.acceleration
     if rule.is_unlimited:
         return {"unlimited": rule.reason} if rule.reason else "unlimited"
@@ -50,12 +48,12 @@ def written_rule(robot: Robot) -> Any:
 
 
 def acceleration_findings(
-    pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument
+    valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument
 ) -> Iterator[Finding]:
     """Rules that do not fit a robot: stated limits that are missing or would not count, more times than joints."""
     for name, model in models.items():
-        entry = pieces.robots[name]
-        choice = pieces.acceleration if entry.acceleration is None else entry.acceleration
+        entry = valid.robots[name]
+        choice = valid.acceleration if entry.acceleration is None else entry.acceleration
         path: KeyPath = ("acceleration",) if entry.acceleration is None else ("robots", name, "acceleration")
         missing = [joint for joint in model.joints if joint.acceleration is None]
         if choice == "stated" and missing:
@@ -71,10 +69,10 @@ def acceleration_findings(
         if entry.acceleration is not None:
             words = f"joint ({listed(model.joint_names)})"
             yield from _too_many_times(choice, len(model.joints), document, path=path, words=words)
-    following = [len(model.joints) for name, model in models.items() if pieces.robots[name].acceleration is None]
+    following = [len(model.joints) for name, model in models.items() if valid.robots[name].acceleration is None]
     if following:
         words = "joint of the longest arm that it counts for"
-        yield from _too_many_times(pieces.acceleration, max(following), document, path=("acceleration",), words=words)
+        yield from _too_many_times(valid.acceleration, max(following), document, path=("acceleration",), words=words)
 
 
 def _limits_beside_unlimited(robot: str, entry: RobotEntry, document: YamlDocument, *, where: str) -> Iterator[Finding]:

@@ -4,12 +4,13 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
-from cellplan.io.input.findings import Finding, did_you_mean, listed, shown
+from cellplan.io.input.findings import Finding, listed, unknown_name
 from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
-from cellplan.io.schema.partial import Pieces
+from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry
-from cellplan.io.shapes import MM, MeshReader, centred_solid, pose_from_entry
+from cellplan.io.schema.units import Mm
+from cellplan.io.shapes import MeshReader, centred_solid, pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.mounting import Pedestal
 from cellplan.model.robot import Body, RobotModel
@@ -20,21 +21,21 @@ ROOM_MM: Final = 1e-3  # [mm] a lower pedestal is none
 
 
 def build_pedestal(entry: RobotEntry, environment: Mapping[str, ObstacleEntry]) -> Pedestal | None:
-    """What a robot stands on, if the cell says so."""
+    """The pedestal of a robot; None without one."""
     pedestal = entry.pedestal
     if pedestal is None:
         return None
     floor = floor_height_mm(entry, environment)
-    size = None if pedestal.box is None else (pedestal.box.size_mm[0] / MM, pedestal.box.size_mm[1] / MM)
+    size = None if pedestal.box is None else (pedestal.box.size_mm[0].si, pedestal.box.size_mm[1].si)
     return Pedestal(
-        radius=None if pedestal.cylinder is None else pedestal.cylinder.radius_mm / MM,
+        radius=None if pedestal.cylinder is None else pedestal.cylinder.radius_mm.si,
         size=size,
-        floor=(floor or 0.0) / MM,
+        floor=(floor or Mm(0.0)).si,
     )
 
 
-def floor_height_mm(entry: RobotEntry, environment: Mapping[str, ObstacleEntry]) -> float | None:
-    """Height in [mm] of the floor that a pedestal stands on: as stated, or the highest plane not above the base."""
+def floor_height_mm(entry: RobotEntry, environment: Mapping[str, ObstacleEntry]) -> Mm | None:
+    """Height of the floor that a pedestal stands on: as stated, or the highest plane not above the base."""
     if entry.pedestal is not None and entry.pedestal.floor_z_mm is not None:
         return entry.pedestal.floor_z_mm
     planes = [thing.plane.z_mm for thing in environment.values() if thing.plane is not None]
@@ -73,12 +74,12 @@ def mounted_names(entry: RobotEntry) -> tuple[str, ...]:
     return (*attachment_names(entry.attachments), *([PEDESTAL] if entry.pedestal is not None else []))
 
 
-def mounting_findings(name: str, model: RobotModel, pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
+def mounting_findings(name: str, model: RobotModel, valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """What a cell mounts on a robot or puts below it must fit its links, its base and the floor."""
-    entry = pieces.robots[name]
+    entry = valid.robots[name]
     yield from _attachment_findings(name, entry, model, document)
     if entry.pedestal is not None:
-        yield from _pedestal_findings(name, entry, entry.pedestal, pieces=pieces, document=document)
+        yield from _pedestal_findings(name, entry, entry.pedestal, valid=valid, document=document)
         if any(body.name == PEDESTAL for body in model.bodies):
             text = "unexpected key, a body of the model is called 'pedestal' already"
             yield document.key_finding(("robots", name, "pedestal"), text)
@@ -92,8 +93,7 @@ def _attachment_findings(name: str, entry: RobotEntry, model: RobotModel, docume
     for index, attachment in enumerate(entry.attachments):
         path = ("robots", name, "attachments", index)
         if attachment.link not in links:
-            hint = did_you_mean(attachment.link, links)
-            text = f"expected a link of the robot ({listed(links)}), got {shown(attachment.link)}{hint}"
+            text = unknown_name("a link of the robot", attachment.link, links)
             yield document.finding((*path, "link"), text)
         own = attachment.name
         if own is None:
@@ -107,11 +107,11 @@ def _attachment_findings(name: str, entry: RobotEntry, model: RobotModel, docume
 
 
 def _pedestal_findings(
-    name: str, entry: RobotEntry, pedestal: PedestalEntry, *, pieces: Pieces, document: YamlDocument
+    name: str, entry: RobotEntry, pedestal: PedestalEntry, *, valid: ValidEntries, document: YamlDocument
 ) -> Iterator[Finding]:
     """A pedestal stands on a floor, below an upright base."""
     path, height = ("robots", name, "pedestal"), entry.base.xyz_mm[2]
-    floor = floor_height_mm(entry, pieces.environment)
+    floor = floor_height_mm(entry, valid.environment)
     if floor is None:
         text = "missing, expected the height of the floor: no plane of the environment lies below the base"
         yield document.finding((*path, "floor_z_mm"), text)
@@ -127,9 +127,11 @@ def _pedestal_findings(
         yield document.finding(path, text)
 
 
-def accuracy_findings(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
+def accuracy_findings(
+    valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument
+) -> Iterator[Finding]:
     """An accuracy can be added to the clearance only where it is stated."""
-    if pieces.checks is None or pieces.checks.body_accuracy != "add":
+    if valid.checks is None or valid.checks.body_accuracy != "add":
         return
     unknown = [name for name, model in models.items() if any(model.accuracy_of(body) is None for body in model.bodies)]
     if unknown:

@@ -3,11 +3,8 @@
 from collections.abc import Mapping
 from typing import Final
 
-import numpy as np
-
-from cellplan.io.robots.rules import start_keys
+from cellplan.io.robots.rules import configuration_in_si
 from cellplan.io.schema.solver import ConfigurationGoalEntry, SecondaryEntry, SolverEntry
-from cellplan.io.shapes import MM
 from cellplan.model.robot import RobotModel
 from cellplan.model.solver import (
     DampedLeastSquaresSettings,
@@ -44,7 +41,7 @@ def build_solver(entry: SolverEntry, step: float, models: Mapping[str, RobotMode
         ),
         filtered_inverse=FilteredInverseSettings(gain=filtered.gain_per_s, starts_at_zero=filtered.start == "zero"),
         search=SearchSettings(
-            tolerance=search.tolerance_mm / MM,
+            tolerance=search.tolerance_mm.si,
             orientation_weight=search.orientation_weight_m2,
             rounds=search.rounds,
             brakes=search.brakes,
@@ -54,7 +51,7 @@ def build_solver(entry: SolverEntry, step: float, models: Mapping[str, RobotMode
         weighting=WeightingSettings(near_limits=entry.weighting.near_limits, load=entry.weighting.load),
         goals=_goals(entry.secondary, models),
         integrator=None if entry.integrator == "auto" else Integrator(entry.integrator),
-        accuracy=entry.accuracy_mm / MM,
+        accuracy=entry.accuracy_mm.si,
     )
 
 
@@ -66,8 +63,8 @@ def _goals(entry: SecondaryEntry, models: Mapping[str, RobotModel]) -> tuple[Sec
     if entry.joint_limits is not None:
         goals.append(SecondaryGoal(kind=GoalKind.JOINT_LIMITS, gain=entry.joint_limits.gain))
     if entry.obstacles is not None:
-        within = entry.obstacles.within_mm / MM
-        goals.append(SecondaryGoal(kind=GoalKind.OBSTACLES, gain=entry.obstacles.gain, within=within))
+        near = entry.obstacles
+        goals.append(SecondaryGoal(kind=GoalKind.OBSTACLES, gain=near.gain, within=near.within_mm.si))
     if entry.posture is not None:
         goals.append(_configuration_goal(entry.posture, models))
     return tuple(goals)
@@ -75,9 +72,5 @@ def _goals(entry: SecondaryEntry, models: Mapping[str, RobotModel]) -> tuple[Sec
 
 def _configuration_goal(entry: ConfigurationGoalEntry, models: Mapping[str, RobotModel]) -> SecondaryGoal:
     """A desired configuration in [rad] and [m]."""
-    configurations = {}
-    for robot, given in entry.at.items():
-        values = [given[key] for key in start_keys(models[robot])]
-        turns = [joint.is_revolute for joint in models[robot].joints]
-        configurations[robot] = np.where(turns, np.deg2rad(values), np.divide(values, MM))
+    configurations = {robot: configuration_in_si(models[robot], given) for robot, given in entry.at.items()}
     return SecondaryGoal(kind=GoalKind.POSTURE, gain=entry.gain, configurations=configurations)

@@ -165,7 +165,7 @@ def _element(node: tuple[Any, ...], steps: list[str]) -> tuple[int, list[str], A
 
 
 def _entry(node: dict[str, Any], steps: list[str], annotation: Any) -> tuple[str, list[str], Any]:
-    """Key in a mapping, the steps behind it, and what stands there, or would by default."""
+    """Key in a mapping, the steps after it, and the value of the key or its default."""
     for count in range(len(steps), 0, -1):  # names of joints may have dots
         if (name := ".".join(steps[:count])) in node:
             return name, steps[count:], node[name]

@@ -31,7 +31,7 @@ from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, key_text,
 from cellplan.io.robots.rules import robot_findings, with_statements
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.mounting import AttachmentEntry
-from cellplan.io.schema.partial import Pieces, read_pieces
+from cellplan.io.schema.partial import ValidEntries, read_valid_entries
 from cellplan.io.schema.shapes import ObstacleEntry, ToolBodyEntry, ToolShapeEntry
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
 from cellplan.model.cell import Cell
@@ -98,73 +98,73 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
 def _read(source: CellFile) -> Cell:
     """The cell of a document, after all rules were applied to it and to the files that it names."""
     document, file = source.document, source.document.file
-    pieces, findings = read_pieces(document)
+    valid, findings = read_valid_entries(document)
     findings += document.findings
-    if pieces.is_too_large:
+    if valid.is_too_large:
         raise_findings(file, findings)
-    findings += rule_findings(pieces, document)
+    findings += rule_findings(valid, document)
     allowed = (*source.allow_dirs, *user_folders(source.folder))
     sources = Sources(document, AllowedFolders(folder=source.folder, allowed=allowed))
     sources.inputs[source.name] = document.digest
-    models = _models(pieces, document, sources)
+    models = _models(valid, document, sources)
     for name, model in models.items():
-        findings += robot_findings(name, pieces.robots[name], model, document)
-        findings += mounting_findings(name, model, pieces, document)
-    findings += acceleration_findings(pieces, models, document)
-    findings += _unknown_bodies(pieces, models, document)
-    findings += accuracy_findings(pieces, models, document)
-    findings += solver_findings(pieces, models, document)
-    findings += _part_extent(pieces, document)
-    _read_meshes(pieces, sources)
-    targets = _targets(pieces, sources)
-    findings += target_findings(pieces, targets, document)
+        findings += robot_findings(name, valid.robots[name], model, document)
+        findings += mounting_findings(name, model, valid, document)
+    findings += acceleration_findings(valid, models, document)
+    findings += _unknown_bodies(valid, models, document)
+    findings += accuracy_findings(valid, models, document)
+    findings += solver_findings(valid, models, document)
+    findings += _part_extent(valid, document)
+    _read_meshes(valid, sources)
+    targets = _targets(valid, sources)
+    findings += target_findings(valid, targets, document)
     raise_findings(file, [*findings, *sources.findings], sources.errors)
-    if pieces.whole is None:
+    if valid.whole is None:
         raise InputError(f"{file}: the cell cannot be understood")
-    return _cell(pieces.whole, models, targets, source=source, sources=sources)
+    return _cell(valid.whole, models, targets, source=source, sources=sources)
 
 
-def _models(pieces: Pieces, document: YamlDocument, sources: Sources) -> dict[str, RobotModel]:
-    """Models of all robots that are understood, by name."""
-    found = {name: sources.robot(name, entry) for name, entry in pieces.robots.items()}
-    for name in pieces.names["robots"]:
+def _models(valid: ValidEntries, document: YamlDocument, sources: Sources) -> dict[str, RobotModel]:
+    """Models of all valid robots by name."""
+    found = {name: sources.robot(name, entry) for name, entry in valid.robots.items()}
+    for name in valid.names["robots"]:
         written = document.root["robots"][name]
         if name not in found and isinstance(written, dict) and isinstance(written.get("model"), str):
             sources.look_for_model(name, written["model"])
-    return {name: with_statements(pieces.robots[name], model) for name, model in found.items() if model is not None}
+    return {name: with_statements(valid.robots[name], model) for name, model in found.items() if model is not None}
 
 
-def _targets(pieces: Pieces, sources: Sources) -> Targets:
+def _targets(valid: ValidEntries, sources: Sources) -> Targets:
     """Tool targets from files, by task."""
     found = {
         name: sources.targets(task.path.csv, ("tasks", name, "path", "csv"))
-        for name, task in pieces.tasks.items()
+        for name, task in valid.tasks.items()
         if task.path.csv is not None
     }
     return {name: sampled for name, sampled in found.items() if sampled is not None}
 
 
-def _unknown_bodies(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
+def _unknown_bodies(valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
     """Exclusions name bodies that exist; checked only when all robots are known."""
-    if pieces.checks is None or set(models) != set(pieces.names["robots"]):
+    if valid.checks is None or set(models) != set(valid.names["robots"]):
         return
-    known = {"part", *pieces.names["environment"]}
+    known = {"part", *valid.names["environment"]}
     for name, model in models.items():
-        tool = pieces.robots[name].tool
+        tool = valid.robots[name].tool
         count = len(tool.bodies) + (tool.geometry is not None)
         known |= {f"{name}/{body.name}" for body in model.bodies}
-        known |= {f"{name}/{body}" for body in mounted_names(pieces.robots[name])}
+        known |= {f"{name}/{body}" for body in mounted_names(valid.robots[name])}
         known |= {f"{name}/tool" if number == 1 else f"{name}/tool_{number}" for number in range(1, count + 1)}
-    for index, pair in enumerate(pieces.checks.exclude):
+    for index, pair in enumerate(valid.checks.exclude):
         for side, body in enumerate(pair.bodies):
             if body not in known:
                 text = f"expected a body of this cell, got {shown(body)}{did_you_mean(body, sorted(known))}"
                 yield document.finding(("checks", "exclude", index, "bodies", side), text)
 
 
-def _part_extent(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
+def _part_extent(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """A part of a likely size; meshes are checked by their reader."""
-    shape = pieces.part.geometry if pieces.part else None
+    shape = valid.part.geometry if valid.part else None
     if shape is None or shape.mesh is not None:
         return
     extent = 0.0
@@ -183,20 +183,20 @@ def _part_extent(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
 Meshed = ToolShapeEntry | ToolBodyEntry | ObstacleEntry | AttachmentEntry
 
 
-def _read_meshes(pieces: Pieces, sources: Sources) -> None:
+def _read_meshes(valid: ValidEntries, sources: Sources) -> None:
     """Read every mesh once, so that all findings come together."""
-    shapes: list[tuple[KeyPath, Meshed]] = [(("environment", name), it) for name, it in pieces.environment.items()]
-    for name, robot in pieces.robots.items():
+    shapes: list[tuple[KeyPath, Meshed]] = [(("environment", name), it) for name, it in valid.environment.items()]
+    for name, robot in valid.robots.items():
         place: KeyPath = ("robots", name, "tool")
         shapes += [((*place, "bodies", index), body) for index, body in enumerate(robot.tool.bodies)]
         shapes += [(("robots", name, "attachments", index), it) for index, it in enumerate(robot.attachments)]
         shapes += [((*place, "geometry"), robot.tool.geometry)] if robot.tool.geometry is not None else []
-    part = pieces.part.geometry if pieces.part is not None else None
+    part = valid.part.geometry if valid.part is not None else None
     if part is not None and part.mesh is not None and part.unit is not None:
-        sources.mesh(part.mesh, part.unit, ("part", "geometry", "mesh"), demand=require_solid)
+        sources.mesh(part.mesh, part.unit, ("part", "geometry", "mesh"), requirement=require_solid)
     for path, shape in shapes:
         if shape.mesh is not None and shape.unit is not None:
-            sources.mesh(shape.mesh, shape.unit, (*path, "mesh"), demand=None if shape.open else require_enclosing)
+            sources.mesh(shape.mesh, shape.unit, (*path, "mesh"), requirement=None if shape.open else require_enclosing)
 
 
 def _cell(

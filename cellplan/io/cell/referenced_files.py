@@ -6,8 +6,6 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from functools import partial
 from pathlib import Path, PurePosixPath
 
-import numpy as np
-
 from cellplan.cache import as_here
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.load import read_mesh
@@ -23,6 +21,7 @@ from cellplan.io.robots.rules import limits_in_si, tightened
 from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot, load_urdf
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import CsvEntry
+from cellplan.io.schema.units import Deg, Mm
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import SampledPath, TimedPath
@@ -51,15 +50,15 @@ class Sources:
         self.errors: list[InputError] = []
 
     def mesh(
-        self, written: str, unit: str, path: KeyPath, *, demand: Callable[[Mesh], None] | None = None
+        self, written: str, unit: str, path: KeyPath, *, requirement: Callable[[Mesh], None] | None = None
     ) -> Mesh | None:
         """Mesh in [m] that meets a requirement, which raises an input error otherwise; None after a finding."""
         if (written, unit) not in self._meshes:
             self._meshes[written, unit] = self._read_mesh(written, unit, path)
         mesh = self._meshes[written, unit]
         try:
-            if mesh is not None and demand is not None:
-                demand(mesh)
+            if mesh is not None and requirement is not None:
+                requirement(mesh)
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))
             return None
@@ -95,7 +94,7 @@ class Sources:
         return None if findings else model
 
     def look_for_model(self, name: str, written: str) -> None:
-        """Complain about a model that does not exist, for a robot that is not understood for other reasons."""
+        """Note a model that does not exist, of a robot that is invalid for other reasons too."""
         path = ("robots", name, "model")
         if PurePosixPath(written).suffix.lower() in URDF_SUFFIXES | TABLE_SUFFIXES:
             self._file(written, path)
@@ -221,4 +220,4 @@ def _locked_in_si(entry: RobotEntry) -> Iterator[tuple[str, float]]:
     """Positions of locked joints in [rad] or [m], by joint name."""
     for key, value in entry.locked.items():
         joint, _, unit = key.rpartition("_")
-        yield joint, float(np.deg2rad(value)) if unit == "deg" else value / 1000.0
+        yield joint, Deg(value).si if unit == "deg" else Mm(value).si

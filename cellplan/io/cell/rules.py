@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from cellplan.io.cell.solver_rules import accurate_findings, feedback_findings
-from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown
-from cellplan.io.schema.partial import Pieces
+from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, unknown_name
+from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
 
@@ -15,55 +15,55 @@ MEANS_ELSE: Final = {"part": "the workpiece", "world": "the frame that everythin
 ANGLE_RANGES: Final = ("base", "start_deg", "start")
 
 
-def rule_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
+def rule_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """Everything in a cell file that contradicts something else in it."""
-    yield from _clashing_names(pieces, document)
-    yield from _holders(pieces, document)
-    yield from _operators(pieces, document)
-    for name, task in pieces.tasks.items():
-        yield from _times(pieces, document, name)
+    yield from _clashing_names(valid, document)
+    yield from _holders(valid, document)
+    yield from _operators(valid, document)
+    for name, task in valid.tasks.items():
+        yield from _times(valid, document, name)
         yield from _tool_axis(task, document, name)
-    yield from feedback_findings(pieces, document)
-    yield from accurate_findings(pieces, document)
-    yield from _layout(pieces, document)
+    yield from feedback_findings(valid, document)
+    yield from accurate_findings(valid, document)
+    yield from _layout(valid, document)
 
 
-def _clashing_names(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
+def _clashing_names(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """Names of files and folders that some systems do not distinguish, and names that mean two bodies."""
     for section in ("robots", "tasks"):
         seen: dict[str, str] = {}
-        for name in pieces.names[section]:
+        for name in valid.names[section]:
             other = seen.setdefault(name.lower(), name)
             if other != name:
                 text = f"expected a name that differs from '{other}' by more than upper and lower case"
                 yield document.key_finding((section, name), text)
-    for name in pieces.names["robots"]:
+    for name in valid.names["robots"]:
         if name.lower() in MEANS_ELSE:
             text = f"expected another name, '{name.lower()}' means {MEANS_ELSE[name.lower()]}"
             yield document.key_finding(("robots", name), text)
-    if "part" in pieces.names["environment"]:
+    if "part" in valid.names["environment"]:
         yield document.key_finding(("environment", "part"), "expected another name, 'part' means the workpiece")
 
 
-def _holders(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
+def _holders(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """The part is held by robots of the cell, each once."""
     seen: set[str] = set()
     for path, robot in _holders_as_written(document):
-        yield from _known_robot(robot, pieces, document, path)
+        yield from _known_robot(robot, valid, document, path)
         if robot in seen:
             yield document.finding(path, f"expected a robot that does not hold the part already, got '{robot}' twice")
         seen.add(robot)
 
 
-def _operators(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
+def _operators(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """Each task has a robot of its own: one that does not hold the part, or the one that carries it."""
     holders = [robot for _, robot in _holders_as_written(document)]
     busy: dict[str, str] = {}
     for name, path, robot in _operators_as_written(document):
-        yield from _known_robot(robot, pieces, document, path)
+        yield from _known_robot(robot, valid, document, path)
         if robot in holders:
             is_in_world = document.root["tasks"][name].get("relative_to") == "world"
-            text = _wrong_holder(robot, holders, pieces, is_in_world=is_in_world)
+            text = _wrong_holder(robot, holders, valid, is_in_world=is_in_world)
             if text:
                 yield document.finding(path, text)
         other = busy.setdefault(robot, name)
@@ -72,13 +72,13 @@ def _operators(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
             yield document.finding(path, text)
 
 
-def _wrong_holder(robot: str, holders: Sequence[str], pieces: Pieces, *, is_in_world: bool) -> str | None:
+def _wrong_holder(robot: str, holders: Sequence[str], valid: ValidEntries, *, is_in_world: bool) -> str | None:
     """What is wrong with a task of a robot that holds the part; None for one that may carry it along a path."""
     if not is_in_world:
         return f"expected a robot that does not hold the part, got the positioner '{robot}'"
     if robot != holders[0]:
         return f"expected the first holder '{holders[0]}', which carries the part frame, got '{robot}'"
-    if pieces.motion is not None and pieces.motion.mode == "part_at_rest":
+    if valid.motion is not None and valid.motion.mode == "part_at_rest":
         return f"expected a robot that does not hold the part in the mode part_at_rest, got the positioner '{robot}'"
     return None
 
@@ -102,19 +102,18 @@ def _operators_as_written(document: YamlDocument) -> Iterator[tuple[str, KeyPath
             yield name, ("tasks", name, "robot"), robot
 
 
-def _known_robot(robot: str, pieces: Pieces, document: YamlDocument, path: KeyPath) -> Iterator[Finding]:
+def _known_robot(robot: str, valid: ValidEntries, document: YamlDocument, path: KeyPath) -> Iterator[Finding]:
     """A robot that the cell has."""
-    known = pieces.names["robots"]
+    known = valid.names["robots"]
     if robot not in known:
-        hint = did_you_mean(robot, known)
-        yield document.finding(path, f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{hint}")
+        yield document.finding(path, unknown_name("a robot of this cell", robot, known))
 
 
-def _times(pieces: Pieces, document: YamlDocument, name: str) -> Iterator[Finding]:
+def _times(valid: ValidEntries, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A task starts and ends within the common clock."""
-    if pieces.motion is None:
+    if valid.motion is None:
         return
-    task, clock = pieces.tasks[name], pieces.motion.duration_s
+    task, clock = valid.tasks[name], valid.motion.duration_s
     if clock is None:  # the command line may give one
         return
     start, leaving = task.begins_s, task.leaving_s
@@ -148,19 +147,15 @@ def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[F
         yield document.finding(("tasks", name, key), text)
 
 
-def _layout(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
+def _layout(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """What a layout search may change exists."""
-    for key, value in (pieces.layout.vary if pieces.layout else {}).items():
+    for key, value in (valid.layout.vary if valid.layout else {}).items():
         path = ("layout", "vary", key)
         robot, _, what = key.rpartition(".")
         if what not in ANGLE_RANGES or not robot:
             text = f"expected ROBOT.base, ROBOT.start_deg or ROBOT.start{did_you_mean(what, ANGLE_RANGES)}"
             yield document.key_finding(path, text)
-        elif robot not in pieces.names["robots"]:
-            known = pieces.names["robots"]
-            hint = did_you_mean(robot, known)
-            yield document.key_finding(
-                path, f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{hint}"
-            )
+        elif robot not in valid.names["robots"]:
+            yield document.key_finding(path, unknown_name("a robot of this cell", robot, valid.names["robots"]))
         elif (what == "base") == (value is True):
             yield document.finding(path, "expected ranges for a base and true for a start posture")

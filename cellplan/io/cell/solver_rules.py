@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown
-from cellplan.io.robots.rules import start_keys
-from cellplan.io.schema.partial import Pieces
+from cellplan.io.input.findings import Finding, KeyPath, listed, shown, unknown_name
+from cellplan.io.robots.rules import configuration_findings
+from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
@@ -15,11 +15,11 @@ FEEDBACK_LIMIT: Final = 2.0  # gain_per_s * step_s at which Euler's steps become
 OR_EULER: Final = "or choose solver.integrator: euler"
 
 
-def feedback_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
+def feedback_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """The error feedback is stable with Euler's steps."""
-    if pieces.motion is None or pieces.solver is None or pieces.solver.gain_per_s is None:
+    if valid.motion is None or valid.solver is None or valid.solver.gain_per_s is None:
         return
-    gain, step = pieces.solver.gain_per_s, pieces.motion.step_s
+    gain, step = valid.solver.gain_per_s, valid.motion.step_s
     if gain * step >= FEEDBACK_LIMIT:
         text = (
             f"expected a gain below {FEEDBACK_LIMIT / step:g} (2 / step_s), got {gain:g}; "
@@ -28,9 +28,9 @@ def feedback_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Findin
         yield document.finding(("solver", "gain_per_s"), text)
 
 
-def accurate_findings(pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
+def accurate_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """An explicit ``integrator: accurate`` must be compatible with the other settings of the solver."""
-    solver = pieces.solver
+    solver = valid.solver
     if solver is None or solver.integrator != "accurate":
         return
     texts = {
@@ -54,18 +54,18 @@ def _goals(solver: SolverEntry) -> list[str]:
     return [name for name, goal in dict(solver.secondary).items() if goal is not None]
 
 
-def solver_findings(pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
+def solver_findings(valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
     """Joints that the solver and the motion name exist; the method has a null space for goals besides the tasks.
 
     Args:
-        pieces: What of the file is understood.
+        valid: Valid entries of the file.
         models: Robots whose model is known, by name.
         document: The file.
     """
-    solver, motion = pieces.solver, pieces.motion
+    solver, motion = valid.solver, valid.motion
     for index, lock in enumerate(motion.locked_joints if motion else ()):
         path: KeyPath = ("motion", "locked_joints", index)
-        yield from _joint(path, lock.robot, lock.joint, pieces=pieces, models=models, document=document)
+        yield from _joint(path, lock.robot, lock.joint, valid=valid, models=models, document=document)
         earlier = [(other.robot, other.joint) for other in (motion.locked_joints if motion else ())[:index]]
         if (lock.robot, lock.joint) in earlier:
             yield document.finding(path, f"expected every joint once, got '{lock.robot}/{lock.joint}' again")
@@ -77,56 +77,50 @@ def solver_findings(pieces: Pieces, models: Mapping[str, RobotModel], document: 
         return
     for index, step in enumerate(solver.search.sequence or ()):
         path = ("solver", "search", "sequence", index)
-        yield from _joint(path, step.robot, step.joint, pieces=pieces, models=models, document=document)
+        yield from _joint(path, step.robot, step.joint, valid=valid, models=models, document=document)
         if step in (solver.search.sequence or ())[:index]:
             yield document.finding(path, f"expected every joint once, got '{step.robot}/{step.joint}' again")
-    yield from _configurations(solver, pieces, models, document=document)
+    yield from _configurations(solver, valid, models, document=document)
     if not METHODS[solver.method].has_null_space:
-        yield from _without_null_space(solver, pieces, document)
+        yield from _without_null_space(solver, valid, document)
 
 
-def _without_null_space(solver: SolverEntry, pieces: Pieces, document: YamlDocument) -> Iterator[Finding]:
+def _without_null_space(solver: SolverEntry, valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """Goals that a method without a null space cannot pursue."""
     text = f"expected a method with a null space besides the tasks ({listed(NULL_SPACE_METHODS)})"
     if _goals(solver):
         yield document.finding(("solver", "secondary"), f"{text}, got '{solver.method}'")
-    if pieces.motion is not None and pieces.motion.cyclic:
+    if valid.motion is not None and valid.motion.cyclic:
         yield document.finding(("motion", "cyclic"), f"{text}, got '{solver.method}'")
 
 
 def _joint(
-    path: KeyPath, robot: str, joint: str, *, pieces: Pieces, models: Mapping[str, RobotModel], document: YamlDocument
+    path: KeyPath,
+    robot: str,
+    joint: str,
+    *,
+    valid: ValidEntries,
+    models: Mapping[str, RobotModel],
+    document: YamlDocument,
 ) -> Iterator[Finding]:
     """A named joint is one of the cell."""
-    known = pieces.names["robots"]
+    known = valid.names["robots"]
     if robot not in known:
-        text = f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{did_you_mean(robot, known)}"
-        yield document.finding((*path, "robot"), text)
+        yield document.finding((*path, "robot"), unknown_name("a robot of this cell", robot, known))
     elif robot in models and joint not in models[robot].joint_names:
         names = models[robot].joint_names
-        text = f"expected a joint of '{robot}' ({listed(names)}), got {shown(joint)}{did_you_mean(joint, names)}"
-        yield document.finding((*path, "joint"), text)
+        yield document.finding((*path, "joint"), unknown_name(f"a joint of '{robot}'", joint, names))
 
 
 def _configurations(
-    solver: SolverEntry, pieces: Pieces, models: Mapping[str, RobotModel], *, document: YamlDocument
+    solver: SolverEntry, valid: ValidEntries, models: Mapping[str, RobotModel], *, document: YamlDocument
 ) -> Iterator[Finding]:
     """A desired configuration has one value for each joint of a robot of the cell."""
     goal = solver.secondary.posture
     for robot, given in goal.at.items() if goal else ():
         path = ("solver", "secondary", "posture", "at", robot)
-        known = pieces.names["robots"]
+        known = valid.names["robots"]
         if robot not in known:
-            text = f"expected a robot of this cell ({listed(known)}), got {shown(robot)}{did_you_mean(robot, known)}"
-            yield document.key_finding(path, text)
-            continue
-        if robot not in models:
-            continue
-        keys = start_keys(models[robot])
-        for key in given:
-            if key not in keys:
-                text = f"unknown key{did_you_mean(key, keys)}; allowed: {listed(keys)}"
-                yield document.key_finding((*path, key), text)
-        missing = [key for key in keys if key not in given]
-        if missing:
-            yield document.finding(path, f"missing, expected one value per joint: add {listed(missing)}")
+            yield document.key_finding(path, unknown_name("a robot of this cell", robot, known))
+        elif robot in models:
+            yield from configuration_findings(path, given, models[robot], document)

@@ -1,7 +1,6 @@
 """Toolpath tables: tool positions on the part, with axes or quaternions, from a CSV file."""
 
 import re
-import stat
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, quaternion_to_rotation
+from cellplan.io.input.files import read_regular_file
 from cellplan.io.input.findings import Finding, did_you_mean, listed, raise_findings, shown
 from cellplan.model.task import SampledPath, TimedPath
 
@@ -22,14 +22,14 @@ COLUMNS: Final = (TIME, *POSITION, *AXIS, *QUATERNION)
 
 MOST_BYTES: Final = 50_000_000
 MOST_POINTS: Final = 200_000
-MOST_COMPLAINTS: Final = 20  # lines with findings that are reported; more are counted only
+FINDING_LIMIT: Final = 20  # lines with findings that are reported; more are counted only
 UNIT_ROOM: Final = 1e-3  # [-] room for axes and quaternions written with four digits
 FARTHEST: Final = 100_000.0  # [mm] no part is that large: a wrong unit
 SHORTEST_S: Final = 1e-6  # [s] between two times, halved for rounding; no controller resolves less
 LATEST: Final = 1e6  # [s] eleven days: a wrong unit
 CLOSING_ROOM: Final = 1e-3  # [mm] room for a return to the start written with three decimals
 FEWEST_CLOSED: Final = 4  # rows of a trajectory that encloses something and repeats its start
-MM: Final = 1e-3  # [m/mm]
+METRES_PER_MM: Final = 1e-3
 
 _LIMITS: Final = {TIME: (LATEST, " s")} | dict.fromkeys(POSITION, (FARTHEST, " mm"))
 _NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -51,7 +51,7 @@ class _Findings:
     @property
     def is_enough(self) -> bool:
         """Whether reading on would not help."""
-        return len(self.found) >= MOST_COMPLAINTS
+        return len(self.found) >= FINDING_LIMIT
 
 
 def read_toolpath_csv(
@@ -92,7 +92,7 @@ def read_toolpath_csv(
         if is_closed:
             _close(values, columns, (axes, quaternions), findings)
     raise_findings(name, findings.found)
-    points = values[:, [columns.index(column) for column in POSITION]] * MM
+    points = values[:, [columns.index(column) for column in POSITION]] * METRES_PER_MM
     rotations = None if quaternions is None else quaternion_to_rotation(quaternions)
     if times is None:
         return SampledPath(
@@ -103,16 +103,7 @@ def read_toolpath_csv(
 
 def _read_text(path: Path, name: str) -> str:
     """Content of a regular file of sensible size, as text without control characters."""
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{name}: expected a regular file")
-        if status.st_size > MOST_BYTES:
-            raise InputError(f"{name}: expected at most {MOST_BYTES} bytes, got {status.st_size}")
-        data = path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "not a file name"
-        raise InputError(f"{name}: cannot be read: {str(reason).lower()}") from None
+    data = read_regular_file(path, file=name, limit=MOST_BYTES)
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -172,7 +163,7 @@ def _read_rows(lines: list[str], columns: list[str], findings: _Findings) -> Arr
     rows: list[list[float]] = []
     for line, text in enumerate(lines[1:], start=2):
         if findings.is_enough:
-            findings.add(line, f"and so on: stopped reading after {MOST_COMPLAINTS} findings")
+            findings.add(line, f"and so on: stopped reading after {FINDING_LIMIT} findings")
             break
         row = list(_read_row(line, text, columns, findings))
         if len(row) == len(columns):
@@ -181,7 +172,7 @@ def _read_rows(lines: list[str], columns: list[str], findings: _Findings) -> Arr
 
 
 def _read_row(line: int, text: str, columns: list[str], findings: _Findings) -> Iterator[float]:
-    """Numbers of one row; a value that is none is complained about and left out."""
+    """Numbers of one row; an invalid value is reported and left out."""
     if not text.strip():
         findings.add(line, "expected a row of numbers, got a blank line; leave it out")
         return
@@ -221,7 +212,7 @@ def _units(
         return None
     vectors = values[:, [columns.index(column) for column in desired]]
     norms = np.linalg.norm(vectors, axis=1)
-    for row in np.flatnonzero(~(np.abs(norms - 1.0) <= UNIT_ROOM))[:MOST_COMPLAINTS]:
+    for row in np.flatnonzero(~(np.abs(norms - 1.0) <= UNIT_ROOM))[:FINDING_LIMIT]:
         text = f"expected a {what} ({listed(desired)}) of length 1, got {norms[row]:.6g}"
         findings.add(int(row) + 2, text)
     unit: Array = vectors / np.where(norms > 0.0, norms, 1.0)[:, None]
@@ -233,7 +224,7 @@ def _examine_times(times: Array, findings: _Findings) -> None:
     if times[0] != 0.0:
         text = f"expected 0 in the first row, got {times[0]:.9g}; a task is shifted by its start_s"
         findings.add(2, text, column=TIME)
-    for row in np.flatnonzero(~(np.diff(times) > 0.5 * SHORTEST_S))[:MOST_COMPLAINTS]:
+    for row in np.flatnonzero(~(np.diff(times) > 0.5 * SHORTEST_S))[:FINDING_LIMIT]:
         text = f"expected a time after {times[row]:.9g} of the row before, got {times[row + 1]:.9g}"
         findings.add(int(row) + 3, text, column=TIME)
 

@@ -5,7 +5,7 @@ from typing import Final
 
 from cellplan.io.cell.rules import TIME_ROOM, needs_surface
 from cellplan.io.input.findings import Finding, KeyPath
-from cellplan.io.schema.partial import Pieces
+from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.task import CsvEntry, TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.task import SampledPath, TimedPath
@@ -15,14 +15,14 @@ Targets = Mapping[str, SampledPath | TimedPath]  # what was read of the files of
 OWN_CLOCK: Final = ("duration_s", "feed_mm_s", "time_law", "corners")  # what a trajectory decides by itself
 
 
-def target_findings(pieces: Pieces, targets: Targets, document: YamlDocument) -> Iterator[Finding]:
+def target_findings(valid: ValidEntries, targets: Targets, document: YamlDocument) -> Iterator[Finding]:
     """Everything in the tasks that contradicts the files of their paths."""
     for name, path in targets.items():
-        task = pieces.tasks[name]
+        task = valid.tasks[name]
         yield from _axes(task, path, document, name)
         if isinstance(path, TimedPath):
             yield from _clock(task, document, name)
-            yield from _end(task, path, pieces, document=document, name=name)
+            yield from _end(task, path, valid, document=document, name=name)
 
 
 def _axes(task: TaskEntry, path: SampledPath | TimedPath, document: YamlDocument, name: str) -> Iterator[Finding]:
@@ -55,11 +55,13 @@ def _clock(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Findi
         yield document.finding(("tasks", name, "path", "csv", "smooth"), text)
 
 
-def _end(task: TaskEntry, path: TimedPath, pieces: Pieces, *, document: YamlDocument, name: str) -> Iterator[Finding]:
+def _end(
+    task: TaskEntry, path: TimedPath, valid: ValidEntries, *, document: YamlDocument, name: str
+) -> Iterator[Finding]:
     """A trajectory ends within the common clock."""
-    if pieces.motion is None or pieces.motion.duration_s is None:
+    if valid.motion is None or valid.motion.duration_s is None:
         return
-    clock, end = pieces.motion.duration_s, task.begins_s + task.repeat * path.duration + task.leaving_s
+    clock, end = valid.motion.duration_s, task.begins_s + task.repeat * path.duration + task.leaving_s
     if end > clock * (1.0 + TIME_ROOM):
         cycles = f"{task.repeat} cycles of " if task.repeat > 1 else ""
         place: KeyPath = ("tasks", name, "path", "csv")

@@ -7,18 +7,19 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, pose, rpy_from_rotation
 from cellplan.io.cell.build_accelerations import written_rule
-from cellplan.io.robots.rules import start_keys
+from cellplan.io.robots.rules import configuration_in_si, start_keys
 from cellplan.io.schema.cell import MotionEntry
 from cellplan.io.schema.robot import RobotEntry
+from cellplan.io.schema.units import Deg, Mm, in_si
 from cellplan.io.yaml.writer import yaml_text
 from cellplan.model.cell import Cell, CheckSettings, Part, Robot
 from cellplan.model.robot import RobotModel
 from cellplan.model.solver import Integrator, SolverSettings
 from cellplan.model.task import SampledPath, Task, TimedPath
+from cellplan.model.units import MM
 
 CONFIGURATIONS: Final = frozenset({"start", "start_deg", "home", "home_deg"})
 NEIGHBOURS: Final = 3  # units in the last place round the quotient in which the written number is sought
-MM: Final = 1000.0  # [mm/m]
 
 
 def render_cell(cell: Cell, starts: Mapping[str, Array] | None = None) -> str:
@@ -63,10 +64,7 @@ def as_written(model: RobotModel, q: Array) -> Array:
         model: The robot.
         q: Configuration in [rad] or [m], shape (n,).
     """
-    written = _in_file_units(model, q)
-    turns = [joint.is_revolute for joint in model.joints]
-    configuration: Array = np.where(turns, np.deg2rad(written), np.divide(written, MM))
-    return configuration
+    return configuration_in_si(model, _in_file_units(model, q))
 
 
 def _robot(entry: Mapping[str, Any], robot: Robot, found: Array | None) -> dict[str, Any]:
@@ -127,8 +125,8 @@ def _solver(entry: Mapping[str, Any], solver: SolverSettings) -> dict[str, Any]:
 
 def _checks(entry: Mapping[str, Any], checks: CheckSettings) -> dict[str, Any]:
     """Required clearance and tolerances."""
-    as_read = entry["clearance_mm"] / 1e3
-    return {**entry, "clearance_mm": entry["clearance_mm"] if as_read == checks.clearance else 1e3 * checks.clearance}
+    is_same = Mm(entry["clearance_mm"]).si == checks.clearance
+    return {**entry, "clearance_mm": entry["clearance_mm"] if is_same else MM * checks.clearance}
 
 
 def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:
@@ -139,9 +137,8 @@ def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:
 
 
 def _pose(entry: Mapping[str, Any], X: Array) -> dict[str, Any]:
-    """A pose in the words of the file; in new words where it was changed since."""
-    written = pose(np.divide(entry["xyz_mm"], MM), np.deg2rad(entry["rpy_deg"]))
-    if np.array_equal(written, X):
+    """A pose with the numbers of the file; with new numbers if it was changed since."""
+    if np.array_equal(pose(in_si(map(Mm, entry["xyz_mm"])), in_si(map(Deg, entry["rpy_deg"]))), X):
         return dict(entry)
     xyz_mm = [_file_number(float(value), is_revolute=False) for value in X[:3, 3]]
     rpy_deg = [_file_number(float(value), is_revolute=True) for value in rpy_from_rotation(X[:3, :3])]
@@ -163,10 +160,5 @@ def _file_number(value: float, *, is_revolute: bool) -> float:
     for _ in range(NEIGHBOURS):
         above, below = float(np.nextafter(above, np.inf)), float(np.nextafter(below, -np.inf))
         candidates += [above, below]
-    exact = (number for number in candidates if _read_back(number, is_revolute=is_revolute) == value)
-    return next(exact, quotient)
-
-
-def _read_back(number: float, *, is_revolute: bool) -> float:
-    """What the cell reader makes of a number of degrees or millimetres."""
-    return float(np.deg2rad(number)) if is_revolute else number / MM
+    unit = Deg if is_revolute else Mm
+    return next((number for number in candidates if unit(number).si == value), quotient)

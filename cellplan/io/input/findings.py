@@ -7,7 +7,7 @@ from typing import Final
 
 from cellplan.errors import InputError, InvalidFileError
 
-COMPLAINT_LIMIT: Final = 100  # of a file; more are counted only
+FINDING_LIMIT: Final = 100  # of a file; more are counted only
 SHOWN_LENGTH: Final = 40  # characters of a wrong text that are repeated in a message
 LISTED_LIMIT: Final = 60  # words of a list in a message; more than any robot's joints
 SHORTEST_GUESS: Final = 3  # characters; for shorter words every other one is near
@@ -45,9 +45,9 @@ def raise_findings(file: str, findings: Iterable[Finding], others: Sequence[Inpu
         InvalidFileError: When there is at least one finding.
     """
     ordered = sorted(dict.fromkeys(findings), key=lambda finding: finding.line)
-    errors = [finding.to_error(file) for finding in ordered[:COMPLAINT_LIMIT]]
-    if len(ordered) > COMPLAINT_LIMIT:
-        errors.append(InputError(f"{file}: and more than {len(ordered) - COMPLAINT_LIMIT - 1} other findings"))
+    errors = [finding.to_error(file) for finding in ordered[:FINDING_LIMIT]]
+    if len(ordered) > FINDING_LIMIT:
+        errors.append(InputError(f"{file}: and more than {len(ordered) - FINDING_LIMIT - 1} other findings"))
     for other in others:
         errors.extend(other.findings if isinstance(other, InvalidFileError) else [other])
     if errors:
@@ -71,6 +71,12 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
         return ""
     near = get_close_matches(word[:SHOWN_LENGTH], list(known), n=1, cutoff=0.6)
     return f", did you mean '{near[0]}'?" if near else ""
+
+
+def unknown_name(what: str, name: object, known: Iterable[str]) -> str:
+    """Text of a finding about a name that does not exist: ``expected a robot of this cell (kuka, abb), got 'kuke'``."""
+    known = tuple(known)
+    return f"expected {what} ({listed(known)}), got {shown(name)}{did_you_mean(str(name), known)}"
 
 
 def listed(words: Iterable[str]) -> str:

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown
+from cellplan.io.input.findings import Finding, KeyPath, unknown_name
 from cellplan.io.schema.robot import PayloadEntry
-from cellplan.io.shapes import MM
+from cellplan.io.schema.units import si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.payload import AxisLimit, Payload
 
@@ -16,8 +16,8 @@ def build_payload(entry: PayloadEntry | None) -> Payload | None:
     return Payload(
         mass=entry.mass_kg,
         source=entry.source,
-        along=None if entry.along_mm is None else entry.along_mm / MM,
-        across=None if entry.across_mm is None else entry.across_mm / MM,
+        along=si_or_none(entry.along_mm),
+        across=si_or_none(entry.across_mm),
         axes=tuple(
             AxisLimit(joint=joint, moment=limit.moment_nm, inertia=limit.inertia_kg_m2)
             for joint, limit in entry.axes.items()
@@ -39,5 +39,5 @@ def payload_findings(
     last = turning[-3:]
     for joint in entry.axes if entry is not None else ():
         if joint not in last:
-            text = f"expected one of the last turning joints ({listed(last)}), got {shown(joint)}"
-            yield document.key_finding((*path, "axes", joint), f"{text}{did_you_mean(joint, last)}")
+            text = unknown_name("one of the last turning joints", joint, last)
+            yield document.key_finding((*path, "axes", joint), text)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,12 +15,15 @@ from cellplan.geometry.mesh.load import read_mesh
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.input.allowed_folders import AllowedFolders
-from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, raise_findings, shown
+from cellplan.io.input.findings import Finding, KeyPath, raise_findings, shown, unknown_name
 from cellplan.io.robots.build_payload import build_payload, payload_findings
+from cellplan.io.robots.limits import RATES
 from cellplan.io.schema import RobotTableDocument
 from cellplan.io.schema.messages import validate
+from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS
 from cellplan.io.schema.robot_table import BodiesEntry, JointEntry
-from cellplan.io.shapes import MM, link_solid, pose_from_entry
+from cellplan.io.schema.units import in_si, si_or_none
+from cellplan.io.shapes import link_solid, pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
 from cellplan.model.robot import BASE, Body, BodyAccuracy, Joint, JointKind, Link, RobotModel
 
@@ -82,9 +85,7 @@ def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Findin
     links, place = (FOOT, *table.joints), table.solids_path
     for index, body in enumerate(table.solids):
         if body.link not in links:
-            hint = did_you_mean(body.link, links)
-            text = f"expected a link ({listed(links)}), got {shown(body.link)}{hint}"
-            yield document.finding((*place, index, "link"), text)
+            yield document.finding((*place, index, "link"), unknown_name("a link", body.link, links))
         if body.name is not None and TOOL_NAME.fullmatch(body.name):
             text = f"expected another name, '{body.name}' means the tool of the robot"
             yield document.finding((*place, index, "name"), text)
@@ -113,10 +114,6 @@ class _Meshes:
             return self._read[written, unit]
         try:
             path = self._folders.file(written)
-        except InputError as error:
-            self.findings.append(self._document.finding((*self._place, index, "mesh", "file"), str(error)))
-            return None
-        try:
             guard = Guard(file=written, worker="the mesh reader")
             mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), path, guard=guard)
         except InputError as error:
@@ -144,7 +141,7 @@ def _bodies(table: RobotTableDocument, meshes: _Meshes) -> Iterator[Body]:
         name = entry.name or _free_name(entry.link, taken)
         taken.add(name)
         shape, X_BS = link_solid(entry, partial(meshes.known, index=index))
-        accuracy = None if entry.accuracy_mm is None else entry.accuracy_mm / MM
+        accuracy = si_or_none(entry.accuracy_mm)
         yield Body(name=name, link=links[entry.link], shape=shape, X_BS=X_BS, accuracy=accuracy)
 
 
@@ -180,30 +177,20 @@ def _body_accuracy(table: RobotTableDocument) -> BodyAccuracy | None:
     bodies = table.bodies
     if not isinstance(bodies, BodiesEntry) or bodies.accuracy_mm is None:
         return None
-    return BodyAccuracy(distance=bodies.accuracy_mm / MM, source=bodies.source)
+    return BodyAccuracy(distance=bodies.accuracy_mm.si, source=bodies.source)
 
 
 def _joint(name: str, entry: JointEntry, parent: int) -> Joint:
     """A joint; its axis was checked to be of length 1 but for the digits it was written with."""
     kind = JointKind(entry.type)
-    is_revolute = kind == JointKind.REVOLUTE
-    words = ("deg", "deg_s", "deg_s2", "deg_s3") if is_revolute else ("mm", "mm_s", "mm_s2", "mm_s3")
-    acceleration, jerk = getattr(entry, f"acceleration_{words[2]}"), getattr(entry, f"jerk_{words[3]}")
+    keys = TURNING_LIMITS if kind == JointKind.REVOLUTE else SLIDING_LIMITS
+    limits: dict[str, Any] = {name: si_or_none(getattr(entry, key)) for name, key in zip(RATES, keys, strict=True)}
     axis = np.array(entry.axis)
     return Joint(
         name=name,
         kind=kind,
         parent=parent,
         axis_B=axis / np.linalg.norm(axis),
-        point_B=np.divide(entry.point_mm, MM),
-        lower=_si(getattr(entry, f"lower_{words[0]}"), is_revolute=is_revolute),
-        upper=_si(getattr(entry, f"upper_{words[0]}"), is_revolute=is_revolute),
-        velocity=_si(getattr(entry, f"velocity_{words[1]}"), is_revolute=is_revolute),
-        acceleration=None if acceleration is None else _si(acceleration, is_revolute=is_revolute),
-        jerk=None if jerk is None else _si(jerk, is_revolute=is_revolute),
+        point_B=in_si(entry.point_mm),
+        **limits,
     )
-
-
-def _si(value: float, *, is_revolute: bool) -> float:
-    """Degrees to radians, or millimetres to metres."""
-    return float(np.deg2rad(value)) if is_revolute else value / MM

@@ -1,16 +1,17 @@
 """What a cell says about a robot must fit its model: start posture, weights and limits, joint by joint."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.io.input.findings import Finding, did_you_mean, listed, shown
+from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, unknown_name
 from cellplan.io.robots.build_payload import build_payload, payload_findings
 from cellplan.io.robots.limits import RATES, StatedLimits, limit_findings, limits_of, tightest
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
+from cellplan.io.schema.units import Deg, Mm, in_si, si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import BodyAccuracy, Joint, RobotModel
 
@@ -25,40 +26,33 @@ def start_keys(model: RobotModel) -> tuple[str, ...]:
 
 def start_posture(entry: RobotEntry, model: RobotModel) -> Array | None:
     """Start posture in [rad] or [m] as written; None when it is to be found."""
-    return _configuration(entry.given_start, model)
+    return None if entry.given_start is None else configuration_in_si(model, entry.given_start)
 
 
 def home_configuration(entry: RobotEntry, model: RobotModel) -> Array | None:
     """Home in [rad] or [m] as written; None when it is to be found."""
-    return _configuration(entry.given_home, model)
+    return None if entry.given_home is None else configuration_in_si(model, entry.given_home)
 
 
-def _configuration(given: Given, model: RobotModel) -> Array | None:
-    """Joint positions in [rad] or [m] from those of a file, shape (n,)."""
-    if given is None:
-        return None
-    values = [given[key] for key in start_keys(model)] if isinstance(given, dict) else given
-    turns = [joint.is_revolute for joint in model.joints]
-    return np.where(turns, np.deg2rad(values), np.divide(values, 1000.0))
+def configuration_in_si(model: RobotModel, given: Iterable[float] | Mapping[str, float]) -> Array:
+    """Joint positions in [rad] or [m] from degrees and millimetres, in order or by key, shape (n,)."""
+    values = [given[key] for key in start_keys(model)] if isinstance(given, Mapping) else given
+    pairs = zip(model.joints, values, strict=True)
+    return in_si(Deg(value) if joint.is_revolute else Mm(value) for joint, value in pairs)
 
 
 def limits_in_si(entry: LimitsEntry) -> StatedLimits:
     """Limits of a cell in [rad], [m], [rad/s], [m/s] and the two rates after these."""
-    slides = entry.unit == "mm"
-    given = (getattr(entry, name) for name in (SLIDING_LIMITS if slides else TURNING_LIMITS))
-    lower, upper, velocity, acceleration, jerk = (
-        None if value is None else value / 1000.0 if slides else float(np.deg2rad(value)) for value in given
-    )
-    return StatedLimits(
-        lower=lower, upper=upper, velocity=velocity, acceleration=acceleration, jerk=jerk, wraps=entry.wrap
-    )
+    keys = SLIDING_LIMITS if entry.unit == "mm" else TURNING_LIMITS
+    values = [si_or_none(getattr(entry, key)) for key in keys]
+    return StatedLimits(**dict(zip(RATES, values, strict=True)), wraps=entry.wrap)
 
 
 def robot_findings(name: str, entry: RobotEntry, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:
     """Everything a cell says about a robot that its model contradicts."""
     path = ("robots", name)
-    yield from _configuration_findings((*path, "start"), entry.given_start, model, document)
-    yield from _configuration_findings((*path, "home"), entry.given_home, model, document)
+    yield from configuration_findings((*path, "start"), entry.given_start, model, document)
+    yield from configuration_findings((*path, "home"), entry.given_home, model, document)
     yield from _unit_findings(("robots", name), entry, model, document)
     turning = tuple(joint.name for joint in model.joints if joint.is_revolute)
     yield from payload_findings(("robots", name, "payload"), entry.payload, turning, document)
@@ -70,16 +64,14 @@ def robot_findings(name: str, entry: RobotEntry, model: RobotModel, document: Ya
     if reach > FARTHEST_FLANGE:
         text = f"expected a reach of at most {FARTHEST_FLANGE:g} m, got {reach:.6g} m; is the unit right?"
         yield document.finding(("robots", name, "model"), text)
-    length = float(np.linalg.norm(entry.tool.xyz_mm)) / 1000.0
+    length = Mm(np.linalg.norm(entry.tool.xyz_mm)).si
     if length > FARTHEST_FLANGE:
         text = f"expected a tool of at most {FARTHEST_FLANGE:g} m, got {length:.6g} m; is the unit right?"
         yield document.finding(("robots", name, "tool", "xyz_mm"), text)
 
 
-def _configuration_findings(
-    path: tuple[str, str, str], given: Given, model: RobotModel, document: YamlDocument
-) -> Iterator[Finding]:
-    """A start posture or a home has one value for each joint, in the joint's unit."""
+def configuration_findings(path: KeyPath, given: Given, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:
+    """A configuration has one value for each joint, in the joint's unit."""
     if given is None:
         return
     *robot, key = path
@@ -111,8 +103,7 @@ def _unit_findings(
     joints = {joint.name: joint for joint in model.joints}
     for name, limits in entry.limits.items():
         if name not in joints:
-            text = f"expected a joint of the robot ({listed(joints)}), got {shown(name)}{did_you_mean(name, joints)}"
-            yield document.key_finding((*path, "limits", name), text)
+            yield document.key_finding((*path, "limits", name), unknown_name("a joint of the robot", name, joints))
         elif limits.unit is not None and (limits.unit == "deg") != joints[name].is_revolute:
             kind, unit = ("revolute", "deg") if joints[name].is_revolute else ("prismatic", "mm")
             text = f"expected limits in {unit}, the joint is {kind}, got {limits.unit}"
@@ -151,7 +142,7 @@ def _within(joint: Joint, limits: StatedLimits, *, is_slowed: bool) -> Joint:
 def with_statements(entry: RobotEntry, model: RobotModel) -> RobotModel:
     """The model with what the cell states in place of the robot's own file."""
     if entry.bodies is not None:
-        accuracy = BodyAccuracy(distance=entry.bodies.accuracy_mm / 1000.0, source=entry.bodies.source)
+        accuracy = BodyAccuracy(distance=entry.bodies.accuracy_mm.si, source=entry.bodies.source)
         bodies = tuple(replace(body, accuracy=None) for body in model.bodies)
         model = replace(model, body_accuracy=accuracy, bodies=bodies)
     return model if entry.payload is None else replace(model, payload=build_payload(entry.payload))

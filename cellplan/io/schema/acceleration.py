@@ -5,13 +5,14 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 from pydantic import ConfigDict, Field, Tag, model_validator
 
 from cellplan.io.schema.common import Entry, Reason, by_kind, one_of_keys, require_one
+from cellplan.io.schema.units import Ms, Within
 
 AXES: Final = 64  # joints of one robot
 SECONDS_WORDS: Final = "a number of seconds or a list of them"
 RULE_WORDS: Final = "stated, unlimited, {full_speed_in_s: …} or {unlimited: reason}"
 
 SpeedUpTime = Annotated[float, Field(ge=0.001, le=1000.0)]  # [s]
-CycleTime = Annotated[float, Field(ge=0.1, le=1000.0)]  # [ms]
+CycleTime = Annotated[Ms, Within(ge=0.1, le=1000.0)]
 SpeedUpTimes = Annotated[
     Annotated[SpeedUpTime, Tag("<number>")]
     | Annotated[tuple[SpeedUpTime, ...], Field(min_length=1, max_length=AXES), Tag("<list>")],

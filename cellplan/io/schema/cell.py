@@ -30,6 +30,7 @@ from cellplan.io.schema.task import (
     ToolDepth,
     require_each_once,
 )
+from cellplan.io.schema.units import Deg, Mm, Ms, Within
 
 SCHEMA_VERSION: Final = 1
 ROBOT_LIMIT: Final = 64
@@ -51,8 +52,8 @@ class GraspEntry(Entry):
         description="Components of its motion on the part that a further holder keeps at zero, in the part frame; the "
         "first holder carries the part frame and has all six.",
     )
-    depth_mm: Annotated[float, Field(ge=0.0, le=1000.0)] = Field(
-        default=2.0,
+    depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = Field(
+        default=Mm(2.0),
         description="Largest penetration of the part by the holder's flange, tool and all that is rigid with them.",
     )
 
@@ -124,7 +125,7 @@ class MotionEntry(Entry):
     )
     step_s: Seconds = Field(default=0.001, description="Time between two samples.")
     controller_cycle_ms: CycleTime = Field(
-        default=4.0, description="Cycle of the controllers, over which jerk is taken."
+        default=Ms(4.0), description="Cycle of the controllers, over which jerk is taken."
     )
     time_law: TimeLawChoice = Field(default="quintic", description="Law of each stretch of path between stops.")
     corners: CornerChoice = Field(default="stop", description="Stop at corners, or round them.")
@@ -166,29 +167,29 @@ class ExclusionEntry(Entry):
 class ChecksEntry(Entry):
     """Requirements of the checks."""
 
-    clearance_mm: Annotated[float, Field(ge=0.0, le=10_000.0)] = Field(
-        default=5.0, description="Smallest allowed distance between things that must not touch."
+    clearance_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = Field(
+        default=Mm(5.0), description="Smallest allowed distance between things that must not touch."
     )
     body_accuracy: Literal["report", "add"] = Field(
         default="report",
         description="What to do with the stated accuracy of link bodies: report it beside the distances, or add that "
         "of both bodies to the demanded clearance of each pair.",
     )
-    contact_zone_mm: Annotated[float, Field(ge=0.0, le=WIDEST_CONTACT_MM)] = Field(
-        default=20.0, description="Radius round the tool tip within which tool and part may touch."
+    contact_zone_mm: Annotated[Mm, Within(ge=0.0, le=WIDEST_CONTACT_MM)] = Field(
+        default=Mm(20.0), description="Radius round the tool tip within which tool and part may touch."
     )
     tool_depth_mm: ToolDepth = Field(
-        default=1.0,
+        default=Mm(1.0),
         description="Largest length of tool inside the part or beyond it, along the tool's axis from where it enters.",
     )
-    closure_mm: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(
-        default=0.003, description="Largest distance of a further holder's tool from its grasp on the part."
+    closure_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] = Field(
+        default=Mm(0.003), description="Largest distance of a further holder's tool from its grasp on the part."
     )
-    closure_deg: Annotated[float, Field(gt=0.0, le=180.0)] = Field(
-        default=0.001, description="Largest angle between a further holder's tool and its grasp on the part."
+    closure_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] = Field(
+        default=Deg(0.001), description="Largest angle between a further holder's tool and its grasp on the part."
     )
-    standing_depth_mm: Annotated[float, Field(ge=0.0, le=1000.0)] = Field(
-        default=5.0,
+    standing_depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = Field(
+        default=Mm(5.0),
         description="How deep bodies that never move may reach into each other where one stands on the other: a base "
         "in a floor or plinth, a fixed part on a table.",
     )

@@ -4,14 +4,14 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from cellplan.io.schema.common import Angle, Entry, PlaneCoordinates, SignedAxis, Size, by_kind, rule
+from cellplan.io.schema.common import Angle, Component, Entry, PlaneCoordinates, SignedAxis, Size, by_kind, rule
+from cellplan.io.schema.units import Deg, Mm
 
 PlaneWord = Literal["xy", "yz", "xz"]
-Component = Annotated[float, Field(ge=-1e6, le=1e6)]
 PlaneDirection = tuple[Component, Component]
+SHORTEST_START: Final = 1e-6  # [-] a shorter vector has no direction
 
 START_WORDS: Final = "+x, -x, +y, -y, +z, -z or a direction [u, v] on the plane's axes"
-SHORTEST_START: Final = 1e-6  # [-] a shorter vector has no direction
 
 StartChoice = Annotated[
     Annotated[SignedAxis, Tag(f"<{START_WORDS}>")] | Annotated[PlaneDirection, Tag("<list>")],
@@ -23,7 +23,7 @@ class ClosedShapeEntry(Entry):
     """What all closed shapes share: a plane, a centre, and the way round."""
 
     plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field(default=(0.0, 0.0), description="Centre on the plane's two axes.")
+    center_mm: PlaneCoordinates = Field(default=(Mm(0.0), Mm(0.0)), description="Centre on the plane's two axes.")
     direction: Literal["counterclockwise", "clockwise"] = Field(
         default="counterclockwise",
         description="Way round, seen from outside the surface: from the side that the path is projected from; for a "
@@ -52,7 +52,7 @@ class RectangleEntry(ClosedShapeEntry):
     """A rectangle."""
 
     sides_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
-    angle_deg: Angle = Field(default=0.0, description="Turn in the plane, from the first axis towards the second.")
+    angle_deg: Angle = Field(default=Deg(0.0), description="Turn in the plane, from the first axis towards the second.")
     start_at: PlaneDirection = Field(
         default=(1.0, 1.0),
         description="Corner of the start by the signs of its place before the rectangle is turned: [1, 1], [-1, 1], "
@@ -72,7 +72,7 @@ class RhombusEntry(ClosedShapeEntry):
     """A rhombus."""
 
     diagonals_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
-    angle_deg: Angle = Field(default=0.0, description="Turn in the plane, from the first axis towards the second.")
+    angle_deg: Angle = Field(default=Deg(0.0), description="Turn in the plane, from the first axis towards the second.")
     start_at: StartChoice = Field(
         default=(1.0, 0.0),
         description="Corner of the start before the rhombus is turned: an axis of the plane, or [u, v] along one of "

@@ -6,6 +6,8 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
+from cellplan.io.schema.units import Deg, Mm, Within
+
 NAME_PATTERN: Final = "^[A-Za-z0-9_][A-Za-z0-9_-]{0,39}$"
 NAME_WORDS: Final = "a name of 1 to 40 letters, digits, '_' or '-' that does not start with '-'"
 
@@ -15,14 +17,16 @@ LARGEST_FRAME_DEG: Final = 720.0  # two turns: more in the pose of a frame is a 
 LARGEST_TURN_DEG: Final = 3_600.0  # ten turns: more is a wrong unit
 
 Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN)]
-Coordinate = Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)]
-Size = Annotated[float, Field(ge=THINNEST_MM, le=FARTHEST_MM)]
-Angle = Annotated[float, Field(ge=-LARGEST_TURN_DEG, le=LARGEST_TURN_DEG)]
+Coordinate = Annotated[Mm, Within(ge=-FARTHEST_MM, le=FARTHEST_MM)]
+Size = Annotated[Mm, Within(ge=THINNEST_MM, le=FARTHEST_MM)]
+Angle = Annotated[Deg, Within(ge=-LARGEST_TURN_DEG, le=LARGEST_TURN_DEG)]
 
 Coordinates = tuple[Coordinate, Coordinate, Coordinate]
 PlaneCoordinates = tuple[Coordinate, Coordinate]
-FrameAngle = Annotated[float, Field(ge=-LARGEST_FRAME_DEG, le=LARGEST_FRAME_DEG)]
+FrameAngle = Annotated[Deg, Within(ge=-LARGEST_FRAME_DEG, le=LARGEST_FRAME_DEG)]
 Angles = tuple[FrameAngle, FrameAngle, FrameAngle]
+ORIGIN: Final = (Mm(0.0), Mm(0.0), Mm(0.0))
+NOT_TURNED: Final = (Deg(0.0), Deg(0.0), Deg(0.0))
 
 SHORTEST_DIRECTION: Final = 1e-6  # [-] a shorter vector has no direction
 
@@ -105,8 +109,8 @@ class Entry(BaseModel):
 class PoseEntry(Entry):
     """A pose: where a frame stands and how it is turned."""
 
-    xyz_mm: Coordinates = Field(default=(0.0, 0.0, 0.0), description="Position.")
+    xyz_mm: Coordinates = Field(default=ORIGIN, description="Position.")
     rpy_deg: Angles = Field(
-        default=(0.0, 0.0, 0.0),
+        default=NOT_TURNED,
         description="Roll, pitch and yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF.",
     )

@@ -11,6 +11,7 @@ from pydantic import BaseModel, Tag, ValidationError
 from cellplan.io.input.findings import Finding, KeyPath
 from cellplan.io.schema.common import Entry
 from cellplan.io.schema.mismatch import Kind, Mismatch, mismatch_text
+from cellplan.io.schema.units import Quantity
 from cellplan.io.yaml.reader import YamlDocument
 
 UNITS: Final[Mapping[str, str]] = {
@@ -37,7 +38,7 @@ def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | 
     """Read a whole file.
 
     Args:
-        model: What should stand there.
+        model: The expected kind of file.
         document: The file.
 
     Returns:
@@ -52,8 +53,8 @@ def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | 
     return None, list(dict.fromkeys(located))
 
 
-def understood(model: type[AnyEntry], document: YamlDocument, path: KeyPath) -> AnyEntry | None:
-    """One part of a file; None when it is not as it should be."""
+def valid_entry(model: type[AnyEntry], document: YamlDocument, path: KeyPath) -> AnyEntry | None:
+    """One entry of a file; None when it is invalid."""
     try:
         return model.model_validate(value_at(document.root, path))
     except ValidationError:
@@ -95,7 +96,7 @@ class _Reader:
 
     @property
     def value(self) -> Any:
-        """What stands at the place of the finding."""
+        """The value at the place of the finding."""
         return value_at(self.document.root, self.path)
 
     def mismatch(self) -> Mismatch | None:
@@ -189,14 +190,14 @@ def fields_of(annotation: Any) -> Mapping[str, Any]:
 
 
 def _bare(annotation: Any) -> Any:
-    """Annotation without metadata and without "or nothing"."""
+    """Annotation without metadata, without "or nothing" and without the unit of a number."""
     while True:
         if get_origin(annotation) is Annotated:
             annotation = get_args(annotation)[0]
             continue
         arms = [arm for arm in _arms(annotation) if arm is not NoneType]
         if len(arms) != 1 or arms[0] is annotation:
-            return annotation
+            return float if isinstance(annotation, type) and issubclass(annotation, Quantity) else annotation
         annotation = arms[0]
 
 
@@ -241,7 +242,7 @@ def _is_fixed_list(annotation: Any) -> bool:
 
 
 def _phrase(annotation: Any) -> str:
-    """What may stand at a place, in words."""
+    """The kinds of value allowed at a place, as a phrase."""
     if get_origin(annotation) is Literal:
         words = [str(word) for word in get_args(annotation)]
         return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"

@@ -71,7 +71,7 @@ def mismatch_text(mismatch: Mismatch) -> str:
 
 
 def _expected_text(mismatch: Mismatch) -> str:
-    """What may stand at the place of a mismatch, in words."""
+    """The values allowed at the place of a mismatch, as a phrase."""
     if mismatch.kind is Kind.NAME:
         return NAME_WORDS
     bound = mismatch.at_most if mismatch.at_least is None else mismatch.at_least

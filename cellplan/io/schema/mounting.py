@@ -1,4 +1,4 @@
-"""What stands below a robot and what is mounted on its links, as it is written in a cell file."""
+"""Pedestals of robots and attachments of their links as written in a cell file."""
 
 from typing import ClassVar, Self
 

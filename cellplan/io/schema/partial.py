@@ -1,4 +1,4 @@
-"""What of a cell file can be understood, so that one mistake does not hide the others."""
+"""The valid entries of a cell file, so that rules between entries are checked in spite of an invalid one."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from cellplan.io.schema.cell import (
     MotionEntry,
     PartEntry,
 )
-from cellplan.io.schema.messages import AnyEntry, understood, validate
+from cellplan.io.schema.messages import AnyEntry, valid_entry, validate
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.solver import SolverEntry
@@ -25,21 +25,21 @@ from cellplan.io.yaml.reader import YamlDocument
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pieces:
-    """The sound parts of a cell file.
+class ValidEntries:
+    """The entries of a cell file that conform to the format.
 
     Attributes:
-        whole: The whole file; None when anything in it is not understood.
-        robots: Robots that are understood, by name.
-        tasks: Tasks that are understood, by name.
-        environment: Obstacles that are understood, by name.
-        part: The part, if understood.
-        motion: The motion, if understood.
-        solver: The solver's settings, if understood.
-        checks: The checks, if understood.
-        layout: The layout, if given and understood.
-        acceleration: What the cell says of accelerations, if the whole file is understood.
-        names: All names that the file gives in each section, understood or not.
+        whole: The whole file; None when any entry is invalid.
+        robots: Valid robots by name.
+        tasks: Valid tasks by name.
+        environment: Valid obstacles by name.
+        part: The part, if valid.
+        motion: The motion, if valid.
+        solver: The solver's settings, if valid.
+        checks: The checks, if valid.
+        layout: The layout, if given and valid.
+        acceleration: The cell's rule for accelerations, if the whole file is valid.
+        names: All names in each section, of valid and invalid entries.
     """
 
     whole: CellDocument | None
@@ -60,10 +60,10 @@ class Pieces:
         return len(self.robots) > ROBOT_LIMIT or len(self.tasks) > TASK_LIMIT or not self.names["robots"]
 
 
-def read_pieces(document: YamlDocument) -> tuple[Pieces, list[Finding]]:
-    """Parse a cell file as far as possible; the findings name the rest."""
+def read_valid_entries(document: YamlDocument) -> tuple[ValidEntries, list[Finding]]:
+    """Validate a cell file entry by entry; the findings name what is invalid."""
     whole, findings = validate(CellDocument, document)
-    pieces = Pieces(
+    valid = ValidEntries(
         whole=whole,
         robots=_named(RobotEntry, document, "robots"),
         tasks=_named(TaskEntry, document, "tasks"),
@@ -76,18 +76,18 @@ def read_pieces(document: YamlDocument) -> tuple[Pieces, list[Finding]]:
         acceleration=None if whole is None else whole.acceleration,
         names={key: tuple(_section(document, key)) for key in ("robots", "tasks", "environment")},
     )
-    return pieces, findings
+    return valid, findings
 
 
 def _section(document: YamlDocument, key: str) -> Mapping[str, Any]:
-    """Entries of a section by name; none when it is something else or far too much."""
+    """Entries of a section by name; none when it is no mapping or far too large."""
     section = document.root.get(key)
     return section if isinstance(section, dict) and len(section) <= OBSTACLE_LIMIT else {}
 
 
 def _named(model: type[AnyEntry], document: YamlDocument, key: str) -> dict[str, AnyEntry]:
-    """Entries of a section that are understood."""
-    found = {name: understood(model, document, (key, name)) for name in _section(document, key)}
+    """Valid entries of a section by name."""
+    found = {name: valid_entry(model, document, (key, name)) for name in _section(document, key)}
     return {name: entry for name, entry in found.items() if entry is not None}
 
 
@@ -95,4 +95,4 @@ def _single(model: type[AnyEntry], document: YamlDocument, key: str) -> AnyEntry
     """A section that is one entry; its defaults when it is absent and may be."""
     if key not in document.root:
         return None if key in {"part", "motion", "layout"} else model()
-    return understood(model, document, (key,))
+    return valid_entry(model, document, (key,))

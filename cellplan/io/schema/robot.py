@@ -8,6 +8,7 @@ from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
 from cellplan.io.schema.common import Angle, Coordinate, Coordinates, Entry, PoseEntry, Size, Text, by_kind, rule
 from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
+from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Within
 
 LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a wrong unit
 FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a wrong unit
@@ -18,12 +19,15 @@ HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
 ROUGHEST_MM: Final = 1_000.0  # bodies that are farther off stand for nothing
 AXIS_LIMIT: Final = 64  # joints of one robot
 
-JointAngle = Annotated[float, Field(ge=-LARGEST_JOINT_DEG, le=LARGEST_JOINT_DEG)]
-TurningSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_DEG_S)]
-SlidingSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_MM_S)]
-Acceleration = Annotated[float, Field(gt=0.0, le=STEEPEST)]
+JointAngle = Annotated[Deg, Within(ge=-LARGEST_JOINT_DEG, le=LARGEST_JOINT_DEG)]
+TurningSpeed = Annotated[DegPerS, Within(gt=0.0, le=FASTEST_DEG_S)]
+SlidingSpeed = Annotated[MmPerS, Within(gt=0.0, le=FASTEST_MM_S)]
+TurningAcceleration = Annotated[DegPerS2, Within(gt=0.0, le=STEEPEST)]
+SlidingAcceleration = Annotated[MmPerS2, Within(gt=0.0, le=STEEPEST)]
+TurningJerk = Annotated[DegPerS3, Within(gt=0.0, le=STEEPEST)]
+SlidingJerk = Annotated[MmPerS3, Within(gt=0.0, le=STEEPEST)]
 Mass = Annotated[float, Field(ge=0.0, le=HEAVIEST_KG)]
-Accuracy = Annotated[float, Field(ge=0.0, le=ROUGHEST_MM)]
+Accuracy = Annotated[Mm, Within(ge=0.0, le=ROUGHEST_MM)]
 LoadFigure = Annotated[float, Field(gt=0.0, le=HEAVIEST_KG)]
 Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
 JointPosition = Annotated[float, Field(ge=-100_000.0, le=100_000.0)]
@@ -35,8 +39,7 @@ POSTURE_WORDS: Final = "auto or a list of joint angles"
 POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
 
 Configuration = Annotated[
-    Annotated[Literal["auto"], Tag(f"<{POSTURE_WORDS}>")]
-    | Annotated[tuple[Annotated[Angle, Field()], ...], Tag("<list>")],
+    Annotated[Literal["auto"], Tag(f"<{POSTURE_WORDS}>")] | Annotated[tuple[Angle, ...], Tag("<list>")],
     by_kind(POSTURE_WORDS, list=tuple),
 ]
 NamedConfiguration = Annotated[
@@ -73,17 +76,17 @@ class LimitsEntry(Entry):
     lower_deg: JointAngle | None = Field(default=None, description="Lowest angle of a revolute joint.")
     upper_deg: JointAngle | None = Field(default=None, description="Highest angle of a revolute joint.")
     velocity_deg_s: TurningSpeed | None = Field(default=None, description="Largest speed of a revolute joint.")
-    acceleration_deg_s2: Acceleration | None = Field(
+    acceleration_deg_s2: TurningAcceleration | None = Field(
         default=None, description="Largest acceleration of a revolute joint."
     )
-    jerk_deg_s3: Acceleration | None = Field(default=None, description="Largest jerk of a revolute joint.")
+    jerk_deg_s3: TurningJerk | None = Field(default=None, description="Largest jerk of a revolute joint.")
     lower_mm: Coordinate | None = Field(default=None, description="Lowest position of a prismatic joint.")
     upper_mm: Coordinate | None = Field(default=None, description="Highest position of a prismatic joint.")
     velocity_mm_s: SlidingSpeed | None = Field(default=None, description="Largest speed of a prismatic joint.")
-    acceleration_mm_s2: Acceleration | None = Field(
+    acceleration_mm_s2: SlidingAcceleration | None = Field(
         default=None, description="Largest acceleration of a prismatic joint."
     )
-    jerk_mm_s3: Acceleration | None = Field(default=None, description="Largest jerk of a prismatic joint.")
+    jerk_mm_s3: SlidingJerk | None = Field(default=None, description="Largest jerk of a prismatic joint.")
     wrap: bool = Field(default=False, description="Whether a continuous joint may turn without end.")
 
     @model_validator(mode="after")

@@ -5,6 +5,8 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 from pydantic import ConfigDict, Field, Tag, model_validator
 
 from cellplan.io.schema.common import (
+    NOT_TURNED,
+    ORIGIN,
     Angles,
     Coordinate,
     Coordinates,
@@ -19,14 +21,24 @@ from cellplan.io.schema.common import (
     require_one,
     rule,
 )
-from cellplan.io.schema.robot import AXIS_LIMIT, Accuracy, JointAngle, PayloadEntry, SlidingSpeed, TurningSpeed
+from cellplan.io.schema.robot import (
+    AXIS_LIMIT,
+    SLIDING_LIMITS,
+    TURNING_LIMITS,
+    Accuracy,
+    JointAngle,
+    PayloadEntry,
+    SlidingAcceleration,
+    SlidingJerk,
+    SlidingSpeed,
+    TurningAcceleration,
+    TurningJerk,
+    TurningSpeed,
+)
 from cellplan.io.schema.shapes import SOLID_SHAPES, MeshUnit, SphereEntry
 
-Positive = Annotated[float, Field(gt=0.0, le=1e9)]
 BODY_LIMIT: Final = 200  # solids of one robot
 UNIT_ROOM: Final = 1e-3  # [-] room for axes written with four digits
-TURNING_KEYS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
-SLIDING_KEYS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
 
 
 class JointEntry(Entry):
@@ -34,28 +46,26 @@ class JointEntry(Entry):
 
     type: Literal["revolute", "prismatic"] = Field(description="How the joint moves.")
     axis: Vector = Field(description="Unit direction of the axis.")
-    point_mm: Coordinates = Field(
-        default=(0.0, 0.0, 0.0), description="A point on the axis; required for a revolute joint."
-    )
+    point_mm: Coordinates = Field(default=ORIGIN, description="A point on the axis; required for a revolute joint.")
     lower_deg: JointAngle | None = Field(default=None, description="Lowest angle of a revolute joint.")
     upper_deg: JointAngle | None = Field(default=None, description="Highest angle of a revolute joint.")
     velocity_deg_s: TurningSpeed | None = Field(default=None, description="Largest speed of a revolute joint.")
-    acceleration_deg_s2: Positive | None = Field(
+    acceleration_deg_s2: TurningAcceleration | None = Field(
         default=None, description="Largest acceleration of a revolute joint, if known."
     )
-    jerk_deg_s3: Positive | None = Field(default=None, description="Largest jerk of a revolute joint, if known.")
+    jerk_deg_s3: TurningJerk | None = Field(default=None, description="Largest jerk of a revolute joint, if known.")
     lower_mm: Coordinate | None = Field(default=None, description="Lowest position of a prismatic joint.")
     upper_mm: Coordinate | None = Field(default=None, description="Highest position of a prismatic joint.")
     velocity_mm_s: SlidingSpeed | None = Field(default=None, description="Largest speed of a prismatic joint.")
-    acceleration_mm_s2: Positive | None = Field(
+    acceleration_mm_s2: SlidingAcceleration | None = Field(
         default=None, description="Largest acceleration of a prismatic joint, if known."
     )
-    jerk_mm_s3: Positive | None = Field(default=None, description="Largest jerk of a prismatic joint, if known.")
+    jerk_mm_s3: SlidingJerk | None = Field(default=None, description="Largest jerk of a prismatic joint, if known.")
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         """Keys of the joint's own unit, all of them, lower below upper."""
-        own, other = (TURNING_KEYS, SLIDING_KEYS) if self.type == "revolute" else (SLIDING_KEYS, TURNING_KEYS)
+        own, other = (TURNING_LIMITS, SLIDING_LIMITS) if self.type == "revolute" else (SLIDING_LIMITS, TURNING_LIMITS)
         for name in other:
             if getattr(self, name) is not None:
                 raise rule(f"unexpected key, a {self.type} joint has {', '.join(own)}", name)
@@ -86,7 +96,7 @@ class PlacedBoxEntry(Entry):
 
     size_mm: tuple[Size, Size, Size] = Field(description="Edge lengths along its own x, y, z.")
     center_mm: Coordinates = Field(description="Centre.")
-    rpy_deg: Angles = Field(default=(0.0, 0.0, 0.0), description="Roll, pitch and yaw about fixed axes.")
+    rpy_deg: Angles = Field(default=NOT_TURNED, description="Roll, pitch and yaw about fixed axes.")
 
 
 class PlacedSphereEntry(SphereEntry):

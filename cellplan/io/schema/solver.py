@@ -6,6 +6,7 @@ from pydantic import Field, Tag
 
 from cellplan.io.schema.common import Entry, Name, Text, by_kind
 from cellplan.io.schema.robot import JointPosition
+from cellplan.io.schema.units import Mm, Within
 from cellplan.model.solver import MethodName
 
 LARGEST_SEED: Final = 2**32 - 1
@@ -53,8 +54,8 @@ class SearchJointEntry(Entry):
 class SearchEntry(Entry):
     """Settings of `heuristic_search` and `recursive_search`."""
 
-    tolerance_mm: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(
-        default=1e-4, description="Largest square root of the cost at which a sample counts as reached."
+    tolerance_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] = Field(
+        default=Mm(1e-4), description="Largest square root of the cost at which a sample counts as reached."
     )
     orientation_weight_m2: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
         default=0.01, description="Weight of the orientation in the cost."
@@ -102,8 +103,8 @@ class ObstacleGoalEntry(Entry):
     """Distance from obstacles and from other robots."""
 
     gain: Gain = Field(default=0.1, description="Gain in rad^2/s.")
-    within_mm: Annotated[float, Field(gt=0.0, le=10_000.0)] = Field(
-        default=200.0, description="Distance below which bodies repel each other."
+    within_mm: Annotated[Mm, Within(gt=0.0, le=10_000.0)] = Field(
+        default=Mm(200.0), description="Distance below which bodies repel each other."
     )
 
 
@@ -151,8 +152,8 @@ class SolverEntry(Entry):
         "weighted_pseudo_inverse without secondary goals, near_limits and load; gain_per_s and damping do not apply to "
         "it. auto is accurate where that is possible, else euler.",
     )
-    accuracy_mm: Annotated[float, Field(ge=1e-9, le=1.0)] = Field(
-        default=1e-4,
+    accuracy_mm: Annotated[Mm, Within(ge=1e-9, le=1.0)] = Field(
+        default=Mm(1e-4),
         description="Largest tool error between the nodes of the accurate mode; for angles the same number in "
         "milliradians. euler does not use it.",
     )

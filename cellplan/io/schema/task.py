@@ -20,6 +20,7 @@ from cellplan.io.schema.common import (
     rule,
 )
 from cellplan.io.schema.robot import SlidingSpeed
+from cellplan.io.schema.units import Deg, Mm, Within
 
 PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
@@ -180,22 +181,24 @@ class PathEntry(Entry):
 class ToleranceEntry(Entry):
     """Largest allowed tool error on the part."""
 
-    position_mm: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(default=0.1, description="Largest position error.")
-    orientation_deg: Annotated[float, Field(gt=0.0, le=180.0)] = Field(
-        default=0.01, description="Largest orientation error."
+    position_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] = Field(
+        default=Mm(0.1), description="Largest position error."
     )
-    between_rows_mm: Annotated[float, Field(gt=0.0, le=1000.0)] | None = Field(
+    orientation_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] = Field(
+        default=Deg(0.01), description="Largest orientation error."
+    )
+    between_rows_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] | None = Field(
         default=None,
         description="Largest position error between the rows of the tables, where joints move evenly from row to row; "
         "position_mm when left out. A larger one is for steps that something else prescribes.",
     )
-    between_rows_deg: Annotated[float, Field(gt=0.0, le=180.0)] | None = Field(
+    between_rows_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] | None = Field(
         default=None, description="Likewise for the orientation; orientation_deg when left out."
     )
 
 
-ToolDepth = Annotated[float, Field(ge=0.0, le=DEEPEST_CUT_MM)]
-StandOff = Annotated[float, Field(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
+ToolDepth = Annotated[Mm, Within(ge=0.0, le=DEEPEST_CUT_MM)]
+StandOff = Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
 
 
@@ -226,7 +229,7 @@ class TaskEntry(Entry):
         description="Direction in the part frame onto which the tool's x axis is aligned as closely as possible.",
     )
     tool_turn_deg: Angle = Field(
-        default=0.0,
+        default=Deg(0.0),
         description="Angle by which the tool turns about its own z axis, evenly over the length of the path, "
         "and on by as much in every further cycle.",
     )
@@ -254,11 +257,12 @@ class TaskEntry(Entry):
         default=1, description="Number of cycles along the path; more than one only for a closed path."
     )
     approach_mm: StandOff = Field(
-        default=0.0, description="Distance from which the tool approaches the start of its path, along its own axis."
+        default=Mm(0.0),
+        description="Distance from which the tool approaches the start of its path, along its own axis.",
     )
     approach_s: Seconds = Field(default=0.5, description="Time for the approach, which ends when the path starts.")
     retract_mm: StandOff = Field(
-        default=0.0, description="Distance to which the tool retracts from the end of its path, along its own axis."
+        default=Mm(0.0), description="Distance to which the tool retracts from the end of its path, along its own axis."
     )
     retract_s: Seconds = Field(default=0.5, description="Time for the retraction.")
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(

@@ -32,7 +32,7 @@ LINE_BREAK: Final = re.compile("\r\n|\r|\n")
 
 
 class Unreadable:
-    """Stands where a value was refused, so that the rest of the file can still be read."""
+    """Takes the place of a refused value, so that the rest of the file can still be read."""
 
     def __repr__(self) -> str:
         """What a message would show."""
@@ -330,7 +330,7 @@ class _Composer:
             raise InputError(f"{self.file}:{_mark(event).line}: expected at most {DEPTH_LIMIT} levels, got more")
 
     def _refuse(self, event: Any, path: KeyPath, text: str) -> Unreadable:
-        """Complain and leave a mark in place of the value."""
+        """Record a finding and leave a mark in place of the value."""
         self._complain(event, path, text)
         self.unreadable.add(path)
         return UNREADABLE

@@ -178,7 +178,7 @@ def test_bytes_that_are_not_utf_8_are_refused(read) -> None:
 def test_only_regular_files_are_read(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.csv")
     for name in ("pipe.csv", "."):
-        with pytest.raises(InputError, match=": expected a regular file"):
+        with pytest.raises(InputError, match=": expected a regular file, got a folder, a pipe or a device"):
             read_toolpath_csv(tmp_path / name, is_smooth=False, is_closed=False, source=name)
 
 
@@ -186,19 +186,19 @@ def test_a_missing_file_is_said_to_be_missing(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read_toolpath_csv(tmp_path / "weld.csv", is_smooth=False, is_closed=False, source="paths/weld.csv")
 
-    assert str(caught.value) == "paths/weld.csv: cannot be read: no such file or directory"
+    assert str(caught.value) == "paths/weld.csv: no such file"
 
 
 def test_too_many_points_are_refused(read) -> None:
     assert findings_of(read, HEADER + "0,0,0\n" * 200_001) == ["weld.csv: expected at most 200000 points, got 200001"]
 
 
-def test_too_large_a_file_is_refused_unread(tmp_path: Path) -> None:
+def test_too_large_a_file_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "weld.csv"
     with file.open("wb") as stream:
         stream.truncate(50_000_001)
 
-    with pytest.raises(InputError, match="expected at most 50000000 bytes, got 50000001"):
+    with pytest.raises(InputError, match=r"weld\.csv: expected a file of at most 50 MB, got a larger one"):
         read_toolpath_csv(file, is_smooth=False, is_closed=False)
 
 

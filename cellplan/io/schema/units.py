@@ -1,0 +1,92 @@
+"""Numbers with a unit: each keeps the number that the file writes, and ``si`` is the same quantity in SI units."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.units import MM
+
+
+class Quantity(float):
+    """A number in the unit of a file, thousandths unless its class says otherwise; it prints as that number."""
+
+    @property
+    def si(self) -> float:
+        """The quantity in SI units; a division, as it rounds once only."""
+        return self / MM
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: type[Self], handler: GetCoreSchemaHandler) -> CoreSchema:
+        """A number without bounds, which then gets its unit."""
+        return core_schema.no_info_after_validator_function(cls, core_schema.float_schema())
+
+
+class Mm(Quantity):
+    """Millimetres."""
+
+
+class MmPerS(Quantity):
+    """Millimetres per second."""
+
+
+class MmPerS2(Quantity):
+    """Millimetres per second²."""
+
+
+class MmPerS3(Quantity):
+    """Millimetres per second³."""
+
+
+class Ms(Quantity):
+    """Milliseconds."""
+
+
+class Deg(Quantity):
+    """Degrees."""
+
+    @property
+    def si(self) -> float:
+        """The quantity in [rad] and its rates."""
+        return math.radians(self)
+
+
+class DegPerS(Deg):
+    """Degrees per second."""
+
+
+class DegPerS2(Deg):
+    """Degrees per second²."""
+
+
+class DegPerS3(Deg):
+    """Degrees per second³."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Within:
+    """Bounds of a quantity in the unit of the file, as in ``Annotated[Mm, Within(ge=0.0, le=1000.0)]``."""
+
+    ge: float | None = None
+    gt: float | None = None
+    le: float
+
+    def __get_pydantic_core_schema__(self, source: type[Quantity], handler: GetCoreSchemaHandler) -> CoreSchema:
+        """A number within the bounds, which then gets its unit."""
+        number = core_schema.float_schema(ge=self.ge, gt=self.gt, le=self.le)
+        return core_schema.no_info_after_validator_function(source, number)
+
+
+def in_si(values: Iterable[Quantity]) -> Array:
+    """Quantities in SI units, shape (n,)."""
+    return np.array([value.si for value in values])
+
+
+def si_or_none(value: Quantity | None) -> float | None:
+    """A quantity in SI units; None stays None."""
+    return None if value is None else value.si
