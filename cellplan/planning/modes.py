@@ -61,7 +61,14 @@ def homeless(cell: Cell, phase: Phase) -> frozenset[str]:
 
 def _phase(cell: Cell, name: str, tasks: Sequence[Task], *, is_carried: bool = True) -> Phase:
     """A phase in which some tasks are worked on and the holders carry the part, or hold it still."""
-    roles: dict[str, Role] = {task.robot: Work(task.name) for task in tasks}
+    roles: dict[str, Role] = {}
+    for task in tasks:
+        if (other := roles.get(task.robot)) is not None:
+            raise InputError(
+                f"{task.where('robot')}: expected a robot without another task in the phase '{name}', got "
+                f"'{task.robot}' ({other})"
+            )
+        roles[task.robot] = Work(task.name)
     for holder in cell.positioners:
         roles.setdefault(holder, Carry() if is_carried else Hold())
     idle = idle_robots(cell, [task.name for task in tasks])

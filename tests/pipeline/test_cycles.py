@@ -129,7 +129,7 @@ def test_a_tool_that_starts_beside_its_path_is_judged_once_it_has_settled(planar
     assert (record["settle_s"], record["judged_from_s"], record["cycles"], record["end_s"]) == (3.0, 3.0, 1, 4.0)
     assert record["max_position_error_with_settling_mm"] == pytest.approx(1e3 * error.max(), rel=1e-9)
     assert record["max_position_error_mm"] == pytest.approx(1e3 * error[600:].max(), rel=1e-9)
-    assert "judged from 3.00 s" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert "evaluated from 3.00 s" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

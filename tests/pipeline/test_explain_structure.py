@@ -7,6 +7,7 @@ import pytest
 from builders.jacobian_cells import planners_jacobian
 from builders.random_cells import make_task, random_cell
 
+from cellplan.errors import InputError
 from cellplan.model.cell import Mode
 from cellplan.pipeline.explain import explain
 from cellplan.report.record.structure import structure_record
@@ -53,16 +54,21 @@ def test_a_bystander_has_links_and_no_columns():
     assert "robot op1  (random) idle" in structure_lines(structure_record(structure))
 
 
-def test_two_tasks_of_one_operator_double_the_rows_and_not_the_rank():
+def test_two_tasks_of_one_operator_are_refused_in_one_phase_and_have_a_matrix_each_in_two():
     cell = random_cell(5, operators=1, joints=6)
     cell = replace(cell, tasks=(*cell.tasks, make_task("op0", name="again")))
     q = np.random.default_rng(5).uniform(-1.5, 1.5, cell.joint_count)
+    started = with_starts(cell, q)
 
-    (matrix,) = explain(with_starts(cell, q)).matrices
+    with pytest.raises(InputError) as caught:
+        explain(started)
+    matrices = explain(replace(started, motion=replace(started.motion, mode=Mode.PAIRWISE))).matrices
 
-    assert sum(matrix.rows) == 12
-    assert matrix.rank == 6
-    assert matrix.redundancy == 6
+    assert str(caught.value) == (
+        "<cell>: tasks.again.robot: expected a robot without another task in the phase 'all tasks', got 'op0' "
+        f"(work: {cell.tasks[0].name})"
+    )
+    assert [(sum(matrix.rows), matrix.rank, matrix.redundancy) for matrix in matrices] == [(6, 6, 6), (6, 6, 6)]
 
 
 def test_a_fixed_part_and_resting_robots_keep_their_places():

@@ -31,7 +31,7 @@ def test_other_figures_and_curves_are_taken_for_rounding(old: str, new: str) -> 
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         ("error in mm", "error in um", "error in um"),
         (">0.5<", ">0.5 safe<", "0.5 safe"),
