@@ -10,7 +10,7 @@ from cellplan.report.record.common import Number, Record
 MAX_NAMES: Final = 3  # links of a robot that a line names; further ones are counted
 CLOCK_NOTES: Final = {
     TASKS: "no motion.duration_s: the clock ends with the last task",
-    NEXT_STEP: "motion.duration_s is no whole number of steps: the clock ends with the step after it",
+    NEXT_STEP: "motion.duration_s is not a multiple of motion.step_s: the clock ends with the step after it",
 }
 
 

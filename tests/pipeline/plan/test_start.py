@@ -46,7 +46,7 @@ def test_a_fault_of_the_cell_is_named_before_the_search(
     reported = why_no_start(tmp_path, base_mm=base_mm, offset_mm=offset_mm)
 
     assert reported.startswith(first)
-    assert "; with that no start was found: cell.yaml:5: robots.pen.start_deg: no configuration" in reported
+    assert "; no start posture was found: cell.yaml:5: robots.pen.start_deg: no configuration" in reported
 
 
 def test_a_fixed_part_in_a_foot_is_named(tmp_path: Path) -> None:
