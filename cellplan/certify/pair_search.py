@@ -106,7 +106,7 @@ class Search(ABC):
             self.state.note_distance(distance, self._time(sample))
 
     def _cut(self, step: int, level: float, cutoff: float) -> None:
-        """Search one step in finer steps; give it up where it cannot be cut any more."""
+        """Search one step in finer steps; mark it as unresolved where it cannot be cut any more."""
         fine, bounds = self._fine.get(step), self.bounds
         if fine is None:
             if self._travel(step) <= RESOLUTION or not self.state.may_cut:

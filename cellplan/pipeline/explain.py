@@ -59,7 +59,7 @@ class MatrixShape:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Structure:
-    """How a cell hangs together.
+    """The structure of a cell.
 
     Attributes:
         cell: The cell.

@@ -53,7 +53,7 @@ def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
     at_s = None if times is None or not pair.moves else float(times[found.row])
     instant = "" if at_s is None else f" at {at_s:.3f} s"
     share = f" ({limit - MM * pair.accuracy:g} mm beyond the accuracy of its body)" if pair.accuracy else ""
-    message = f"{inner} is {_shown(depth)} mm deep in {outer}{instant}, at most {limit:g} mm{share}"
+    message = f"{inner} is {_shown(depth)} mm deep in {outer}{instant}, allowed {limit:g} mm{share}"
     passed, cure = _passed(found), PIT_CURE if is_ground(scene.bodies[pair.second]) else CURES[pair.mount]
     return Check(
         name=str(pair.mount),

@@ -66,7 +66,7 @@ def _check_position(use: JointUse, times: Array, q: Array) -> Check:
         first = float(times[np.argmax((q < use.lower) | (q > use.upper))])
         side = "below its lower" if limit == scale * use.lower else "beyond its upper"
         verdict = (
-            f"goes {-scale * use.margin:.4g} {unit} {side} limit {limit:g} {unit} "
+            f"is {-scale * use.margin:.4g} {unit} {side} limit {limit:g} {unit} "
             f"(reaches {value:.4f} {unit}; outside from {first:.3f} s)"
         )
     return Check(

@@ -72,7 +72,7 @@ def _deep_grasps(scene: Scene) -> Iterator[str]:
             if depth > pair.limit:
                 yield (
                     f"{cell.origin.at(f'part.held_by[{number}].at')}: {body.name} is {1e3 * depth:.4g} mm deep in part "
-                    f"at this pose, at most {1e3 * pair.limit:g} mm: {CURES[Mount.GRIP]}"
+                    f"at this pose, allowed {1e3 * pair.limit:g} mm: {CURES[Mount.GRIP]}"
                 )
 
 

@@ -83,7 +83,7 @@ def correct_from_pass_to_pass(
         real: The real cell.
         system: The measuring system.
         rng: Where its noise comes from.
-        rounds: Most corrections that are made.
+        rounds: Maximum number of corrections.
         on_round: Called with the number of each round that begins.
     """
     executions = _Executions(job, real, system, rng)

@@ -69,7 +69,7 @@ def test_a_renamed_cell_file_is_still_the_same(copy: Path) -> None:
 
 def test_nobody_else_can_make_a_verified_run(sound: Path) -> None:
     run = open_gate(sound / "run", cell=sound / "cell" / "small.yaml")
-    with pytest.raises(TypeError, match=r"made by cellplan\.open_gate only"):
+    with pytest.raises(TypeError, match=r"created by cellplan\.open_gate only"):
         replace(run, token=None)
     with pytest.raises(ValueError, match="has motions"):
         replace(run, motions=(), token=ACCESS_TOKEN)

@@ -230,7 +230,7 @@ def test_a_clock_of_another_program_is_refused(solved: tuple[Path, Solution], tm
     record["files"]["tables/clock.csv"] = {"bytes": len(data), "sha256": digest(data)}
     (tmp_path / "run" / "manifest.json").write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n")
 
-    with pytest.raises(InputError, match=r"clock\.csv:3: program digest: is not that of this run"):
+    with pytest.raises(InputError, match=r"clock\.csv:3: program digest: differs from that of this run"):
         open_gate(tmp_path / "run", cell=solved[0])
 
 
