@@ -55,7 +55,7 @@ def test_an_open_mesh_is_refused_unless_it_is_a_surface(
     (found,) = open_surfaces_record(cell)
     (line,) = open_surface_notes([found])
     assert (found["open_edges"], found["has_inside"]) == (3, False)
-    assert line[1].endswith("has 3 open edges: touching it counts, being inside it does not")
+    assert line[1].endswith("has 3 open edges: contact is detected, containment is not")
 
 
 def test_a_closed_mesh_that_may_be_open_is_a_solid_all_the_same(load: Load) -> None:
@@ -74,7 +74,7 @@ def test_open_links_are_told_robot_by_robot() -> None:
     assert list(open_surface_notes(links)) == [
         (
             "robots.arm.model",
-            "5 meshes of links are open (arm/link_0, arm/link_1, arm/link_2, …): what they wind round by more than one "
-            "half counts as inside",
+            "5 meshes of links are open (arm/link_0, arm/link_1, arm/link_2, …): points with a winding number "
+            "above one half count as inside",
         )
     ]
