@@ -214,7 +214,7 @@ def table(rows: dict[str, list[Row]]) -> list[str]:
     """The table in Markdown."""
     lines = [
         "| cell | method | largest error | cost per step | × pseudo-inverse | evaluations per step | fastest joint "
-        "| limits kept | room for goals |",
+        "| limits kept | secondary goals |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for title, each in rows.items():

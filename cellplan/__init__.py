@@ -97,7 +97,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is first asked for."""
+    """Import a public name on first access."""
     if name not in _HOME:
         raise AttributeError(f"module 'cellplan' has no attribute '{name}'")
     return getattr(import_module(f"cellplan.{_HOME[name]}"), name)

@@ -1,10 +1,10 @@
-"""Everything that can go wrong, as one tree; each class knows the exit status it ends the program with."""
+"""All errors as one hierarchy; each class has the exit status with which it ends the program."""
 
 from enum import IntEnum
 
 
 class ExitStatus(IntEnum):
-    """What the shell sees when a command ends."""
+    """Exit statuses of the commands."""
 
     PASSED = 0
     CHECK_FAILED = 1
@@ -15,13 +15,13 @@ class ExitStatus(IntEnum):
 
 
 class CellplanError(Exception):
-    """Anything cellplan refuses or cannot do; the message is one line that says where, what, got and allowed."""
+    """Base class of all errors; the message is one line: where, what, the value found and the values allowed."""
 
     status = ExitStatus.INTERNAL
 
 
 class InputError(CellplanError):
-    """Something the user wrote cannot be used: a value, a file, an option."""
+    """A value, a file or an option of the user cannot be used."""
 
     status = ExitStatus.BAD_INPUT
 
@@ -44,7 +44,7 @@ class InvalidFileError(InputError):
 
 
 class OverrunError(InputError):
-    """A file took its reader down, or more time or memory than any sound file needs."""
+    """A file crashed its reader, or exceeded the limits of time or memory."""
 
 
 class NotVerifiedError(CellplanError):
@@ -83,7 +83,7 @@ class NotPlanarError(InputError):
 
 
 class PrimaryChoiceError(InputError):
-    """Joint speeds were imposed that no speeds of the other joints can go with."""
+    """Joint velocities were imposed that are not compatible with any velocities of the other joints."""
 
 
 class NoSolutionError(CellplanError):
@@ -97,12 +97,12 @@ class StartNotFoundError(NoSolutionError):
 
 
 class HomeNotFoundError(NoSolutionError):
-    """No configuration was found in which an idle robot stands free of everything for the whole of its runs."""
+    """No collision-free configuration was found for an idle robot during its runs."""
 
 
 class DivergedError(NoSolutionError):
-    """The integration left the task by so much that going on would be meaningless."""
+    """The integration deviated so far from the task that it was stopped."""
 
 
 class SelfTestError(CellplanError):
-    """A start-up test with a known answer gave another one: no verdict can be trusted."""
+    """A start-up test of the collision engine failed: no verdict can be trusted."""

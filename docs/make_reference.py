@@ -54,13 +54,13 @@ ERRORS_INTRODUCTION = """\
 This page is made from the format itself by `docs/make_reference.py`; do not edit it by hand. Its version,
 `cellplan_errors: 1`, is promised as that of [the cell file](cell-file.md) is.
 
-An errors file says how a real cell differs from the written one. `cellplan rehearse CELL --errors FILE` reads it; the
+An errors file states how a real cell differs from the nominal one. `cellplan rehearse CELL --errors FILE` reads it; the
 guide is [Rehearse with errors](../guides/rehearse-with-errors.md). It is read as strictly as the cell file, and its
 robots and joints must be those of the cell.
 
 - **A number is fixed**: the same in every trial. `{normal: S}` is drawn for every trial from a normal distribution with
   mean zero and standard deviation S, `{uniform: H}` evenly between -H and H.
-- **Poses** are those of the real frame seen from the written one: the real base in the place of the written base, the
+- **Poses** are those of the real frame in the nominal one: the real base in the nominal base frame, the
   real tool tip in the place of the written tip, the real part in the place where the written part sits.
 - **A longer link**: the vector from the axis point of the joint before to that of the named joint, at the reference
   configuration, is lengthened; the named joint and all that it carries move along. Where the two points are one, there

@@ -1,4 +1,4 @@
-"""Cache: what is long in the making and follows from the bytes of its inputs alone is kept from run to run."""
+"""Cache: results that take long to compute and depend on the bytes of their inputs alone."""
 
 from cellplan.cache.store import Key, keep, key_of, recall
 from cellplan.cache.use import as_here, nothing_kept

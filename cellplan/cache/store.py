@@ -31,7 +31,7 @@ Arrays = tuple[NDArray[np.generic], ...]
 FORMAT: Final = b"cellplan cache 1\n"
 DIGEST: Final = 32  # [bytes] of a SHA-256
 SUFFIX: Final = ".entry"
-MAKERS: Final = ("cache", "geometry", "collision")  # packages whose code makes what is kept
+CODE_PACKAGES: Final = ("cache", "geometry", "collision")  # packages whose code makes what is kept
 LIBRARIES: Final = ("numpy", "trimesh", "coal")  # and what they rest on
 MAX_ENTRY: Final = 64_000_000  # [bytes]
 MAX_FOLDER: Final = 256_000_000  # [bytes]; the entries that were not used for longest go first
@@ -111,7 +111,7 @@ def forget() -> None:
 
 
 def _remember(key: Key, held: Held) -> None:
-    """Hold arrays for the rest of this process, as far as there is room."""
+    """Hold arrays for the rest of this process, up to a limit of memory."""
     _recent[key] = held
     while sum(array.nbytes for each in _recent.values() for array in each.arrays) > MAX_RECENT:
         _recent.popitem(last=False)
@@ -120,7 +120,7 @@ def _remember(key: Key, held: Held) -> None:
 def _read_own(path: Path) -> bytes | None:
     """Content of an entry; None for anything but a regular file of the user's own that only the user may write to.
 
-    It is opened without following a link and without waiting for whoever may be at the other end.
+    It is opened without following a link and without waiting for another process.
     """
     handle = os.open(path, OPEN)
     with os.fdopen(handle, "rb") as file:
@@ -179,14 +179,14 @@ def _write(path: Path, content: bytes) -> None:
 
 def _make_room(folder: Path) -> None:
     """Remove the entries that were not used for longest, until the others fit."""
-    found = []
+    entries = []
     for path in folder.iterdir():
         if path.suffix in (SUFFIX, ".part"):
             with suppress(OSError):
                 status = path.lstat()
-                found.append((status.st_mtime, path.name, status.st_size))
-    total = sum(size for _, _, size in found)
-    for _, name, size in sorted(found):
+                entries.append((status.st_mtime, path.name, status.st_size))
+    total = sum(size for _, _, size in entries)
+    for _, name, size in sorted(entries):
         if total <= MAX_FOLDER:
             return
         with suppress(OSError):
@@ -200,7 +200,7 @@ def _code() -> bytes | None:
     total = hashlib.sha256(f"{platform.system()} {platform.machine()}".encode())
     root = Path(__file__).resolve().parent.parent
     try:
-        files = [path for package in MAKERS for path in sorted((root / package).rglob("*.py"))]
+        files = [path for package in CODE_PACKAGES for path in sorted((root / package).rglob("*.py"))]
         for path in files:
             total.update(
                 path.relative_to(root).as_posix().encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest()

@@ -1,4 +1,4 @@
-"""Whether what was kept may be used: never by a command that proves what another one wrote."""
+"""Whether cache entries may be used: never by a command that verifies the output of another one."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

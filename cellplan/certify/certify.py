@@ -31,7 +31,7 @@ def certify(
 ) -> Bound:
     """Bound the distance of every pair of bodies from below, at the samples of a motion and between them.
 
-    Between two samples every joint moves evenly, so what is proved holds at all times. The verdict comes first: that
+    Between two samples every joint moves linearly, so what is proved holds at all times. The verdict comes first: that
     nothing touches and that every pair keeps what is demanded of it. The smallest distances are searched for after it.
 
     Args:
@@ -39,7 +39,7 @@ def certify(
         q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2.
         demand: Distance in [m] that pairs with the rule ``clearance`` are to keep; that of the scene when None.
         with_minimum: Whether the smallest distances are searched for too. Otherwise the search ends with the first pair
-            that does not keep its demand, and ``Bound.is_kept`` is all that is to be read of the result.
+            that does not keep its demand, and only ``Bound.is_kept`` of the result is valid.
         progress: Called with the fraction done.
     """
     if demand is not None:

@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.pair_search import SolidSearch
 from cellplan.collision.continuous.motion_bound import Pair
-from cellplan.collision.distance import TIGHT
+from cellplan.collision.distance import TIGHT_TOL
 from cellplan.collision.engine import Engine
 from cellplan.geometry.arrays import Array, Indices
 
@@ -63,4 +63,4 @@ class CurveRefiner:
         reading = search.read(sample, float(ceiling[block]))
         if reading.is_exact:
             moved = np.minimum(*search.relative.displacement(sample, self._middles))
-            np.minimum(ceiling, reading.bound + 2.0 * TIGHT + moved, out=ceiling)
+            np.minimum(ceiling, reading.bound + 2.0 * TIGHT_TOL + moved, out=ceiling)

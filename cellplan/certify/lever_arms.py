@@ -93,11 +93,11 @@ class LeverArms:
 
     def chain(self, first: int | None, second: int) -> Chain:
         """The joints between two of the engine's bodies; ``first`` is None for the ground."""
-        found = self._known.get((first, second))
-        if found is None:
+        chain = self._known.get((first, second))
+        if chain is None:
             down = [] if first is None else self._way(*_link(self._scene.carrier(first)))
-            found = self._known[first, second] = self._chain(down, second)
-        return found
+            chain = self._known[first, second] = self._chain(down, second)
+        return chain
 
     def tool(self, robot: str, *, seen_by: str | None) -> Chain:
         """The joints between the flange of a robot, or the ground for None, and the tool tip of another one."""

@@ -20,7 +20,7 @@ from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.pair_state import PairState, StepBounds
 from cellplan.collision.continuous.motion_bound import Motion, Pair, PairMotion
 from cellplan.collision.continuous.pieces import PieceMotion, can_be_split, read_piece, split
-from cellplan.collision.distance import SURELY_APART, TIGHT, Reading, exact_reading, quick_reading
+from cellplan.collision.distance import APART_TOL, TIGHT_TOL, Reading, exact_reading, quick_reading
 from cellplan.collision.engine import Engine
 from cellplan.collision.overlap.containment import is_inside
 from cellplan.geometry.arrays import Array, Flags, Indices
@@ -68,7 +68,7 @@ class Search(ABC):
         """
         state = self.state
         state.is_verdict_open = True
-        for level in (SURELY_APART, state.demand):
+        for level in (APART_TOL, state.demand):
             self.raise_to(level, cutoff)
         state.is_verdict_open = False
         while (
@@ -106,7 +106,7 @@ class Search(ABC):
             self.state.note_distance(distance, self._time(sample))
 
     def _cut(self, step: int, level: float, cutoff: float) -> None:
-        """Search one step in finer steps; give it up where it cannot be cut any more."""
+        """Search one step in finer steps; mark it as unresolved where it cannot be cut any more."""
         fine, bounds = self._fine.get(step), self.bounds
         if fine is None:
             if self._travel(step) <= RESOLUTION or not self.state.may_cut:
@@ -174,7 +174,7 @@ class SolidSearch(Search):
         """
         super().__init__(motion.sphere_bounds(pair), state or PairState(), begin=begin, width=width)
         self._engine, self._pair, self._motion = engine, pair, motion
-        self._are_spheres_apart = self.low > SURELY_APART
+        self._are_spheres_apart = self.low > APART_TOL
         self._relative: PairMotion | None = None
         self._readings: dict[int, Reading] = {}
         self._loose = 0
@@ -205,7 +205,7 @@ class SolidSearch(Search):
         if reading.is_exact or reading.bound >= goal:
             return reading
         sharp = exact_reading(self._engine, self._pair, poses, sample=sample, reading=reading)
-        self._loose += sharp.bound > reading.bound + TIGHT
+        self._loose += sharp.bound > reading.bound + TIGHT_TOL
         return sharp
 
     def take(self, sample: int, reading: Reading, goal: float) -> None:
@@ -277,7 +277,7 @@ class SolidSearch(Search):
         """Read the samples between steps given up, and find where one body lies wholly inside the other."""
         is_left = np.append(True, self.bounds.is_closed) & np.append(self.bounds.is_closed, True) & ~self._is_read
         for sample in np.flatnonzero(is_left):
-            self.read(int(sample), SURELY_APART)
+            self.read(int(sample), APART_TOL)
         if self._finds_enclosures and self._width == 1.0:
             for stretch in _free_stretches(self._touches, self.bounds.is_closed):
                 if self._is_enclosed(stretch):

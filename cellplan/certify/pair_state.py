@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.collision.distance import SURELY_APART
+from cellplan.collision.distance import APART_TOL
 from cellplan.geometry.arrays import Array, Flags
 
 SEARCH_TOL: Final = 5e-5  # [m] a search stops when nothing can be nearer than the nearest found by more than this
@@ -35,7 +35,7 @@ class PairState:
     at: float = 0.0
     touches: list[float] = field(default_factory=list)
     unproved: list[float] = field(default_factory=list)
-    demand: float = SURELY_APART
+    demand: float = APART_TOL
     cuts: int = 0
     max_cuts: int = MAX_CUTS
     is_verdict_open: bool = True
@@ -45,11 +45,11 @@ class PairState:
     @property
     def needed(self) -> float:
         """Distance in [m] that has to be proved: once less than the demand was measured, only that nothing touches."""
-        return self.demand if self.distance >= self.demand else SURELY_APART
+        return self.demand if self.distance >= self.demand else APART_TOL
 
     def goal(self, cutoff: float) -> float:
         """Distance in [m] beyond which a step does not matter: a cutoff, or the nearest distance found."""
-        return max(SURELY_APART, min(cutoff, self.distance - SEARCH_TOL))
+        return max(APART_TOL, min(cutoff, self.distance - SEARCH_TOL))
 
     @property
     def is_spent(self) -> bool:

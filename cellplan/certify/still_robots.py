@@ -12,7 +12,7 @@ import numpy as np
 
 from cellplan.collision.bodies import BodyPoses
 from cellplan.collision.continuous.motion_bound import Pair
-from cellplan.collision.distance import SURELY_APART, exact_reading, quick_reading
+from cellplan.collision.distance import APART_TOL, exact_reading, quick_reading
 from cellplan.collision.overlap.containment import is_inside
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import ClearanceClass
@@ -54,18 +54,18 @@ class HomeTrials:
         """Include another sample of a run from now on, at the stacked configuration of shape (nq,)."""
         self._tables[run].add(q)
 
-    def is_refused(self, q: Array, *, room: float = 0.0) -> bool:
+    def is_refused(self, q: Array, *, extra: float = 0.0) -> bool:
         """Whether a configuration is too near to something at one of the samples.
 
         Args:
             q: The configuration in [rad] or [m], shape (n,).
-            room: Distance in [m] beyond the demanded one that is required from the part and from other robots.
+            extra: Distance in [m] beyond the demanded one that is required from the part and from other robots.
         """
         own = self._tables[0].placed(q)
-        pair = self._tables[0].too_near_alone(own, room)  # what stands still is the same in every run
+        pair = self._tables[0].too_near_alone(own, extra)  # what stands still is the same in every run
         for table in self._tables:
             if pair is None:
-                pair = table.too_near_others(own, room)
+                pair = table.too_near_others(own, extra)
         if pair is not None:
             self.refused[pair] += 1
         return pair is not None
@@ -83,7 +83,7 @@ class _Table:
         self._alone, self._others = np.flatnonzero(is_alone), np.flatnonzero(~is_alone)
         self._demanded = np.array([self._limit(row) for row in rows])
         is_part = np.array([self._scene.pairs[row].clearance_class is ClearanceClass.PART for row in rows], dtype=bool)
-        self._is_roomy, self._limits = ~is_alone | is_part, self._demanded
+        self._has_extra, self._limits = ~is_alone | is_part, self._demanded
         self._q = run.q
         self._poses = self._scene.body_poses(run.q)
         self._order = list(range(len(run.q)))  # samples that refused something lately come first
@@ -99,17 +99,17 @@ class _Table:
         stacked[0, self._scene.cell.columns(self._robot)] = q
         return self._scene.body_poses(stacked)
 
-    def too_near_alone(self, own: BodyPoses, room: float) -> tuple[str, str] | None:
+    def too_near_alone(self, own: BodyPoses, extra: float) -> tuple[str, str] | None:
         """Names of the first pair nearer than it may be, of those that no other robot changes, or None."""
-        self._limits = self._demanded + room * self._is_roomy
+        self._limits = self._demanded + extra * self._has_extra
         row = self._on_ground(own)
         if row is None:
             row = self._among(self._alone, own, sample=0)
         return None if row is None else self._scene.names(self._scene.pairs[row])
 
-    def too_near_others(self, own: BodyPoses, room: float) -> tuple[str, str] | None:
+    def too_near_others(self, own: BodyPoses, extra: float) -> tuple[str, str] | None:
         """The same of the other pairs, at all samples."""
-        self._limits = self._demanded + room * self._is_roomy
+        self._limits = self._demanded + extra * self._has_extra
         self._poses.R[self._own], self._poses.p[self._own] = own.R[self._own], own.p[self._own]
         for place, sample in enumerate(self._order):
             row = self._among(self._others, self._poses, sample=sample)
@@ -121,7 +121,7 @@ class _Table:
     def _limit(self, row: int) -> float:
         """Distance in [m] that a pair is to keep."""
         pair = self._scene.pairs[row]
-        return max(SURELY_APART, pair.demand) if pair.rule is Rule.CLEARANCE else SURELY_APART
+        return max(APART_TOL, pair.demand) if pair.rule is Rule.CLEARANCE else APART_TOL
 
     def _on_ground(self, poses: BodyPoses) -> int | None:
         for row in self._scene.ground_rows.tolist():
@@ -147,7 +147,7 @@ class _Table:
         reading = quick_reading(engine, pair, poses, sample=sample)
         if reading.touches or reading.bound >= limit:
             return reading.touches
-        if reading.bound <= SURELY_APART and is_inside(engine, pair, poses, sample=sample):
+        if reading.bound <= APART_TOL and is_inside(engine, pair, poses, sample=sample):
             return True
         return exact_reading(engine, pair, poses, sample=sample, reading=reading).bound < limit
 

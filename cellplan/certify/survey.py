@@ -14,7 +14,7 @@ import numpy as np
 from cellplan.certify.bound import Bound, PairBound
 from cellplan.certify.pair_search import Search
 from cellplan.certify.pair_state import SEARCH_TOL, PairState
-from cellplan.collision.distance import SURELY_APART
+from cellplan.collision.distance import APART_TOL
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.report import ClearanceClass
 from cellplan.scene.pairs import Rule, ScenePair
@@ -81,18 +81,18 @@ class Survey:
         """
         kind = self.scene.pairs[row].clearance_class
         if not self._keeps[kind][row]:
-            return SURELY_APART
+            return APART_TOL
         ranks = self._ranked()
         is_among = self._nearest[row] <= ranks.closest[CLOSEST_COUNT - 1]
         last = ranks.closest[CLOSEST_COUNT if is_among else CLOSEST_COUNT - 1]  # of the others
-        return max(SURELY_APART, max(ranks.best[kind], last) - SEARCH_TOL, float(self._raised[row]))
+        return max(APART_TOL, max(ranks.best[kind], last) - SEARCH_TOL, float(self._raised[row]))
 
     def largest_cutoff(self) -> float:
         """No pair has a larger cutoff in [m], now or later: distances that are found only become smaller."""
         ranks = self._ranked()
         kept = [ranks.best[kind] for kind in ClearanceClass if self._keeps[kind].any()]
         raised = float(self._raised.max(initial=0.0))
-        return max(SURELY_APART, max([ranks.closest[CLOSEST_COUNT], *kept]) - SEARCH_TOL, raised)
+        return max(APART_TOL, max([ranks.closest[CLOSEST_COUNT], *kept]) - SEARCH_TOL, raised)
 
     def note_distance(self, row: int, distance: float, at: float) -> None:
         """Record a measured distance of a pair in [m] and its time in samples."""
@@ -151,4 +151,4 @@ def _raised_demands(scene: Scene) -> Array:
 def _initial_state(pair: ScenePair) -> PairState:
     """The state before anything is searched, with what is to be proved first."""
     demand = pair.demand if pair.rule is Rule.CLEARANCE else 0.0
-    return PairState(demand=max(SURELY_APART, demand))
+    return PairState(demand=max(APART_TOL, demand))

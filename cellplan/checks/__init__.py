@@ -1,1 +1,1 @@
-"""Verification of what was written, by arithmetic that planning never used."""
+"""Verification of written tables, by arithmetic independent of planning."""

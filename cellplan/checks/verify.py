@@ -1,4 +1,4 @@
-"""Verification: everything that is said about a run is computed here, from the joint tables that were read back."""
+"""Verification: all results of a run are computed here, from the joint tables that were read back."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -167,7 +167,7 @@ def _positions(cell: Cell, schedule: Schedule, tables: Sequence[JointTable]) -> 
         if table.joints != robot.model.joint_names:
             raise InputError(f"table of '{robot.name}': expected joints {robot.model.joint_names}, got {table.joints}")
         if not np.array_equal(table.times, schedule.times):
-            raise InputError(f"table of '{robot.name}': its times are not those of the schedule")
+            raise InputError(f"table of '{robot.name}': its times differ from those of the schedule")
         if not np.all(np.isfinite(table.q)):
             raise InputError(f"table of '{robot.name}': a position is not a finite number")
     return {name: table.q for name, table in by_name.items()}

@@ -88,10 +88,12 @@ def _lines(record: dict[str, Any]) -> list[str]:
     from cellplan.report.record.tasks import direction_text
     from cellplan.report.text.run import left_out_lines
 
-    lines = [f"{record['cell']}: {'sound' if record['status'] == 'passed' else 'not sound'}"]
+    lines = [f"{record['cell']}: {'passed' if record['status'] == 'passed' else 'failed'}"]
     for robot, start in record["start"].items():
         configuration = ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
-        lines.append(f"  start of {robot} ({'found' if robot in record['start_found'] else 'given'}): {configuration}")
+        lines.append(
+            f"  start of {robot} ({'searched' if robot in record['start_found'] else 'given'}): {configuration}"
+        )
     lines += [f"  {record['start_choice']}"] if record["start_choice"] else []
     for name, length in record["path_length_mm"].items():
         lines.append(f"  task {name}: path of {length:.4g} mm, {direction_text(record['direction'][name])}")

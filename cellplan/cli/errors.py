@@ -1,4 +1,4 @@
-"""Failure of a command: plain lines on the error stream and one exit status."""
+"""Failure of a command: lines on the error stream and one exit status."""
 
 import contextlib
 import os
@@ -26,14 +26,14 @@ def exit_status(error: BaseException) -> ExitStatus:
 def error_lines(error: BaseException) -> list[str]:
     """The findings, one per line; a finding about a line of a file begins with ``FILE:LINE:``."""
     if isinstance(error, KeyboardInterrupt):
-        return ["interrupted: no half-written run is left behind"]
+        return ["interrupted: no incomplete run folder was left behind"]
     if isinstance(error, InvalidFileError | NotVerifiedError):
         return [_one_line(str(finding)) for finding in error.findings]
     if isinstance(error, CellplanError):
         line = _one_line(str(error))
         return [line if LOCATED.match(line) else f"error: {line}"]
     what = _one_line(str(error)) or "no message"
-    return [f"internal error: {type(error).__name__}: {what} (set {DEBUG_VARIABLE}=1 to see where)"]
+    return [f"internal error: {type(error).__name__}: {what} (set {DEBUG_VARIABLE}=1 to see the traceback)"]
 
 
 def tell(line: str) -> None:

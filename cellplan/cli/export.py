@@ -66,7 +66,7 @@ def _require_choice(cell: Path | None, *, without_cell: bool) -> None:
     if cell is None and not without_cell:
         raise InputError(
             "--cell: expected the cell file that was solved, so that it and its files are compared with the run, got "
-            "none; say --without-cell to use the run's own copy of it"
+            "none; use --without-cell for the run's own copy of it"
         )
     if cell is not None and without_cell:
-        raise InputError("--without-cell: unexpected option beside --cell")
+        raise InputError("--without-cell: expected no --cell beside it")

@@ -24,7 +24,7 @@ from cellplan.errors import ExitStatus
 INTERRUPTIONS: Final = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]  # a background job ignores the first of them
-AGAIN_S: Final = 0.02  # [s] by then Python is out of the callback in which it lost an interruption
+REPEAT_DELAY_S: Final = 0.02  # [s] delay after which the callback that lost the interruption has ended
 
 app = typer.Typer(
     add_completion=False,
@@ -44,7 +44,7 @@ def _show_version(desired: bool) -> None:
 @app.callback()
 def program(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and end.")
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Offline programming for cooperative robots that work on one moving part."""
@@ -85,24 +85,24 @@ def _usage_status(error: BaseException) -> int | None:
 
 
 def main() -> NoReturn:
-    """Enter from the console; whoever ends the program or closes its terminal interrupts it, as Ctrl-C does."""
+    """Entry point of the console; termination signals and a closed terminal interrupt the program, as Ctrl-C does."""
     for number in INTERRUPTIONS:
         if signal.getsignal(number) == signal.SIG_DFL:  # nohup keeps its way
             signal.signal(number, signal.default_int_handler)
-    sys.unraisablehook = _say_again
+    sys.unraisablehook = _repeat_interruption
     sys.exit(run())
 
 
-def _say_again(lost: "sys.UnraisableHookArgs") -> None:
-    """Repeat an interruption a moment later that came while Python was in a callback, where it loses exceptions."""
+def _repeat_interruption(lost: "sys.UnraisableHookArgs") -> None:
+    """Raise a KeyboardInterrupt again shortly after it was lost in a callback."""
     if lost.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(lost)
         return
     heard = [number for number in INTERRUPTIONS if signal.getsignal(number) == signal.default_int_handler]
     if not heard:
         return
-    again = threading.Timer(AGAIN_S, signal.raise_signal, heard[:1])
+    again = threading.Timer(REPEAT_DELAY_S, signal.raise_signal, heard[:1])
     if hasattr(signal, "pthread_kill"):  # wakes the program where it waits
-        again = threading.Timer(AGAIN_S, signal.pthread_kill, [threading.main_thread().ident, heard[0]])
+        again = threading.Timer(REPEAT_DELAY_S, signal.pthread_kill, [threading.main_thread().ident, heard[0]])
     again.daemon = True
     again.start()

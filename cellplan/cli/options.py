@@ -26,7 +26,7 @@ AllowDirs = Annotated[
 ]
 Mode = Annotated[
     str | None,
-    typer.Option("--mode", metavar="MODE", help="Robots that move: simultaneous, pairwise or part_at_rest."),
+    typer.Option("--mode", metavar="MODE", help="Which robots move: simultaneous, pairwise or part_at_rest."),
 ]
 Method = Annotated[
     str | None,
@@ -39,11 +39,9 @@ Method = Annotated[
 ]
 Integrator = Annotated[
     str | None,
-    typer.Option("--integrator", metavar="NAME", help="From joint velocities to positions: auto, accurate or euler."),
+    typer.Option("--integrator", metavar="NAME", help="Integration of joint velocities: auto, accurate or euler."),
 ]
-Duration = Annotated[
-    float | None, typer.Option("--duration", metavar="S", help="Length of the common clock in seconds.")
-]
+Duration = Annotated[float | None, typer.Option("--duration", metavar="S", help="Duration of the motion in seconds.")]
 Clearance = Annotated[
     float | None, typer.Option("--clearance-mm", metavar="MM", help="Required clearance in millimetres.")
 ]

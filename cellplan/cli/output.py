@@ -55,7 +55,7 @@ def _say_escaped(text: str) -> None:
 
 
 def _abandon_stdout() -> None:
-    """Lead the rest of the stream nowhere, or the interpreter would complain once more on its way out."""
+    """Discard the rest of the stream, as the interpreter would report another error at exit."""
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())

@@ -59,14 +59,16 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.rehearsal.write import write_rehearsal
         from cellplan.report.text.rehearsal import summary_lines
 
-        asked = with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), settings or ())
-        stated = with_draws(load_errors(errors, asked), trials=trials, seed=seed)
-        folder = output or Path("outputs") / asked.name / REHEARSAL
+        changed = with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), settings or ())
+        stated = with_draws(load_errors(errors, changed), trials=trials, seed=seed)
+        folder = output or Path("outputs") / changed.name / REHEARSAL
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:
-            made = rehearse_cell(asked, stated, feedback=feedback, in_pass=in_pass, rounds=rounds, progress=progress)
-            record = write_rehearsal(made, folder, progress=progress)
-    status = ExitStatus.PASSED if made.passed else ExitStatus.CHECK_FAILED
+            rehearsal = rehearse_cell(
+                changed, stated, feedback=feedback, in_pass=in_pass, rounds=rounds, progress=progress
+            )
+            record = write_rehearsal(rehearsal, folder, progress=progress)
+    status = ExitStatus.PASSED if rehearsal.passed else ExitStatus.CHECK_FAILED
     if as_json:
         place = {"folder": str(folder), "report_path": str(folder / "rehearsal.html")}
         say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "rehearsal": record})

@@ -66,7 +66,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.report.text.run import summary_lines
 
         given = load_cell(cell, allow_dirs=allow_dir or ())
-        asked = with_overrides(
+        changed = with_overrides(
             given,
             settings or (),
             mode=mode,
@@ -75,11 +75,11 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
             duration=duration,
             clearance_mm=clearance_mm,
         )
-        require_task(asked, task)
-        folder = output or Path("outputs") / asked.name
+        require_task(changed, task)
+        folder = output or Path("outputs") / changed.name
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:
-            solution = solve_with_plots(asked, plots, task=task, progress=progress)
+            solution = solve_with_plots(changed, plots, task=task, progress=progress)
             record = write_run(solution, folder, keep_rejected=keep_rejected, plots=plots)
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
     if as_json:

@@ -9,18 +9,18 @@ from cellplan.collision.separation import separation
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 
-SURELY_APART: Final = 1e-9  # [m] a proved distance above this is not rounding
-TIGHT: Final = 2.5e-5  # [m] a proof this near to the proposed distance counts as the distance
+APART_TOL: Final = 1e-9  # [m] a proved distance above this is not rounding
+TIGHT_TOL: Final = 2.5e-5  # [m] a proof this near to the proposed distance counts as the distance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """What is known of two bodies at one sample.
+    """Distance reading of two bodies at one sample.
 
     Attributes:
         touches: Whether they touch.
         bound: Proved distance in [m], never above the truth; zero when they touch or nothing is proved.
-        is_exact: Whether the truth is above the bound by no more than ``2 TIGHT``.
+        is_exact: Whether the truth is above the bound by no more than ``2 TIGHT_TOL``.
         direction: Direction from first to second in the world, shape (3,), that proves ``bound`` on the hulls; None
             where no direction does.
     """
@@ -50,8 +50,8 @@ def quick_reading(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sa
         X_second=(poses.R[second, sample], poses.p[second, sample]),
     )
     bound -= a.looseness + b.looseness
-    if bound > SURELY_APART:
-        return Reading(False, bound, a.is_convex and b.is_convex and bound >= proposed - TIGHT, n)
+    if bound > APART_TOL:
+        return Reading(False, bound, a.is_convex and b.is_convex and bound >= proposed - TIGHT_TOL, n)
     if not is_cheap and engine.touch(first, second, poses, sample=sample):
         return TOUCHING
     return Reading(False, 0.0, False, None)

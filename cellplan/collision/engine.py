@@ -17,7 +17,7 @@ from cellplan.errors import CellplanError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.transforms import Array
 
-NO_ANSWER: Final = "collision: the engine gave a distance that is not a number between '{}' and '{}'"
+NO_ANSWER: Final = "collision: the engine returned no valid distance between '{}' and '{}'"
 
 
 @dataclass(slots=True)
@@ -123,11 +123,11 @@ class Engine:
     def _placed(self, kind: str, index: int, poses: BodyPoses, sample: int) -> Any:
         """FCL's object for the solid, hull or core of a body, moved to its pose."""
         key = (kind, id(self.bodies[index]))
-        found = self._objects.get(key)
-        if found is None:
-            found = self._objects[key] = self._built(kind, index)
-        found.setTransform(fcl.Transform(poses.R[index, sample], poses.p[index, sample]))
-        return found
+        geometry = self._objects.get(key)
+        if geometry is None:
+            geometry = self._objects[key] = self._built(kind, index)
+        geometry.setTransform(fcl.Transform(poses.R[index, sample], poses.p[index, sample]))
+        return geometry
 
     def _built(self, kind: str, index: int) -> Any:
         """FCL's object for the solid, hull or core of a body."""

@@ -49,7 +49,7 @@ def convex_hull(mesh: Mesh) -> Mesh:
             hull = _blown_up(hull, points)
         if hull is not None and _holds(hull, points):
             return hull
-    raise InputError(f"{mesh.source}: expected a mesh with a convex hull, got one too ill-shaped for it")
+    raise InputError(f"{mesh.source}: expected a mesh with a convex hull, got one that is too ill-conditioned")
 
 
 def is_hull(hull: Mesh, points: Array) -> bool:

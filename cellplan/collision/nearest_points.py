@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cellplan.collision.bodies import BodyPoses
-from cellplan.collision.distance import TIGHT
+from cellplan.collision.distance import TIGHT_TOL
 from cellplan.collision.engine import Engine
 from cellplan.collision.overlap.containment import is_inside
 from cellplan.collision.separation import separation
@@ -45,7 +45,7 @@ def nearest_points(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, s
         points = engine.proposed_points(first, second, poses, sample=sample)
         apart = float(np.linalg.norm(points[1] - points[0]))
         proved = separation(a.hull, b.hull, points[1] - points[0], X_first=X_a, X_second=X_b)
-        if not (proved > TIGHT and proved >= apart - TIGHT):
+        if not (proved > TIGHT_TOL and proved >= apart - TIGHT_TOL):
             points = None
     if points is None and not _touch(engine, pair, poses, sample=sample):
         points = engine.surface_points(first, second, poses, sample=sample)

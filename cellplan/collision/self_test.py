@@ -1,4 +1,4 @@
-"""Start-up test: pairs of bodies with known answers, because an engine that fails silently says "free"."""
+"""Start-up test: pairs of bodies with known distances, as an engine that fails silently reports no contact."""
 
 from functools import cache
 
@@ -61,7 +61,7 @@ def _side_by_side(first: Solid, second: Solid, y: float) -> tuple[Engine, BodyPo
 
 
 def _refuses(X: Array) -> bool:
-    """Whether a pose is turned away at the door."""
+    """Whether a pose is refused."""
     try:
         checked_poses([X])
     except CellplanError:

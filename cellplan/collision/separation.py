@@ -2,7 +2,7 @@ r"""Proof that two convex solids are apart: a direction in which everything of o
 
 .. math:: LB(n) = \min_{x \in B} n \cdot x - \max_{x \in A} n \cdot x = -h_B(-n) - h_A(n)
 
-holds for every unit direction, whoever proposed it, and equals the distance for the right one.
+holds for every unit direction, however it was proposed, and equals the distance for the right one.
 """
 
 import numpy as np

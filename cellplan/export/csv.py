@@ -22,7 +22,7 @@ def render_csv(run: VerifiedRun) -> dict[str, str]:
     """Text of every file, by its path in the folder of the export: ``<robot>.csv``, or ``<task>/<robot>.csv``.
 
     Args:
-        run: What the gate let through.
+        run: The verified run.
 
     Raises:
         InputError: A joint cannot be written with the decimals of the format.
@@ -84,7 +84,7 @@ def _read(robot: Robot, text: str, file: str) -> JointTable:
     if names != _names(robot):
         raise InputError(f"{file}:1: expected the names '{_names(robot)}', got {names[:80]!r}")
     if not rest.endswith("\n"):
-        raise InputError(f"{file}: expected the last row to end with a line break; the file is cut off")
+        raise InputError(f"{file}: expected the last row to end with a line break; the file is truncated")
     row = re.compile(_NUMBER + rf"(?:,{_NUMBER}){{{len(robot.model.joints)}}}")
     lines = rest.split("\n")[:-1]
     bad = next((number for number, line in enumerate(lines, start=2) if not row.fullmatch(line)), None)

@@ -53,7 +53,5 @@ def rounded_quanta(values: Array, decimals: int, *, what: str) -> Array:
         InputError: A value is not finite or too large for so many decimals.
     """
     if not np.all(np.abs(values) < LARGEST):
-        raise InputError(
-            f"{what}: expected numbers below {LARGEST:g}, got one that cannot be written with its decimals"
-        )
+        raise InputError(f"{what}: expected numbers below {LARGEST:g}, got one that is too large for its decimals")
     return np.rint(values * 10.0**decimals)

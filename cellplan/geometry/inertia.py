@@ -28,7 +28,7 @@ def centre_and_inertia(solid: Solid) -> tuple[Array, Array]:
             return np.zeros(3), _capsule(radius, length)
         case Mesh():
             return _mesh(solid)
-    raise TypeError(f"no solid: {solid!r}")
+    raise TypeError(f"not a solid: {solid!r}")
 
 
 def _capsule(radius: float, length: float) -> Array:

@@ -70,10 +70,10 @@ def _round(offset: Array, across: Array, radius: float) -> Ends:
     safe = np.where(runs_along, 1.0, square)
     middle = -np.sum(offset * across, axis=1) / safe
     nearest = offset + middle[:, None] * across
-    room = radius**2 - np.sum(nearest * nearest, axis=1)
-    half = np.sqrt(np.maximum(room, 0.0) / safe)
+    squared_half = radius**2 - np.sum(nearest * nearest, axis=1)
+    half = np.sqrt(np.maximum(squared_half, 0.0) / safe)
     half = np.where(runs_along, np.inf, half)
-    met = room > 0.0
+    met = squared_half > 0.0
     return np.where(met, middle - half, np.inf), np.where(met, middle + half, -np.inf)
 
 

@@ -1,4 +1,4 @@
-"""Guard: work on foreign files that could take a program down is done in a child process, within limits.
+"""Guard: foreign files, which could crash the program, are processed in a child process with limits.
 
 The same mechanism runs work of our own in the background.
 """

@@ -10,7 +10,9 @@ from typing import Final, Self, TypeVar
 from cellplan.guard.worker import Answer, Job
 from cellplan.guard.worker_process import ChildProcess, Guard
 
-OWN_WORK: Final = Guard(file="cellplan", worker="the child process", seconds=600.0, megabytes=4000)  # no foreign work
+BACKGROUND_GUARD: Final = Guard(
+    file="cellplan", worker="the child process", seconds=600.0, megabytes=4000
+)  # no foreign work
 
 Value = TypeVar("Value")
 
@@ -53,7 +55,7 @@ class BackgroundProcess:
         Returns:
             What gives the result, once it is there; exceptions are those of the function.
         """
-        begun = self._begun(Job(function, arguments, None, OWN_WORK.seconds, OWN_WORK.megabytes))
+        begun = self._begun(Job(function, arguments, None, BACKGROUND_GUARD.seconds, BACKGROUND_GUARD.megabytes))
 
         def result() -> Value:
             answer = None if begun is None else begun.result()
@@ -77,7 +79,7 @@ class BackgroundProcess:
     def _asked(self, child: ChildProcess, job: Job) -> Answer | None:
         """Answer of the child; None when it has none."""
         try:
-            return child.ask(job, OWN_WORK)
+            return child.ask(job, BACKGROUND_GUARD)
         except Exception:  # noqa: BLE001 - the child is gone, or the job cannot be sent: it is done here
             self._is_desired = False
             return None

@@ -13,21 +13,21 @@ from typing import Final
 from cellplan.errors import OverrunError
 from cellplan.guard.worker import Answer, Job
 
-# The child begins without the folder it stands in, or a file called pickle.py there would be run.
-OPENING: Final = (
+# The child starts without its working directory on the path, or a file named pickle.py there would be run.
+WORKER_PROGRAM: Final = (
     "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer); from cellplan.guard.worker import serve; serve()"
 )
 ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # each more takes address space
-PATIENCE_S: Final = 0.5  # [s] an idle process ends at once when its pipe is closed
+EXIT_TIMEOUT_S: Final = 0.5  # [s] an idle process ends at once when its pipe is closed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Guard:
-    """Whose work is guarded, and how much it may take.
+    """Name and limits of guarded work.
 
     Attributes:
         file: The file at fault when it goes wrong, as messages name it.
-        worker: Who works, as messages name it, as in "the mesh reader".
+        worker: Name of the worker in messages, such as "the mesh reader".
         seconds: Longest time, of the clock and of the processor.
         megabytes: Largest address space of the child, what Python and its libraries take included.
     """
@@ -45,7 +45,7 @@ class ChildProcess:
         """Start the process."""
         self.owner = os.getpid()
         self._process = subprocess.Popen(  # noqa: S603 - our own interpreter
-            [sys.executable, "-I", "-c", OPENING],
+            [sys.executable, "-I", "-c", WORKER_PROGRAM],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -88,7 +88,7 @@ class ChildProcess:
                 if pipe is not None:
                     pipe.close()
         try:
-            self._process.wait(PATIENCE_S)
+            self._process.wait(EXIT_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()

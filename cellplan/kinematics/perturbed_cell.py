@@ -1,4 +1,4 @@
-"""Perturbed cell: the cell as it really stands, its errors worked into bases, joint axes, tools and grasps."""
+"""Perturbed cell: the real cell, with its errors in bases, joint axes, tools and grasps."""
 
 from dataclasses import replace
 from typing import Final, TypeVar

@@ -1,4 +1,4 @@
-"""The door to pinocchio: all robots of a cell as one combined model for the planner."""
+"""The interface to pinocchio: all robots of a cell as one combined model for the planner."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -11,7 +11,7 @@ from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.robot import BASE
 
-MOST_AXES: Final = 48  # [-] of the robots that share a pinocchio model: 4 MB of its results; eight arms
+MAX_AXES: Final = 48  # [-] of the robots that share a pinocchio model: 4 MB of its results; eight arms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,7 +144,7 @@ class CombinedModel:
 
     def _group_for(self, axes: int) -> _Group:
         """The last group, or a new one when the last has no room for so many axes."""
-        if not self._groups or self._groups[-1].model.nv + axes > MOST_AXES:
+        if not self._groups or self._groups[-1].model.nv + axes > MAX_AXES:
             self._groups.append(_Group(len(self._leaders)))
         return self._groups[-1]
 

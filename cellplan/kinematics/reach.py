@@ -1,4 +1,4 @@
-"""Reach of a robot: how far from its first axis it can bring its flange."""
+"""Reach of a robot: largest distance of its flange from its first axis."""
 
 from collections.abc import Callable
 from typing import Final
@@ -10,10 +10,10 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Robot, Tool
 from cellplan.model.robot import RobotModel
 
-STARTS: Final = 4  # configurations the search climbs from; the bundled arms need one
-GRID: Final = 25  # positions tried per joint and round
-SWEEPS: Final = 24  # rounds over all joints; the grid shrinks by half in each, down to a rounding error
-ENDLESS: Final = 2.0 * np.pi  # [rad] range of a joint that may turn without end
+START_COUNT: Final = 4  # configurations the search climbs from; the bundled arms need one
+GRID_COUNT: Final = 25  # positions tried per joint and round
+SWEEP_COUNT: Final = 24  # rounds over all joints; the grid shrinks by half in each, down to a rounding error
+UNLIMITED_RANGE: Final = 2.0 * np.pi  # [rad] range of a joint that may turn without end
 
 
 def arm_reach(model: RobotModel) -> float:
@@ -38,9 +38,9 @@ def arm_reach(model: RobotModel) -> float:
         lever = np.cross(from_point, first.axis_B) if first.is_revolute else from_point
         return np.sqrt(np.sum(lever**2, axis=1))
 
-    lower = np.where(np.isfinite(model.lower), model.lower, -0.5 * ENDLESS)
-    upper = np.where(np.isfinite(model.upper), model.upper, 0.5 * ENDLESS)
-    starts = np.random.default_rng(0).uniform(lower, upper, size=(STARTS, len(lower)))
+    lower = np.where(np.isfinite(model.lower), model.lower, -0.5 * UNLIMITED_RANGE)
+    upper = np.where(np.isfinite(model.upper), model.upper, 0.5 * UNLIMITED_RANGE)
+    starts = np.random.default_rng(0).uniform(lower, upper, size=(START_COUNT, len(lower)))
     return max(_climb(distances, q, lower, upper) for q in starts)
 
 
@@ -48,10 +48,10 @@ def _climb(distances: Callable[[Array], Array], q: Array, lower: Array, upper: A
     """Distance at the best configuration found from ``q``, in [m]."""
     best = q.copy()
     width = upper - lower
-    for _ in range(SWEEPS):
+    for _ in range(SWEEP_COUNT):
         for joint in range(len(best)):
-            tried = np.repeat(best[None], GRID, axis=0)
-            offsets = np.linspace(-width[joint], width[joint], GRID)
+            tried = np.repeat(best[None], GRID_COUNT, axis=0)
+            offsets = np.linspace(-width[joint], width[joint], GRID_COUNT)
             tried[:, joint] = np.clip(best[joint] + offsets, lower[joint], upper[joint])
             best = tried[int(np.argmax(distances(tried)))]
         width = 0.5 * width

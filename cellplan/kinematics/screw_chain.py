@@ -1,4 +1,4 @@
-"""Where every link of a robot is, by successive screw displacements in plain NumPy.
+"""Poses of all links of a robot, by successive screw displacements in plain NumPy.
 
 The checks, the collision bodies and the reports use this file; the planner uses another engine, so that a mistake in
 one of them shows as an error in the report ([Ribeiro2010]_ appendix B).

@@ -1,1 +1,1 @@
-"""Frozen data: what every stage takes and returns. SI units and radians throughout."""
+"""Frozen data types that every stage takes and returns. SI units and radians throughout."""

@@ -1,4 +1,4 @@
-"""Accelerations: what a cell demands of them, and those of the written motion at joints, tools, part and processes."""
+"""Accelerations: requirements of a cell, and those of the written motion at joints, tools, part and processes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

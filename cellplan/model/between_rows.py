@@ -1,4 +1,4 @@
-"""Errors between the rows of the tables: what a tool does while every joint moves evenly from one row to the next."""
+"""Errors between the rows of the tables: what a tool does while every joint moves linearly from one row to the next."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ class BetweenError:
         at_s: Its instant in [s].
         bound: No error between the rows is larger; None where the bound is wider than what is allowed, and the verdict
             rests on ten subdivisions of every such step.
-        longest_step: A step in [s] that keeps what is allowed for all tools, by the way errors grow with the step; None
+        longest_step: A step in [s] that meets the tolerance for all tools, by the way errors grow with the step; None
             where the error is small enough, or too large at the rows already.
     """
 

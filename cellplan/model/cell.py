@@ -1,4 +1,4 @@
-"""Cell: what the user wrote, as immutable data."""
+"""Cell: the content of a cell file, as immutable data."""
 
 import math
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from cellplan.model.task import Frame, Task
 
 
 class Mode(StrEnum):
-    """Who moves: MODO 1, 2, 3 of Ribeiro 2010, chapter 5."""
+    """Which robots move: MODO 1, 2, 3 of Ribeiro 2010, chapter 5."""
 
     SIMULTANEOUS = "simultaneous"
     PAIRWISE = "pairwise"
@@ -58,14 +58,14 @@ class Robot:
         name: Name in the cell.
         model: Its data sheet.
         X_WB: Base in the world.
-        tool: What it carries.
-        start: Start posture in [rad] or [m], shape (n,); None when it is to be found.
+        tool: Its tool.
+        start: Start posture in [rad] or [m], shape (n,); None when it is to be searched.
         weights: Joint weights, positive, shape (n,): a larger one moves that joint less.
-        home: Where it stands while it is idle in [rad] or [m], shape (n,); None when that is to be found.
-        acceleration: Against which accelerations its joints are judged.
-        controller_cycle: Cycle of its controller in [s]; jerk is taken over it.
+        home: Configuration while it is idle in [rad] or [m], shape (n,); None when it is to be searched.
+        acceleration: Accelerations that its joints are checked against.
+        controller_cycle: Cycle of its controller in [s], over which jerk is computed.
         attachments: Solids mounted on its links, their poses ``X_BS`` in B while all joints read zero.
-        pedestal: What the base stands on; None when it stands on whatever the surroundings have there.
+        pedestal: Pedestal below the base; None for a base on the floor or on an obstacle.
     """
 
     name: str
@@ -184,10 +184,10 @@ class LockedJoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionSettings:
-    """Who moves and on which clock.
+    """Mode and clock.
 
     Attributes:
-        mode: Who moves.
+        mode: Which robots move.
         duration: Length of the common clock in [s]; None when it ends with the last task.
         step: Time between two samples in [s].
         cyclic: Whether all joints are to end where they started.
@@ -263,7 +263,7 @@ class Cell:
     inputs: Mapping[str, str]
 
     def with_values(self, values: Mapping[str, object]) -> "Cell":
-        """The cell of the same document with other values, validated as if they stood in the file.
+        """The cell of the same document with other values, validated like those of the file.
 
         Addresses are key paths of the cell file: ``motion.duration_s``, ``robots.kuka.base.x_mm``,
         ``tasks.seam.path.polyline.points_mm[2]``. Named entries are addressed by name, list elements by index; the
@@ -285,12 +285,12 @@ class Cell:
         return self.robots[self.index(name)]
 
     def index(self, name: str) -> int:
-        """Place of the robot of that name among all robots."""
+        """Index of a robot in ``robots``."""
         return next(index for index, robot in enumerate(self.robots) if robot.name == name)
 
     @property
     def carrier(self) -> int | None:
-        """Place of the positioner that carries the part frame among all robots; None for a part at a fixed pose."""
+        """Index of the positioner that carries the part frame; None for a part at a fixed pose."""
         return self.index(self.part.held_by[0].robot) if self.part.held_by else None
 
     @cached_property
@@ -318,7 +318,7 @@ class Cell:
         return (*self.tasks, *self.closures)
 
     def columns(self, robot: str) -> slice:
-        """Place of a robot's joints in the stacked joint vector."""
+        """Slice of a robot's joints in the stacked joint vector."""
         first = 0
         for placed in self.robots:
             last = first + len(placed.model.joints)

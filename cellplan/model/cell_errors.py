@@ -1,4 +1,4 @@
-"""Cell errors: how the real cell differs from the one that was written down, as stated and as drawn."""
+"""Cell errors: deviations of the real cell from the nominal one, as stated and as sampled."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -31,9 +31,9 @@ class Clock:
         if not np.all(np.isfinite(self.times)) or not np.all(np.isfinite(self.sigma)):
             raise ValueError("clock: a time is not finite")
         if self.times[0] != 0.0 or not np.all(np.diff(self.times) > 0.0):
-            raise ValueError("clock: expected times that grow from 0")
+            raise ValueError("clock: expected times that increase from 0")
         if self.sigma[0] != 0.0 or not np.all(np.diff(self.sigma) >= 0.0):
-            raise ValueError("clock: expected a nominal time that starts at 0 and never falls")
+            raise ValueError("clock: expected a nominal time that starts at 0 and never decreases")
 
     @classmethod
     def as_written(cls, times: Array) -> Self:

@@ -1,4 +1,4 @@
-"""Idle robots: robots without work in a run, and where they stand meanwhile."""
+"""Idle robots: robots without a task in a run, and their configurations."""
 
 from collections.abc import Collection
 
@@ -17,7 +17,7 @@ def idle_robots(cell: Cell, tasks: Collection[str]) -> tuple[str, ...]:
 
 
 def not_in_program(cell: Cell, tasks: Collection[str]) -> str:
-    """One line on moves that a run leaves out: those of robots with a task, which is not the run's, to and from home.
+    """One line on moves that a run omits: those of robots whose task is not part of the run, to and from home.
 
     Empty when there are none; a robot without work in the whole cell never leaves its home.
     """

@@ -48,7 +48,7 @@ class JointLimits:
 
 
 def _frozen(values: list[float]) -> Array:
-    """An array that nothing can write to: it is shared by all who read it."""
+    """A read-only array, as it is shared."""
     array = np.array(values, dtype=float)
     array.flags.writeable = False
     return array

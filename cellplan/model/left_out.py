@@ -1,4 +1,4 @@
-"""What was not judged in full: pairs of bodies that were left out, or with a weaker rule than clearance, and why."""
+"""Pairs of bodies that are not checked for the full clearance, with the reasons."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Final
 
 
 class LeftOutKind(StrEnum):
-    """Why less than the clearance is demanded of bodies that are not two links of one robot's file."""
+    """Why less than the clearance is required of bodies that are not two links of one robot's file."""
 
     EXCLUDED = "excluded"  # named under checks.exclude
     GRIP = "grip"  # the part and what holds it
@@ -29,7 +29,7 @@ TITLES: Final = {
     LeftOutKind.ENVIRONMENT: "surroundings",
     LeftOutKind.NO_BODY: "without bodies",
 }
-NOTHING: Final = "nothing was left out"
+NOTHING_LEFT_OUT: Final = "every pair was checked in full"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class LeftOut:
 
 
 def left_out_lines(kinds: Iterable[tuple[str, tuple[str, ...], str]], *, most: int = 3) -> list[str]:
-    """One line for each kind: its pairs with their reasons, each reason once; or that nothing was left out.
+    """One line for each kind: its pairs with their reasons, each reason once; or that every pair was checked in full.
 
     Args:
         kinds: Kind, bodies and reason of everything that was left out.
@@ -61,8 +61,8 @@ def left_out_lines(kinds: Iterable[tuple[str, tuple[str, ...], str]], *, most: i
     for kind in LeftOutKind:
         texts = [f"{_listed(pairs, most)} ({reason})" for reason, pairs in grouped.get(kind, {}).items()]
         if texts:
-            lines.append(f"left out, {TITLES[kind]}: {'; '.join(texts)}")
-    return lines or [NOTHING]
+            lines.append(f"not checked in full, {TITLES[kind]}: {'; '.join(texts)}")
+    return lines or [NOTHING_LEFT_OUT]
 
 
 def _listed(pairs: list[str], most: int) -> str:

@@ -107,16 +107,16 @@ class NearestSingular:
 
     @property
     def words(self) -> str:
-        """The same as the end of a sentence."""
+        """The values as text."""
         return (
-            f"nearest to a singular configuration is '{self.robot}' on '{self.task}': smallest singular value "
+            f"closest to a singularity: robot '{self.robot}' on task '{self.task}': smallest singular value "
             f"{self.smallest:.2g}, of all robots together {self.stack:.2g}"
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resolution:
-    """How finely a motion was resolved, and what that took.
+    """Nodes and effort of a motion of the accurate mode.
 
     Attributes:
         integrator: What integrated the joints from the start on; ``euler_from`` is where the accurate one failed.
@@ -161,7 +161,7 @@ class Motion:
         iterations: Iterations of the method in each step, shape (N - 1,); None when they were not counted.
         slack: Norm of the twist residual that each step accepts (mixed units: m/s and rad/s), shape (N - 1,); None when
             it was not measured.
-        resolution: How finely it was resolved; None when that was not recorded.
+        resolution: Nodes and effort of the accurate mode; None when not recorded.
     """
 
     times: Array
@@ -185,7 +185,7 @@ class Motion:
 
     @property
     def gaps(self) -> dict[int, str]:
-        """Name of what is not part of the program, by the first row after it."""
+        """Names of interruptions of the program, by the first row after each."""
         return self.plan.gaps(self.sigma)
 
     def rows(self, phase: Phase) -> slice:

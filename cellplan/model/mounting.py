@@ -1,4 +1,4 @@
-"""Mounting: what a robot stands on and what is mounted on its links, beside the bodies of its own file."""
+"""Mounting: pedestals, and bodies mounted on links, beside the bodies of the robot's own file."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -28,7 +28,7 @@ class Pedestal:
     def __post_init__(self) -> None:
         """Make sure that it is either a column or a box."""
         if (self.radius is None) == (self.size is None):
-            raise ValueError("a pedestal is either a column with a radius or a box with a size")
+            raise ValueError("a pedestal has either a radius (column) or a size (box)")
 
     def solid(self, X_WB: Array) -> tuple[Solid, Array] | None:
         """The solid below a base and its pose in the base frame B; None below a base that stands on the floor.

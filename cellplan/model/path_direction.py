@@ -1,4 +1,4 @@
-"""The way round in which a closed path runs, seen from outside the surface."""
+"""Direction of a closed path, seen from outside the surface."""
 
 from typing import Final
 
@@ -16,7 +16,7 @@ from cellplan.model.task import (
     TimedPath,
 )
 
-EDGE_ON: Final = (
+EDGE_ON_TOL: Final = (
     1e-9  # [-] a direction that leans less out of a plane does not tell its outside; nor an area this small
 )
 PLANE_AXES: Final = {PlaneName.XY: (0, 1), PlaneName.YZ: (1, 2), PlaneName.XZ: (0, 2)}
@@ -37,13 +37,13 @@ def outside_of(task: Task, normal: Array) -> Array:
     """
     if task.project is not None:
         return task.project
-    if task.tool_axis is None or abs(task.tool_axis @ normal) <= EDGE_ON:
+    if task.tool_axis is None or abs(task.tool_axis @ normal) <= EDGE_ON_TOL:
         return normal
     return -task.tool_axis
 
 
 def run_direction(task: Task) -> tuple[RunDirection | None, Array | None]:
-    """The way round that a task's path runs, and the side in P that it is seen from, shape (3,).
+    """Direction of a task's path, and the side in P from which it is seen, shape (3,).
 
     Listed points run as they are listed; where they are closed and enclose an area, that has a way round. None for an
     open path, or for one that encloses no area or has no outside.
@@ -58,7 +58,7 @@ def run_direction(task: Task) -> tuple[RunDirection | None, Array | None]:
         return path.direction, outside
     centred = points - points.mean(axis=0)
     area = 0.5 * np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
-    if outside is None or abs(area @ outside) <= EDGE_ON * float(np.sum(centred * centred)):
+    if outside is None or abs(area @ outside) <= EDGE_ON_TOL * float(np.sum(centred * centred)):
         return None, None
     return (RunDirection.COUNTERCLOCKWISE if area @ outside > 0.0 else RunDirection.CLOCKWISE), outside
 
@@ -90,4 +90,4 @@ def _outside_of_file(task: Task, path: SampledPath | TimedPath) -> Array | None:
         return None
     mean = -axes.mean(axis=0)
     length = float(np.linalg.norm(mean))
-    return mean / length if length > EDGE_ON else None
+    return mean / length if length > EDGE_ON_TOL else None

@@ -1,4 +1,4 @@
-"""Payload: what a robot may carry as far as its maker publishes it, and what it carries in a run."""
+"""Payload: rated loads as published by the manufacturer, and loads in a run."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from cellplan.geometry.transforms import Array
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisLimit:
-    """What the load may do to one axis of the wrist.
+    """Limits of the load about one axis of the wrist.
 
     Attributes:
         joint: Name of the joint.
@@ -24,13 +24,14 @@ class AxisLimit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Payload:
-    """What a robot may carry on its flange.
+    """Rated load of a robot.
 
     Attributes:
         mass: Largest mass in [kg].
         source: Where the figures come from.
-        along: Farthest centre of the load from the flange plane in [m], along the flange's z; None when not published.
-        across: Farthest centre of the load from the flange's z axis in [m]; None when not published.
+        along: Largest distance of the centre of mass of the load from the flange plane in [m], along the flange's z;
+            None when not published.
+        across: Largest distance of it from the flange's z axis in [m]; None when not published.
         axes: Limits of axes of the wrist.
     """
 
@@ -52,7 +53,7 @@ class Payload:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisUse:
-    """What the load does to one of the last axes over a run.
+    """Moment and inertia of the load about one of the last axes over a run.
 
     Attributes:
         joint: Name of the joint.
@@ -112,10 +113,10 @@ class LoadUse:
 
     @property
     def across(self) -> float:
-        """Distance of the centre of the load from the flange's z axis in [m]."""
+        """Distance of the centre of mass of the load from the flange's z axis in [m]."""
         return 0.0 if self.centre_F is None else float(np.hypot(self.centre_F[0], self.centre_F[1]))
 
     @property
     def along(self) -> float:
-        """Distance of the centre of the load from the flange plane in [m]."""
+        """Distance of the centre of mass of the load from the flange plane in [m]."""
         return 0.0 if self.centre_F is None else float(abs(self.centre_F[2]))

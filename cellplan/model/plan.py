@@ -1,4 +1,4 @@
-"""Plan: who does what, in which order, over the nominal time of a program."""
+"""Plan: phases of a program and roles of the robots, over its nominal time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """The phases of a program, and what its tools do in them.
+    """The phases of a program, and the tasks of its tools.
 
     Attributes:
         phases: All phases in their order, those without rows in the program among them; neighbours share their ends.

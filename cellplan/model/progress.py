@@ -1,9 +1,9 @@
-"""Progress of long stages, reported to whoever listens."""
+"""Progress callback of long stages: stage and fraction done."""
 
 from collections.abc import Callable
 
-Progress = Callable[[str, float], None]  # (what is being done, share done 0..1)
+Progress = Callable[[str, float], None]  # (stage, fraction done from 0 to 1)
 
 
 def silent(stage: str, share: float) -> None:
-    """Listen to nothing."""
+    """Report no progress."""

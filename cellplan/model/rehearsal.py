@@ -1,4 +1,4 @@
-"""Rehearsal: what a program does on real cells, before and after its references were corrected."""
+"""Rehearsal: execution of a program on real cells, before and after correction of its references."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -62,7 +62,7 @@ class IsoFigures:
 
 
 class Outcome(StrEnum):
-    """How correcting ended.
+    """Outcome of a correction.
 
     Attributes:
         CONVERGED: The error is far within tolerance, or within tolerance and falls no more.
@@ -98,7 +98,7 @@ class Round:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Correction:
-    """What correcting from pass to pass came to on one real cell.
+    """Result of the correction from pass to pass on one real cell.
 
     Attributes:
         outcome: How it ended.

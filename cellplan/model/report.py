@@ -23,14 +23,14 @@ CYCLE_TOL = 1e-9  # [-] of the whole time: cycles that differ by less are equall
 REDUCED_SPEED = 0.25  # [m/s] of the tool tip: what ISO 10218-1 allows while people are near
 
 
-ASSUMPTION = "every joint moves evenly from each sample to the next"  # between the samples
-MARGIN = "deviation of the controllers, calibration and elasticity belong in the required clearance"
+ASSUMPTION = "every joint moves linearly from each sample to the next"  # between the samples
+MARGIN = "the required clearance must cover controller deviation, calibration errors and elasticity"
 
 Point = tuple[float, float, float]
 
 
 class ClearanceClass(StrEnum):
-    """What keeps its distance from what."""
+    """Classes of pairs of bodies."""
 
     ROBOT_ROBOT = "robot_robot"
     SELF = "self"
@@ -47,10 +47,10 @@ class Check:
         subject: Robot and joint, task, or pair of bodies.
         passed: The verdict.
         value: The worst value, in ``unit``.
-        limit: What was allowed, in ``unit``.
+        limit: The allowed value, in ``unit``.
         unit: Unit of value and limit as printed.
-        at_s: Instant of the worst value in [s]; None where there is none.
-        message: One line for people: what, by how much, where, when.
+        at_s: Time of the worst value in [s]; None without a time.
+        message: One line of text: what, by how much, where, when.
     """
 
     name: str
@@ -119,7 +119,7 @@ class ToolDepth:
         depth: Largest depth in [m]; 0 when the tool is free or just touches.
         at_s: Its instant in [s]; None where a path is judged before it has a clock.
         limit: Depth that is allowed in [m].
-        body: What of the tool is so deep: ``axis``, or the name of a body of it.
+        body: Deepest element of the tool: ``axis``, or the name of a body.
     """
 
     task: str
@@ -223,7 +223,7 @@ class Contact:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ClearanceReport:
-    """All that is known about distances.
+    """Results on distances.
 
     Attributes:
         minima: Smallest distance per class.
@@ -311,25 +311,25 @@ class Repeatability:
     """Whether the joints come back when all tools do.
 
     Attributes:
-        sample_times: Times in [s] at which all tools are at their start together, shape (cycles + 1,).
+        cycle_times: Times in [s] at which all tools are at their start together, shape (cycles + 1,).
         drifts: One entry per joint of every robot.
         closes: Whether every joint comes back in every cycle, so that the program may be repeated as it is.
     """
 
-    sample_times: Array
+    cycle_times: Array
     drifts: tuple[JointDrift, ...]
     closes: bool
 
     @property
     def cycles(self) -> int:
         """How many cycles there are."""
-        return len(self.sample_times) - 1
+        return len(self.cycle_times) - 1
 
     @property
     def period(self) -> float | None:
         """Length of a cycle in [s]; None when the cycles differ in length."""
-        lengths = np.diff(self.sample_times)
-        return float(lengths.mean()) if np.ptp(lengths) <= CYCLE_TOL * self.sample_times[-1] else None
+        lengths = np.diff(self.cycle_times)
+        return float(lengths.mean()) if np.ptp(lengths) <= CYCLE_TOL * self.cycle_times[-1] else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -338,23 +338,23 @@ class Report:
 
     Attributes:
         cell: Name of the cell.
-        mode: Who moved.
-        tasks: Names of the tasks that were worked on.
+        mode: Which robots moved.
+        tasks: Names of the tasks of the run.
         checks: Every verified statement.
         accuracy: Tool errors, one entry per task.
         joints: One entry per joint of every robot.
         clearance: Distances.
-        conditioning: How far the motion stays from singularities.
+        conditioning: Distance of the motion from singularities.
         motion_share: Share of all joint travel per robot, 0..1, and the busiest joint of each, as (share, joint).
-        speeds: How fast each robot moves in the world.
+        speeds: Speeds of each robot in the world.
         times: The common clock in [s], shape (N,).
         q: Positions read back from the tables in [rad] or [m], shape (N, n), by robot.
         qd: Speeds between the samples, shape (N - 1, n), by robot.
         closures: Closure errors, one entry per holder but the first.
         repeatability: Whether the joints come back with the tools; None when not all tools come back.
-        depths: How deep tools stand in the part, one entry per task on it.
+        depths: Depth of tools in the part, one entry per task on it.
         accelerations: Accelerations, jerk and process speeds.
-        loads: What each robot carries.
+        loads: Load of each robot.
         phases: All phases of the program on its nominal time, those that are not part of it among them; the times of
             this report count from the begin of the phase that it is for.
     """

@@ -160,7 +160,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotModel:
-    """A kind of robot: what stands in its data sheet.
+    """A robot model: the content of its data sheet.
 
     Attributes:
         name: Model name.

@@ -21,7 +21,7 @@ class PlaneName(StrEnum):
 
 
 class RunDirection(StrEnum):
-    """Way round that a closed path runs, seen from outside the surface."""
+    """Direction of a closed path, seen from outside the surface."""
 
     COUNTERCLOCKWISE = "counterclockwise"
     CLOCKWISE = "clockwise"
@@ -113,7 +113,7 @@ class TimedPath:
     is_closed: bool
 
     def __post_init__(self) -> None:
-        """Check at the door that time goes on and nothing is missing or not finite."""
+        """Check that times increase and that nothing is missing or not finite."""
         fewest = 4 if self.is_closed else 2
         if len(self.times) < fewest or self.points.shape != (len(self.times), 3):
             raise ValueError(f"trajectory '{self.source}': expected at least {fewest} times with a point each")
@@ -199,11 +199,11 @@ class Task:
         robot: Name of the operator.
         path: The path as written.
         project: Unit direction in P naming the side of the part onto which the path is projected (the outward normal
-            there), shape (3,); None when the path is used where it stands.
+            there), shape (3,); None when the path is used at its place.
         plane_offset: Position of an unprojected planar path along the plane's normal axis in [m].
         tool_axis: ``None`` for the inward surface normal (or the axes of the file), else a unit direction in P.
         tool_x: Direction in P that the tool's x axis leans to, shape (3,).
-        turn: Angle in [rad] by which the tool turns about its own z axis, evenly over the path's length; every
+        turn: Angle in [rad] by which the tool turns about its own z axis, uniformly over the path's length; every
             further cycle turns it on.
         axes: Constrained components of the tool's motion in P, in the order x, y, z, rx, ry, rz.
         is_spin_free: Whether rotation about the tool's own axis is left open.
@@ -216,9 +216,9 @@ class Task:
         blend: Corner rounding distance in [m]; None means that the tool stops at every corner.
         settle: Time in [s] after the start during which the tool may come from beside its path: errors are reported
             and not judged.
-        repeat: How often a closed path is gone through.
-        approach: How the tool comes to the start of its path; None when it starts there.
-        retract: How the tool leaves the end of its path; None when it stays there.
+        repeat: Number of passes along a closed path.
+        approach: Motion of the tool to the start of its path; None when it starts there.
+        retract: Motion of the tool away from the end of its path; None when it stays there.
         relative_to: Frame that path and axes are given in. In the world, the first holder's task says where the part
             is carried; P then reads W in everything that is said of the task.
         tool_depth: Largest depth in [m] that the tool may have in the part, along its axis.
@@ -265,7 +265,7 @@ class Task:
         return self.retract.duration if self.retract else 0.0
 
     def time_for_path(self, clock: float | None) -> float | None:
-        """Time for the whole path in [s]: its own, or what the common clock leaves; None when neither is given.
+        """Time for the whole path in [s]: its own, or the rest of the common clock; None when neither is given.
 
         Args:
             clock: Length of the common clock in [s]; None when the clock follows the tasks.
@@ -276,7 +276,7 @@ class Task:
 
     @property
     def judged_from(self) -> float:
-        """Time in [s] from which on errors are judged: all along, unless the tool needs time to settle."""
+        """Time in [s] from which errors are judged: 0 unless the tool needs time to settle."""
         return self.start + self.settle if self.settle > 0.0 else 0.0
 
     def first_judged(self, times: Array) -> int:

@@ -20,11 +20,11 @@ class Toolpath:
 
     Attributes:
         name: Name of the task.
-        tip: Where the tool tip goes, in P.
-        orientation: How the tool stands, in P, before it turns about its own axis.
+        tip: Curve of the tool tip in P.
+        orientation: Orientation of the tool in P, before its rotation about its own axis.
         arc: Length along the tip curve.
         stops: Parameters of the tip curve between which the pieces lie, shape (pieces + 1,).
-        turn: Angle in [rad] by which the tool turns about its own z axis, evenly over the whole length.
+        turn: Angle in [rad] by which the tool turns about its own z axis, uniformly over the whole length.
         is_closed: Whether the last piece ends in the pose in which the first starts, but for the turn.
         runs_on: Whether the closed path passes its start without a corner and without a stop.
         stand_off: Distance in [m], against the tool's axis, from which the tool comes to its start.
@@ -70,7 +70,7 @@ class Toolpath:
 
     @property
     def pieces(self) -> "tuple[Piece, ...]":
-        """The stretches between stops, in order; each starts where the one before ends."""
+        """The segments between stops, in order; each starts where the previous one ends."""
         behind = self.behind
         lengths = zip(behind[:-1], np.diff(behind), strict=True)
         return tuple(Piece(self, k, float(start), float(length)) for k, (start, length) in enumerate(lengths))

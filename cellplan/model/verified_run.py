@@ -1,4 +1,4 @@
-"""Verified run: the only thing a controller program may be made from."""
+"""Verified run: controller programs are made from nothing else."""
 
 from collections.abc import Mapping
 from dataclasses import InitVar, dataclass
@@ -9,7 +9,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import JointTable, Motion, Schedule
 from cellplan.model.report import Report
 
-SEAL: Final = object()  # held by the gate alone: whoever shows it has verified the run
+ACCESS_TOKEN: Final = object()  # known to ``open_gate`` only
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,7 +41,7 @@ class VerifiedRun:
         folder: The run folder.
         digest: SHA-256 of its manifest, which stands for the whole run.
         cell: The cell that was solved.
-        motion: All rows of the program, as they stand in its tables, and its plan, as the cell demands it.
+        motion: All rows of the program, as written in its tables, and its plan, as the cell requires it.
         motions: One for each phase: one, or one per task in the pairwise mode.
         file_count: Files that were compared with the manifest.
         inputs_compared: Names of the files the run rests on that were found unchanged.
@@ -56,11 +56,11 @@ class VerifiedRun:
     file_count: int
     inputs_compared: tuple[str, ...]
     remarks: tuple[str, ...]
-    seal: InitVar[object]
+    token: InitVar[object]
 
-    def __post_init__(self, seal: object) -> None:
-        """Refuse to be made outside the gate, or of a run with a failed check."""
-        if seal is not SEAL:
-            raise TypeError("a verified run is made by cellplan.open_gate only")
+    def __post_init__(self, token: object) -> None:
+        """Refuse construction outside of ``open_gate``, or of a run with a failed check."""
+        if token is not ACCESS_TOKEN:
+            raise TypeError("a verified run is created by cellplan.open_gate only")
         if not self.motions or not all(motion.report.passed for motion in self.motions):
-            raise ValueError("a verified run has motions, and all their checks passed")
+            raise ValueError("a verified run has motions whose checks all passed")

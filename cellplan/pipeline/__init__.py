@@ -1,1 +1,1 @@
-"""Whole jobs, each a short recipe over the stages."""
+"""Whole jobs: solve, verify, rehearse, export, each as a sequence of stages."""

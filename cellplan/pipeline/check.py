@@ -63,7 +63,7 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
     start = choice.start
     pair = _touching_at_start(scene, start)
     found = tuple(robot.name for robot in cell.robots if robot.start is None)
-    words = "nothing touches at the start" if pair is None else f"'{pair[0]}' touches '{pair[1]}' at the start"
+    words = "no collision at the start" if pair is None else f"'{pair[0]}' touches '{pair[1]}' at the start"
     at_start = Check(
         name="start_collision",
         subject="cell" if pair is None else f"{pair[0]} - {pair[1]}",
@@ -91,7 +91,7 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
 
 
 def _touching_at_start(scene: Scene, start: Array) -> tuple[str, str] | None:
-    """The first two bodies that touch at the start of a run; idle robots stand at their homes, as far as known."""
+    """The first two bodies that touch at the start of a run; idle robots are at their homes where these are known."""
     for phase in plan_phases(scene.cell).program:
         of_run = scene_of_run(scene, phase.tasks)
         pair = of_run.touching(standing(scene.cell, phase, start), among=present_pairs(of_run, phase))

@@ -26,7 +26,7 @@ class MatrixShape:
     """The cooperation Jacobian of one phase, at the start postures of the cell.
 
     Attributes:
-        phase: Which tasks are worked on and who moves.
+        phase: Tasks and moving robots.
         blocks: Names of the block rows: the tasks of the phase, then the grasps of further holders that move.
         rows: Constrained components of each block row.
         columns: Joints of each robot, in the order of the cell, that move and carry a tool or the part.
@@ -59,7 +59,7 @@ class MatrixShape:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Structure:
-    """How a cell hangs together.
+    """The structure of a cell.
 
     Attributes:
         cell: The cell.

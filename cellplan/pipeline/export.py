@@ -71,9 +71,9 @@ def refuse_unless_exportable(folder: Path, run: Path) -> None:
     place, source = folder.resolve(), run.resolve()
     inside = place.relative_to(source).parts if place.is_relative_to(source) else None
     if source.is_relative_to(place) or (inside is not None and (len(inside) < 2 or inside[0] != PROGRAMS)):
-        raise InputError(f"{folder}: programs are not written into a run, but below '{run / PROGRAMS}' or elsewhere")
+        raise InputError(f"{folder}: expected a folder outside the run, or below '{run / PROGRAMS}'")
     if folder.is_dir() and any(folder.iterdir()) and not (folder / EXPORT).is_file():
-        raise InputError(f"{folder}: holds something else than exported programs; choose another folder")
+        raise InputError(f"{folder}: contains files other than exported programs; choose another folder")
     refuse_unless_replaceable(folder)
 
 
@@ -85,7 +85,7 @@ def export_program(
     The files are read back by their own reader before they are written, and every check is made on what was read.
 
     Args:
-        run: What the gate let through.
+        run: The verified run.
         folder: Where the files go; an older export there is replaced.
         form: Name of the format.
         progress: Called with the stage and the fraction done.
@@ -117,7 +117,7 @@ def _verify_rounded(
     scene = Scene.from_cell(run.cell)
     findings = []
     for motion, tables in zip(run.motions, read, strict=True):
-        _refuse_other_clock(motion, tables, room=0.5 * 10.0**-decimals)
+        _refuse_other_clock(motion, tables, tolerance=0.5 * 10.0**-decimals)
         clock = next(iter(tables.values())).times
         schedule = replace(motion.schedule, times=clock)
         report = verify(scene, schedule, list(tables.values()), moving=motion.moving, progress=progress)
@@ -126,11 +126,11 @@ def _verify_rounded(
         raise NotVerifiedError(findings)
 
 
-def _refuse_other_clock(motion: VerifiedMotion, tables: Mapping[str, JointTable], *, room: float) -> None:
+def _refuse_other_clock(motion: VerifiedMotion, tables: Mapping[str, JointTable], *, tolerance: float) -> None:
     """Make sure that rounding moved no time by more than half a unit of the last decimal."""
     for table in tables.values():
         late = np.abs(table.times - motion.schedule.times)
-        if np.any(late > room + np.spacing(motion.schedule.times[-1])) or not np.all(np.diff(table.times) > 0.0):
+        if np.any(late > tolerance + np.spacing(motion.schedule.times[-1])) or not np.all(np.diff(table.times) > 0.0):
             raise InputError(f"program of '{table.robot}': its times cannot be written with the decimals of the format")
 
 

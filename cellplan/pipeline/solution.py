@@ -46,7 +46,7 @@ class Solution:
         cell: The cell that was solved, with every start posture filled in.
         motion: Joint positions in all rows of the program, and its plan.
         runs: One run for each phase of the program: one, or one per task in the pairwise mode.
-        remark: What to know of the start that was chosen when no trial of one was without fault.
+        remark: Note on the chosen start when no trial of a start was free of faults.
     """
 
     cell: Cell

@@ -32,11 +32,11 @@ from cellplan.scene.scene import Scene
 def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -> Solution:
     """Plan the motion of all robots, render their joint tables, read these back and verify them.
 
-    A program that breaks a limit or collides is returned like any other: its reports say by how much, where and when.
+    A program that violates a limit or collides is returned like any other: its reports state where, when and how much.
 
     Args:
         cell: The cell, as ``load_cell`` gives it.
-        task: Name of the only task to work on; the other operators stand at their homes.
+        task: Name of the only task to work on; the other operators stay at their homes.
         progress: Called with the stage and the fraction done.
 
     Raises:
@@ -55,7 +55,7 @@ def solve_with_plots(
     Args:
         cell: The cell, as ``load_cell`` gives it.
         plots: Takes the reports of all runs as soon as all of them is known but the clearance.
-        task: Name of the only task to work on; the other operators stand at their homes.
+        task: Name of the only task to work on; the other operators stay at their homes.
         progress: Called with the stage and the fraction done.
     """
     scene, solution = _solve_motion(cell, task=task, progress=progress)

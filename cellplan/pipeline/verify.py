@@ -66,6 +66,6 @@ def _refuse_other_rows(clock: ProgramClock, tables: list[JointTable]) -> None:
     """Refuse tables whose times or gaps are not those of the program."""
     for table in tables:
         if not np.array_equal(table.times, clock.times):
-            raise InputError(f"table of '{table.robot}': its times are not those of the program")
+            raise InputError(f"table of '{table.robot}': its times differ from those of the program")
         if table.gaps != clock.gaps:
-            raise InputError(f"table of '{table.robot}': its gaps are not those of the program")
+            raise InputError(f"table of '{table.robot}': its interruptions differ from those of the program")

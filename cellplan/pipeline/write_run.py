@@ -46,17 +46,17 @@ def write_run(
     subfolders, and an overview above them. Last comes ``manifest.json``, which names every file.
 
     Args:
-        solution: What was solved.
+        solution: The solution.
         folder: The run folder; an older run there is replaced.
         keep_rejected: Write the tables of a failed solution too, under ``rejected/``, marked in every header.
         progress: Called with the stage and the fraction done.
-        plots: Draws the plots; those that it has begun are not drawn again.
+        plots: Renders the plots; plots that it has begun are not rendered again.
 
     Returns:
         The record in the ``report.json`` of the folder.
 
     Raises:
-        InputError: The folder cannot be written, or holds something else than a run.
+        InputError: The folder cannot be written, or contains something other than a run.
     """
     background = plots or BackgroundPlots()
     cell, program = solution.cell, solution.program

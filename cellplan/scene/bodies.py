@@ -68,11 +68,11 @@ def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
     bodies = [body for robot in named.robots for body in _robot_bodies(robot)]
     bodies.append(part_body(cell, cell.part, *cell.part.held_by[:1]))
     bodies += [_fixed(thing.name, Kind.OBSTACLE, shape=thing.shape, X_WS=thing.X_WS) for thing in named.obstacles]
-    seen: set[str] = set()
+    names: set[str] = set()
     for body in bodies:
-        if body.name in seen:
-            raise InputError(f"{cell.origin.file}: two bodies are called '{body.name}': rename one of them")
-        seen.add(body.name)
+        if body.name in names:
+            raise InputError(f"{cell.origin.file}: two bodies are named '{body.name}': rename one of them")
+        names.add(body.name)
     return tuple(bodies)
 
 

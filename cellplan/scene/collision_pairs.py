@@ -30,7 +30,7 @@ class CollisionPairs:
         exclusions: Pairs that are not, as (first, second, reason).
         mounted: Pairs that may touch and of which the depth is judged.
         left_out: What is not judged in full, but for two links of one robot's file.
-        outside: What of tools and holders lies outside their contact zones; the engine has them after its solids.
+        outside: Surfaces of tools and holders outside their contact zones; the engine has them after its solids.
         cut_from: The body that each of these is cut from, by its index.
     """
 
@@ -118,7 +118,7 @@ class _ContactZones:
         return self._first_index + len(self.outside) - 1, part
 
     def _outside_zone(self, body: SceneBody) -> tuple[CollisionBody | None, bool]:
-        """What of a tool lies outside its contact zone, and whether any lies inside; equal tools are cut once."""
+        """The surface of a tool outside its contact zone, and whether any lies inside; equal tools are cut once."""
         if isinstance(body.shape, HalfSpace):
             return None, False
         robot = self._cell.robot(str(body.robot))

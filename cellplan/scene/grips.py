@@ -20,7 +20,7 @@ from cellplan.scene.pairs import Rule
 
 GRIP_TOL: Final = 1e-4  # [m] by which the face of a grip may lie deeper than the grip: what counts there is its depth
 COMPONENT_COUNT: Final = 6  # [-] components of a grasp that leaves nothing open
-RIGID: Final = "checked for contact only: rigid with a flange that holds the part"
+RIGID: Final = "checked for contact only: rigidly attached to a flange that holds the part"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,7 +41,7 @@ class GripWatch:
 
 
 def grip_watch(cell: Cell, body: SceneBody, grasp: Grasp) -> GripWatch:
-    """Say what of a further holder's body must not touch the part.
+    """The surface of a co-holder's body that must not touch the part.
 
     The first holder carries the part, and of what is rigid with its flange only the depth is judged. A further one may
     touch the part near its tool tip, and with the face in the plane of the tip; everything behind is watched at every
@@ -88,7 +88,7 @@ def _require_free(cell: Cell, body: SceneBody, grasp: Grasp, outside: CollisionB
         raise InputError(
             f"{cell.origin.at(f'part.held_by[{number}].at')}: expected '{grasp.robot}' to touch the part near its tool "
             f"tip (checks.contact_zone_mm = {zone:g}) or with the face at the tip, got {body.name} that touches it "
-            "elsewhere: is the grasp the right way round? If it may, name the pair under checks.exclude"
+            "elsewhere: is the grasp the right way round? If so permitted, name the pair under checks.exclude"
         )
 
 

@@ -23,8 +23,8 @@ KIND: Final = {
     Rule.PROCESS: LeftOutKind.AT_WORK,
     Rule.GRIP: LeftOutKind.GRIP,
 }
-WITHOUT_LINKS: Final = "none of its links has a body: what its arm touches is not judged"
-AMONG_THINGS: Final = "all of them stand still: they are not judged against each other"
+NO_BODY_REASON: Final = "none of its links has a body: contacts of its arm are not checked"
+FIXED_REASON: Final = "all of them are fixed: not checked against each other"
 
 
 def left_out(
@@ -53,10 +53,10 @@ def left_out(
     found = sorted(entries, key=lambda each: each[:2])
     named = [LeftOut(kind, (bodies[i].name, bodies[j].name), reason) for i, j, kind, reason in found]
     things = tuple(body.name for body in bodies if body.kind is Kind.OBSTACLE)
-    among = [LeftOut(LeftOutKind.ENVIRONMENT, things, AMONG_THINGS)] if len(things) > 1 else []
+    among = [LeftOut(LeftOutKind.ENVIRONMENT, things, FIXED_REASON)] if len(things) > 1 else []
     with_links = {body.robot for body in bodies if body.kind is Kind.LINK}
     bare = [robot.name for robot in cell.robots if robot.name not in with_links]
-    return (*named, *among, *(LeftOut(LeftOutKind.NO_BODY, (name,), WITHOUT_LINKS) for name in bare))
+    return (*named, *among, *(LeftOut(LeftOutKind.NO_BODY, (name,), NO_BODY_REASON) for name in bare))
 
 
 class _Standing:

@@ -16,7 +16,7 @@ from cellplan.scene.bodies import Kind, SceneBody
 
 MOUNT_DEPTH: Final = 0.002  # [m] by which a tool may reach into the link that its flange, without a body, is part of
 MAX_NAMED: Final = 3  # [-] bodies that an error names; the others are counted
-NEVER_STANDING: Final = (Kind.LINK, Kind.TOOL, Kind.PART)  # nothing of these stands on another one of them
+MOVING_KINDS: Final = (Kind.LINK, Kind.TOOL, Kind.PART)  # nothing of these stands on another one of them
 
 
 class Mount(StrEnum):
@@ -61,7 +61,7 @@ def stand_on_each_other(a: SceneBody, b: SceneBody) -> bool:
     """
     if a.robot is not None and a.robot == b.robot:
         return False
-    return a.is_at_rest and b.is_at_rest and not (a.kind in NEVER_STANDING and b.kind in NEVER_STANDING)
+    return a.is_at_rest and b.is_at_rest and not (a.kind in MOVING_KINDS and b.kind in MOVING_KINDS)
 
 
 def is_rigid_with_flange(body: SceneBody, cell: Cell) -> bool:
@@ -131,7 +131,7 @@ def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Seque
         beyond = "its own" if body.kind is Kind.ATTACHMENT else "its flange"
         raise InputError(
             f"{where}: expected {what} clear of the links of '{robot}' beyond {beyond}, got one that touches {named} "
-            f"in every configuration: {question} If they may touch, name the pairs under checks.exclude"
+            f"in every configuration: {question} If contact is permitted, name the pairs under checks.exclude"
         )
 
 
@@ -163,5 +163,5 @@ def _words(body: SceneBody) -> tuple[str, str]:
     if body.kind is Kind.PART:
         return "a part", "is the grasp the right way round?"
     if body.kind is Kind.TOOL:
-        return "a body of the tool", "does it lie in front of the flange, along its z?"
+        return "a body of the tool", "is it in front of the flange, along its z axis?"
     return "an attachment", "is it on the right link, and placed in the frame that 'at' is given in?"

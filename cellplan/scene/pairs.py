@@ -38,7 +38,7 @@ class ScenePair:
         solids: The engine's bodies that must not touch: the two bodies themselves, or what lies outside a contact zone
             and the part. None for a half-space, and where all of a tool lies inside its zone.
         is_ground: Whether the second body is a half-space.
-        clearance_class: What keeps its distance from what.
+        clearance_class: Classes of pairs of bodies.
         rule: What is demanded of them.
         reason: Why less than the clearance is demanded; empty for the rule ``clearance``.
         demand: Distance in [m] that a pair with the rule ``clearance`` is to keep.
@@ -162,7 +162,7 @@ def _mounting(a: SceneBody, b: SceneBody, *, cell: Cell, trees: Mapping[str, Lin
     """Why two bodies are joined by their mounting, or None."""
     mounted = mounted_pair(a, b, (0, 0), cell)
     if mounted is not None and mounted.mount is Mount.STANDING:
-        return f"both stand still: may touch, at most {MM * mounted.limit:g} mm deep"
+        return f"both are fixed: may touch, at most {MM * mounted.limit:g} mm deep"
     if mounted is not None:
         is_first = grasp_of(a, b, cell) is cell.part.held_by[0]
         return f"holds the part: may touch, at most {MM * mounted.limit:g} mm deep" if is_first else None

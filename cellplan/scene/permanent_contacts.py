@@ -198,7 +198,7 @@ def _own_links(design: Design, sampled: _Sampled, pair: ScenePair) -> bool:
     """Leave out two near links of one robot's file that always touch; the others are checked for contact only."""
     if sampled.always_touch(pair, None):
         configurations = f"the reference configuration and at {CONFIGURATION_COUNT} random ones"
-        reason = f"touch at {configurations}: it is their shape, not the motion"
+        reason = f"touch at {configurations}: caused by their shapes, not by the motion"
         design.excluded.append(Excluded(pair.first, pair.second, reason))
     else:
         reason = "checked for contact only: two joints apart, their distance is set by the robot's design"
@@ -231,9 +231,9 @@ def _relaxed(pair: ScenePair, sampled: _Sampled, holder: str | None) -> ScenePai
     """The pair, checked for contact only where the distance between the two is a matter of their mounting."""
     nearest, farthest = sampled.distances(pair, holder)
     if farthest < pair.demand:
-        reason = "checked for contact only: nearer than the demanded clearance in every configuration by its mounting"
+        reason = "checked for contact only: closer than the required clearance in every configuration by the mounting"
         return replace(pair, rule=Rule.CONTACT, reason=reason)
     if farthest - nearest <= CONSTANT_DISTANCE_TOL:
-        reason = "checked for contact only: the mounting sets their distance, the same in every configuration"
+        reason = "checked for contact only: their distance is fixed by the mounting"
         return replace(pair, rule=Rule.CONTACT, reason=reason)
     return pair

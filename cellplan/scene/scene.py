@@ -34,7 +34,7 @@ class Scene:
         exclusions: Pairs that are not watched, as (first, second, reason).
         mounted: Pairs that may touch and of which the depth is judged.
         left_out: What is not judged in full, but for two links of one robot's file.
-        engine: The solid bodies in the order of ``bodies``, then what of tools lies outside their contact zones.
+        engine: The solid bodies in the order of ``bodies``, then the surfaces of tools outside their contact zones.
         cut_from: The tool body that each of these last ones is cut from.
         solid_rows: Indices of the pairs that the engine watches, shape (S,), ascending.
         solid_pairs: ``ScenePair.solids`` of each of them, shape (S, 2).

@@ -136,12 +136,12 @@ FOLDED = [0.3, np.pi, 0.0]  # the outer links lie on the inner one: the tip is a
 WRIST = [0.3, -0.9, 0.4, 0.2, 0.0, 0.1]  # the fourth and the sixth axis coincide
 ELBOW = [0.3, -0.9, np.arctan2(0.4318, 0.0203), 0.2, 0.5, 0.1]  # the arm is stretched
 SLOW = {"velocity": 0.05}
-TIGHT = {"lower": -1.0001, "upper": 1.0001, "acceleration": 5.0}
+TIGHT_TOL = {"lower": -1.0001, "upper": 1.0001, "acceleration": 5.0}
 
 
 def tight(joint: Joint) -> Joint:
     """Limits that the start all but touches."""
-    return replace(joint, **TIGHT)
+    return replace(joint, **TIGHT_TOL)
 
 
 def slow(joint: Joint) -> Joint:

@@ -10,7 +10,7 @@ from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.pair_search import SolidSearch
 from cellplan.certify.pair_state import PairState
-from cellplan.collision.distance import SURELY_APART, measure
+from cellplan.collision.distance import APART_TOL, measure
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Sphere
 from cellplan.geometry.transforms import Array, frame_from_axes, pose, pose_from
@@ -52,7 +52,7 @@ def turned(model: RobotModel, X: Array) -> RobotModel:
     return replace(model, bodies=tuple(replace(body, X_BS=X @ body.X_BS) for body in model.bodies))
 
 
-def search(scene: Scene, q: Array, pair: tuple[int, int], cutoff: float = SURELY_APART) -> SolidSearch:
+def search(scene: Scene, q: Array, pair: tuple[int, int], cutoff: float = APART_TOL) -> SolidSearch:
     found = SolidSearch(scene.engine, pair, StraightMotion.of_cell(scene, LeverArms(scene, q), q), state=PairState())
     found.run(cutoff)
     return found

@@ -8,7 +8,7 @@ from cellplan.certify import bound, search
 from cellplan.certify.certify import certify
 from cellplan.certify.pair_state import SEARCH_TOL
 from cellplan.certify.survey import CLOSEST_COUNT, Survey
-from cellplan.collision.distance import SURELY_APART
+from cellplan.collision.distance import APART_TOL
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import ClearanceClass
 from cellplan.scene.pairs import Rule
@@ -26,10 +26,10 @@ def cutoff_by_definition(known: Array, scene: Scene, row: int) -> float:
     kept = np.array([pair.rule is Rule.CLEARANCE for pair in scene.pairs])
     kinds = np.array([pair.clearance_class for pair in scene.pairs])
     if not kept[row]:
-        return SURELY_APART
+        return APART_TOL
     others = np.sort(known[kept & (np.arange(len(known)) != row)])
     last = others[CLOSEST_COUNT - 1] if len(others) >= CLOSEST_COUNT else np.inf
-    return max(SURELY_APART, max(known[kinds == kinds[row]].min(), last) - SEARCH_TOL)
+    return max(APART_TOL, max(known[kinds == kinds[row]].min(), last) - SEARCH_TOL)
 
 
 def test_cutoffs_are_those_of_the_definition_whatever_is_found() -> None:

@@ -52,7 +52,7 @@ def test_an_internal_error_is_one_line_without_traceback(
 
     assert status == ExitStatus.INTERNAL
     assert capsys.readouterr().err == (
-        "internal error: ValueError: first\\nsecond (set CELLPLAN_DEBUG=1 to see where)\n"
+        "internal error: ValueError: first\\nsecond (set CELLPLAN_DEBUG=1 to see the traceback)\n"
     )
 
 

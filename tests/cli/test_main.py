@@ -94,7 +94,7 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Pa
 
     assert process.returncode == 130
     assert out == ""
-    assert err.splitlines()[-1] == "interrupted: no half-written run is left behind"
+    assert err.splitlines()[-1] == "interrupted: no incomplete run folder was left behind"
     assert list(tmp_path.iterdir()) == []
     assert not any(lives(helper) for helper in helpers)
 

@@ -102,7 +102,7 @@ def test_an_export_without_the_cell_must_be_asked_for_by_name(
     assert "--cell: expected the cell file that was solved" in err
     assert "--without-cell" in err
     assert run([*words, "--cell", str(copy.cell), "--without-cell"]) == 2
-    assert capsys.readouterr().err == "error: --without-cell: unexpected option beside --cell\n"
+    assert capsys.readouterr().err == "error: --without-cell: expected no --cell beside it\n"
     assert run([*words, "--without-cell"]) == 2  # files beside the cell cannot be found without it
     assert "name the cell file 'small.yaml' with --cell" in capsys.readouterr().err
     assert not (tmp_path / "programs").exists()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders.random_cells import random_cell
 
-from cellplan.kinematics.pinocchio_model import MOST_AXES, CombinedModel
+from cellplan.kinematics.pinocchio_model import MAX_AXES, CombinedModel
 from cellplan.kinematics.screw_chain import ScrewChain
 
 ROUNDING = 1e-12  # [-] products of a dozen matrices of order one
@@ -58,7 +58,7 @@ def test_a_cell_of_one_single_joint_has_one_column() -> None:
 @pytest.mark.parametrize("with_follower", [False, True], ids=["plain", "follower"])
 def test_more_robots_than_one_model_takes_stand_where_successive_screws_put_them(with_follower: bool) -> None:
     cell = random_cell(5, operators=11, with_follower=with_follower)
-    assert cell.joint_count > MOST_AXES
+    assert cell.joint_count > MAX_AXES
     q = np.random.default_rng(5).uniform(-1.5, 1.5, cell.joint_count)
     chains = [ScrewChain(robot) for robot in cell.robots]
     own = [q[None, cell.columns(robot.name)] for robot in cell.robots]

@@ -12,8 +12,8 @@ def test_there_is_one_line_for_each_kind_with_bodies_and_reasons() -> None:
     ]
 
     assert left_out_lines(reported) == [
-        "left out, excluded by the cell: a/hand - post (a cover); b/hand - post (another cover)",
-        "left out, grip: a/hand - part, a/tool - part (holds the part)",
+        "not checked in full, excluded by the cell: a/hand - post (a cover); b/hand - post (another cover)",
+        "not checked in full, grip: a/hand - part, a/tool - part (holds the part)",
     ]
 
 
@@ -26,4 +26,4 @@ def test_many_pairs_of_one_reason_are_counted() -> None:
 
 
 def test_nothing_left_out_is_said_in_words() -> None:
-    assert left_out_lines([]) == ["nothing was left out"]
+    assert left_out_lines([]) == ["every pair was checked in full"]

@@ -77,10 +77,10 @@ def test_a_dwell_keeps_the_nominal_time() -> None:
     [
         ([0.0, 1.0], [0.0], "clock: \\(1,\\) nominal times for \\(2,\\) times"),
         ([0.0, np.nan], [0.0, 1.0], "a time is not finite"),
-        ([0.0, 0.0], [0.0, 1.0], "expected times that grow from 0"),
-        ([1.0, 2.0], [0.0, 1.0], "expected times that grow from 0"),
-        ([0.0, 1.0, 2.0], [0.0, 1.0, 0.9], "expected a nominal time that starts at 0 and never falls"),
-        ([0.0, 1.0], [0.1, 1.0], "expected a nominal time that starts at 0 and never falls"),
+        ([0.0, 0.0], [0.0, 1.0], "expected times that increase from 0"),
+        ([1.0, 2.0], [0.0, 1.0], "expected times that increase from 0"),
+        ([0.0, 1.0, 2.0], [0.0, 1.0, 0.9], "expected a nominal time that starts at 0 and never decreases"),
+        ([0.0, 1.0], [0.1, 1.0], "expected a nominal time that starts at 0 and never decreases"),
     ],
 )
 def test_a_clock_that_is_none_is_refused(times: list[float], sigma: list[float], message: str) -> None:

@@ -80,7 +80,7 @@ def test_an_arm_without_spare_joints_comes_back_in_every_cycle(planar):
 def test_cycles_under_one_law_differ_in_length(planar):
     found = solve(planar(2)).runs[0].report.repeatability
 
-    assert np.diff(found.sample_times)[[0, 3]] == pytest.approx(
+    assert np.diff(found.cycle_times)[[0, 3]] == pytest.approx(
         [2.8755, 2.8755], abs=1e-4
     )  # 10 s^3 - 15 s^4 + 6 s^5 = 1/4
     assert found.period is None
@@ -94,7 +94,7 @@ def test_a_closed_trajectory_is_repeated_period_by_period(planar):
     run = solve(cell).runs[0]
 
     assert run.report.passed
-    assert run.report.repeatability.sample_times == pytest.approx([0.0, 2.0, 4.0, 6.0], abs=1e-12)
+    assert run.report.repeatability.cycle_times == pytest.approx([0.0, 2.0, 4.0, 6.0], abs=1e-12)
     again = verify(cell, run.program.tables)
     assert [drift.worst for drift in again.repeatability.drifts] == [
         drift.worst for drift in run.report.repeatability.drifts

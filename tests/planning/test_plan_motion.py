@@ -132,7 +132,7 @@ def test_an_arm_that_cannot_leave_its_singularity_stays_as_with_steps() -> None:
 
 SAYS_WHY = (
     r"motion: at \d\.\d+ s (the tool of 'arm' is .* mm from task 'task_arm'|joint 'j\d' of 'arm' would move).*"
-    r"nearest to a singular configuration is 'arm' on 'task_arm': smallest singular value \d"
+    r"closest to a singularity: robot 'arm' on task 'task_arm': smallest singular value \d"
 )
 
 

@@ -147,7 +147,7 @@ def test_a_part_on_a_bare_flange_without_a_body_is_mounted_on_the_link_before() 
 def test_feet_may_stand_in_the_floor_but_not_in_each_other() -> None:
     scene = Scene.from_cell(two_arms(things=(floor(),)))
 
-    assert "both stand still" in reasons(scene)[frozenset(("a/foot", "floor"))]
+    assert "both are fixed" in reasons(scene)[frozenset(("a/foot", "floor"))]
     assert watched(scene)[frozenset(("a/foot", "b/foot"))].clearance_class is ClearanceClass.ROBOT_ROBOT
     assert watched(scene)[frozenset(("a/column", "floor"))].clearance_class is ClearanceClass.ENVIRONMENT
 
@@ -157,7 +157,7 @@ def test_a_fixed_part_may_rest_on_a_fixture_but_not_in_a_foot() -> None:
 
     scene = Scene.from_cell(two_arms(part=part, things=(floor(),)))
 
-    assert "both stand still" in reasons(scene)[frozenset(("part", "floor"))]
+    assert "both are fixed" in reasons(scene)[frozenset(("part", "floor"))]
     assert frozenset(("a/foot", "part")) in watched(scene)
 
 
@@ -207,7 +207,7 @@ def test_exclusions_that_name_no_pair_are_refused(bodies: tuple[str, str], messa
 
 
 def test_two_bodies_of_one_name_are_refused() -> None:
-    with pytest.raises(InputError, match="two bodies are called 'part'"):
+    with pytest.raises(InputError, match="two bodies are named 'part'"):
         Scene.from_cell(two_arms(things=(thing("part", Sphere(0.1)),)))
 
 
@@ -245,7 +245,7 @@ def test_a_tool_always_near_the_link_behind_it_is_checked_for_contact_only() -> 
     pair = watched(Scene.from_cell(make_cell(placed("a", thin, tool=stick()))))[frozenset(("a/wrist", "a/tool"))]
 
     assert pair.rule is Rule.CONTACT
-    assert "nearer than the demanded clearance in every configuration" in pair.reason
+    assert "closer than the required clearance in every configuration" in pair.reason
 
 
 def test_a_tool_at_a_distance_that_no_joint_changes_is_checked_for_contact_only() -> None:
@@ -253,7 +253,7 @@ def test_a_tool_at_a_distance_that_no_joint_changes_is_checked_for_contact_only(
     pair = watched(Scene.from_cell(make_cell(placed("a", arm_model(), tool=stick()))))[frozenset(("a/wrist", "a/tool"))]
 
     assert pair.rule is Rule.CONTACT
-    assert "the mounting sets their distance, the same in every configuration" in pair.reason
+    assert "their distance is fixed by the mounting" in pair.reason
 
 
 def test_a_bent_tool_whose_distance_changes_keeps_its_clearance() -> None:

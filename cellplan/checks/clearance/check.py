@@ -1,4 +1,4 @@
-"""Clearance: what touches, when, and how near the bodies of a cell come to each other at any time of a motion."""
+"""Clearance: contacts and smallest distances of the bodies of a cell at any time of a motion."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -29,13 +29,13 @@ def check_clearance(
 ) -> tuple[ClearanceReport, tuple[Check, ...]]:
     """Find every contact and the smallest distance of each class, at the samples of a motion and between them.
 
-    Between two samples every joint moves evenly. What is reported then holds at all times. That the demanded distance
+    Between two samples every joint moves linearly. What is reported then holds at all times. That the demanded distance
     is kept is proved first; where it cannot be the pair is "not certified", which fails the check. The smallest
     distance is searched for afterwards; where that takes too much work a lower bound of it is reported.
 
     The tool of a robot whose task is scheduled may touch the part within ``checks.contact_zone`` of its tip, during the
     whole motion: before its start and after its end it dwells on the part. Such contacts are listed as allowed, and
-    that pair is excluded from the clearance requirement. What of the tool lies outside the zone must not touch. Robots
+    that pair is excluded from the clearance requirement. The part of the tool outside the zone must not touch. Robots
     whose tasks are not scheduled are idle and keep away from everything, the part too.
 
     Args:

@@ -1,4 +1,4 @@
-"""Contacts and demanded clearance: what touches from when to when, what of it is allowed, and the verdicts."""
+"""Contacts and required clearance: intervals of contact, permitted contacts, and the verdicts."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -6,14 +6,14 @@ from typing import Final
 import numpy as np
 
 from cellplan.certify.bound import Bound, PairBound
-from cellplan.collision.distance import TIGHT
+from cellplan.collision.distance import TIGHT_TOL
 from cellplan.geometry.arrays import Array
 from cellplan.model.report import Check, ClearanceClass, ClearanceMinimum, Contact
 from cellplan.model.units import MM
 from cellplan.scene.pairs import Rule
 
-LONGEST_BREAK: Final = 0.010  # [s] touches with shorter breaks between them are one contact
-EXACT_TOL: Final = 1e-4 - 2.0 * TIGHT  # [m] a bound this near to a measured distance is exact to 0.1 mm
+MAX_BREAK: Final = 0.010  # [s] touches with shorter breaks between them are one contact
+EXACT_TOL: Final = 1e-4 - 2.0 * TIGHT_TOL  # [m] a bound this near to a measured distance is exact to 0.1 mm
 OUTSIDE_ZONE: Final = {
     Rule.PROCESS: "outside the contact zone of the tool at work",
     Rule.GRIP: "outside the contact zone of the grip",
@@ -104,7 +104,7 @@ def _of_pair(bound: Bound, times: Array, pair: PairBound) -> list[Contact]:
 
 def _spans(touches: Array, times: Array) -> list[tuple[float, float]]:
     """First and last time of each contact in [s], short breaks bridged."""
-    longest_break = max(LONGEST_BREAK, 1.5 * float(times[-1]) / max(1, len(times) - 1))
+    longest_break = max(MAX_BREAK, 1.5 * float(times[-1]) / max(1, len(times) - 1))
     ends = np.flatnonzero(np.diff(touches) > longest_break)
     first, last = np.append(0, ends + 1), np.append(ends, len(touches) - 1)
     return [(float(touches[a]), float(touches[b])) for a, b in zip(first, last, strict=True)]
@@ -151,9 +151,9 @@ def _not_certified(bound: Bound, times: Array, pair: PairBound) -> Check:
     others = len({int(at) for at in pair.unproved}) - 1
     more = f" and in {others} more steps" if others else ""
     smallest = f", the smallest distance found is {MM * pair.distance:.2f} mm" if np.isfinite(pair.distance) else ""
-    what = f"{np.floor(10.0 * proved) / 10.0:.1f} mm are proved, required {required:.1f} mm"
+    what = f"{np.floor(10.0 * proved) / 10.0:.1f} mm is proved, required {required:.1f} mm"
     if not proved > 0.0:
-        what = "no contact was found and none could be ruled out"
+        what = "no contact was found, but none could be ruled out"
     return Check(
         name="clearance",
         subject=f"{first} - {second}",

@@ -1,4 +1,4 @@
-"""Idle robots: each stands at its home, from the first row of its table to the last."""
+"""Idle robots: each stays at its home, from the first row of its table to the last."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -33,7 +33,7 @@ def _stands(robot: Robot, times: Array, q: Array) -> Check:
     row, column = np.unravel_index(int(np.argmax(away)), away.shape)
     joint, value = robot.model.joints[column], float(away[row, column])
     unit, passed = joint.display_unit.name, value <= HOME_TOL
-    found = f"stands at its home, {value:.2g} {unit} from it at most" if passed else ""
+    found = f"stays at its home, at most {value:.2g} {unit} from it" if passed else ""
     far = f"joint {joint.name} is {value:.6g} {unit} from its home at {times[row]:.3f} s, although the robot is idle"
     return Check(
         name="home",

@@ -1,4 +1,4 @@
-"""Mounting: how deep what holds, carries or stands on something else reaches into it, and whether that may be so."""
+"""Mounting: penetration depth of bodies that hold, carry or stand on each other, against their limits."""
 
 import math
 from collections.abc import Sequence
@@ -15,12 +15,12 @@ from cellplan.scene.scene import Scene
 
 DEPTH_TOL: Final = 1e-6  # [m] poses are worked out to less than that: bodies that just touch are not deep
 CURES: Final = {
-    Mount.GRIP: "is the grasp the right way round? If the grip is that deep, say so with depth_mm of the grasp",
-    Mount.MOUNT: "does the tool lie in front of the flange? If they may touch, name them under checks.exclude",
-    Mount.STANDING: "does it stand where it should? Put the one on the other, or name them under checks.exclude",
+    Mount.GRIP: "is the grasp the right way round? If so deep a grip is intended, state it as depth_mm of the grasp",
+    Mount.MOUNT: "is the tool in front of the flange? If contact is permitted, name the pair under checks.exclude",
+    Mount.STANDING: "is it placed correctly? Place one on top of the other, or name the pair under checks.exclude",
 }
 DISPLAY_TOL: Final = 1e-3  # [-] of 0.01 mm: a depth of 3 mm that is worked out as 3.000000001 is shown as 3
-PIT: Final = "a pit? Put the base on the ground, or name them under checks.exclude"
+PIT_CURE: Final = "is there a pit? Place the base on the floor, or name the pair under checks.exclude"
 
 
 def check_mounting(scene: Scene, q: Array, times: Array | None = None) -> tuple[Check, ...]:
@@ -53,8 +53,8 @@ def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
     at_s = None if times is None or not pair.moves else float(times[found.row])
     instant = "" if at_s is None else f" at {at_s:.3f} s"
     share = f" ({limit - MM * pair.accuracy:g} mm beyond the accuracy of its body)" if pair.accuracy else ""
-    message = f"{inner} is {_shown(depth)} mm deep in {outer}{instant}, at most {limit:g} mm{share}"
-    passed, cure = _passed(found), PIT if is_ground(scene.bodies[pair.second]) else CURES[pair.mount]
+    message = f"{inner} is {_shown(depth)} mm deep in {outer}{instant}, allowed {limit:g} mm{share}"
+    passed, cure = _passed(found), PIT_CURE if is_ground(scene.bodies[pair.second]) else CURES[pair.mount]
     return Check(
         name=str(pair.mount),
         subject=f"{inner} - {outer}",
@@ -76,8 +76,8 @@ def _all_standing(scene: Scene, standing: Sequence[FoundDepth], times: Array | N
     if deepest.depth > DEPTH_TOL:
         return [check]
     limit = MM * deepest.pair.limit
-    words = f"nothing that stands reaches into what carries it, allowed are {limit:g} mm"
-    return [replace(check, subject="cell", value=0.0, message=words)]
+    message = f"no mounted body is deeper in its support than the allowed {limit:g} mm"
+    return [replace(check, subject="cell", value=0.0, message=message)]
 
 
 def _named(scene: Scene, found: FoundDepth) -> tuple[str, str]:

@@ -20,7 +20,7 @@ from cellplan.model.units import MM
 AXIS: Final = "axis"
 AXIS_COMPONENTS: Final = (0, 1, 2, 3, 4)  # of a task: they leave no more than the turn about one axis open
 DEPTH_TOL: Final = 1e-6  # [m] tracking errors of a micrometre do not decide about a cut that is as deep as it may be
-FINE_STEP: Final = 1e-3  # [m] longer steps of a tool between two rows are subdivided, joints moving evenly
+FINE_STEP: Final = 1e-3  # [m] longer steps of a tool between two rows are subdivided, joints moving linearly
 MAX_TIMES: Final = 4000  # times to which long steps are refined; programs of more rows are taken as they are
 POSE_COUNT: Final = 400  # poses of a body that are evaluated, beside those round the deepest of them
 MESH_POSE_COUNT: Final = 100  # likewise on a mesh, where a line costs fifty times as much
@@ -31,7 +31,7 @@ RADIUS_FRACTION: Final = 0.5  # [-] of a body's radius that it moves between two
 def tool_depths(
     cell: Cell, schedule: Schedule, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
 ) -> tuple[ToolDepth, ...]:
-    """The largest depth of the tool of every task on the part, at any instant of the program.
+    """The largest depth of the tool of every task on the part, at any time of the program.
 
     The axis of a tool counts from the tip back to where the flange stands beside it, and its bodies count. The axis is
     evaluated at every row, and between rows that are more than a millimetre apart. Bodies are evaluated whenever the
@@ -79,10 +79,10 @@ def path_depth(cell: Cell, task: Task, X_PT: Array) -> ToolDepth | None:
 def _task_depth(
     cell: Cell, scheduled: TaskSchedule, times: Array, *, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
 ) -> ToolDepth:
-    """The largest depth of one task's tool, its instant and what of the tool is so deep."""
+    """The largest depth of one task's tool, its time and the deepest body of the tool."""
     task = scheduled.task
     robot = cell.robot(task.robot)
-    sample_times, X_PT = _tool_on_part(cell, task, times, chains=chains, q=q)
+    fine_times, X_PT = _tool_on_part(cell, task, times, chains=chains, q=q)
     X_ST = inverse(cell.part.X_PS) @ X_PT
     tool, zone = robot.tool, cell.checks.contact_zone
     along = line_depths(tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not tool.bodies)
@@ -95,7 +95,7 @@ def _task_depth(
         task=task.name,
         robot=task.robot,
         depth=depth,
-        at_s=float(sample_times[row]),
+        at_s=float(fine_times[row]),
         limit=task.tool_depth,
         body=name,
     )
@@ -104,7 +104,7 @@ def _task_depth(
 def _tool_on_part(
     cell: Cell, task: Task, times: Array, *, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
 ) -> tuple[Array, Array]:
-    """Times in [s] and tool poses on the part there; long steps are cut, every joint moving evenly in them."""
+    """Times in [s] and tool poses on the part there; long steps are cut, every joint moving linearly in them."""
     movers = {task.robot, *(grasp.robot for grasp in cell.part.held_by[:1])}
     own = {name: q[name] for name in sorted(movers)}
     X_PT = inverse(part_poses(cell, chains, own)) @ chains[task.robot].tool_poses(own[task.robot])
@@ -116,8 +116,8 @@ def _tool_on_part(
     whole = np.minimum(rows.astype(np.intp), len(times) - 2)
     share = (rows - whole)[:, None]
     fine = {name: values[whole] + share * (values[whole + 1] - values[whole]) for name, values in own.items()}
-    sample_times = times[whole] + share[:, 0] * (times[whole + 1] - times[whole])
-    return sample_times, inverse(part_poses(cell, chains, fine)) @ chains[task.robot].tool_poses(fine[task.robot])
+    fine_times = times[whole] + share[:, 0] * (times[whole + 1] - times[whole])
+    return fine_times, inverse(part_poses(cell, chains, fine)) @ chains[task.robot].tool_poses(fine[task.robot])
 
 
 def _deepest(columns: Columns, cell: Cell, X_ST: Array) -> tuple[int, float]:
@@ -154,7 +154,7 @@ def _check(task: Task, found: ToolDepth) -> Check:
     what = "its axis" if found.body == AXIS else f"{found.robot}/{found.body}"
     when = " on its path" if found.at_s is None else f" at {found.at_s:.3f} s"
     message = (
-        f"tool depth of task '{task.name}': {depth:.3g} mm of the tool inside the part or beyond it{when} ({what}), "
+        f"tool depth of task '{task.name}': {depth:.3g} mm of the tool is inside the part or beyond it{when} ({what}), "
         f"allowed {limit:g} mm"
     )
     return Check(
@@ -172,13 +172,13 @@ def _check(task: Task, found: ToolDepth) -> Check:
 def _cures(task: Task, found: ToolDepth) -> Iterator[str]:
     """What may be wrong when a tool is too deep."""
     if task.project is not None and task.tool_axis is not None and task.tool_axis @ task.project > 0.0:
-        yield "reverse tool_axis: it points out of the surface, so that the tool comes through the part"
+        yield "reverse tool_axis: it points out of the surface, so the tool passes through the part"
     elif task.project is None and isinstance(task.path, SampledPath | TimedPath):
-        yield "check the points and axes of the file: do they lie on the surface, do the axes point into it?"
+        yield "check the points and axes of the file: points must lie on the surface, axes must point into it"
     elif task.project is None:
-        yield "project the path onto the surface (path.project), or check its place, the sign of offset_mm, tool_axis"
+        yield "project the path onto the surface (path.project), or check its pose, the sign of offset_mm and tool_axis"
     elif found.body == AXIS:
         yield "check the tool's pose and the side that the path is projected from"
     else:
-        yield "use a slimmer tool or another tool_axis: the surface is hollow or leans there"
-    yield "allow it with tool_depth_mm if the process cuts"
+        yield "use a slimmer tool or another tool_axis: the surface is concave or inclined there"
+    yield "allow it with tool_depth_mm if the process removes material"

@@ -27,7 +27,7 @@ from cellplan.model.motion import Schedule
 from cellplan.model.report import Check
 
 FAILURE_ROWS: Final = (1.5, 2.5)  # [-] steps before and after the instant at which a joint fails: not judged
-FAILURE_REASON: Final = "a joint that fails stops at once, and the others take over at once"
+FAILURE_REASON: Final = "a failing joint stops instantly, and the others compensate instantly"
 
 
 def motion_accelerations(
@@ -171,12 +171,12 @@ def _check_acceleration(cell: Cell, use: JointAcceleration, limit: float) -> Che
     unit, scale = use.display_unit
     is_assumed = use.source is LimitSource.ASSUMED
     passed = use.peak <= limit
-    verdict = "accelerates at most at" if passed else "is accelerated too much:"
+    verdict = "has a peak acceleration of" if passed else "exceeds its acceleration limit:"
     against = f"limit {scale * limit:.5g} {unit}/s2"
     if is_assumed:
         index = cell.robot(use.robot).model.joint_names.index(use.joint)
         against = f"assumed {against}: full speed in {full_speed_in(cell.robot(use.robot).acceleration, index):g} s"
-    jump = "; its speed jumps" if use.is_jump and not passed else ""
+    jump = "; its velocity is discontinuous" if use.is_jump and not passed else ""
     return Check(
         name="joint_acceleration_assumed" if is_assumed else "joint_acceleration",
         subject=f"{use.robot}/{use.joint}",
@@ -204,7 +204,7 @@ def _check_jerk(use: JointAcceleration, limit: float) -> Check:
         unit=f"{unit}/s3",
         at_s=use.peak_jerk_at_s,
         message=(
-            f"joint {use.robot}/{use.joint} has a jerk of at most {scale * use.peak_jerk:.4g} {unit}/s3 over "
+            f"joint {use.robot}/{use.joint} has a peak jerk of {scale * use.peak_jerk:.4g} {unit}/s3 over "
             f"{1e3 * use.window:g} ms at {use.peak_jerk_at_s:.3f} s, limit {scale * limit:g} {unit}/s3"
         ),
     )
@@ -221,7 +221,7 @@ def _check_part(corner: PointAcceleration, limit: float) -> Check:
         unit="m/s2",
         at_s=corner.peak_at_s,
         message=(
-            f"part is accelerated at most at {corner.peak:.4g} m/s2 (a corner of its bounding box) "
+            f"part has a peak acceleration of {corner.peak:.4g} m/s2 (a corner of its bounding box) "
             f"at {corner.peak_at_s:.3f} s, allowed {limit:g} m/s2"
         ),
     )

@@ -49,7 +49,7 @@ def joint_accelerations(times: Array, q: Array, *, cycle: float, jumps_at: Array
     """Sizes of the accelerations of joints at the rows; a jump of speed counts over the controller's cycle.
 
     Where a joint leaves rest, the change of speed at that row is followed by another one as large or larger when the
-    joint speeds up evenly or gently. By as much as the next change falls short, the speed has jumped:
+    joint accelerates uniformly or smoothly. By as much as the next change falls short, the speed has jumped:
     ``v_0 - (v_1 - v_0)``, between 0 and ``v_0``. No controller spreads a jump over a long step for it, so it is divided
     by its cycle, where that is shorter than the step. The same holds backwards in time where a joint comes to rest.
     Likewise for the jumps at times at which the desired speed of a tool is known to jump.
@@ -83,7 +83,7 @@ def _jumps(moves: Array) -> Array:
 def jerks(times: Array, accelerations: Array, *, window: float) -> Array:
     """Size of the jerk at the rows: the change of acceleration over a window, divided by the window.
 
-    Between two rows the acceleration is taken to change evenly; before the first row and after the last one it is zero.
+    Between two rows the acceleration is taken to change linearly; before the first row and after the last it is zero.
     For each row the window that begins there and the one that ends there are compared, and the larger change counts;
     as the acceleration is piecewise linear, no window elsewhere has a larger one. A window that is shorter than the
     step gives the change over that step, divided by the step.

@@ -20,7 +20,7 @@ def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Rep
 
     A cycle lies between two times at which all tools are at the pose of their start together. Tasks that begin and
     end their cycles together are taken cycle by cycle; otherwise the whole run is one cycle. Cycles that begin while a
-    tool still settles are left out. Between two samples a joint moves evenly.
+    tool still settles are left out. Between two samples a joint moves linearly.
 
     Args:
         cell: The cell.
@@ -30,13 +30,13 @@ def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Rep
     Returns:
         The drift of every joint; None when a tool does not come back, or no cycle is left.
     """
-    sample_times = _instants(schedule)
-    if len(sample_times) < 2:
+    cycle_times = _cycle_times(schedule)
+    if len(cycle_times) < 2:
         return None
     drifts = []
     for robot in cell.robots:
         for joint, positions in zip(robot.model.joints, q[robot.name].T, strict=True):
-            drift = np.diff(np.interp(sample_times, schedule.times, positions))
+            drift = np.diff(np.interp(cycle_times, schedule.times, positions))
             k = int(np.argmax(np.abs(drift)))
             drifts.append(
                 JointDrift(
@@ -49,7 +49,7 @@ def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Rep
                 )
             )
     closes = all(drift.worst <= _limit(drift) for drift in drifts)
-    return Repeatability(sample_times=sample_times, drifts=tuple(drifts), closes=closes)
+    return Repeatability(cycle_times=cycle_times, drifts=tuple(drifts), closes=closes)
 
 
 def check_joint_drift(found: Repeatability | None, *, is_demanded: bool) -> tuple[Check, ...]:
@@ -78,15 +78,15 @@ def check_joint_drift(found: Repeatability | None, *, is_demanded: bool) -> tupl
     return tuple(_check(found, drift) for drift in found.drifts)
 
 
-def _instants(schedule: Schedule) -> Array:
+def _cycle_times(schedule: Schedule) -> Array:
     """Times at which all tools are at their start together, shape (cycles + 1,); fewer than two: no cycle."""
     if not schedule.tasks or not all(scheduled.cycle_ends for scheduled in schedule.tasks):
         return np.zeros(0)
     bounds = [np.array([scheduled.task.start, *scheduled.cycle_ends]) for scheduled in schedule.tasks]
     is_common = all(len(b) == len(bounds[0]) and np.abs(b - bounds[0]).max() <= INSTANT_ROOM for b in bounds)
-    sample_times = bounds[0] if is_common else np.array([min(b[0] for b in bounds), max(b[-1] for b in bounds)])
+    cycle_times = bounds[0] if is_common else np.array([min(b[0] for b in bounds), max(b[-1] for b in bounds)])
     settled = max(scheduled.task.judged_from for scheduled in schedule.tasks)
-    return sample_times[sample_times >= settled - INSTANT_ROOM]
+    return cycle_times[cycle_times >= settled - INSTANT_ROOM]
 
 
 def _limit(drift: JointDrift) -> float:
@@ -105,7 +105,7 @@ def _check(found: Repeatability, drift: JointDrift) -> Check:
         value=value,
         limit=limit,
         unit=unit,
-        at_s=float(found.sample_times[drift.at_cycle]),
-        message=f"{drift.robot} {drift.joint} is {value:.3g} {unit} from where it was a cycle before, "
-        f"at {found.sample_times[drift.at_cycle]:.3f} s, the end of cycle {drift.at_cycle}; allowed {limit:g} {unit}",
+        at_s=float(found.cycle_times[drift.at_cycle]),
+        message=f"{drift.robot} {drift.joint} is {value:.3g} {unit} away from its position one cycle earlier, "
+        f"at {found.cycle_times[drift.at_cycle]:.3f} s, the end of cycle {drift.at_cycle}; allowed {limit:g} {unit}",
     )

@@ -10,7 +10,7 @@ from cellplan.model.report import Check, JointUse
 def joint_uses(robot: Robot, times: Array, q: Array) -> tuple[JointUse, ...]:
     """How each joint of one robot is used.
 
-    Between two samples a joint moves evenly, so its speed there is the difference quotient.
+    Between two samples a joint moves linearly, so its speed there is the difference quotient.
 
     Args:
         robot: The robot.
@@ -59,14 +59,14 @@ def _check_position(use: JointUse, times: Array, q: Array) -> Check:
     limit = scale * (use.lower if q[worst] - use.lower < use.upper - q[worst] else use.upper)
     passed = use.margin >= 0.0
     if np.isinf(use.margin):
-        verdict = "may turn without end"
+        verdict = "has no position limits"
     elif passed:
         verdict = f"stays {scale * use.margin:.4g} {unit} inside its limits"
     else:
         first = float(times[np.argmax((q < use.lower) | (q > use.upper))])
         side = "below its lower" if limit == scale * use.lower else "beyond its upper"
         verdict = (
-            f"goes {-scale * use.margin:.4g} {unit} {side} limit {limit:g} {unit} "
+            f"is {-scale * use.margin:.4g} {unit} {side} limit {limit:g} {unit} "
             f"(reaches {value:.4f} {unit}; outside from {first:.3f} s)"
         )
     return Check(
@@ -85,7 +85,7 @@ def _check_velocity(use: JointUse) -> Check:
     """One joint's largest speed."""
     unit, scale = use.display_unit
     passed = use.peak_velocity <= use.velocity_limit
-    verdict = "moves at most at" if passed else "is too fast:"
+    verdict = "has a peak velocity of" if passed else "exceeds its velocity limit:"
     percent = 100 * use.peak_velocity / use.velocity_limit
     return Check(
         name="joint_velocity",

@@ -1,4 +1,4 @@
-"""Joints that fail on the way: whether they stand still from then on, and what the tasks lose by it."""
+"""Joints that fail during the motion: whether they remain at rest, and the effect on the tasks."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -47,7 +47,7 @@ def with_locked_joints(
     names = [f"{lock.robot}/{lock.joint} locked at {lock.since:.3f} s" for lock in locked if lock.since <= left]
     if not names:
         return list(checks)
-    reason = f"after {' and '.join(names)}: the other joints cannot make up for it"
+    reason = f"after {' and '.join(names)}: the other joints cannot compensate"
     return [check if check.passed else replace(check, message=f"{check.message}, {reason}") for check in checks]
 
 

@@ -1,4 +1,4 @@
-"""Payload: what each robot carries, at rest and in the written motion, against what it may carry."""
+"""Payload: the load of each robot, at rest and in the written motion, against its rated load."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -66,7 +66,7 @@ def load_uses(
 
 
 def check_payload(uses: tuple[LoadUse, ...]) -> list[Check]:
-    """Whether what the robots carry is within what they may carry, as far as both are stated."""
+    """Whether the loads are within the rated loads, where both are stated."""
     return [check for use in uses for check in _checks(use)]
 
 
@@ -77,7 +77,7 @@ def check_payload_at_rest(cell: Cell, chains: Mapping[str, ScrewChain], start: A
 
 
 def _load_use(cell: Cell, robot: Robot, chain: ScrewChain, *, times: Array, q: Array) -> LoadUse:
-    """What one robot carries."""
+    """Load of one robot."""
     grasp = next((grasp for grasp in cell.part.held_by if grasp.robot == robot.name), None)
     share = None if cell.part.mass is None else cell.part.mass / max(1, len(cell.positioners))
     use = LoadUse(
@@ -104,7 +104,7 @@ def _load_use(cell: Cell, robot: Robot, chain: ScrewChain, *, times: Array, q: A
 
 
 def _masses(cell: Cell, robot: Robot, grasp: Grasp | None, use: LoadUse) -> list[_Mass]:
-    """The tool and the share of the part, as far as they weigh anything."""
+    """The tool and the share of the part, where they have a mass."""
     masses, tool, part = [], robot.tool, cell.part
     if use.tool_mass:
         centre_F = tool.X_FT[:3, 3] if tool.centre is None else tool.centre
@@ -131,13 +131,13 @@ def _carried(mass: _Mass, X_WF: Array, times: Array) -> _Carried:
 def _wrist(robot: Robot) -> list[Joint]:
     """The last turning axes on the way to the flange, in the order of the joints."""
     axes: tuple[Joint | FollowerJoint, ...] = (*robot.model.joints, *robot.model.followers)
-    link, found = robot.model.flange_link, list[Joint]()
-    while link != BASE and len(found) < WRIST_AXIS_COUNT:
+    link, joints = robot.model.flange_link, list[Joint]()
+    while link != BASE and len(joints) < WRIST_AXIS_COUNT:
         axis = axes[link]
         if isinstance(axis, Joint) and axis.is_revolute:
-            found.append(axis)
+            joints.append(axis)
         link = axis.parent
-    return found[::-1]
+    return joints[::-1]
 
 
 def _axis_use(joint: Joint, D: Array, carried: Sequence[_Carried], times: Array) -> AxisUse:
@@ -184,13 +184,13 @@ def _checks(use: LoadUse) -> list[Check]:
 
 def _mass_check(use: LoadUse, limits: Payload) -> Check:
     """The mass against the payload."""
-    words = []
+    masses = []
     if use.tool_mass is None or use.tool_mass > 0.0:
-        words.append(f"tool {use.tool_mass:.4g} kg" if use.tool_mass is not None else "tool not stated")
+        masses.append(f"tool {use.tool_mass:.4g} kg" if use.tool_mass is not None else "tool mass not stated")
     if use.part_mass is None or use.part_mass > 0.0:
-        share = "" if use.holders < 2 else f" as one of {use.holders} holders"
-        words.append(f"part {use.part_mass:.4g} kg{share}" if use.part_mass is not None else "part not stated")
-    carried = f"carries {use.known_mass:.4g} kg" + (f" ({', '.join(words)})" if words else "")
+        share = "" if use.holders < 2 else f" as its share among {use.holders} holders"
+        masses.append(f"part {use.part_mass:.4g} kg{share}" if use.part_mass is not None else "part mass not stated")
+    carried = f"carries {use.known_mass:.4g} kg" + (f" ({', '.join(masses)})" if masses else "")
     return Check(
         name="payload",
         subject=use.robot,
@@ -204,14 +204,14 @@ def _mass_check(use: LoadUse, limits: Payload) -> Check:
 
 
 def _centre_checks(use: LoadUse, limits: Payload) -> list[Check]:
-    """The centre of the load against the published distances."""
+    """The centre of mass of the load against the published distances."""
     checks = []
-    for where, words, value, limit in (
+    for where, origin, value, limit in (
         ("along", "from the flange plane", use.along, limits.along),
         ("across", "from the flange axis", use.across, limits.across),
     ):
         if limit is not None:
-            text = f"payload {use.robot}: centre of the load {MM * value:.1f} mm {words}, allowed {MM * limit:g} mm"
+            text = f"payload {use.robot}: centre of mass {MM * value:.1f} mm {origin}, allowed {MM * limit:g} mm"
             checks.append(
                 Check(
                     name="payload_centre",

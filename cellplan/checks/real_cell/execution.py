@@ -66,10 +66,10 @@ def measured_poses(X_PT: Sequence[Array], system: Measurement, rng: np.random.Ge
 
 def _measured(X_PT: Array, system: Measurement, rng: np.random.Generator) -> Array:
     """Poses of one tool with noise."""
-    seen = X_PT.copy()
+    measured = X_PT.copy()
     if system.position_noise > 0.0:
-        seen[:, :3, 3] += system.position_noise * rng.standard_normal((len(seen), 3))
+        measured[:, :3, 3] += system.position_noise * rng.standard_normal((len(measured), 3))
     if system.orientation_noise > 0.0:
-        turns = rotation_exp(system.orientation_noise * rng.standard_normal((len(seen), 3)))
-        seen[:, :3, :3] = turns @ seen[:, :3, :3]
-    return seen
+        turns = rotation_exp(system.orientation_noise * rng.standard_normal((len(measured), 3)))
+        measured[:, :3, :3] = turns @ measured[:, :3, :3]
+    return measured

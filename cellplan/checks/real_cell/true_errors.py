@@ -24,11 +24,11 @@ def worst_share(cell: Cell, accuracy: Sequence[TaskAccuracy], judged_from: Mappi
     shares = [0.0]
     for errors in accuracy:
         tolerance, first = cell.task(errors.task).tolerance, judged_from[errors.task]
-        for found, allowed in (
+        for error, allowed in (
             (largest(errors.position_error, first), tolerance.position),
             (largest(errors.orientation_error, first), tolerance.orientation),
         ):
-            shares.append(found / allowed if allowed > 0.0 else np.inf if found > 0.0 else 0.0)
+            shares.append(error / allowed if allowed > 0.0 else np.inf if error > 0.0 else 0.0)
     return max(shares)
 
 
@@ -42,17 +42,17 @@ def check_true_errors(cell: Cell, run: RunRehearsal) -> tuple[Check, ...]:
 def _check(cell: Cell, run: RunRehearsal, place: int, kind: int) -> Check:
     """One error of one task."""
     name, (unit, scale) = KINDS[kind]
-    found = [trial.final[place] for trial in run.trials]
-    task = cell.task(found[0].task)
+    errors = [trial.final[place] for trial in run.trials]
+    task = cell.task(errors[0].task)
     first = run.judged_from[task.name]
     series = np.stack(
-        [np.linalg.norm((each.position_error, each.orientation_error)[kind][first:], axis=1) for each in found]
+        [np.linalg.norm((each.position_error, each.orientation_error)[kind][first:], axis=1) for each in errors]
     )
     trial, sample = np.unravel_index(int(np.argmax(series)), series.shape)
     value, at_s = scale * float(series[trial, sample]), float(run.times[first + sample])
     limit = scale * (task.tolerance.position, task.tolerance.orientation)[kind]
-    after = " after correcting" if run.trials[0].correction is not None else ""
-    which = f" in trial {trial + 1} of {len(found)}" if len(found) > 1 else ""
+    after = " after correction" if run.trials[0].correction is not None else ""
+    which = f" in trial {trial + 1} of {len(errors)}" if len(errors) > 1 else ""
     return Check(
         name=f"true_{name}_error",
         subject=task.name,

@@ -1,4 +1,4 @@
-"""Verdicts on what tools do between the rows of the tables."""
+"""Checks of tool errors between the rows of the tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -85,7 +85,7 @@ def _check(name: str, error: BetweenError, subject: str, *, allowed: float, of: 
         f"allowed {scale * allowed:g} {unit}"
     )
     if error.longest_step is not None:
-        message += f"; a motion.step_s of at most {error.longest_step:g} keeps what is allowed"
+        message += f"; a motion.step_s of at most {error.longest_step:g} meets the tolerance"
     return Check(
         name=name,
         subject=subject,

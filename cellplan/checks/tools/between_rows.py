@@ -1,4 +1,4 @@
-r"""How far tools stray between the rows of the tables, where every joint moves evenly from one row to the next.
+r"""Tool errors between the rows of the tables, where every joint moves linearly from one row to the next.
 
 Let x(s) be a tool tip seen from the part while the joints go from one row to the next, s from 0 to 1, and
 :math:`|\ddot x| \le M` (``scene.lever_arms``). In each half of the step x stays within :math:`M/32` of its chord, and
@@ -93,14 +93,14 @@ class ErrorsBetweenRows:
             for kind in range(2):
                 chosen[np.argsort(-middle[:, place, kind] * judged, kind="stable")[:WORST_COUNT]] = True
         k, s = _subdivided(np.flatnonzero(chosen), self._jumped, self._share)
-        fine, (sample_times, corners) = self._errors(tools, k, s), self._corners(tools)
+        fine, (jump_times, corners) = self._errors(tools, k, s), self._corners(tools)
         found = [
-            _Found(tool, middle[:, place], bounds[place], chosen, k, s, fine[:, place], sample_times, corners[:, place])
+            _Found(tool, middle[:, place], bounds[place], chosen, k, s, fine[:, place], jump_times, corners[:, place])
             for place, tool in enumerate(tools)
         ]
         every = [self._worst(one, kind) for one in found for kind in range(2)]
         step = min((error.longest_step for error in every if error.longest_step is not None), default=None)
-        if step is not None and _stops_at_once(tools, corners[sample_times > self._schedule.times[-1] - INSTANT_ROOM]):
+        if step is not None and _stops_at_once(tools, corners[jump_times > self._schedule.times[-1] - INSTANT_ROOM]):
             step = _fitting(step, float(self._schedule.times[-1]))
         every = [error if error.longest_step is None else replace(error, longest_step=step) for error in every]
         results = [BetweenRows(position=a, orientation=b) for a, b in zip(every[::2], every[1::2], strict=True)]
@@ -200,15 +200,15 @@ class ErrorsBetweenRows:
             Times in [s], shape (J,), and errors with the present step in [m] and [rad], shape (J, tools, 2).
         """
         times, step = self._schedule.times, self._schedule.step
-        sample_times = self._schedule.jumps
-        sample_times = sample_times[(sample_times > times[0] + INSTANT_ROOM) & (sample_times <= times[-1])]
-        errors = np.zeros((len(sample_times), len(tools), 2))
-        around = [self._schedule.poses(np.clip(sample_times + shift * step, times[0], times[-1])) for shift in SIDES]
+        jump_times = self._schedule.jumps
+        jump_times = jump_times[(jump_times > times[0] + INSTANT_ROOM) & (jump_times <= times[-1])]
+        errors = np.zeros((len(jump_times), len(tools), 2))
+        around = [self._schedule.poses(np.clip(jump_times + shift * step, times[0], times[-1])) for shift in SIDES]
         for place, tool in enumerate(tools):
             if tool.place is not None:
                 before, at, after = (poses[tool.place] for poses in around)
                 errors[:, place] = _sag(after - 2.0 * at + before, tool.relation) / (4.0 * SIDE_FRACTION)
-        return sample_times, errors
+        return jump_times, errors
 
     def _worst(self, found: "_Found", kind: int) -> BetweenError:
         """The largest error of one kind, what bounds it, and the step that would keep what is allowed."""
@@ -235,7 +235,7 @@ class ErrorsBetweenRows:
         )
 
     def _longest_step(self, found: "_Found", kind: int, *, errors: Array, rows: Array, k: Indices) -> float | None:
-        """A step in [s] that keeps what is allowed, as all shorter ones do; None when the present one does.
+        """A step in [s] that meets the tolerance, as all shorter ones do; None when the present one does.
 
         Errors grow with the square of the step; near a corner they are taken to grow with the step itself.
 
@@ -250,9 +250,9 @@ class ErrorsBetweenRows:
         if not np.any(errors > allowed) or np.any(rows >= allowed):
             return None
         corners = np.where(found.corners[:, kind] > KINK_FRACTION * allowed, found.corners[:, kind], 0.0)
-        corners[(found.sample_times < times[found.tool.first]) | (found.sample_times > times[-1] - INSTANT_ROOM)] = 0.0
+        corners[(found.jump_times < times[found.tool.first]) | (found.jump_times > times[-1] - INSTANT_ROOM)] = 0.0
         share = min(1.0, (allowed - float(rows.max())) / max(float(corners.max(initial=0.0)), allowed))
-        near = np.searchsorted(times, found.sample_times[corners > 0.0])
+        near = np.searchsorted(times, found.jump_times[corners > 0.0])
         over = errors > allowed
         kept = (allowed - rows[over]) / (errors[over] - rows[over])
         is_near = np.isin(k[over], np.concatenate([near - 1, near]))
@@ -272,7 +272,7 @@ class _Found:
         k: Indices of the times evaluated, shape (M,).
         s: Shares of these steps, shape (M,).
         fine: Errors there, shape (M, 2).
-        sample_times: When the tool may change its speed at once, in [s], shape (J,).
+        jump_times: When the tool may change its speed at once, in [s], shape (J,).
         corners: The largest error that each makes with a step of this length, shape (J, 2).
     """
 
@@ -283,7 +283,7 @@ class _Found:
     k: Indices
     s: Array
     fine: Array
-    sample_times: Array
+    jump_times: Array
     corners: Array
 
 
@@ -300,12 +300,12 @@ def _sag(off: Array, relation: Relation) -> Array:
     return np.stack([np.linalg.norm(off[:, axes, 3], axis=1), np.linalg.norm(turned, axis=(1, 2))], axis=1)
 
 
-def _within_steps(times: Array, sample_times: Array) -> tuple[Indices, Array]:
+def _within_steps(times: Array, others: Array) -> tuple[Indices, Array]:
     """Steps and shares of them for those times that lie between two rows."""
-    k = np.clip(np.searchsorted(times, sample_times, side="right") - 1, 0, len(times) - 2)
-    inside = (sample_times > times[k] + INSTANT_ROOM) & (sample_times < times[k + 1] - INSTANT_ROOM)
-    k, sample_times = k[inside], sample_times[inside]
-    return k, (sample_times - times[k]) / (times[k + 1] - times[k])
+    k = np.clip(np.searchsorted(times, others, side="right") - 1, 0, len(times) - 2)
+    inside = (others > times[k] + INSTANT_ROOM) & (others < times[k + 1] - INSTANT_ROOM)
+    k, others = k[inside], others[inside]
+    return k, (others - times[k]) / (times[k + 1] - times[k])
 
 
 def _subdivided(steps: Indices, jumped: Indices, share: Array) -> tuple[Indices, Array]:

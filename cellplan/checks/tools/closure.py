@@ -1,4 +1,4 @@
-"""Closure: how far the tools of further holders stray from their grasps, by the positions that were read back."""
+"""Closure: deviation of the co-holders' tools from their grasps, by the positions that were read back."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,9 +13,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.report import Check, ClosureAccuracy
 from cellplan.model.units import DEG, MM
 
-CURE: Final = (
-    "a shorter motion.step_s or a slower motion keeps the grasps better, and so does a way round singularities"
-)
+CURE: Final = "a shorter motion.step_s, a slower motion or a path farther from singularities reduces it"
 
 
 def closure_accuracy(

@@ -1,4 +1,4 @@
-"""How near the motion comes to a singularity: singular values along it, from the screws of all joints."""
+"""Distance of the motion from singularities: singular values along it, from the screws of all joints."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -73,7 +73,7 @@ def conditioning(
 
 
 def _relations(cell: Cell, schedule: Schedule, moving: Sequence[str]) -> list[tuple[Relation, Array]]:
-    """Tasks worked on, then grasps of further holders that move, each with desired rotations of its tool in P."""
+    """Tasks of the run, then grasps of further holders that move, each with desired rotations of its tool in P."""
     tasks: list[tuple[Relation, Array]] = [(each.task, each.X_PT[:, :3, :3]) for each in schedule.tasks]
     count = len(schedule.times)
     grasps = [grasp for grasp in cell.closures if grasp.robot in moving]

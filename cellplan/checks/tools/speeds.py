@@ -54,9 +54,9 @@ def process_speeds(schedule: Schedule, X_WT: Mapping[str, Array], X_WP: Array) -
 def _process_speed(scheduled: TaskSchedule, times: Array, X_WT: Array, *, X_WP: Array) -> ProcessSpeed | None:
     """Speeds between the samples from the start of the path, once settled, to its end; None for a tool at rest."""
     task = scheduled.task
-    room = 1e-6 * float(times[-1])  # rounding of times
+    tolerance = 1e-6 * float(times[-1])  # rounding of times
     begin = task.start + task.settle
-    steps = np.flatnonzero((times[:-1] >= begin - room) & (times[1:] <= scheduled.end + room))
+    steps = np.flatnonzero((times[:-1] >= begin - tolerance) & (times[1:] <= scheduled.end + tolerance))
     if not len(steps) or not scheduled.length > 0.0:
         return None
     points = seen_from_task(task, X_WT, X_WP)[:, :3, 3]

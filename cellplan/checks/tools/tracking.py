@@ -97,7 +97,7 @@ def check_accuracy(schedule: Schedule, accuracy: TaskAccuracy, task: Task) -> tu
             words=("deg", f"of task '{task.name}'"),
         ),
     )
-    since = f", judged from {task.judged_from:g} s" if task.settle > 0.0 else ""
+    since = f", evaluated from {task.judged_from:g} s" if task.settle > 0.0 else ""
     position_check, orientation_check = (replace(check, message=f"{check.message}{since}") for check in checks)
     return position_check, orientation_check
 

@@ -1,6 +1,6 @@
-r"""What a distance at one sample proves about every instant of a motion: nothing comes closer faster than it moves.
+r"""Bounds on the distance of moving bodies: a distance at one sample bounds those at other times by the motion between.
 
-Between two samples all joints move evenly; the unit of time here is that step. Let x(s) be a point of B seen from A and
+Between two samples all joints move linearly; the unit of time is that step. Let x(s) be a point of B seen from A and
 :math:`|\ddot x| \le M` for every such point (``Bends``). Then, for s in [0, 1]:
 
 - Taylor's theorem, a point strays from the chord of its step by no more than
@@ -56,7 +56,7 @@ class Bends:
 
 
 class Motion(Protocol):
-    """Bodies that move through n samples, joints moving evenly from each to the next."""
+    """Bodies that move through n samples, joints moving linearly from each to the next."""
 
     @property
     def poses(self) -> BodyPoses:

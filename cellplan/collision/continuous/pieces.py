@@ -11,7 +11,7 @@ import numpy as np
 
 from cellplan.collision.bodies import BodyPoses, CollisionBody
 from cellplan.collision.continuous.motion_bound import ROUNDING_TOL, Bends, Motion, Pair
-from cellplan.collision.distance import SURELY_APART, TIGHT, Reading, quick_reading
+from cellplan.collision.distance import APART_TOL, TIGHT_TOL, Reading, quick_reading
 from cellplan.collision.engine import Engine
 from cellplan.collision.separation import separation
 from cellplan.geometry.shapes import Mesh, bounding_capsule
@@ -132,7 +132,7 @@ def _exact(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, reading
     if proved < reading.bound:
         proved, n = reading.bound, reading.direction
     bound = max(distance, proved)
-    return Reading(False, bound, True, n if proved > SURELY_APART else None), proved >= bound - TIGHT
+    return Reading(False, bound, True, n if proved > APART_TOL else None), proved >= bound - TIGHT_TOL
 
 
 def _pieces(body: CollisionBody) -> list[CollisionBody]:

@@ -1,4 +1,4 @@
-"""What of a tool lies outside the zone round its tip in which it may touch the part."""
+"""The surface of a tool outside the zone round its tip in which it may touch the part."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""What of a holder's flange and tool lies outside the zone in which they may touch the part that they grip."""
+"""The surfaces of a holder's flange and tool outside the zone in which they may touch the part that they grip."""
 
 from typing import Final
 
@@ -9,7 +9,7 @@ from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.mesh.topology import make_mesh
 from cellplan.geometry.shapes import Mesh, Solid
 
-SLIVER: Final = 1e-12  # [m2] twice the area of triangles that are left out: clipping leaves some without any
+SLIVER_AREA: Final = 1e-12  # [m2] twice the area of triangles that are left out: clipping leaves some without any
 
 
 def outside_grip(shape: Solid, X_ST: Array, *, radius: float, layer: float) -> tuple[Mesh | None, bool]:
@@ -36,7 +36,7 @@ def outside_grip(shape: Solid, X_ST: Array, *, radius: float, layer: float) -> t
         return surface, is_in_ball
     kept = np.concatenate([_above(triangles, height - layer), _above(triangles, -layer - height)])
     sides = kept[:, 1:] - kept[:, :1]
-    kept = kept[np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) > SLIVER]
+    kept = kept[np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) > SLIVER_AREA]
     if not len(kept):
         return None, True
     faces = np.arange(3 * len(kept)).reshape(-1, 3)

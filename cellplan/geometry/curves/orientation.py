@@ -123,7 +123,7 @@ class RotationCurve:
 
 
 def rotations_through(knots: Array, rotations: Array, *, breaks: NDArray[np.bool_]) -> RotationCurve:
-    """Smooth orientations through given ones; a span between two breaks turns evenly about one axis.
+    """Smooth orientations through given ones; a span between two breaks rotates uniformly about one axis.
 
     Args:
         knots: Increasing parameters, shape (N,).

@@ -1,4 +1,4 @@
-"""What of a surface can be put right without moving it: triangles that face opposite ways, shells turned inside out."""
+"""Repairs of a surface that move no vertex: triangles that face opposite ways, shells turned inside out."""
 
 from typing import Final
 
@@ -23,7 +23,7 @@ def require_few_pieces(faces: Indices, *, source: str) -> None:
     pieces = len(np.unique(shells(faces, int(faces.max(initial=-1)) + 1)[faces[:, 0]]))
     if pieces > MAX_PIECES:
         raise InputError(
-            f"{source}: expected a surface of at most {MAX_PIECES} pieces that hang together, got {pieces}: "
+            f"{source}: expected a surface of at most {MAX_PIECES} connected components, got {pieces}: "
             "join its triangles at common vertices"
         )
 

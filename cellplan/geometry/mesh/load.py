@@ -103,7 +103,9 @@ def require_enclosing(mesh: Mesh) -> None:
         InputError: The surface is open.
     """
     if not mesh.is_closed:
-        raise InputError(f"{_not_closed(mesh)}: repair the mesh, or say open: true, and nothing counts as inside it")
+        raise InputError(
+            f"{_not_closed(mesh)}: repair the mesh, or set open: true, with which no point counts as inside it"
+        )
 
 
 def open_edges(mesh: Mesh) -> int:
@@ -155,7 +157,7 @@ def _not_closed(mesh: Mesh) -> str:
     edges = count_edges(mesh.faces)
     return (
         f"{mesh.source}: expected a closed surface, got {edges.open} open edges, {edges.crowded} edges of more "
-        f"than two triangles and {edges.turned} edges whose triangles face opposite ways"
+        f"than two triangles and {edges.turned} edges whose triangles face opposite directions"
     )
 
 

@@ -1,4 +1,4 @@
-"""Label of foreign text files that are to become numbers."""
+"""Numbers in foreign text files, read strictly."""
 
 
 def plain_word(word: str) -> str:

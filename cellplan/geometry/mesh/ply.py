@@ -76,7 +76,7 @@ class _Values:
             values = np.frombuffer(self._body, dtype=dtype, count=count, offset=self.place).astype(np.float64)
             self.place += count * dtype.itemsize
         if len(values) != count:
-            raise ValueError("ends too early")
+            raise ValueError("unexpected end of the file")
         return values
 
     def take_table(self, element: _Element) -> NDArray[np.float64]:
@@ -118,19 +118,21 @@ def parse_ply(data: bytes, name: str) -> Triangles:
                 values.take_table(element)
     except ValueError as error:
         raise InputError(
-            f"{name}: expected the numbers that the PLY header names, got a damaged file: {error}"
+            f"{name}: expected the numbers that the PLY header declares, got a damaged file: {error}"
         ) from None
     if vertices is None or polygons is None:
         raise InputError(f"{name}: expected a PLY file with elements 'vertex' (x, y, z) and 'face' (vertex_indices)")
     if not values.is_used_up:
-        raise InputError(f"{name}: expected the end of the file after the numbers that the PLY header names, got more")
+        raise InputError(
+            f"{name}: expected the end of the file after the numbers that the PLY header declares, got more"
+        )
     return fan(vertices, polygons, name)
 
 
 def _numbers(body: bytes) -> NDArray[np.float64]:
     """All numbers of a text, piece by piece, for a list of all words would take ten times its memory."""
     if b"_" in body:  # NumPy reads 1_000 as a number, as Python does
-        raise ValueError("a number holds '_'")
+        raise ValueError("a number contains '_'")
     pieces, start, count = [np.zeros(0)], 0, 0
     while start < len(body):
         end = start + CHUNK

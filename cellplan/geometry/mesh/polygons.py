@@ -44,5 +44,7 @@ def _cut(vertices: Array, indices: NDArray[np.int64], name: str) -> NDArray[np.i
             folded = np.any(leaning < -FOLD_FRACTION * np.sum(whole * whole, axis=2), axis=1)
         if np.any(folded):
             count = int(folded.sum())
-            raise InputError(f"{name}: expected convex faces, got {count} others: triangulate the mesh before export")
+            raise InputError(
+                f"{name}: expected convex faces, got {count} that are not convex: triangulate the mesh before export"
+            )
     return triangles.reshape(-1, 3)

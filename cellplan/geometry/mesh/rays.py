@@ -74,7 +74,7 @@ def ray_hits(mesh: Mesh, origins: Array, directions: Array) -> RayHits:
     rays = np.broadcast_to(np.asarray(directions, dtype=float), origins.shape)
     length = np.linalg.norm(rays, axis=1, keepdims=True)
     if not (np.all(np.isfinite(origins)) and np.all(np.isfinite(length)) and np.all(length > 0.0)):
-        raise ValueError("rays need finite origins and finite directions other than zero")
+        raise ValueError("rays need finite origins and non-zero finite directions")
     rays = rays / length
     triangles = mesh.vertices[mesh.faces]
     middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))

@@ -95,7 +95,7 @@ def _parse_stl(data: bytes, name: str) -> Triangles:
     if len(data) < STL_HEADER:
         raise InputError(f"{name}: expected an STL file, got {len(data)} bytes that are neither binary nor text STL")
     raise InputError(
-        f"{name}: expected {expected} bytes for the {count} triangles that its header names, "
+        f"{name}: expected {expected} bytes for the {count} triangles that its header declares, "
         f"got {len(data)}: the file is damaged or not STL"
     )
 
@@ -147,7 +147,7 @@ def _checked_text_stl(data: bytes, name: str) -> tuple[bytes, int]:
     if not STL_ORDER.fullmatch("".join(order)):
         raise InputError(
             f"{name}: expected three vertices in each of {facets} facets and an 'endsolid', got {tally[b'vertex']} "
-            f"vertices, {tally[b'endfacet']} 'endfacet' and {tally[b'endsolid']} 'endsolid': the file is cut off"
+            f"vertices, {tally[b'endfacet']} 'endfacet' and {tally[b'endsolid']} 'endsolid': the file is truncated"
         )
     return b"\n".join([b"solid", *kept, b"endsolid"]), facets
 
@@ -174,7 +174,7 @@ def _parse_obj(data: bytes, name: str) -> Triangles:
 
 
 def _obj_lines(data: bytes, name: str) -> Iterable[tuple[int, list[str]]]:
-    """Label of each line that is not empty, comments cut off and continued lines joined."""
+    """Words of each line that is not empty, comments cut off and continued lines joined."""
     waiting: list[str] = []
     for line, content in enumerate(BytesIO(data), start=1):
         require_no_more(len(content), MAX_LINE, "characters in a line", place=f"{name}:{line}")

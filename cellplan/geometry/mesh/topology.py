@@ -106,7 +106,9 @@ def _has_area(vertices: Array, faces: Indices) -> NDArray[np.bool_]:
 def _account_for(lost: int, *, total: int, source: str) -> None:
     """A few triangles without area are usual; many mean that the file is damaged."""
     if lost > LOST_FRACTION * total:
-        raise InputError(f"{source}: expected triangles with an area, got {lost} of {total} without: is it damaged?")
+        raise InputError(
+            f"{source}: expected triangles of non-zero area, got {lost} of {total} degenerate: is the file damaged?"
+        )
 
 
 def _volume(vertices: Array, faces: Indices) -> float:

@@ -181,7 +181,7 @@ def solve_network(net: Network, imposed: Mapping[str, float], *, weights: Array 
     if np.abs(N_s @ speeds - desired).max(initial=0.0) > CLOSURE_TOL * scale.max(initial=0.0):
         raise PrimaryChoiceError(
             f"imposed speeds of {', '.join(imposed)}: no speeds of the other joints keep the circuits closed; "
-            "impose fewer joints, or speeds that fit each other"
+            "impose fewer joints, or consistent speeds"
         )
     values = {**dict(zip(sought, speeds.tolist(), strict=True)), **imposed}
     return NetworkSpeeds(speeds={name: values[name] for name in net.joints}, freedom=len(sought) - int(rank))
@@ -193,7 +193,7 @@ def _refuse_world_in_plane(cell: Cell, plane: PlaneName | None) -> None:
         if plane is not None and task.relative_to is Frame.WORLD:
             raise NotPlanarError(
                 f"task '{task.name}': expected a path on the part in a plane of the part, got one in the world; "
-                "leave the plane out and use the spatial chains"
+                "omit the plane and use the spatial chains"
             )
 
 
@@ -241,7 +241,7 @@ def _check_planar(graph: CouplingGraph, screws: Array, *, B: Signs, rows: list[i
         if passes and off > limit:
             raise NotPlanarError(
                 f"joint '{joint.name}': expected motion in a plane of the part, got motion across it; "
-                "leave the plane out and use the spatial chains"
+                "omit the plane and use the spatial chains"
             )
 
 

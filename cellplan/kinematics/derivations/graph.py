@@ -119,14 +119,14 @@ def circuit_matrix(graph: CouplingGraph, found: Sequence[Circuit]) -> Signs:
 def _way(neighbours: dict[str, list[tuple[int, int, str]]], start: str, goal: str) -> list[tuple[int, int]]:
     """The only way through a tree from one link to another, as joints with signs."""
     came: dict[str, tuple[int, int, str]] = {}
-    waiting, seen = [start], {start}
-    while goal not in seen:
-        here = waiting.pop()
+    open_links, visited = [start], {start}
+    while goal not in visited:
+        here = open_links.pop()
         for joint, sign, there in neighbours[here]:
-            if there not in seen:
-                seen.add(there)
+            if there not in visited:
+                visited.add(there)
                 came[there] = (joint, sign, here)
-                waiting.append(there)
+                open_links.append(there)
     way: list[tuple[int, int]] = []
     while goal != start:
         joint, sign, goal = came[goal]

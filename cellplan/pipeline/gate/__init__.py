@@ -1,1 +1,1 @@
-"""The gate: a run folder is opened for export only after it is verified from its own files."""
+"""Verification of run folders before export, from their own files."""

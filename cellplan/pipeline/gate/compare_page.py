@@ -21,7 +21,7 @@ from cellplan.report.record.summary import summary_record
 Drawings = Mapping[str, Mapping[str, bytes]]
 
 PAGE: Final = "report.html"
-AROUND: Final = 40  # [characters] shown of a page from where it differs
+EXCERPT_LENGTH: Final = 40  # [characters] shown of a page from where it differs
 
 
 def drawn_again(cell: Cell, motions: Sequence[VerifiedMotion]) -> Drawings:
@@ -45,8 +45,8 @@ def page_findings(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotio
         yield from _page_finding(stored, place, cell=cell, motion=motion, record=record)
     if "runs" in stored.record:
         reports = {str(motion.name): motion.report for motion in motions}
-        found = summary_record(reports, cell=cell, provenance=_provenance(stored, ""))
-        yield from _difference(stored, "", overview_page(_of_the_run(stored, "", found), cell=cell))
+        expected = summary_record(reports, cell=cell, provenance=_provenance(stored, ""))
+        yield from _difference(stored, "", overview_page(_of_the_run(stored, "", expected), cell=cell))
 
 
 def other_pictures(stored: StoredRun, drawn: Drawings) -> Iterator[str]:
@@ -67,7 +67,7 @@ def _foreign_pieces(stored: StoredRun, place: str, drawn: Mapping[str, bytes]) -
             foreign = foreign_piece(picture.decode("utf-8", "replace"), drawn[name].decode())
             if foreign is not None:
                 file = stored.file(place, f"plots/{name}")
-                yield f"{file}: {foreign} stands there, which cellplan does not draw; solve the cell again"
+                yield f"{file}: unexpected {foreign}, which cellplan does not draw; solve the cell again"
 
 
 def _sheets(motion: VerifiedMotion, cell: Cell) -> dict[str, Sheet]:
@@ -88,7 +88,8 @@ def _page_finding(
     try:
         page = report_page(record, motion.report.checks, cell=cell, plots=in_order)
     except (KeyError, TypeError, ValueError, AttributeError):  # of what only the planner knows, or of a picture
-        yield f"{stored.file(place, 'report.json')}: solver: expected cellplan's own form; solve the cell again"
+        file = stored.file(place, "report.json")
+        yield f"{file}: solver: expected the form that cellplan writes; solve the cell again"
         return
     yield from _difference(stored, place, page)
 
@@ -98,15 +99,15 @@ def _difference(stored: StoredRun, place: str, page: str) -> Iterator[str]:
     text = stored.content(place, PAGE).decode("utf-8", "replace")
     different = first_difference(text, page)
     if different is not None:
-        at, said, found = different
+        at, got, expected = different
         line = text.count("\n", 0, at) + 1
-        words = f"{_shown(said)} stands there, {_shown(found)} was found"
+        words = f"expected {_shown(expected)}, got {_shown(got)}"
         yield f"{stored.file(place, PAGE)}:{line}: {words}; solve the cell again"
 
 
 def _shown(text: str) -> str:
     """The beginning of a text, on one line."""
-    return shown(" ".join(text[:AROUND].split()) or "nothing")
+    return shown(" ".join(text[:EXCERPT_LENGTH].split()) or "nothing")
 
 
 def _provenance(stored: StoredRun, place: str) -> Provenance:
@@ -115,8 +116,8 @@ def _provenance(stored: StoredRun, place: str) -> Provenance:
     return Provenance(versions=stored.manifest.versions, digests=record.get("digests", {}))
 
 
-def _of_the_run(stored: StoredRun, place: str, found: Record) -> Record:
+def _of_the_run(stored: StoredRun, place: str, expected: Record) -> Record:
     """A record with the inputs of the run, and with what only its planner knew as its report has it."""
-    said: Any = stored.records.get(place, stored.record).get("solver", {})
-    solver = {key: said.get(key) if key in PLANNER_KEYS else value for key, value in found["solver"].items()}
-    return {**found, "inputs": dict(stored.manifest.inputs), "solver": solver}
+    got: Any = stored.records.get(place, stored.record).get("solver", {})
+    solver = {key: got.get(key) if key in PLANNER_KEYS else value for key, value in expected["solver"].items()}
+    return {**expected, "inputs": dict(stored.manifest.inputs), "solver": solver}

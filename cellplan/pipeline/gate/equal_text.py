@@ -9,32 +9,32 @@ NOISE: Final = 1e-7  # [-] in printed units; below it stands the noise of the ar
 NUMBER: Final = re.compile(r"((?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]))")  # not a part of a name
 
 
-def is_same(said: Any, found: Any, *, noise: float = NOISE) -> bool:
+def is_same(got: Any, expected: Any, *, noise: float = NOISE) -> bool:
     """Whether two single values are the same up to rounding; a number is never the same as a word.
 
     A whole number is a count: it is the same or another one.
 
     Args:
-        said: The one value.
-        found: The other.
+        got: The one value.
+        expected: The other.
         noise: Difference of numbers in their printed unit below which stands the noise of the arithmetic.
     """
-    are_numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (said, found))
-    if are_numbers and isinstance(found, int):
-        return bool(said == found)
+    are_numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (got, expected))
+    if are_numbers and isinstance(expected, int):
+        return bool(got == expected)
     if are_numbers:
-        return math.isclose(said, found, rel_tol=RELATIVE, abs_tol=noise)
-    if isinstance(said, str) and isinstance(found, str):
-        return first_difference(said, found) is None
-    return type(said) is type(found) and bool(said == found)
+        return math.isclose(got, expected, rel_tol=RELATIVE, abs_tol=noise)
+    if isinstance(got, str) and isinstance(expected, str):
+        return first_difference(got, expected) is None
+    return type(got) is type(expected) and bool(got == expected)
 
 
-def first_difference(said: str, found: str) -> tuple[int, str, str] | None:
+def first_difference(got: str, expected: str) -> tuple[int, str, str] | None:
     """Place in the first text, and the piece of each, at which two texts say something else; None when nowhere."""
-    if said == found:
+    if got == expected:
         return None
     place = 0
-    pieces, others = NUMBER.split(said), NUMBER.split(found)
+    pieces, others = NUMBER.split(got), NUMBER.split(expected)
     for index, (piece, other) in enumerate(zip(pieces, others, strict=False)):
         is_number = index % 2 == 1
         if piece != other and not (is_number and is_same(_number(piece), _number(other))):

@@ -1,4 +1,4 @@
-"""The gate before export: a run on disk passes only when everything in it is found to be true once more."""
+"""Verification before export: a run on disk is opened only when all of its content is verified again."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.plan import Plan
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
-from cellplan.model.verified_run import SEAL, VerifiedMotion, VerifiedRun
+from cellplan.model.verified_run import ACCESS_TOKEN, VerifiedMotion, VerifiedRun
 from cellplan.pipeline.gate.compare_page import drawn_again, other_pictures, page_findings
 from cellplan.pipeline.gate.compare_report import differences, misshapen_series
 from cellplan.pipeline.gate.stored_cell import load_stored_cell
@@ -32,20 +32,20 @@ from cellplan.report.record.series import series
 from cellplan.report.record.summary import summary_record
 from cellplan.scene.scene import Scene
 
-MOST_DIFFERENCES: Final = 10  # of a report that are listed; the rest is counted
+MAX_DIFFERENCES: Final = 10  # of a report that are listed; the rest is counted
 
 
 def open_gate(
     folder: Path, *, cell: Path | None = None, allow_dirs: Sequence[Path] = (), progress: Progress = silent
 ) -> VerifiedRun:
-    """Verify a run on disk, by this version of the program, and hand it out for export.
+    """Verify a run on disk with this version of the program; the result can be exported.
 
     Every file must be as it was written and every input as it was read. The tables are read back, all checks are made
-    again by a kinematics that shares nothing with the planner, and the report must say what was found.
+    again by a kinematics that shares nothing with the planner, and the report must agree with the results.
 
     Args:
         folder: The run folder.
-        cell: The cell file that was solved; None when it is not at hand.
+        cell: The cell file that was solved; None when it is not available.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
         progress: Called with the stage and the fraction done.
 
@@ -86,7 +86,7 @@ def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], prog
             *of_pages,
             *missing_moves(source.cell, {phase.task: phase.tasks for phase in plan.program}),
         ),
-        seal=SEAL,
+        token=ACCESS_TOKEN,
     )
 
 
@@ -111,7 +111,7 @@ def _plan(cell: Cell, stored: StoredRun) -> Plan:
     unknown = sorted({name for phase in plan.program for name in homeless(cell, phase)})
     if unknown:
         raise InputError(
-            f"{stored.file('', CELL)}: robots: expected the home of every idle robot written out, got auto for "
+            f"{stored.file('', CELL)}: robots: expected an explicit home of every idle robot, got auto for "
             f"{listed(unknown)}"
         )
     places = [phase.task or "" for phase in plan.program]
@@ -141,12 +141,12 @@ def _refuse_other_headers(
     headers = table_headers(cell, clock.plan.program, [motion.report for motion in motions], digests={})
     for robot, text in stored.tables.items():
         file = stored.file("", f"tables/{robot}.csv")
-        said, found = parse_header(text, file).accelerations, headers[robot].accelerations
-        if said != found and (said or is_same):
-            raise InputError(f"{file}: accelerations: expected {shown(found)}, got {shown(said)}")
+        got, expected = parse_header(text, file).accelerations, headers[robot].accelerations
+        if got != expected and (got or is_same):
+            raise InputError(f"{file}: accelerations: expected {shown(expected)}, got {shown(got)}")
         line = other_header_line(text, file) if is_same else None
         if line is not None:
-            raise InputError(f"{file}:{line}: is not a header line that cellplan writes there; solve the cell again")
+            raise InputError(f"{file}:{line}: unexpected header line; solve the cell again")
 
 
 def _refuse_failing(stored: StoredRun, motions: Sequence[VerifiedMotion]) -> None:
@@ -173,20 +173,20 @@ def _unproved(report: Report) -> Iterator[str]:
 def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> None:
     """Refuse reports that say something else than was found."""
     provenance = Provenance(versions=stored.manifest.versions, digests={})
-    found: dict[str, Record] = {
+    expected: dict[str, Record] = {
         motion.name or "": run_record(motion.report, cell=cell, provenance=provenance) for motion in motions
     }
-    said: dict[str, Record] = dict(stored.records)
+    got: dict[str, Record] = dict(stored.records)
     if "runs" in stored.record:
-        said[""] = stored.record
+        got[""] = stored.record
         reports = {str(motion.name): motion.report for motion in motions}
-        found[""] = summary_record(reports, cell=cell, provenance=provenance)
+        expected[""] = summary_record(reports, cell=cell, provenance=provenance)
     is_same = _is_of_this_version(stored)
     findings = []
-    for place, record in said.items():
+    for place, record in got.items():
         findings += [
-            f"{stored.file(place, 'report.json')}: {key}: {shown(old)} stands there, {shown(new)} was found"
-            for key, old, new in differences(record, found[place], same_program=is_same)
+            f"{stored.file(place, 'report.json')}: {key}: expected {shown(new)}, got {shown(old)}"
+            for key, old, new in differences(record, expected[place], same_program=is_same)
         ]
     for motion in motions:
         findings += _series_findings(stored, motion, is_same=is_same)
@@ -196,11 +196,11 @@ def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[Verifi
 def _series_findings(stored: StoredRun, motion: VerifiedMotion, *, is_same: bool) -> Iterator[str]:
     """Differences between the series of one run and those of its tables."""
     place = motion.name or ""
-    said, found = stored.series(place), series(motion.report)
-    different = list(differences(said, found, same_program=is_same))
-    different += misshapen_series(said, len(found["times_s"]) - 1) if is_same else []
+    got, expected = stored.series(place), series(motion.report)
+    different = list(differences(got, expected, same_program=is_same))
+    different += misshapen_series(got, len(expected["times_s"]) - 1) if is_same else []
     for key, old, new in different:
-        yield f"{stored.file(place, SERIES)}: {key}: {shown(old)} stands there, {shown(new)} was found"
+        yield f"{stored.file(place, SERIES)}: {key}: expected {shown(new)}, got {shown(old)}"
 
 
 def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> tuple[str, ...]:
@@ -210,7 +210,7 @@ def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[Verifie
     drawn = drawn_again(cell, motions)
     _refuse_because(stored, list(page_findings(stored, cell, motions, drawn)))
     other = list(other_pictures(stored, drawn))
-    remark = f"drawn here, some pictures look different, by rounding or by hand: {listed(other)}"
+    remark = f"some pictures differ from those rendered here, by rounding or by editing: {listed(other)}"
     return (remark,) if other else ()
 
 
@@ -222,8 +222,8 @@ def _is_of_this_version(stored: StoredRun) -> bool:
 def _refuse_because(stored: StoredRun, findings: Sequence[str]) -> None:
     """Refuse a run when there are findings about its files, of which the first are listed."""
     if findings:
-        more = len(findings) - MOST_DIFFERENCES
-        listed_first = list(findings[:MOST_DIFFERENCES]) + (
+        more = len(findings) - MAX_DIFFERENCES
+        listed_first = list(findings[:MAX_DIFFERENCES]) + (
             [f"{stored.folder}: and {more} more differences"] if more > 0 else []
         )
         raise InvalidFileError([InputError(finding) for finding in listed_first])

@@ -9,34 +9,34 @@ from cellplan.io.input.findings import shown
 
 ELEMENTS: Final = frozenset({"svg", "metadata", "defs", "style", "g", "path", "text", "use"})
 ATTRIBUTES: Final = frozenset({"id", "style", "x", "y", "transform", "d", "xlink:href"})
-OPENING: Final = "<svg"
+SVG_START: Final = "<svg"
 PIECE: Final = re.compile(r"<[^<>]*>|[^<>]+|[<>]")
 TAG: Final = re.compile(r'</?([\w:]+)((?:\s+[\w:-]+="[^"<>]*")*)\s*/?>')
 ATTRIBUTE: Final = re.compile(r'([\w:-]+)="([^"]*)"')
 FIGURE: Final = re.compile(r"[-−+]?[\d.,]+(?:e[-−+]?\d+)?")
-INSIDE: Final = re.compile(r"(?!.*(?:url\((?!#)|[&\\@]|:/)).*", re.DOTALL)  # an attribute that leads nowhere else
+LOCAL_VALUE: Final = re.compile(r"(?!.*(?:url\((?!#)|[&\\@]|:/)).*", re.DOTALL)  # an attribute that leads nowhere else
 
 
-def foreign_piece(said: str, drawn: str) -> str | None:
+def foreign_piece(got: str, drawn: str) -> str | None:
     """The first piece of a picture that cellplan does not draw: an element, an attribute, a word; None without any.
 
     Figures at the axes and the courses of curves are not compared: where a curve shows nothing but the noise of the
     arithmetic, they are others on every processor.
 
     Args:
-        said: The picture on disk, an SVG file.
+        got: The picture on disk, an SVG file.
         drawn: The picture that was drawn anew.
     """
-    head, _, body = said.partition(OPENING)
-    other_head, _, other_body = drawn.partition(OPENING)
+    head, _, body = got.partition(SVG_START)
+    other_head, _, other_body = drawn.partition(SVG_START)
     if head != other_head:
         return shown(" ".join(head.split()) or "nothing")
-    known = frozenset(PIECE.findall(OPENING + other_body))
+    known = frozenset(PIECE.findall(SVG_START + other_body))
     words = frozenset(piece.strip() for piece in known)
-    for piece in PIECE.findall(OPENING + body):
+    for piece in PIECE.findall(SVG_START + body):
         if piece not in known and piece.strip() not in words and _is_foreign(piece):
             return shown(" ".join(piece.split()))
-    return next(_unbalanced(said), None)
+    return next(_unbalanced(got), None)
 
 
 def _is_foreign(piece: str) -> bool:
@@ -47,14 +47,16 @@ def _is_foreign(piece: str) -> bool:
     if tag is None or tag[1] not in ELEMENTS:
         return True
     return any(
-        name not in ATTRIBUTES or not INSIDE.fullmatch(value) or (name == "xlink:href" and not value.startswith("#"))
+        name not in ATTRIBUTES
+        or not LOCAL_VALUE.fullmatch(value)
+        or (name == "xlink:href" and not value.startswith("#"))
         for name, value in ATTRIBUTE.findall(tag[2])
     )
 
 
-def _unbalanced(said: str) -> Iterator[str]:
+def _unbalanced(got: str) -> Iterator[str]:
     """What keeps a picture from being one whole element."""
     try:
-        ET.fromstring(said)  # noqa: S314 - its head, where entities would be declared, is the one that is drawn here
+        ET.fromstring(got)  # noqa: S314 - its head, where entities would be declared, is the one that is drawn here
     except ET.ParseError as error:
         yield f"a picture that cannot be read ({error})"

@@ -14,7 +14,9 @@ from cellplan.io.run.manifest import BUNDLED
 from cellplan.io.run.stored import CELL, StoredRun
 from cellplan.model.cell import Cell
 
-FOUND: Final = frozenset({"start", "start_deg", "home", "home_deg"})  # written ``auto`` where they were to be found
+SEARCHED_KEYS: Final = frozenset(
+    {"start", "start_deg", "home", "home_deg"}
+)  # written ``auto`` where they were to be found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,7 +63,7 @@ def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequen
 
 def _change(address: str, value: object) -> str:
     """A value that was set, as text."""
-    return f"{address} was left out" if value is None else f"{address} was set to {shown(value)}"
+    return f"{address} was removed" if value is None else f"{address} was set to {shown(value)}"
 
 
 def _without_file(stored: StoredRun) -> StoredCell:
@@ -69,8 +71,8 @@ def _without_file(stored: StoredRun) -> StoredCell:
     manifest = stored.manifest
     if manifest.own_inputs:
         raise InputError(
-            f"{stored.folder}: the run rests on files beside its cell file ({listed(manifest.own_inputs)}): name the "
-            f"cell file '{manifest.cell_file}' with --cell, so that they can be found and compared"
+            f"{stored.folder}: the run depends on files beside its cell file ({listed(manifest.own_inputs)}): name the "
+            f"cell file '{manifest.cell_file}' with --cell, so that they can be compared"
         )
     bundled = [name for name in manifest.inputs if name != manifest.cell_file]
     now = {manifest.cell_file: manifest.inputs[manifest.cell_file]}
@@ -93,18 +95,20 @@ def _refuse_stale(stored: StoredRun, now: Mapping[str, str], *, where: str) -> N
     findings = []
     for name, digest in stored.manifest.inputs.items():
         if not now.get(name):
-            findings.append(f"the run rests on '{name}', which {where} does not lead to")
+            findings.append(f"the run depends on '{name}', to which {where} does not refer")
         elif now[name] != digest:
             findings.append(f"'{name}' has changed since the run was made; solve the cell again")
     findings += [
-        f"{where} needs '{name}', which the run does not rest on" for name in now if name not in stored.manifest.inputs
+        f"{where} needs '{name}', on which the run does not depend"
+        for name in now
+        if name not in stored.manifest.inputs
     ]
     if findings:
         raise InvalidFileError([InputError(f"{stored.folder}: {finding}") for finding in findings])
 
 
 def _resolved(stored: StoredRun, *, folder: Path, allow_dirs: Sequence[Path]) -> Cell:
-    """The resolved copy, which must be the file the manifest speaks of and lead to the inputs it speaks of."""
+    """The resolved copy, which must be the file that the manifest names and refer to its inputs."""
     manifest = stored.manifest
     cell = load_cell(stored.folder / CELL, allow_dirs=allow_dirs, folder=folder)
     digests = dict(cell.inputs)
@@ -112,11 +116,11 @@ def _resolved(stored: StoredRun, *, folder: Path, allow_dirs: Sequence[Path]) ->
         raise InputError(f"{stored.folder / CELL}: changed while it was read")
     own = {name: digest for name, digest in manifest.inputs.items() if name != manifest.cell_file}
     if digests != own:
-        raise InputError(f"{stored.folder / CELL}: leads to other files than the cell file did; solve the cell again")
+        raise InputError(f"{stored.folder / CELL}: refers to other files than the cell file; solve the cell again")
     if cell.name != manifest.cell:
         raise InputError(f"{stored.folder / CELL}: name: expected '{manifest.cell}', got '{cell.name}'")
     if any(robot.start is None for robot in cell.robots):
-        raise InputError(f"{stored.folder / CELL}: robots: expected every start posture written out, got auto")
+        raise InputError(f"{stored.folder / CELL}: robots: expected an explicit start posture of every robot, got auto")
     return cell
 
 
@@ -134,7 +138,7 @@ def _differences(old: object, new: object, path: KeyPath = ()) -> Iterator[tuple
 
 def _may_differ(path: KeyPath, old: object) -> bool:
     """Whether a run may have another value there than its cell file."""
-    return len(path) == 3 and path[0] == "robots" and path[2] in FOUND and (old == "auto" or old is None)
+    return len(path) == 3 and path[0] == "robots" and path[2] in SEARCHED_KEYS and (old == "auto" or old is None)
 
 
 def _foreign(stored: StoredRun, cell: Path, difference: tuple[KeyPath, object, object]) -> InputError:

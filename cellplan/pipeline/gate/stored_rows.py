@@ -19,7 +19,7 @@ from cellplan.model.plan import rows_of
 from cellplan.pipeline.plan.headers import left_out_of_program
 from cellplan.pipeline.plan.program import ProgramClock, moved_while_holding
 
-START_ROOM: Final = 1e-9  # [rad] or [m] tables and cells have twelve decimals of a degree, millimetre or metre
+START_TOL: Final = 1e-9  # [rad] or [m] tables and cells have twelve decimals of a degree, millimetre or metre
 LENGTH_TOL: Final = 1e-6  # [mm] of path: rounding of the arithmetic on another processor
 
 
@@ -54,7 +54,7 @@ class StoredRows:
             first = rows_of(phase, self.clock.times).start
             for robot in cell.robots:
                 off = np.abs(self.tables[robot.name].q[first] - robot.start)
-                if robot.name not in phase.idle and not np.all(off <= START_ROOM):
+                if robot.name not in phase.idle and not np.all(off <= START_TOL):
                     joint = robot.model.joint_names[int(np.argmax(off))]
                     place = self.place(robot.name, first)
                     raise InputError(f"{place}: {joint}: expected the start posture of the cell, got another one")
@@ -135,7 +135,7 @@ def _joint_tables(stored: StoredRun, cell: Cell, phases: tuple[Phase, ...], prog
     for place, record in {"": stored.record, **stored.records}.items():
         if record.get("digests") != {"program": program}:
             file = stored.file(place, "report.json")
-            raise InputError(f"{file}: digests.program: is not that of the tables of the run")
+            raise InputError(f"{file}: digests.program: differs from that of the tables of the run")
     return found
 
 
@@ -147,20 +147,24 @@ def _refuse_other_header(header: TableHeader, expected: TableHeader, file: str) 
             raise InputError(f"{file}: {key}: expected {shown(desired)}, got {shown(got)}")
     for name in dict.fromkeys([*expected.digests, *header.digests]):
         if header.digests.get(name) != expected.digests.get(name):
-            raise InputError(f"{file}: {name} digest: is not that of this run; tables of different runs do not mix")
+            raise InputError(
+                f"{file}: {name} digest: differs from that of this run; tables of different runs must not be mixed"
+            )
 
 
 def _refuse_other_times(stored: StoredRun, robot: str, table: JointTable, clock: ProgramClock) -> None:
     """Refuse a table whose times or gaps are not those of the cell, and name the first line that is not."""
     file = stored.file("", f"tables/{robot}.csv")
     if len(table.times) != len(clock.times):
-        raise InputError(f"{file}: expected {len(clock.times)} rows as the cell's clock has, got {len(table.times)}")
+        raise InputError(
+            f"{file}: expected {len(clock.times)} rows, as on the clock of the cell, got {len(table.times)}"
+        )
     late = np.flatnonzero(table.times != clock.times)
     if len(late):
         row = int(late[0])
         desired, got = float(clock.times[row]), float(table.times[row])
         place = row_place(stored.tables[robot], file, row)
-        raise InputError(f"{place}: time_s: expected {desired!r} as the cell's clock has, got {got!r}")
+        raise InputError(f"{place}: time_s: expected {desired!r} as on the clock of the cell, got {got!r}")
     for finding in _gap_findings(table.gaps, clock, lambda row: row_place(stored.tables[robot], file, row)):
         raise InputError(finding)
 
@@ -171,17 +175,17 @@ def _clock_findings(written: ClockText, clock: ProgramClock, *, cell: Cell, prog
     if written.cell != cell.name:
         yield f":2: cell: expected {shown(cell.name)}, got {shown(written.cell)}"
     if written.program != program:
-        yield ":3: program digest: is not that of this run; tables of different runs do not mix"
+        yield ":3: program digest: differs from that of this run; tables of different runs must not be mixed"
     if tuple(table.lengths) != tuple(demanded.lengths):
         yield f":4: expected the tasks {listed(demanded.lengths)}, got {listed(table.lengths)}"
     if len(table.times) != len(demanded.times):
-        yield f": expected {len(demanded.times)} rows as the joint tables have, got {len(table.times)}"
+        yield f": expected {len(demanded.times)} rows, as in the joint tables, got {len(table.times)}"
     yield from _gap_findings(table.gaps, clock, lambda row: f":{written.line(row)}")
     for name, got, desired, is_other in _columns(table, demanded):
         rows = np.flatnonzero(is_other)
         if len(rows):
             row = int(rows[0])
-            yield f":{written.line(row)}: {name}: expected {desired[row]} as the plan of the cell has, got {got[row]}"
+            yield f":{written.line(row)}: {name}: expected {desired[row]} as in the plan of the cell, got {got[row]}"
 
 
 def _columns(
@@ -209,4 +213,4 @@ def _gap_findings(gaps: Mapping[int, str], clock: ProgramClock, place: Callable[
         if gaps.get(row) != demanded.get(row):
             before = "no line" if row not in demanded else f"the line '# {NOT_IN_PROGRAM}: {demanded[row]}'"
             got = f"'{gaps[row]}'" if row in gaps else "none"
-            yield f"{place(row)}: expected {before} about the program before this row, got {got}"
+            yield f"{place(row)}: expected {before} before this row, got {got}"

@@ -1,4 +1,4 @@
-"""Headers of the tables of a program: what solving writes above the rows, and what the gate demands there."""
+"""Headers of the tables of a program: what solving writes above the rows, and what verification expects there."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

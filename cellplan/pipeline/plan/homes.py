@@ -26,17 +26,21 @@ from cellplan.planning.start.given import home_key, home_place
 from cellplan.planning.start.home_candidates import home_candidates
 from cellplan.scene.scene import Scene
 
-STAGE: Final = "searching homes of idle robots"
+STAGE: Final = "searching for homes of idle robots"
 TRIED_SAMPLES: Final = 32  # samples of each phase at which candidates are tried before one is certified
-ROOMS: Final = (0.05, 0.02, 0.0)  # [m] beyond the demanded clearance that the part and other robots are to leave a home
-MOST_CERTIFIED: Final = 24  # candidates per robot of which certification is tried; each failure adds its sample
+EXTRA_CLEARANCES: Final = (
+    0.05,
+    0.02,
+    0.0,
+)  # [m] beyond the demanded clearance that the part and other robots are to leave a home
+MAX_CERTIFIED: Final = 24  # candidates per robot of which certification is tried; each failure adds its sample
 
 
 def find_homes(scene: Scene, runs: Sequence[PlannedRun], *, progress: Progress = silent) -> Mapping[str, Array]:
     """Homes of all robots that are idle in some run and have none yet, in [rad] or [m], shape (n,) each.
 
     A home keeps the demanded clearance from everything, by the same check that judges the run afterwards, in every run
-    in which its robot is idle. One robot after another is placed, in the order of their names; one that finds no room
+    in which its robot is idle. One robot after another is placed, in the order of their names; one that finds no extra
     comes before the others in the next try.
 
     Args:
@@ -120,8 +124,8 @@ class _Search:
         self._cell, self._robot, self._chain = scene.cell, robot, scene.chains[robot.name]
         self._runs = [_idle_run(scene, run, robot.name) for run in runs if robot.name in run.phase.idle]
         picked = [np.unique(np.linspace(0, len(run.q) - 1, TRIED_SAMPLES).astype(int)) for run in self._runs]
-        sample_times = [RunSamples(scene=run.scene, q=run.q[few]) for run, few in zip(self._runs, picked, strict=True)]
-        self._trials = HomeTrials(robot.name, sample_times)
+        samples = [RunSamples(scene=run.scene, q=run.q[few]) for run, few in zip(self._runs, picked, strict=True)]
+        self._trials = HomeTrials(robot.name, samples)
         self._failed = Counter[str]()
 
     def home(self) -> Array | None:
@@ -129,24 +133,24 @@ class _Search:
         robot = self._robot
         rng = generator(robot.name, self._cell.solver.seed)
         candidates = home_candidates(robot.model, self._chain, self._start(), rng)
-        for room in ROOMS:
+        for extra in EXTRA_CLEARANCES:
             for candidate in candidates:
-                if self._trials.is_refused(candidate, room=room):
+                if self._trials.is_refused(candidate, extra=extra):
                     continue
-                home = rounded(robot, self._nearer(candidate, room))
+                home = rounded(robot, self._nearer(candidate, extra))
                 if self._is_certified(home):
                     return home
-                if self._failed.total() >= MOST_CERTIFIED:
+                if self._failed.total() >= MAX_CERTIFIED:
                     return None
         return None
 
-    def _nearer(self, q: Array, room: float) -> Array:
+    def _nearer(self, q: Array, extra: float) -> Array:
         """The configuration with every joint back at its start that need not be elsewhere, the last joint first."""
         start = self._start()
         for joint in reversed(range(len(q))):
             back = q.copy()
             back[joint] = start[joint]
-            if back[joint] != q[joint] and not self._trials.is_refused(back, room=room):
+            if back[joint] != q[joint] and not self._trials.is_refused(back, extra=extra):
                 q = back
         return q
 
@@ -158,13 +162,13 @@ class _Search:
         often = ""
         if self._trials.refused:
             first, second = self._trials.refused.most_common(1)[0][0]
-            often = f", most often because '{first}' comes too near to '{second}'"
+            often = f", most often because '{first}' comes too close to '{second}'"
         elif self._failed:
-            often = f", most often because of this: {self._failed.most_common(1)[0][0]}"
+            often = f", most often: {self._failed.most_common(1)[0][0]}"
         return (
-            f"{home_place(cell, self._robot)}: found no home near the start for '{name}', which is idle "
+            f"{home_place(cell, self._robot)}: no home found near the start for '{name}', which is idle "
             f"while {while_worked}, that keeps {1e3 * cell.checks.clearance:g} mm from everything{often} "
-            f"(some hundred configurations tried): give {home_key(self._robot)} or move the base"
+            f"(several hundred configurations tried): give {home_key(self._robot)} or move the base"
         )
 
     def _start(self) -> Array:

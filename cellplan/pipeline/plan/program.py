@@ -67,7 +67,7 @@ class ProgramClock:
 
     @property
     def gaps(self) -> dict[int, str]:
-        """Name of what is not part of the program, by the first row after it."""
+        """Names of interruptions of the program, by the first row after each."""
         return self.plan.gaps(self.times)
 
     def motion(self, q: Sequence[Array]) -> Motion:

@@ -21,7 +21,7 @@ class PlannedRun:
     """The motion of one phase.
 
     Attributes:
-        phase: What is worked on, who moves, who is idle.
+        phase: Tasks, moving robots and idle robots.
         schedule: Where every tool must be.
         motion: What all joints do.
     """

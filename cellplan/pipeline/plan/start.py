@@ -35,7 +35,7 @@ def chosen_start(scene: Scene, paths: Mapping[str, ClockedPath], *, progress: Pr
         faults = list(_faults(scene, {name: path.toolpath for name, path in paths.items()}))
         if not faults:
             raise
-        raise StartNotFoundError(f"{'; '.join(faults)}; with that no start was found: {error}") from error
+        raise StartNotFoundError(f"{'; '.join(faults)}; no start posture was found: {error}") from error
 
 
 def _faults(scene: Scene, toolpaths: Mapping[str, Toolpath]) -> Iterator[str]:
@@ -54,7 +54,7 @@ def _faults(scene: Scene, toolpaths: Mapping[str, Toolpath]) -> Iterator[str]:
     touching = scene.touching(np.zeros(cell.joint_count), among=np.array(at_rest, dtype=bool))
     if touching is not None:
         key = _mounting_key(cell, Mount.STANDING, list(touching))
-        yield f"{cell.origin.at(key)}: '{touching[0]}' touches '{touching[1]}', and neither of them ever moves"
+        yield f"{cell.origin.at(key)}: '{touching[0]}' touches '{touching[1]}', and neither of them moves"
     yield from _deep_grasps(scene)
     for check in depths_on_paths(cell, toolpaths):
         yield f"{cell.origin.at(f'tasks.{check.subject}')}: {check.message}"
@@ -72,7 +72,7 @@ def _deep_grasps(scene: Scene) -> Iterator[str]:
             if depth > pair.limit:
                 yield (
                     f"{cell.origin.at(f'part.held_by[{number}].at')}: {body.name} is {1e3 * depth:.4g} mm deep in part "
-                    f"at this pose, at most {1e3 * pair.limit:g} mm: {CURES[Mount.GRIP]}"
+                    f"at this pose, allowed {1e3 * pair.limit:g} mm: {CURES[Mount.GRIP]}"
                 )
 
 

@@ -25,9 +25,9 @@ from cellplan.planning.euler.measured_feedback import (
 )
 from cellplan.planning.tracking.motion_task import MotionTask
 
-FAR_WITHIN: Final = 0.02  # [-] share of the tolerance below which errors are not reduced further
-PROGRESS: Final = 0.9  # [-] an error that is not below this share of the last one falls no more
-GROWN: Final = 2.0  # [-] an error above this multiple of the first one diverges
+CONVERGED_FRACTION: Final = 0.02  # [-] share of the tolerance below which errors are not reduced further
+STALLED_RATIO: Final = 0.9  # [-] an error that is not below this share of the last one falls no more
+DIVERGED_RATIO: Final = 2.0  # [-] an error above this multiple of the first one diverges
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -83,7 +83,7 @@ def correct_from_pass_to_pass(
         real: The real cell.
         system: The measuring system.
         rng: Where its noise comes from.
-        rounds: Most corrections that are made.
+        rounds: Maximum number of corrections.
         on_round: Called with the number of each round that begins.
     """
     executions = _Executions(job, real, system, rng)
@@ -158,7 +158,7 @@ class _Executions:
         job = self._job
         true = self._real.tool_poses(job.operators, q)
         measured = measured_poses(true, self._system, self._rng)
-        accuracy, seen = (
+        accuracy, measured_accuracy = (
             tuple(pose_accuracy(task, X_PT) for task, X_PT in zip(job.schedule.tasks, poses, strict=True))
             for poses in (true, measured)
         )
@@ -167,7 +167,7 @@ class _Executions:
             position={each.task: largest(each.position_error, job.judged_from[each.task]) for each in accuracy},
             orientation={each.task: largest(each.orientation_error, job.judged_from[each.task]) for each in accuracy},
             share=worst_share(job.cell, accuracy, job.judged_from),
-            measured_share=worst_share(job.cell, seen, job.judged_from),
+            measured_share=worst_share(job.cell, measured_accuracy, job.judged_from),
         )
         self.all.append(_Attempt(references=references, q=q, measured=measured, accuracy=accuracy, figures=figures))
 
@@ -176,10 +176,10 @@ def _outcome(rounds: Sequence[Round], limit: int) -> Outcome | None:
     """How correcting ended; None while another round is worth its while."""
     shares = [each.measured_share for each in rounds]
     last = shares[-1]
-    if last <= FAR_WITHIN:
+    if last <= CONVERGED_FRACTION:
         return Outcome.CONVERGED
-    if not last <= GROWN * shares[0]:
+    if not last <= DIVERGED_RATIO * shares[0]:
         return Outcome.DIVERGED
-    if len(shares) > 1 and last > PROGRESS * shares[-2]:
+    if len(shares) > 1 and last > STALLED_RATIO * shares[-2]:
         return Outcome.CONVERGED if min(shares) <= 1.0 else Outcome.STALLED
     return Outcome.UNFINISHED if len(shares) > limit else None

@@ -28,7 +28,7 @@ from cellplan.scene.scene import Scene
 
 MEASUREMENT_STREAM: Final = 1  # stream of random numbers of the measurements of a trial; its cell has stream 0
 IN_PASS_STREAM: Final = 2
-MOST_ERRORS: Final = 4_000_000  # trials times samples times tasks that are kept: 200 MB, twice with feedback
+MAX_ERRORS: Final = 4_000_000  # trials times samples times tasks that are kept: 200 MB, twice with feedback
 DEFAULT_ROUNDS: Final = 20
 TOOL_ERRORS: Final = frozenset(
     {"position_error", "orientation_error", "position_error_between_rows", "orientation_error_between_rows"}
@@ -53,7 +53,7 @@ def rehearse(
     rounds: int = DEFAULT_ROUNDS,
     progress: Progress = silent,
 ) -> Rehearsal:
-    """Solve a cell and execute its program on perturbed cells; say how far the tools really are from their tasks.
+    """Solve a cell, execute its program on perturbed cells, and compute the actual errors of the tools.
 
     With feedback the program is repeated on each real cell: the tools are measured on the part, the references are
     corrected, and the written cell is planned again, until the error converges. For a single real cell the corrected
@@ -64,7 +64,7 @@ def rehearse(
         errors: How real cells differ from it, as ``load_errors`` gives them.
         feedback: Correct from pass to pass.
         in_pass: Also execute with the error measured at each sample fed back at the next.
-        rounds: Most corrections from pass to pass.
+        rounds: Maximum number of corrections from pass to pass.
         progress: Called with the stage and the fraction done.
 
     Raises:
@@ -77,7 +77,7 @@ def rehearse(
     if cell.closures:
         raise InputError(
             f"{cell.origin.at('part.held_by')}: expected one robot that holds the part, got {len(cell.part.held_by)}: "
-            "where a part settles between holders that pull at it depends on their stiffness, which no cell tells"
+            "the pose of a part between several holders depends on their stiffness, which a cell does not state"
         )
     solution = solve(cell, progress=progress)
     trials = errors.trials if errors.is_random else 1
@@ -113,11 +113,11 @@ def _without_tool_errors(report: Report) -> Report:
 def _refuse_too_many(runs: Sequence[Run], trials: int, errors: CellErrors) -> None:
     """Refuse more trials than fit into memory."""
     kept = sum(len(run.schedule.times) * len(run.schedule.tasks) for run in runs)
-    most = MOST_ERRORS // kept
+    most = MAX_ERRORS // kept
     if trials > max(most, 1):
         raise InputError(
             f"{errors.file}: trials: expected at most {max(most, 1)} for this cell ({kept} samples of its tasks), "
-            f"got {trials}; make fewer trials or motion.step_s longer"
+            f"got {trials}; reduce trials or increase motion.step_s"
         )
 
 
@@ -167,10 +167,10 @@ def _try(job: Pass, errors: CellErrors, number: int, *, options: _Options, progr
             system,
             rng=np.random.default_rng([errors.seed, number, MEASUREMENT_STREAM]),
             rounds=options.rounds,
-            on_round=lambda made: progress(f"correcting, round {made}", made / (options.rounds + 1)),
+            on_round=lambda made: progress(f"correction, round {made}", made / (options.rounds + 1)),
         )
     if options.in_pass:
-        progress("correcting within the pass", 1.0)
+        progress("correction within the pass", 1.0)
         rng = np.random.default_rng([errors.seed, number, IN_PASS_STREAM])
         in_pass = correct_within_the_pass(job, real, system, rng=rng)
     return Trial(draw=draw, before=before, correction=correction, in_pass=in_pass)

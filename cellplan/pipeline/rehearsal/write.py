@@ -21,7 +21,7 @@ def write_rehearsal(rehearsal: Rehearsal, folder: Path, *, progress: Progress = 
     ``tables/``, or ``tables/<task>/`` where there is one run per task; only when everything passed.
 
     Args:
-        rehearsal: What was rehearsed.
+        rehearsal: The rehearsal.
         folder: The folder; an older rehearsal there is replaced.
         progress: Called with the stage and the fraction done.
 

@@ -46,8 +46,8 @@ CHECKS: Final = {
     "payload_moment": "moments of the load on the wrist within their limits",
     "payload_inertia": "inertia of the load on the wrist within its limits",
     "collision": "no collision",
-    "grip_depth": "depth of holders in the part within their grip",
-    "mount_depth": "depth of tools in the arm within their mounting",
+    "grip_depth": "depth of holders in the part within the depth of their grip",
+    "mount_depth": "depth of tools in the arm within the depth of their mounting",
     "standing_depth": "depth of mounted bodies in their supports within its limit",
 }
 CLASSES: Final = {
@@ -69,8 +69,8 @@ OUTCOMES: Final = {
     "unfinished": "has not converged within the allowed rounds",
 }
 MAX_UNFOLDED: Final = 8  # robots; with more, pictures and long lists are folded
-NARROW: Final = 0.05  # [-] fraction of the half range: smaller margins are marked
-FAST: Final = 0.95  # [-] fraction of the speed limit: higher speeds are marked
+NARROW_FRACTION: Final = 0.05  # [-] fraction of the half range: smaller margins are marked
+FAST_FRACTION: Final = 0.95  # [-] fraction of the speed limit: higher speeds are marked
 
 
 def report_page(record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes]) -> str:
@@ -116,8 +116,8 @@ def _render(template: str, record: Record, cell: Cell, parts: Mapping[str, objec
     texts = {
         "modes": MODES,
         "classes": CLASSES,
-        "narrow": NARROW,
-        "fast": FAST,
+        "narrow": NARROW_FRACTION,
+        "fast": FAST_FRACTION,
         "many": len(cell.robots) > MAX_UNFOLDED,
     }
     colours = robot_colours(cell)

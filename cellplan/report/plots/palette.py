@@ -3,7 +3,7 @@
 import colorsys
 from typing import TYPE_CHECKING, Final
 
-if TYPE_CHECKING:  # whoever only paints needs no cells
+if TYPE_CHECKING:  # rendering needs no cells
     from cellplan.model.cell import Cell
 
 INK = "#1d2733"
@@ -15,9 +15,9 @@ AXES = ("#c4472b", "#2a7d53", "#2b5fa6")
 CLASSES = ("#0f7f8c", "#7b4aa6", "#6b6a13", "#4a5568")
 
 
-GOLDEN: Final = 0.6180339887498949  # [-] of the colour circle from one further robot to the next: none comes back
-DARK: Final = (0.26, 0.38)  # [-] lightness of further robots in turn
-FULL: Final = 0.6  # [-] their saturation
+HUE_STEP: Final = 0.6180339887498949  # [-] of the colour circle from one further robot to the next: none comes back
+LIGHTNESS: Final = (0.26, 0.38)  # [-] lightness of further robots in turn
+SATURATION: Final = 0.6  # [-] their saturation
 
 
 def robot_colours(cell: "Cell") -> dict[str, str]:
@@ -29,5 +29,5 @@ def _colour(index: int) -> str:
     """A chosen colour for the first robots, then others round the colour circle."""
     if index < len(ROBOTS):
         return ROBOTS[index]
-    shares = colorsys.hls_to_rgb(index * GOLDEN % 1.0, DARK[index % 2], FULL)
+    shares = colorsys.hls_to_rgb(index * HUE_STEP % 1.0, LIGHTNESS[index % 2], SATURATION)
     return "#" + "".join(f"{round(255 * share):02x}" for share in shares)

@@ -16,7 +16,7 @@ from cellplan.report.plots.sheet import Sheet
 from cellplan.report.record.rehearsal import EXECUTIONS, Pick
 
 TITLES = {"before": "as solved", "after": "corrected from pass to pass", "in_pass": "corrected within the pass"}
-SMALLEST_MM = 1e-12  # errors below it are drawn there: a logarithm needs a floor
+MIN_SHOWN_MM = 1e-12  # errors below it are drawn there: a logarithm needs a floor
 
 
 def draw_rehearsal(rehearsal: Rehearsal) -> dict[str, bytes]:
@@ -32,33 +32,33 @@ def draw_rehearsal(rehearsal: Rehearsal) -> dict[str, bytes]:
 
 def _execution_sheets(cell: Cell, run: RunRehearsal, place: int, *, name: str, pick: Pick) -> dict[str, Sheet]:
     """True errors of one task over time in its worst trial, and the envelope of all trials."""
-    found = [(trial, errors[place]) for trial in run.trials if (errors := pick(trial)) is not None]
-    if not found:
+    selected = [(trial, errors[place]) for trial in run.trials if (errors := pick(trial)) is not None]
+    if not selected:
         return {}
-    task = cell.task(found[0][1].task)
+    task = cell.task(selected[0][1].task)
     first = run.judged_from[task.name]
-    largest = [float(np.linalg.norm(errors.position_error[first:], axis=1).max()) for _, errors in found]
-    worst = found[int(np.argmax(largest))]
-    several = f" (worst of {len(found)} trials)" if len(found) > 1 else ""
+    largest = [float(np.linalg.norm(errors.position_error[first:], axis=1).max()) for _, errors in selected]
+    worst = selected[int(np.argmax(largest))]
+    several = f" (worst of {len(selected)} trials)" if len(selected) > 1 else ""
     title = f"{task.name} ({task.robot}): true tool error on the part, {TITLES[name]}{several}"
     sheet = Sheet(title, rows=2, columns=2, times=run.times)
     draw_error(sheet, 0, worst[1].position_error, allowed=task.tolerance.position, kind=POSITION)
     draw_error(sheet, 1, worst[1].orientation_error, allowed=task.tolerance.orientation, kind=ORIENTATION)
     sheets = {f"{name}_{task.name}": sheet}
-    if len(found) > 1:
-        sheets |= _envelope_sheets(run, [errors for _, errors in found], name=name)
+    if len(selected) > 1:
+        sheets |= _envelope_sheets(run, [errors for _, errors in selected], name=name)
     return sheets
 
 
-def _envelope_sheets(run: RunRehearsal, found: Sequence[TaskAccuracy], *, name: str) -> dict[str, Sheet]:
+def _envelope_sheets(run: RunRehearsal, selected: Sequence[TaskAccuracy], *, name: str) -> dict[str, Sheet]:
     """Largest, mean and smallest error of all trials over time."""
-    title = f"{found[0].task}: largest, mean and smallest true error of {len(found)} trials, {TITLES[name]}"
+    title = f"{selected[0].task}: largest, mean and smallest true error of {len(selected)} trials, {TITLES[name]}"
     sheet = Sheet(title, rows=1, columns=2, times=run.times)
-    position = np.stack([np.linalg.norm(errors.position_error, axis=1) for errors in found])
-    orientation = np.stack([np.linalg.norm(errors.orientation_error, axis=1) for errors in found])
+    position = np.stack([np.linalg.norm(errors.position_error, axis=1) for errors in selected])
+    orientation = np.stack([np.linalg.norm(errors.orientation_error, axis=1) for errors in selected])
     _draw_band(sheet, 0, position, kind=POSITION)
     _draw_band(sheet, 1, orientation, kind=ORIENTATION)
-    return {f"envelope_{name}_{found[0].task}": sheet}
+    return {f"envelope_{name}_{selected[0].task}": sheet}
 
 
 def _draw_band(sheet: Sheet, index: int, lengths: Array, *, kind: ErrorKind) -> None:
@@ -77,7 +77,11 @@ def _round_sheets(cell: Cell, run: RunRehearsal, task: str) -> dict[str, Sheet]:
     if longest < 2:
         return {}
     sheet = Sheet(
-        f"{task}: largest true error by round", rows=1, columns=2, times=np.arange(float(longest)), across="round"
+        f"{task}: largest true error by correction round",
+        rows=1,
+        columns=2,
+        times=np.arange(float(longest)),
+        across="round",
     )
     tolerance = cell.task(task).tolerance
     position = [[1e3 * made.position[task] for made in correction.rounds] for correction in corrections]
@@ -89,11 +93,11 @@ def _round_sheets(cell: Cell, run: RunRehearsal, task: str) -> dict[str, Sheet]:
 
 def _draw_decades(sheet: Sheet, index: int, curves: Sequence[Sequence[float]], *, title: str, allowed: float) -> None:
     """Errors by round as powers of ten."""
-    decades = [np.log10(np.maximum(curve, SMALLEST_MM)) for curve in curves]
-    limit = math.log10(max(allowed, SMALLEST_MM))
+    decades = [np.log10(np.maximum(curve, MIN_SHOWN_MM)) for curve in curves]
+    limit = math.log10(max(allowed, MIN_SHOWN_MM))
     low = min(limit, *(float(curve.min()) for curve in decades))
     high = max(limit, *(float(curve.max()) for curve in decades))
-    panel = sheet.panel(index, f"power of ten of the {title}", note=f"allowed {allowed:g}", span=(low, high))
+    panel = sheet.panel(index, f"log10 of the {title}", note=f"allowed {allowed:g}", span=(low, high))
     sheet.limit(panel, limit)
     for number, curve in enumerate(decades):
         rounds = np.arange(float(len(curve)))

@@ -17,9 +17,9 @@ from cellplan.report.plots.sheet import Sheet
 from cellplan.report.record.common import rounded_down
 
 JOINT_COLUMNS = 3
-LEAST_IN_UNIT = 0.5  # [-] of an error in its unit: a larger unit is not chosen below
+MIN_IN_UNIT = 0.5  # [-] of an error in its unit: a larger unit is not chosen below
 LEAST_PLAIN, SMALLEST_DRAWN = 1e-2, 1e-200  # [-] of a manipulability: below, in powers of ten; below, as zero
-LONGEST_TITLE = 29  # [-] letters beside which the whole note has room in one of three columns
+MAX_TITLE_LETTERS = 29  # [-] letters beside which the whole note has room in one of three columns
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 CLASS_TITLES: Mapping[ClearanceClass, str] = {
     ClearanceClass.ROBOT_ROBOT: "robot to robot",
@@ -94,7 +94,7 @@ def _task_sheet(accuracy: TaskAccuracy, times: Array, cell: Cell) -> Sheet:
 def _closure_sheet(closure: ClosureAccuracy, times: Array, cell: Cell) -> Sheet:
     """Total and per-axis error of the tool of a further holder on its grasp."""
     checks = cell.checks
-    sheet = Sheet(f"{closure.robot}: tool error on its grasp", rows=2, columns=2, times=times)
+    sheet = Sheet(f"{closure.robot}: closure error at its grasp", rows=2, columns=2, times=times)
     draw_error(sheet, 0, closure.position_error, allowed=checks.closure_position, kind=POSITION)
     draw_error(sheet, 1, closure.orientation_error, allowed=checks.closure_orientation, kind=ORIENTATION)
     return sheet
@@ -111,10 +111,10 @@ def draw_error(sheet: Sheet, row: int, error: Array, *, allowed: float, kind: Er
     main_unit, main_scale = kind.units[0]
     is_in_sight = allowed <= 4.0 * largest or largest == 0.0
     highest = scale * (max(largest, allowed) if is_in_sight else largest)
-    is_ripple = scale * largest < LEAST_IN_UNIT
+    is_ripple = scale * largest < MIN_IN_UNIT
     least = (scale * allowed if is_in_sight else 1.0) if is_ripple else 0.0
     span = (0.0, max(highest, least))
-    note = f"tolerance {allowed * main_scale:.6g} {main_unit}{'' if is_in_sight else ', out of sight'}"
+    note = f"tolerance {allowed * main_scale:.6g} {main_unit}{'' if is_in_sight else ', off the scale'}"
     panel = sheet.panel(2 * row, f"{kind.name}, total, in {unit}", note=note, span=span, is_floored=True)
     if is_in_sight:
         sheet.limit(panel, scale * allowed)
@@ -133,7 +133,7 @@ def readable_unit(largest: float, units: tuple[tuple[str, float], ...]) -> tuple
     """The largest unit in which the value is at least one half, or the smallest of all; the first one for zero."""
     if largest == 0.0:
         return units[0]
-    return next((unit for unit in units if largest * unit[1] >= LEAST_IN_UNIT), units[-1])
+    return next((unit for unit in units if largest * unit[1] >= MIN_IN_UNIT), units[-1])
 
 
 def _positions_sheet(robot: str, uses: list[JointUse], report: Report, colour: str) -> Sheet:
@@ -156,7 +156,7 @@ def _positions_sheet(robot: str, uses: list[JointUse], report: Report, colour: s
 def _margin_note(use: JointUse, scale: float) -> str:
     """How near the joint comes to its limits, or how far it leaves them, and when."""
     if not math.isfinite(use.margin):
-        return "turns without end"
+        return "no position limits"
     margin = scale * use.margin
     near = f"margin {rounded_down(margin):.1f}" if margin >= 0.0 else f"outside by {-margin:.3g}"
     return f"{near} at {use.margin_at_s:.2f} s"
@@ -251,7 +251,7 @@ def _singularity_sheet(report: Report, colours: Mapping[str, str]) -> Sheet:
         worst = int(np.argmin(values))
         unit, scale = _power_of_ten(float(values.max()))
         at_s, smallest = float(report.times[worst]), scale * float(values[worst])
-        is_long = len(name + unit) > LONGEST_TITLE
+        is_long = len(name + unit) > MAX_TITLE_LETTERS
         panel = sheet.panel(
             index,
             name + unit,

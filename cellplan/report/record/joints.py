@@ -156,7 +156,7 @@ def repeatability_record(report: Report) -> dict[str, RepeatabilityRecord]:
     record: RepeatabilityRecord = {
         "cycles": found.cycles,
         "period_s": number(found.period),
-        "ends_s": [number(float(time)) for time in found.sample_times[1:]],
+        "ends_s": [number(float(time)) for time in found.cycle_times[1:]],
         **_worst_drift(found),
         "closes": found.closes,
         "per_joint": _drifts_by_joint(found),

@@ -69,8 +69,8 @@ class HeadRecord(OriginRecord):
     cycle_time_s: Annotated[Number, "duration of the motion"]
     clock_from: Annotated[
         str,
-        "what determines the duration: `motion.duration_s`; `step after motion.duration_s` if that is no whole number "
-        "of steps; `tasks` if the cell states no duration",
+        "what determines the duration: `motion.duration_s`; `step after motion.duration_s` if that is not a "
+        "multiple of the step; `tasks` if the cell states no duration",
     ]
     phases: Annotated[list[PhaseRecord], "phases of the whole program"]
     tasks: Annotated[dict[str, TaskRecord], "by task"]
@@ -82,7 +82,7 @@ class HeadRecord(OriginRecord):
     required_clearance_mm: Annotated[Number, "`checks.clearance_mm` of the cell"]
     accelerations: Annotated[AccelerationsRecord, "accelerations in the world"]
     not_in_program: Annotated[list[str], "moves that the program does not contain"]
-    rests_on: Annotated[RestsOnRecord, "assumptions behind the numbers"]
+    rests_on: Annotated[RestsOnRecord, "assumptions on which the values rest"]
     open_surfaces: Annotated[list[OpenSurfaceRecord], "bodies whose mesh is not closed"]
     left_out: Annotated[list[LeftOutRecord], "pairs that were not judged in full"]
     solver: Annotated[SolverRecord, "how the motion was computed"]
@@ -105,7 +105,7 @@ class RunRecord(HeadRecord):
     motion_share: Annotated[dict[str, MotionShareRecord], "by robot"]
     speeds: Annotated[dict[str, SpeedRecord], "by robot"]
     checks: Annotated[list[CheckRecord], "every verified statement"]
-    idle: Annotated[list[str], "robots without a role in this run; their tables hold them at their homes"]
+    idle: Annotated[list[str], "idle robots of this run; their tables keep them at their homes"]
 
 
 def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> RunRecord:

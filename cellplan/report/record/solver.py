@@ -189,17 +189,17 @@ def _slack_record(motion: Motion) -> SlackRecord | None:
 
 def _resolution_record(motion: Motion) -> ResolutionRecord | None:
     """Effort of the accurate mode; None without a record of it."""
-    made = motion.resolution
-    if made is None:
+    resolution = motion.resolution
+    if resolution is None:
         return None
     return {
-        "panels": made.panels,
-        "nodes": made.nodes,
-        "sweeps": made.sweeps,
-        "solves": made.solves,
-        "error_between_nodes_mm": None if made.error_between is None else number(MM * made.error_between),
-        "euler_from_s": number(made.euler_from),
-        "lost": None if made.lost is None else _lost_record(made.lost),
+        "panels": resolution.panels,
+        "nodes": resolution.nodes,
+        "sweeps": resolution.sweeps,
+        "solves": resolution.solves,
+        "error_between_nodes_mm": None if resolution.error_between is None else number(MM * resolution.error_between),
+        "euler_from_s": number(resolution.euler_from),
+        "lost": None if resolution.lost is None else _lost_record(resolution.lost),
     }
 
 

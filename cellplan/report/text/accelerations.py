@@ -7,12 +7,12 @@ from cellplan.report.record.common import Record
 
 def acceleration_lines(record: Record) -> Iterator[str]:
     """Lines about the accelerations of a run; none for a record without them."""
-    found = record.get("accelerations")
-    if found is None:
+    accelerations = record.get("accelerations")
+    if accelerations is None:
         return
     yield from _joint_lines(record["joints"])
-    yield from _world_lines(found)
-    yield from _not_judged_lines(found["not_judged"])
+    yield from _world_lines(accelerations)
+    yield from _not_judged_lines(accelerations["not_judged"])
 
 
 def _joint_lines(joints: Record) -> Iterator[str]:
@@ -35,14 +35,14 @@ def _joint_lines(joints: Record) -> Iterator[str]:
         yield f"  largest joint jerk {figure}: {joint} at {use['peak_jerk_at_s']:.3f} s"
 
 
-def _world_lines(found: Record) -> Iterator[str]:
+def _world_lines(accelerations: Record) -> Iterator[str]:
     """The tool tip and the part with the largest acceleration."""
     texts = []
-    if found["tools"]:
-        robot, tool = max(found["tools"].items(), key=lambda it: it[1]["peak_acceleration_m_s2"])
+    if accelerations["tools"]:
+        robot, tool = max(accelerations["tools"].items(), key=lambda it: it[1]["peak_acceleration_m_s2"])
         texts.append(f"of a tool tip {_figure(tool)} ({robot})")
-    if found["part"] is not None:
-        texts.append(f"of the part {_figure(found['part']['corner'])}")
+    if accelerations["part"] is not None:
+        texts.append(f"of the part {_figure(accelerations['part']['corner'])}")
     if texts:
         yield f"  largest acceleration {', '.join(texts)}"
 

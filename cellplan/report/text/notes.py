@@ -10,7 +10,7 @@ from cellplan.report.record.common import Number, Record
 MAX_NAMES: Final = 3  # links of a robot that a line names; further ones are counted
 CLOCK_NOTES: Final = {
     TASKS: "no motion.duration_s: the clock ends with the last task",
-    NEXT_STEP: "motion.duration_s is no whole number of steps: the clock ends with the step after it",
+    NEXT_STEP: "motion.duration_s is not a multiple of motion.step_s: the clock ends with the step after it",
 }
 
 
@@ -31,7 +31,7 @@ def accuracy_note(pair: Sequence[str], accuracies: Sequence[Number] | None) -> s
         return f"accuracy of {' and '.join(unknown)} not stated"
     stated = [(name, value) for name, value in zip(pair, accuracies, strict=True) if value]
     if not stated:
-        return "between bodies taken as exact"
+        return "between bodies assumed exact"
     if len(stated) == len(accuracies) and len(set(accuracies)) == 1:
         return f"between bodies accurate to {stated[0][1]:g} mm"
     return f"between bodies accurate to {' and '.join(f'{value:g} mm ({name})' for name, value in stated)}"

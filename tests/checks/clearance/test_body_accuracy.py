@@ -84,7 +84,7 @@ def test_bodies_of_which_nobody_says_how_good_they_are_are_named_in_one_line() -
         ((30.0, 30.0), "between bodies accurate to 30 mm"),
         ((30.0, 45.0), "between bodies accurate to 30 mm (a/arm) and 45 mm (b/arm)"),
         ((0.0, 45.0), "between bodies accurate to 45 mm (b/arm)"),
-        ((0.0, 0.0), "between bodies taken as exact"),
+        ((0.0, 0.0), "between bodies assumed exact"),
         ((None, 45.0), "accuracy of a/arm not stated"),
         (None, ""),
     ],

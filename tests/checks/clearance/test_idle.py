@@ -30,7 +30,7 @@ def test_a_robot_at_its_home_passes() -> None:
     assert (check.name, check.subject, check.message) == (
         "home",
         "arm",
-        "idle robot arm: stands at its home, 0 deg from it at most",
+        "idle robot arm: stays at its home, at most 0 deg from it",
     )
 
 

@@ -34,7 +34,7 @@ def test_a_grip_is_as_deep_as_it_is_said_to_be_and_no_more_than_allowed(depth: f
 
     assert (check.name, check.subject, check.passed) == ("grip_depth", "a/hand - part", passed)
     assert check.value == pytest.approx(1e3 * depth, abs=0.011)
-    assert check.message.startswith(f"a/hand is {1e3 * depth:.4g} mm deep in part, at most 2 mm")
+    assert check.message.startswith(f"a/hand is {1e3 * depth:.4g} mm deep in part, allowed 2 mm")
     assert ("is the grasp the right way round?" in check.message) is not passed
 
 
@@ -75,7 +75,7 @@ def test_a_base_may_stand_on_things_but_not_in_them(shape: Shape, X_WS: Array, d
 def test_the_message_says_how_deep_and_asks_for_the_pit() -> None:
     (check,) = standing(HalfSpace(), pose((0.0, 0.0, 0.11)))
 
-    assert check.message.startswith("a/foot is 110 mm deep in it, at most 5 mm: a pit?")
+    assert check.message.startswith("a/foot is 110 mm deep in it, allowed 5 mm: is there a pit?")
 
 
 def test_the_limit_of_what_stands_is_the_cells() -> None:
@@ -102,7 +102,7 @@ def test_a_fixed_part_may_lie_on_a_table_but_not_in_it(height: float, passed: bo
 
     assert check.passed is passed
     if not passed:
-        assert check.message.startswith("part is 20 mm deep in table, at most 5 mm")
+        assert check.message.startswith("part is 20 mm deep in table, allowed 5 mm")
 
 
 def test_all_that_stands_passes_in_one_check() -> None:
@@ -110,7 +110,7 @@ def test_all_that_stands_passes_in_one_check() -> None:
 
     (check,) = judged(make_cell(*arms, things=(floor(),)), np.zeros((1, 12)))
 
-    assert check.message == "b/foot is 3 mm deep in floor, at most 5 mm"
+    assert check.message == "b/foot is 3 mm deep in floor, allowed 5 mm"
 
 
 def test_a_first_link_without_a_foot_is_judged_over_the_whole_motion() -> None:

@@ -63,7 +63,7 @@ def test_a_pen_through_a_sheet_fails_with_all_that_is_inside_and_beyond(tool: To
     assert depth.at_s == pytest.approx(2.0 / 3.0)
     assert not check.passed
     assert check.message.startswith(
-        "tool depth of task 'work_of_drill': 15 mm of the tool inside the part or beyond it"
+        "tool depth of task 'work_of_drill': 15 mm of the tool is inside the part or beyond it"
     )
 
 
@@ -129,7 +129,7 @@ def test_the_cure_fits_the_task() -> None:
     for cure, task in words.items():
         _, check = found(cell_with(BARE, Box((0.4, 0.4, 0.1)), task), [0.0, 0.0])
         assert f"; {cure}" in check.message
-        assert check.message.endswith("allow it with tool_depth_mm if the process cuts")
+        assert check.message.endswith("allow it with tool_depth_mm if the process removes material")
 
 
 def test_the_desired_path_is_measured_where_the_task_keeps_the_axis() -> None:

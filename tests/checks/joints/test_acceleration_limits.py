@@ -79,7 +79,7 @@ def test_a_motion_that_starts_at_speed_fails_at_any_step_and_says_why(steps: int
     first = checks["joint_acceleration_assumed"][0]
     assert not first.passed
     assert first.at_s in {0.0, 1.0}
-    assert first.message.endswith("; its speed jumps")
+    assert first.message.endswith("; its velocity is discontinuous")
 
 
 def test_unlimited_accelerations_are_told_with_the_reason_and_not_judged() -> None:

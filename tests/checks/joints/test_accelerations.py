@@ -134,8 +134,8 @@ def test_jerk_is_the_largest_change_over_any_window_of_that_length(window: float
     accelerations = generator.normal(size=len(times))
     known = np.concatenate([[-0.01], times, [0.41]])
     values = np.concatenate([[0.0], accelerations, [0.0]])
-    sample_times = np.concatenate([known, known - window])  # a piecewise linear change is largest at a corner
-    changes = np.interp(sample_times + window, known, values) - np.interp(sample_times, known, values)
+    from_times = np.concatenate([known, known - window])  # a piecewise linear change is largest at a corner
+    changes = np.interp(from_times + window, known, values) - np.interp(from_times, known, values)
 
     found = jerks(times, accelerations[:, None, None], window=window)
 

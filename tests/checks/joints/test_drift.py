@@ -63,7 +63,7 @@ def test_between_two_samples_a_joint_moves_evenly():
 def test_tasks_that_do_not_come_back_together_make_one_cycle_of_the_run():
     found = repeatability(CELL, clocked((1.0, 2.0, 3.0, 4.0), (2.0, 4.0)), positions(b_turn=0.01 * TIMES))
 
-    assert found.sample_times.tolist() == [0.0, 4.0]
+    assert found.cycle_times.tolist() == [0.0, 4.0]
     assert found.drifts[2].drift == pytest.approx([0.04], abs=1e-15)
 
 
@@ -73,7 +73,7 @@ def test_one_cycle_of_the_run_lasts_from_the_first_start_to_the_last_end():
 
     found = repeatability(CELL, replace(timed, tasks=(late, timed.tasks[1])), positions())
 
-    assert found.sample_times.tolist() == [0.0, 4.0]
+    assert found.cycle_times.tolist() == [0.0, 4.0]
 
 
 def test_an_open_task_or_none_leaves_nothing_to_say():
@@ -86,7 +86,7 @@ def test_cycles_that_begin_while_the_tool_settles_are_left_out():
 
     found = repeatability(CELL, clocked((1.0, 2.0, 3.0, 4.0), settle=0.7), positions(a_turn=transient))
 
-    assert found.sample_times.tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert found.cycle_times.tolist() == [1.0, 2.0, 3.0, 4.0]
     assert found.closes
     assert repeatability(CELL, clocked((4.0,), settle=0.7), positions()) is None
 
@@ -100,7 +100,7 @@ def test_a_drift_is_judged_only_when_the_cell_asks_for_none():
     assert all(check.passed for check in check_joint_drift(closed, is_demanded=True))
     broken = [check for check in check_joint_drift(drifting, is_demanded=True) if not check.passed]
     assert [check.message for check in broken] == [
-        "a turn is 1.15 deg from where it was a cycle before, at 2.000 s, the end of cycle 1; allowed 0.001 deg"
+        "a turn is 1.15 deg away from its position one cycle earlier, at 2.000 s, the end of cycle 1; allowed 0.001 deg"
     ]
     assert (broken[0].name, broken[0].subject, broken[0].unit) == ("joint_drift", "a turn", "deg")
 

@@ -53,7 +53,7 @@ def test_violation_is_named_with_instant_and_amount():
     assert check.value == pytest.approx(73.0)
     assert check.limit == pytest.approx(35.0)
     assert check.message == (
-        "joint kuka/B2 goes 38 deg beyond its upper limit 35 deg (reaches 73.0000 deg; outside from 0.487 s), "
+        "joint kuka/B2 is 38 deg beyond its upper limit 35 deg (reaches 73.0000 deg; outside from 0.487 s), "
         "worst at 1.000 s"
     )
 
@@ -74,7 +74,7 @@ def test_sliding_joints_speak_millimetres():
     use, checks = report(robot, 0.6 * TIMES)
     assert use.margin == pytest.approx(-0.2)
     assert checks["joint_position"].unit == "mm"
-    assert "goes 200 mm beyond its upper limit 1000 mm" in checks["joint_position"].message
+    assert "is 200 mm beyond its upper limit 1000 mm" in checks["joint_position"].message
     assert checks["joint_velocity"].value == pytest.approx(600.0)
 
 

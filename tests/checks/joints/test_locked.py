@@ -96,7 +96,7 @@ def test_a_lost_task_names_all_joints_that_had_failed():
     assert not reported[0].passed
     assert reported[0].message == (
         f"{before[0].message}, after arm/q2 locked at 0.300 s and arm/q3 locked at 0.400 s and arm/q1 locked at "
-        "0.500 s: the other joints cannot make up for it"
+        "0.500 s: the other joints cannot compensate"
     )
     assert reported[1] == before[1]
 

@@ -65,8 +65,8 @@ def looked(
     rows = scene.chains["arm"].tool_poses(q)
     plain = schedule(ROWS, task)
     scheduled = replace(plain.tasks[0], X_PT=rows)
-    sample_times = np.array([0.35] if corner else jumps)
-    known = Known(times=plain.times, tasks=(scheduled,), sample_times=sample_times, corner=corner)
+    jump_times = np.array([0.35] if corner else jumps)
+    known = Known(times=plain.times, tasks=(scheduled,), jump_times=jump_times, corner=corner)
     accuracy = task_accuracy(scheduled, scene.chains["arm"], q=q, X_WP=part_poses(cell, scene.chains, {"arm": q}))
     ((found,), _) = look_between(scene, known, {"arm": q}, accuracy=(accuracy,), closures=())
     assert found.between is not None
@@ -99,7 +99,7 @@ def test_a_step_that_is_too_long_fails_and_names_one_that_keeps_the_tolerance() 
     assert [check.passed for check in checks] == [False, True]
     assert checks[0].message == (
         "position error of task 'work_of_arm' between the rows of its table: 1 mm at "
-        f"{between.position.at_s:.4f} s, allowed 0.1 mm; a motion.step_s of at most {step:g} keeps what is allowed"
+        f"{between.position.at_s:.4f} s, allowed 0.1 mm; a motion.step_s of at most {step:g} meets the tolerance"
     )
 
 

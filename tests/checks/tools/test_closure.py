@@ -80,7 +80,7 @@ def test_an_error_beyond_what_is_allowed_is_named_with_instant_and_cure():
     assert position.limit == pytest.approx(3e-3)
     assert position.message == (
         "closure position error of 'second' on the part: 0.005 mm at 0.200 s, allowed 0.003 mm; a shorter "
-        "motion.step_s or a slower motion keeps the grasps better, and so does a way round singularities"
+        "motion.step_s, a slower motion or a path farther from singularities reduces it"
     )
     assert (orientation.name, orientation.passed, orientation.limit) == (
         "closure_orientation_error",

@@ -139,7 +139,7 @@ def test_errors_are_judged_from_the_instant_on_that_the_tool_has_settled():
     early, _ = check_accuracy(schedule, accuracy, replace(task, settle=0.49))
 
     assert settled.passed
-    assert settled.message == "position error of task 'ring': 0.05 mm at 1.000 s, allowed 0.1 mm, judged from 1 s"
+    assert settled.message == "position error of task 'ring': 0.05 mm at 1.000 s, allowed 0.1 mm, evaluated from 1 s"
     assert early.passed
     assert not check_accuracy(schedule, accuracy, replace(task, start=0.0))[0].passed
     assert check_accuracy(schedule, accuracy, replace(task, settle=99.0))[0].at_s == 2.0  # the last instant at least

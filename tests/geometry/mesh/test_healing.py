@@ -79,7 +79,7 @@ def test_the_wall_of_a_cavity_stays_a_wall() -> None:
 def test_a_box_with_a_missing_triangle_has_no_inside_nor_has_one_with_both_sides_of_each() -> None:
     torn = BOX.faces[1:]
     for faces in (torn, np.concatenate([torn, torn[:, ::-1]]), np.concatenate([BOX.faces, BOX.faces[:, ::-1]])):
-        with pytest.raises(InputError, match=r"expected a closed surface, .*: repair the mesh, or say open: true"):
+        with pytest.raises(InputError, match=r"expected a closed surface, .*: repair the mesh, or set open: true"):
             require_enclosing(make_mesh(BOX.vertices, faces, source="box.stl"))
 
 
@@ -104,5 +104,5 @@ def test_vertices_that_differ_by_rounding_are_joined_wherever_the_grid_lies() ->
 def test_a_heap_of_loose_triangles_is_refused() -> None:
     count = MAX_PIECES + 1
     require_few_pieces(np.arange(3 * MAX_PIECES).reshape(-1, 3), source="heap.stl")
-    with pytest.raises(InputError, match=f"expected a surface of at most 5000 pieces that hang together, got {count}"):
+    with pytest.raises(InputError, match=f"expected a surface of at most 5000 connected components, got {count}"):
         require_few_pieces(np.arange(3 * count).reshape(-1, 3), source="heap.stl")

@@ -27,7 +27,9 @@ def test_triangles_without_area_are_dropped_and_a_heap_of_them_is_refused() -> N
     mesh = make_mesh(BOX.vertices, slivers, source="part.stl")
     assert (len(mesh.faces), mesh.is_closed) == (12, True)
 
-    with pytest.raises(InputError, match=re.escape("part.stl: expected triangles with an area, got 13 of 25 without")):
+    with pytest.raises(
+        InputError, match=re.escape("part.stl: expected triangles of non-zero area, got 13 of 25 degenerate")
+    ):
         make_mesh(BOX.vertices, np.concatenate([BOX.faces, np.zeros((13, 3), int)]), source="part.stl")
 
 
@@ -61,7 +63,7 @@ def test_an_open_crowded_or_flat_surface_is_no_solid() -> None:
         require_solid(open_box)
     assert str(caught.value) == (
         "part.stl: expected a closed surface, got 3 open edges, 0 edges of more than two triangles and 0 edges whose "
-        "triangles face opposite ways: repair the mesh"
+        "triangles face opposite directions: repair the mesh"
     )
     crowded = make_mesh(BOX.vertices, np.concatenate([BOX.faces, BOX.faces[:1, ::-1]]), source="part.stl")
     with pytest.raises(InputError, match="3 edges of more than two triangles"):

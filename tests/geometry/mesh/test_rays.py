@@ -83,7 +83,7 @@ def test_rays_lie_on_the_plane_of_the_triangle_they_hit_and_nothing_lies_before(
 
 
 def test_rays_without_direction_are_a_mistake_of_the_caller() -> None:
-    with pytest.raises(ValueError, match="directions other than zero"):
+    with pytest.raises(ValueError, match="non-zero finite directions"):
         ray_hits(BOX, np.zeros((1, 3)), np.zeros(3))
     with pytest.raises(ValueError, match="finite origins"):
         ray_hits(BOX, np.full((1, 3), np.nan), np.array([0.0, 0, 1]))

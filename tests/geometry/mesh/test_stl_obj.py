@@ -116,13 +116,13 @@ def test_binary_ply_may_have_more_columns_and_mixed_faces_in_either_byte_order(t
     assert mesh_volume(mesh) == pytest.approx(1.0 / 3.0, rel=1e-12)
     path.write_bytes(header.encode() + body[:-3])
     assert "part" not in refusal(path)
-    assert "expected the numbers that the PLY header names, got a damaged file" in refusal(path)
+    assert "expected the numbers that the PLY header declares, got a damaged file" in refusal(path)
 
 
 def test_damaged_binary_stl_names_the_bytes(tmp_path: Path) -> None:
     path = write(tmp_path, "stl")
     path.write_bytes(path.read_bytes()[:-1])
-    expected = "part.stl: expected 684 bytes for the 12 triangles that its header names, got 683: "
+    expected = "part.stl: expected 684 bytes for the 12 triangles that its header declares, got 683: "
     assert refusal(path) == expected + "the file is damaged or not STL"
 
     path.write_bytes(path.read_bytes()[:40])
@@ -151,7 +151,7 @@ def test_text_stl_with_a_lost_line_is_refused(tmp_path: Path) -> None:
     path.write_text("\n".join(lines[:vertex] + lines[vertex + 1 :]))
     assert refusal(path) == (
         "part.stl: expected three vertices in each of 12 facets and an 'endsolid', got 35 vertices, 12 'endfacet' and "
-        "1 'endsolid': the file is cut off"
+        "1 'endsolid': the file is truncated"
     )
     path.write_text("\n".join(lines).replace("vertex", "vertx", 1))
     assert refusal(path) == f"part.stl:{vertex + 1}: expected a line of a text STL, got 'vertx'"
@@ -181,7 +181,7 @@ def test_numbers_of_text_stl_that_slipped_from_one_line_to_another_are_refused(t
     path.write_text(text.replace(vertex[0], "", 1).replace("endloop", f"{vertex[0]}endloop", 2))
     assert "got 37 vertices, 12 'endfacet'" in refusal(path)
     path.write_text(text.replace(vertex[0], "", 1).replace("endfacet", f"{vertex[0]}endfacet", 1))
-    assert "got 36 vertices, 12 'endfacet' and 1 'endsolid': the file is cut off" in refusal(path)
+    assert "got 36 vertices, 12 'endfacet' and 1 'endsolid': the file is truncated" in refusal(path)
 
 
 def test_a_binary_stl_with_too_many_or_no_triangles_is_refused_by_its_header(tmp_path: Path) -> None:
@@ -207,7 +207,7 @@ def test_a_binary_stl_with_too_many_or_no_triangles_is_refused_by_its_header(tmp
         ("v 0 0 0\n", "m.obj: expected 4 to 500000 triangles, got 0"),
         (
             "v 0 0 0\nv 2 0 0\nv 0.1 0.1 0\nv 0 2 0\nf 2 3 4 1\n",
-            "m.obj: expected convex faces, got 1 others: triangulate the mesh before export",
+            "m.obj: expected convex faces, got 1 that are not convex: triangulate the mesh before export",
         ),
         ("\0", "m.obj: expected an OBJ text file, got binary data"),
     ],
@@ -224,11 +224,11 @@ def test_bad_obj_is_refused_with_its_line(tmp_path: Path, text: str, message: st
     [
         (
             "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nend_header\ninf 0 1 2\n",
-            "m.ply: expected the numbers that the PLY header names, got a damaged file: a list has inf entries",
+            "m.ply: expected the numbers that the PLY header declares, got a damaged file: a list has inf entries",
         ),
         (
             "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n3 0 1 nan\n",
-            "m.ply: expected the numbers that the PLY header names, got a damaged file: "
+            "m.ply: expected the numbers that the PLY header declares, got a damaged file: "
             "a face needs three or more whole vertex numbers",
         ),
         ("PLY\n", "m.ply: expected a PLY file that starts with 'ply' and has an 'end_header'"),
@@ -244,7 +244,7 @@ def test_bad_obj_is_refused_with_its_line(tmp_path: Path, text: str, message: st
         ),
         (
             "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n3 0 1.5 2\n",
-            "m.ply: expected the numbers that the PLY header names, got a damaged file: "
+            "m.ply: expected the numbers that the PLY header declares, got a damaged file: "
             "a face needs three or more whole vertex numbers",
         ),
     ],

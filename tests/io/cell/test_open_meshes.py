@@ -15,7 +15,7 @@ Refuse = Callable[..., list[str]]
 FLOOR = "  floor: {plane: {z_mm: 0}}"
 OPEN = (
     "a.stl: expected a closed surface, got 3 open edges, 0 edges of more than two triangles and 0 edges whose "
-    "triangles face opposite ways: repair the mesh, or say open: true, and nothing counts as inside it"
+    "triangles face opposite directions: repair the mesh, or set open: true, with which no point counts as inside it"
 )
 
 
@@ -74,7 +74,7 @@ def test_open_links_are_listed_robot_by_robot() -> None:
     assert list(open_surface_notes(links)) == [
         (
             "robots.arm.model",
-            "5 meshes of links are open (arm/link_0, arm/link_1, arm/link_2, …): points with a winding number above "
-            "one half count as inside",
+            "5 meshes of links are open (arm/link_0, arm/link_1, arm/link_2, …): points with a winding number "
+            "above one half count as inside",
         )
     ]

@@ -277,6 +277,6 @@ def test_a_task_in_the_world_has_no_chain_in_a_plane_of_the_part(cells):
     with pytest.raises(NotPlanarError) as caught:
         network(cell, np.zeros(6), plane=PlaneName.XY)
     assert str(caught.value) == (
-        "task 'carry': expected a path on the part in a plane of the part, got one in the world; leave the plane out "
+        "task 'carry': expected a path on the part in a plane of the part, got one in the world; omit the plane "
         "and use the spatial chains"
     )

@@ -18,7 +18,7 @@ from cellplan.errors import InputError, NotVerifiedError
 from cellplan.guard import isolated_call
 from cellplan.model.motion import Resolution
 from cellplan.model.solver import Integrator
-from cellplan.model.verified_run import SEAL, VerifiedRun
+from cellplan.model.verified_run import ACCESS_TOKEN, VerifiedRun
 from cellplan.pipeline.overrides import with_overrides
 
 PACKAGE = Path(__file__).resolve().parents[3] / "cellplan"
@@ -55,9 +55,9 @@ def test_the_gate_may_be_opened_from_anywhere(sound: Path, tmp_path: Path, monke
 
 def test_a_cell_with_files_of_its_own_must_be_named(sound: Path) -> None:
     assert refusal(sound / "run") == (
-        f"{sound / 'run'}: the run rests on files beside its cell file (meshes/block.stl, paths/bow.csv, "
+        f"{sound / 'run'}: the run depends on files beside its cell file (meshes/block.stl, paths/bow.csv, "
         "robots/elbow.stl, robots/left.yaml, robots/right.urdf): name the cell file 'small.yaml' with --cell, so that "
-        "they can be found and compared"
+        "they can be compared"
     )
 
 
@@ -69,10 +69,10 @@ def test_a_renamed_cell_file_is_still_the_same(copy: Path) -> None:
 
 def test_nobody_else_can_make_a_verified_run(sound: Path) -> None:
     run = open_gate(sound / "run", cell=sound / "cell" / "small.yaml")
-    with pytest.raises(TypeError, match=r"made by cellplan\.open_gate only"):
-        replace(run, seal=None)
+    with pytest.raises(TypeError, match=r"created by cellplan\.open_gate only"):
+        replace(run, token=None)
     with pytest.raises(ValueError, match="has motions"):
-        replace(run, motions=(), seal=SEAL)
+        replace(run, motions=(), token=ACCESS_TOKEN)
 
 
 def test_the_seal_is_held_by_the_gate_alone() -> None:
@@ -80,8 +80,8 @@ def test_the_seal_is_held_by_the_gate_alone() -> None:
     for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             named = [alias.name for alias in node.names] if isinstance(node, ast.ImportFrom) else []
-            is_reached = isinstance(node, ast.Attribute) and node.attr == "SEAL"
-            holders += [path.relative_to(PACKAGE).as_posix()] if "SEAL" in named or is_reached else []
+            is_reached = isinstance(node, ast.Attribute) and node.attr == "ACCESS_TOKEN"
+            holders += [path.relative_to(PACKAGE).as_posix()] if "ACCESS_TOKEN" in named or is_reached else []
     assert holders == ["pipeline/gate/open_gate.py"]
 
 
@@ -219,7 +219,7 @@ def test_another_integrator_than_that_of_the_run_is_found_in_its_report(copy: Pa
     seal_again(copy / "run")
 
     assert refusal(copy / "run", copy / "cell" / "small.yaml") == (
-        f"{copy / 'run' / 'report.json'}: solver.integrator: 'euler' stands there, 'accurate' was found"
+        f"{copy / 'run' / 'report.json'}: solver.integrator: expected 'accurate', got 'euler'"
     )
 
 
@@ -235,9 +235,7 @@ def test_runs_of_single_tasks_are_verified_one_by_one(sound: Path, tmp_path: Pat
     seal_again(tmp_path / "run")
 
     message = refusal(tmp_path / "run", sound / "cell" / "small.yaml")
-    assert message.startswith(
-        f"{tmp_path / 'run' / 'report.json'}: tasks.path.mean_position_error_mm: 0.001 stands there, "
-    )
+    assert message.startswith(f"{tmp_path / 'run' / 'report.json'}: tasks.path.mean_position_error_mm: expected ")
 
 
 def seal_again(run: Path) -> None:

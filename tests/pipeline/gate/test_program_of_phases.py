@@ -152,7 +152,7 @@ def moved_by_a_step(run: Path) -> None:
 FORGERIES: dict[str, tuple[Callable[[Path], None], str]] = {
     "sigma shifted in one row": (
         edited("clock.csv", "\n1.0,1.0,first", "\n1.0,1.0049,first"),
-        "tables/clock.csv:105: sigma_s: expected 1.0 as the plan of the cell has, got 1.0049",
+        "tables/clock.csv:105: sigma_s: expected 1.0 as in the plan of the cell, got 1.0049",
     ),
     "sigma that falls": (
         edited("clock.csv", "\n1.0,1.0,first", "\n1.0,0.5,first"),
@@ -160,11 +160,11 @@ FORGERIES: dict[str, tuple[Callable[[Path], None], str]] = {
     ),
     "a row of another phase": (
         edited("clock.csv", "\n2.0,2.0,first", "\n2.0,2.0,second"),
-        "tables/clock.csv:205: phase: expected first as the plan of the cell has, got second",
+        "tables/clock.csv:205: phase: expected first as in the plan of the cell, got second",
     ),
     "process flipped": (
         edited("clock.csv", "\n2.01,2.01,second,628.318530718,0,", "\n2.01,2.01,second,628.318530718,1,"),
-        "tables/clock.csv:207: first_process: expected 0 as the plan of the cell has, got 1",
+        "tables/clock.csv:207: first_process: expected 0 as in the plan of the cell, got 1",
     ),
     "another length": (
         edited("clock.csv", "\n4.01,4.01,second,628.318530718,0,628.3", "\n4.01,4.01,second,628.318530718,0,629.3"),
@@ -172,11 +172,11 @@ FORGERIES: dict[str, tuple[Callable[[Path], None], str]] = {
     ),
     "a time of its own": (
         edited("clock.csv", "\n1.0,1.0,first", "\n1.001,1.0,first"),
-        "tables/clock.csv:105: time_s: expected 1.0 as the plan of the cell has, got 1.001",
+        "tables/clock.csv:105: time_s: expected 1.0 as in the plan of the cell, got 1.001",
     ),
     "no gap in the clock": (
         without_line("clock.csv", "# not part of"),
-        "tables/clock.csv:206: expected the line '# not part of the program: first to second' about the program "
+        "tables/clock.csv:206: expected the line '# not part of the program: first to second' "
         "before this row, got none",
     ),
     "no gap in a table": (
@@ -186,9 +186,9 @@ FORGERIES: dict[str, tuple[Callable[[Path], None], str]] = {
     "gaps one row later": (moved_by_a_step, "expected the line '# not part of the program: first to second'"),
     "a gap of another name": (
         edited("right.csv", "program: first to second", "program: second to first"),
-        "about the program before this row, got 'second to first'",
+        "before this row, got 'second to first'",
     ),
-    "swapped phases": (swapped_phases, "tables/clock.csv:5: phase: expected first as the plan of the cell has, got"),
+    "swapped phases": (swapped_phases, "tables/clock.csv:5: phase: expected first as in the plan of the cell, got"),
     "an idle robot that moves": (
         moved_holder,
         "A: expected the position at the start of the phase 'first', in which 'right' holds still, got another one",
@@ -230,7 +230,7 @@ def test_a_clock_of_another_program_is_refused(solved: tuple[Path, Solution], tm
     record["files"]["tables/clock.csv"] = {"bytes": len(data), "sha256": digest(data)}
     (tmp_path / "run" / "manifest.json").write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n")
 
-    with pytest.raises(InputError, match=r"clock\.csv:3: program digest: is not that of this run"):
+    with pytest.raises(InputError, match=r"clock\.csv:3: program digest: differs from that of this run"):
         open_gate(tmp_path / "run", cell=solved[0])
 
 

@@ -84,10 +84,10 @@ def test_a_robot_that_cannot_leave_is_named_with_what_is_in_its_way() -> None:
         homes(cell, "saw", {"saw": np.linspace(-1.0, 1.0, 50)})
 
     assert isinstance(refusal.value, NoSolutionError)
-    assert "robots.pen.home: found no home near the start for 'pen', which is idle while 'work_of_saw'" in str(
+    assert "robots.pen.home: no home found near the start for 'pen', which is idle while 'work_of_saw'" in str(
         refusal.value
     )
-    assert "'pen/block' comes too near to 'saw/block'" in str(refusal.value)
+    assert "'pen/block' comes too close to 'saw/block'" in str(refusal.value)
 
 
 def test_robots_that_are_idle_together_keep_apart_in_any_order_of_the_file() -> None:

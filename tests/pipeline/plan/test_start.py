@@ -37,7 +37,7 @@ def why_no_start(folder: Path, *, base_mm: float, offset_mm: float) -> str:
     ("base_mm", "offset_mm", "first"),
     [
         (70.0, 25.0, "cell.yaml:5: robots.pen.base: pen/"),
-        (100.0, 10.0, "cell.yaml:8: tasks.seam: tool depth of task 'seam': 15 mm of the tool inside the part"),
+        (100.0, 10.0, "cell.yaml:8: tasks.seam: tool depth of task 'seam': 15 mm of the tool is inside the part"),
     ],
 )
 def test_a_fault_of_the_cell_is_named_before_the_search(
@@ -46,7 +46,7 @@ def test_a_fault_of_the_cell_is_named_before_the_search(
     reported = why_no_start(tmp_path, base_mm=base_mm, offset_mm=offset_mm)
 
     assert reported.startswith(first)
-    assert "; with that no start was found: cell.yaml:5: robots.pen.start_deg: no configuration" in reported
+    assert "; no start posture was found: cell.yaml:5: robots.pen.start_deg: no configuration" in reported
 
 
 def test_a_fixed_part_in_a_foot_is_named(tmp_path: Path) -> None:
@@ -98,5 +98,5 @@ def test_a_free_grasp_that_is_stated_too_deep_is_named(tmp_path: Path, tip_mm: f
         check(load_cell(file))
 
     reported = str(caught.value).replace(str(file), "cell.yaml")
-    deep = "cell.yaml:11: part.held_by[1].at: right/tool is 15 mm deep in part at this pose, at most 2 mm: is the grasp"
+    deep = "cell.yaml:11: part.held_by[1].at: right/tool is 15 mm deep in part at this pose, allowed 2 mm: is the grasp"
     assert reported.startswith(deep if is_deep else "cell.yaml:6: robots.right.start_deg: no configuration")

@@ -33,9 +33,9 @@ BIG = 2 * np.cos(np.pi / 6)  # [m] the published 1.7320: reach of the arm at its
 BOTH = ["heuristic_search", "recursive_search"]
 
 
-def circle_through_shoulder(sample_times):
+def circle_through_shoulder(count):
     """[Nicolato2007]_ 4.1: a circle in the plane xz that meets the shoulder at half time, and starts at reach BIG."""
-    times = np.linspace(0.0, 6.0, sample_times)
+    times = np.linspace(0.0, 6.0, count)
     phi = 2 * np.pi * quintic(times)
     return times, 0.5 * BIG * np.stack([1 + np.cos(phi), 0 * phi, np.sin(phi)], axis=1)
 
@@ -140,9 +140,9 @@ def relative(cell, task, q):
     return inverse(X_WH @ inverse(cell.part.held_by[0].X_PT)) @ X_WT
 
 
-def wave_schedule(cell, start, sample_times=16):
+def wave_schedule(cell, start, count=16):
     """A small loop and a small turn of every tool on the part, from where it starts."""
-    times = np.linspace(0.0, 2.0, sample_times)
+    times = np.linspace(0.0, 2.0, count)
     phi = 2 * np.pi * quintic(times)
     tasks = []
     for task in cell.tasks:
@@ -151,9 +151,7 @@ def wave_schedule(cell, start, sample_times=16):
         offset = 0.006 * np.stack([np.cos(phi) - 1, np.sin(phi), 0 * phi], axis=1)
         X_PT = pose_from(rotation_exp(turn) @ X[:3, :3], X[:3, 3] + offset)
         tasks.append(
-            TaskSchedule(
-                task=task, X_PT=X_PT, V_PT_P=np.zeros((sample_times, 6)), travelled=times, length=1.0, end=times[-1]
-            )
+            TaskSchedule(task=task, X_PT=X_PT, V_PT_P=np.zeros((count, 6)), travelled=times, length=1.0, end=times[-1])
         )
     return Schedule(times=times, tasks=tuple(tasks))
 

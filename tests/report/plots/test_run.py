@@ -79,7 +79,7 @@ def test_ripples_below_a_nanometre_look_small_and_the_tolerance_is_said_to_be_ou
 
     total = words[: words.index("position error, total, in nm")]
     assert [word for word in total if word in {"0", "0.25", "0.5", "0.75", "1"}] == ["0", "0.25", "0.5", "0.75", "1"]
-    assert "tolerance 0.1 mm, out of sight" in words
+    assert "tolerance 0.1 mm, off the scale" in words
 
 
 def test_error_of_zero_is_drawn_below_its_tolerance(passed_run: Any) -> None:
@@ -121,7 +121,7 @@ def test_robot_that_stands_still_and_a_clock_of_two_samples_can_be_drawn(rail_ru
         ),
     )
     files = draw_plots(report, cell=rail_run.cell)
-    assert "turns without end" in text_of(files["positions_reis.svg"])
+    assert "no position limits" in text_of(files["positions_reis.svg"])
     assert "no such pair" in text_of(files["clearance.svg"])
 
 

@@ -9,15 +9,15 @@ def test_each_pair_stands_in_the_record_with_kind_bodies_and_reason() -> None:
     found = left_out_record([LeftOut(LeftOutKind.GRIP, ("a/hand", "part"), "holds the part")])
 
     assert found == [{"kind": "grip", "bodies": ["a/hand", "part"], "reason": "holds the part"}]
-    assert left_out_notes({"left_out": found}) == ["left out, grip: a/hand - part (holds the part)"]
+    assert left_out_notes({"left_out": found}) == ["not checked in full, grip: a/hand - part (holds the part)"]
 
 
 def test_a_record_without_any_says_so_and_one_that_is_silent_says_nothing() -> None:
-    assert left_out_notes({"left_out": []}) == ["nothing was left out"]
+    assert left_out_notes({"left_out": []}) == ["every pair was checked in full"]
     assert left_out_notes({}) == []
 
 
 def test_grips_of_several_runs_are_told_once() -> None:
-    grip = {"name": "grip_depth", "message": "a/hand is 0 mm deep in part, at most 2 mm"}
+    grip = {"name": "grip_depth", "message": "a/hand is 0 mm deep in part, allowed 2 mm"}
 
     assert grip_notes({"checks": [grip, {"name": "clearance", "message": "fine"}, grip]}) == [grip["message"]]

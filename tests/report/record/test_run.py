@@ -125,8 +125,8 @@ def test_closest_pairs_and_the_proof_are_told(passed_run: Any) -> None:
         "at_s": 3.06,
     }
     assert record["clearance_proof"] == {
-        "assumption": "every joint moves evenly from each sample to the next",
-        "margin": "deviation of the controllers, calibration and elasticity belong in the required clearance",
+        "assumption": "every joint moves linearly from each sample to the next",
+        "margin": "the required clearance must cover controller deviation, calibration errors and elasticity",
         "not_certified": [],
         "distance_queries": 349,
         "contact_queries": 348,
@@ -304,7 +304,7 @@ def drifting(run: Any) -> Any:
         )
         for use in run.report.joints
     )
-    found = Repeatability(sample_times=np.array([0.0, 1.0, 2.0, 3.0]), drifts=drifts, closes=False)
+    found = Repeatability(cycle_times=np.array([0.0, 1.0, 2.0, 3.0]), drifts=drifts, closes=False)
     return replace(run, report=replace(run.report, repeatability=found))
 
 

@@ -64,7 +64,7 @@ def test_missing_meshes_name_every_place_that_was_tried(tmp_path: Path) -> None:
         ("a.stp", "a.stp: expected a mesh file .stl, .obj or .ply, got '.stp'"),
         (
             "torn.stl",
-            "torn.stl: expected 684 bytes for the 12 triangles that its header names, got 683: "
+            "torn.stl: expected 684 bytes for the 12 triangles that its header declares, got 683: "
             "the file is damaged or not STL",
         ),
         ("sheet.stl", "sheet.stl: expected a body with a volume, got a flat one"),
