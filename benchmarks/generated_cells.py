@@ -172,7 +172,7 @@ def _starts(cell: Cell) -> dict[str, str]:
 
 def _start(cell: Cell, robot: Robot, task: Task, *, X_WP: np.ndarray, ready: np.ndarray) -> np.ndarray:
     """The configuration on the start of a task that is found from a configuration ready for work."""
-    X_PT = build_toolpath(task, cell.part, cell.origin).X_PT_start
+    X_PT = build_toolpath(task, cell.part).X_PT_start
     found = within_limits(
         robot.model, reaching_configurations(ScrewChain(robot), task, X_PT, X_WP=X_WP, seeds=ready[None])
     )

@@ -128,7 +128,7 @@ def problem_of(case: Case) -> Problem:
         gain = cell.solver.gain * cell.motion.step / case.step_s
         motion, solver = replace(cell.motion, step=case.step_s), replace(cell.solver, gain=gain)
         cell = replace(cell, motion=motion, solver=solver)
-    toolpaths = {task.name: build_toolpath(task, cell.part, cell.origin) for task in cell.tasks}
+    toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     start = choose_start(Scene.from_cell(cell), clock_paths(cell, toolpaths.values())).start
     plan = plan_phases(cell).program[0]
     schedule = schedule_tasks(cell, [toolpaths[name] for name in plan.tasks])

@@ -146,7 +146,7 @@ def filled(q: Array, *, degree: int, parts: int = BETWEEN + 1) -> Array:
 
 def _schedule(cell: Cell) -> Schedule:
     """All tasks on the clock."""
-    return schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    return schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
 
 
 def _end(cell: Cell, steps: int, *, start: Array) -> Array:

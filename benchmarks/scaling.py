@@ -79,7 +79,7 @@ def generated(robots: int) -> Cell:
 
 def prepared(cell: Cell) -> Callable[[], int]:
     """Set the clock; a run resolves the cell and says at how many nodes."""
-    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     moving = [robot.name for robot in cell.robots]
 

@@ -18,13 +18,13 @@ from multiprocessing import get_context
 from typing import Final
 
 import numpy as np
-from cellplan.planning.timing.timed_path import TimedTasks
 from options import benchmark_options
 from reference_job import CELL
 from sections import Goal, Section, digits, table
 
 from cellplan import Cell, load_cell
 from cellplan.geometry.transforms import rotation_about
+from cellplan.model.motion import Schedule
 from cellplan.planning.layout_screening import AT_ONCE, Candidates, Screening, screen_layouts
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
@@ -81,10 +81,10 @@ def measure(rounds: int) -> Figures:
 
 
 @cache
-def job() -> tuple[Cell, TimedTasks]:
+def job() -> tuple[Cell, Schedule]:
     """The cell and its tasks on the clock, prepared once in each process."""
     cell = load_cell(CELL)
-    return cell, schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks]).desired
+    return cell, schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
 
 
 def candidates_near(cell: Cell, count: int) -> Candidates:

@@ -32,7 +32,7 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     "bodies, hulls and pairs": {"cellplan.scene.scene": ("Scene.from_cell",)},
     "paths and times of the tools": {
         "cellplan.planning.path.build": ("build_toolpath",),
-        "cellplan.planning.timing.schedule": ("time_tasks", "sample", "clock_paths"),
+        "cellplan.planning.timing.schedule": ("schedule_paths", "clock_paths"),
     },
     "start postures": {
         "cellplan.planning.start.given": ("examine_given_starts",),

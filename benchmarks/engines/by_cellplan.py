@@ -22,7 +22,7 @@ def prepare(job: Job, *, accuracy_m: float) -> Callable[[], Array]:
     cell = load_cell(Path(job.cell))
     solver = replace(cell.solver, integrator=Integrator.ACCURATE, accuracy=accuracy_m)
     cell = replace(cell, solver=solver)
-    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     moving = [robot.name for robot in cell.robots]
 
     def run() -> Array:

@@ -15,7 +15,7 @@ from cellplan.planning.tracking.motion_task import MotionTask
 def prepare(job: Job) -> Callable[[], Array]:
     """Read the cell and set the clock; a run builds the planner's model and goes from sample to sample."""
     cell = load_cell(Path(job.cell))
-    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part, cell.origin) for task in cell.tasks])
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     moving = [robot.name for robot in cell.robots]
 
     def run() -> Array:

@@ -17,7 +17,7 @@ def test_a_sound_cell_is_told_with_postures_and_paths_and_nothing_is_written(
 
     lines = capsys.readouterr().out.splitlines()
     assert status == 0
-    assert lines[0] == "four-robots: sound"
+    assert lines[0] == "four-robots: passed"
     assert "  start of reis (given): A1_deg 0, B1_deg -93, C1_deg 108, D1_deg 0, E1_deg -15, F1_deg 0" in lines
     assert any(line.startswith("  task rectangle: path of ") for line in lines)
     assert list(tmp_path.iterdir()) == []

@@ -167,7 +167,7 @@ class Thing:
 def interrupted(_):
     raise KeyboardInterrupt
 
-sys.unraisablehook = main._say_again
+sys.unraisablehook = main._repeat_interruption
 thing = Thing()
 callback = weakref.ref(thing, interrupted)
 del thing

@@ -159,5 +159,5 @@ def test_a_part_between_several_holders_is_refused_with_its_line(
 
     err = capsys.readouterr().err
     assert status == 2
-    assert ": part.held_by: expected one robot that holds the part, got 2: where a part settles between" in err
+    assert ": part.held_by: expected one robot that holds the part, got 2: the pose of a part between several" in err
     assert not (tmp_path / "out").exists()

@@ -79,7 +79,7 @@ def test_a_failed_cell_ends_with_one_and_leaves_no_tables(
     out = capsys.readouterr().out
     assert status == 1
     assert out.startswith("planar-pair: failed\n")
-    assert "too fast" in out
+    assert "exceeds its velocity limit" in out
     assert (folder / "report.html").is_file()
     assert not (folder / "tables").exists()
     assert not (folder / "rejected").exists()

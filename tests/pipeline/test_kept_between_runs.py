@@ -17,7 +17,7 @@ class Blank:
     def pictures(self, report, *, cell):
         return dict
 
-write_run(solve(load_cell(sys.argv[1])), Path(sys.argv[2]), drawing=Blank())
+write_run(solve(load_cell(sys.argv[1])), Path(sys.argv[2]), plots=Blank())
 """
 
 

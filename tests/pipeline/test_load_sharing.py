@@ -119,14 +119,14 @@ def test_explain_shows_the_closure_as_a_block_and_counts_the_freedom(planar):
     np.testing.assert_array_equal(matrix.signs, [[1, 0], [-1, 1]])
     assert (matrix.rank, matrix.redundancy) == (6, 0)
     assert "  right@part  3     - J    + J" in lines
-    assert "grasps that close a loop over the part and the world; left carries the part frame" in lines
+    assert "grasps of co-holders, which close kinematic loops; left carries the part frame" in lines
 
 
 def test_explain_tells_the_real_circuit_up_one_holder_and_down_the_other(cells):
     lines = structure_lines(structure_record(explain(load_cell(cells / "load_sharing.yaml"))))
     place = lines.index("  1  right      +A2 +B2 +C2 +D2 +E2 +F2")
     assert lines[place + 1] == "     left       -F2 -E2 -D2 -C2 -B2 -A2"
-    assert "  degree of redundancy: 18 - 12 = 6 wherever the rows are independent" in lines
+    assert "  degree of redundancy: 18 - 12 = 6 where the rows are independent" in lines
 
 
 @pytest.mark.slow

@@ -218,7 +218,7 @@ def test_failed_run_leaves_no_tables_unless_asked(initial, tmp_path):
     tables = {path.stem: path.read_text() for path in (tmp_path / "kept" / "rejected").iterdir()}
     assert set(tables) == {"clock", *(robot.name for robot in initial.cell.robots)}
     for robot in initial.cell.robots:
-        assert "# verdict: REJECTED: joint kuka/B2 goes" in tables[robot.name]
+        assert "# verdict: REJECTED: joint kuka/B2 is" in tables[robot.name]
 
 
 def test_pairwise_writes_one_program_and_a_report_for_each_task(rectangle, tmp_path):

@@ -17,7 +17,7 @@ def solution(sound: Path) -> Solution:
 
 def test_results_are_one_line(solution: Solution) -> None:
     report, cell = solution.runs[0].report, solution.cell
-    toolpath = build_toolpath(cell.tasks[0], cell.part, cell.origin)
+    toolpath = build_toolpath(cell.tasks[0], cell.part)
 
     assert repr(solution) == "<Solution of 'small-pair', simultaneous, passed>"
     assert repr(report) == f"<Report of 'small-pair', simultaneous, 41 samples, passed: {len(report.checks)} checks>"

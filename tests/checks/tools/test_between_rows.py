@@ -34,7 +34,7 @@ def swinger() -> RobotModel:
 class Known(Schedule):
     """Its one tool is desired at the poses of the rows and on straight lines between them, or late by a corner."""
 
-    sample_times: Array
+    jump_times: Array
     corner: float = 0.0
 
     @property
@@ -43,7 +43,7 @@ class Known(Schedule):
 
     @property
     def jumps(self) -> Array:
-        return self.sample_times
+        return self.jump_times
 
     def poses(self, times: Array) -> tuple[Array, ...]:
         desired = np.tile(np.eye(4), (len(times), 1, 1))

@@ -118,7 +118,7 @@ def test_noise_above_the_tolerance_stalls(pair):
     (trial,) = made.runs[0].trials
     assert trial.correction.outcome is Outcome.STALLED
     assert not made.passed
-    assert made.checks[0].message.startswith("true position error of task 'circle' after correcting: ")
+    assert made.checks[0].message.startswith("true position error of task 'circle' after correction: ")
 
 
 def test_used_up_rounds_are_told(pair):
