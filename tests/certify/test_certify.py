@@ -5,13 +5,14 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 from builders.moving_cells import cell_with_bodies
-from builders.scene_builders import make_cell, placed, slide_model, thing
+from builders.scene_builders import body, floor, joint, make_cell, placed, slide_model, thing
 
 from cellplan.certify.certify import certify
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell import CheckSettings
 from cellplan.model.report import ClearanceClass
+from cellplan.model.robot import RobotModel
 from cellplan.scene.scene import Scene
 
 GAP = 0.05  # [m] that the ball keeps from the post where it passes it
@@ -106,3 +107,23 @@ def test_every_pair_of_a_class_is_bounded() -> None:
     assert ClearanceClass.ENVIRONMENT in curves
     for kind, curve in curves.items():
         assert curve.min() == min(pair.lowest for pair in bound.of_class(kind))
+
+
+def test_the_lowest_point_of_a_swing_above_the_floor_is_found_between_two_samples() -> None:
+    """A ball on an arm of 0.6 m about a horizontal axis at 1 m: lowest where the arm hangs, in the middle of a step."""
+    swing = RobotModel(
+        name="swing",
+        source="test",
+        joints=(joint("s", -1, axis=(0.0, 1.0, 0.0), point=(0.0, 0.0, 1.0)),),
+        flange_link=0,
+        X_BF=np.eye(4),
+        bodies=(body("ball", 0, shape=Sphere(0.05), at=(0.0, 0.0, 0.4)),),
+    )
+    cell = make_cell(placed("arm", swing), things=(floor(),), checks=CheckSettings(clearance=0.3, contact_zone=0.0))
+    q = np.array([[-0.9], [-0.5], [-0.1], [0.3], [0.7]])
+
+    bound = certify(Scene.from_cell(cell), q, 0.3)
+
+    (pair,) = [pair for pair in bound.pairs if bound.names(pair) == ("arm/ball", "floor")]
+    assert 0.35 - EXACT <= pair.lowest <= 0.35
+    assert pair.at == pytest.approx(2.25, abs=0.1)
