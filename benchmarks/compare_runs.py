@@ -5,20 +5,26 @@ Every run folder below OLD is compared with the folder of the same name below NE
 - joint tables byte for byte below their headers; where OLD has tables for each task and NEW has one program, the rows
   of each task must occur in the program in one piece, on whatever clock;
 - ``report.json`` key by key; series that OLD keeps in it are compared with ``series.json`` of NEW. Keys that only NEW
-  has are counted. Texts may differ by the pairs in RENAMED.json (here ``renamed_texts.json``), old and new pieces.
+  has are counted. Texts may differ by the pairs in RENAMED.json (here ``renamed_texts.json``), old and new pieces; with
+  ``--reworded`` also in any other words around the same figures, and those texts are counted.
 
 The exit status is 1 if anything else differs.
 """
 
 import argparse
 import json
+import re
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 MAX_SHOWN: Final = 12  # differences of a report that are listed
 ONLY_NEW: Final = "only new"
+REWORDED: Final = "reworded"
+FIGURE: Final = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 IGNORED: Final = frozenset({"inputs", "digests", "versions"})  # digests of files and versions of packages
 
 
@@ -28,15 +34,17 @@ def main() -> None:
     parser.add_argument("old", type=Path)
     parser.add_argument("new", type=Path)
     parser.add_argument("--texts", type=Path, help="JSON object of old and new pieces of text")
+    parser.add_argument("--reworded", action="store_true", help="count texts with other words round the same figures")
     options = parser.parse_args()
     texts = json.loads(options.texts.read_text(encoding="utf-8")) if options.texts else {}
     runs = sorted(path.parent for path in options.old.rglob("report.json"))
     roots = [run for run in runs if run.parent not in runs and run.parent.parent not in runs]
-    different = [run for run in roots if compare_run(run, options.new / run.relative_to(options.old), texts)]
+    compare = partial(compare_run, texts=texts, may_be_reworded=options.reworded)
+    different = [run for run in roots if compare(run, options.new / run.relative_to(options.old))]
     sys.exit(bool(different))
 
 
-def compare_run(old: Path, new: Path, texts: Mapping[str, str]) -> bool:
+def compare_run(old: Path, new: Path, *, texts: Mapping[str, str], may_be_reworded: bool = False) -> bool:
     """Print what differs between two run folders; returns whether anything does."""
     if not (new / "report.json").is_file():
         print(f"{old.name}: missing")
@@ -48,10 +56,12 @@ def compare_run(old: Path, new: Path, texts: Mapping[str, str]) -> bool:
         for line in report_differences(file, new / file.relative_to(old), texts)
     ]
     added = [line for line in differences if line.endswith(ONLY_NEW)]
-    changed = [line for line in differences if not line.endswith(ONLY_NEW)]
+    reworded = [line for line in differences if may_be_reworded and line.endswith(REWORDED)]
+    changed = [line for line in differences if line not in {*added, *reworded}]
     count = len(list(old.rglob("tables/*.csv")))
     print(
-        f"{old.name}: {count} tables, {len(tables)} differ; report: {len(changed)} differences, {len(added)} new keys"
+        f"{old.name}: {count} tables, {len(tables)} differ; report: {len(changed)} differences, {len(added)} new keys, "
+        f"{len(reworded)} texts reworded"
     )
     for line in [*tables, *changed[:MAX_SHOWN]]:
         print(f"    {line}")
@@ -120,7 +130,9 @@ def differences(old: Any, new: Any, texts: Mapping[str, str], path: str = "") ->
         for index, (left, right) in enumerate(zip(old, new, strict=True)):
             yield from differences(left, right, texts, f"{path}[{index}]")
     elif renamed(old, texts) != new:
-        yield f"{path}: {old!r:.90} -> {new!r:.90}"
+        both = isinstance(old, str) and isinstance(new, str)
+        ending = f" {REWORDED}" if both and Counter(FIGURE.findall(old)) == Counter(FIGURE.findall(new)) else ""
+        yield f"{path}: {old!r:.90} -> {new!r:.90}{ending}"
 
 
 def renamed(value: Any, texts: Mapping[str, str]) -> Any:

@@ -32,8 +32,8 @@ def texts(trees: tuple[Path, Path]) -> dict[str, str]:
 def test_renamed_texts_new_keys_and_split_series_are_accepted(
     trees: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert not compare_runs.compare_run(trees[0] / "pair", trees[1] / "pair", texts(trees))
-    assert capsys.readouterr().out == "pair: 4 tables, 0 differ; report: 0 differences, 1 new keys\n"
+    assert not compare_runs.compare_run(trees[0] / "pair", trees[1] / "pair", texts=texts(trees))
+    assert capsys.readouterr().out == "pair: 4 tables, 0 differ; report: 0 differences, 1 new keys, 0 texts reworded\n"
 
 
 def without_a_row(text: str) -> str:
@@ -55,8 +55,22 @@ def test_any_other_difference_is_found(
     path = trees[1] / "pair" / file
     path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
 
-    assert compare_runs.compare_run(trees[0] / "pair", trees[1] / "pair", texts(trees))
+    assert compare_runs.compare_run(trees[0] / "pair", trees[1] / "pair", texts=texts(trees))
     assert "differ" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("old", "is_different"), [("other words, no figure", False), ("at most 7.5 mm", True)])
+def test_texts_may_be_reworded_round_the_same_figures_only(
+    trees: tuple[Path, Path], old: str, is_different: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = trees[0] / "pair/report.json"
+    record = json.loads(report.read_text(encoding="utf-8"))
+    report.write_text(json.dumps(record | {"caution": old}), encoding="utf-8")
+
+    found = compare_runs.compare_run(trees[0] / "pair", trees[1] / "pair", texts={}, may_be_reworded=True)
+
+    assert found is is_different
+    assert f"{0 if is_different else 1} texts reworded" in capsys.readouterr().out
 
 
 def test_rows_of_a_task_are_found_in_the_program_of_several() -> None:
