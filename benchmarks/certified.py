@@ -16,11 +16,12 @@ from typing import Any, Final
 
 import coal
 import numpy as np
+from coal_shapes import coal_shape
 
 from cellplan import load_cell
 from cellplan.checks.clearance.check import check_clearance
 from cellplan.collision.bodies import BodyPoses
-from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
+from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Obstacle
@@ -122,7 +123,7 @@ def compare(cell: Cell, q: Array) -> list[Compared]:
 
 def brute_force(scene: Scene, q: Array) -> dict[ClearanceClass, float]:
     """Smallest distance of each class in [m], by another engine, at many times; zero where bodies touch."""
-    shapes = [_coal(body.shape) for body in scene.engine.bodies]
+    shapes = [coal_shape(body.shape) for body in scene.engine.bodies]
     times = np.linspace(0.0, len(q) - 1.0, FINE * (len(q) - 1) + 1)
     poses = scene.body_poses(_between(q, times))
     smallest: dict[ClearanceClass, float] = {}
@@ -179,26 +180,6 @@ def _distance(shapes: Sequence[Any], poses: BodyPoses, pair: tuple[int, int], sa
     request = coal.DistanceRequest()
     request.gjk_tolerance, request.gjk_max_iterations = 1e-10, 1000
     return max(0.0, float(coal.distance(shapes[pair[0]], placed[0], shapes[pair[1]], placed[1], request, result)))
-
-
-def _coal(shape: Solid) -> Any:
-    """The other engine's geometry of a solid."""
-    match shape:
-        case Box(size):
-            return coal.Box(*size)
-        case Cylinder(radius, length):
-            return coal.Cylinder(radius, length)
-        case Capsule(radius, length):
-            return coal.Capsule(radius, length)
-        case Sphere(radius):
-            return coal.Sphere(radius)
-        case Mesh(vertices, faces):
-            tree = coal.BVHModelOBBRSS()
-            tree.beginModel(len(faces), len(vertices))
-            tree.addVertices(vertices)
-            tree.addTriangles(faces)
-            tree.endModel()
-            return tree
 
 
 def main() -> None:

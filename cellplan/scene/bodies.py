@@ -153,9 +153,7 @@ def _mounted_bodies(robot: Robot) -> list[SceneBody]:
 def part_body(cell: Cell, part: Part, grasp: Grasp | None = None) -> SceneBody:
     """The part, carried by one of its holders or fixed in the world."""
     if grasp is None:
-        if part.X_WP is None:
-            raise InputError(f"{cell.origin.at('part')}: the part has neither a holder nor a pose in the world")
-        return _fixed("part", Kind.PART, shape=part.shape, X_WS=part.X_WP @ part.X_PS)
+        return _fixed("part", Kind.PART, shape=part.shape, X_WS=part.X_CP @ part.X_PS)
     holder = cell.robot(grasp.robot)
     return SceneBody(
         name="part",

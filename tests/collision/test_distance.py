@@ -4,6 +4,7 @@ import coal
 import numpy as np
 import pytest
 from builders.scene_builders import random_pose
+from coal_shapes import coal_shape
 
 from cellplan.collision.bodies import BodyPoses, CollisionBody, checked_poses, prepare
 from cellplan.collision.distance import Reading, measure, quick_reading
@@ -54,28 +55,9 @@ def horseshoe() -> Mesh:
     )
 
 
-def coal_geometry(shape: Solid):
-    match shape:
-        case Box(size):
-            return coal.Box(*size)
-        case Cylinder(radius, length):
-            return coal.Cylinder(radius, length)
-        case Capsule(radius, length):
-            return coal.Capsule(radius, length)
-        case Sphere(radius):
-            return coal.Sphere(radius)
-        case Mesh(vertices, faces):
-            tree = coal.BVHModelOBBRSS()
-            tree.beginModel(len(faces), len(vertices))
-            for a, b, c in faces:
-                tree.addTriangle(vertices[a], vertices[b], vertices[c])
-            tree.endModel()
-            return tree
-
-
 def coal_distances(first: Solid, second: Solid, poses: BodyPoses) -> np.ndarray:
     """Second opinion: signed distances by coal at its finest settings."""
-    a, b = coal_geometry(first), coal_geometry(second)
+    a, b = coal_shape(first), coal_shape(second)
     request = coal.DistanceRequest()
     request.gjk_tolerance, request.gjk_max_iterations = 1e-10, 1000
     return np.array(

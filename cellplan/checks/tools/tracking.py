@@ -15,13 +15,11 @@ from cellplan.model.units import DEG, MM
 
 
 def part_poses(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> Array:
-    """The part frame in the world at every instant, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed place."""
-    if not cell.part.held_by:
-        if cell.part.X_WP is None:
-            raise ValueError("a part without a holder needs a pose in the world")
-        return cell.part.X_WP[None]
-    grasp = cell.part.held_by[0]
-    return chains[grasp.robot].tool_poses(q[grasp.robot]) @ inverse(grasp.X_PT)
+    """The part frame in the world at every sample, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed pose."""
+    if cell.carrier is None:
+        return cell.part.X_CP[None]
+    carrier = cell.robots[cell.carrier].name
+    return chains[carrier].tool_poses(q[carrier]) @ cell.part.X_CP
 
 
 def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP: Array) -> TaskAccuracy:

@@ -3,6 +3,7 @@
 import coal
 import numpy as np
 import pytest
+from coal_shapes import coal_shape
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -64,26 +65,12 @@ def test_no_direction_separates_sooner_than_the_depth_says_but_for_its_room(i: i
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     request.enable_contact = True
     X_A, X_B = coal.Transform3s(np.eye(3), np.zeros(3)), coal.Transform3s(R, p)
-    coal.collide(engine_shape(first), X_A, engine_shape(second), X_B, request, result)
+    coal.collide(coal_shape(first), X_A, coal_shape(second), X_B, request, result)
     theirs = -result.getContact(0).penetration_depth if result.isCollision() else 0.0
     assert found <= theirs * (1.0 + SHARE) + 2e-5  # theirs is a way out, though not always the shortest
     if found > 1e-4:
         assert result.isCollision()
         assert moved_apart(first, second, R, p, by=1.001 * found + CLOSE)
-
-
-def engine_shape(solid: Solid) -> coal.CollisionGeometry:
-    match solid:
-        case Box(size):
-            return coal.Box(*size)
-        case Cylinder(radius, length):
-            return coal.Cylinder(radius, length)
-        case Capsule(radius, length):
-            return coal.Capsule(radius, length)
-        case Sphere(radius):
-            return coal.Sphere(radius)
-        case _:
-            raise TypeError
 
 
 def moved_apart(first: Solid, second: Solid, R: Array, p: Array, *, by: float) -> bool:
