@@ -26,7 +26,7 @@ def exit_status(error: BaseException) -> ExitStatus:
 def error_lines(error: BaseException) -> list[str]:
     """The findings, one per line; a finding about a line of a file begins with ``FILE:LINE:``."""
     if isinstance(error, KeyboardInterrupt):
-        return ["interrupted: no incomplete run folder was left behind"]
+        return [str(error) or "interrupted: no incomplete run folder was left behind"]
     if isinstance(error, InvalidFileError | NotVerifiedError):
         return [_one_line(str(finding)) for finding in error.findings]
     if isinstance(error, CellplanError):
