@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from cellplan.cli.errors import InterruptedWorkError
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
@@ -73,7 +74,10 @@ def sweep(  # noqa: PLR0913, PLR0917 - the options of the command
             runs=folder if keep_runs else None,
         )
         with progress_listener(quiet=quiet) as progress:
-            record = run_sweep(job, axes, folder, workers=workers or processors(), resume=resume, progress=progress)
+            try:
+                record = run_sweep(job, axes, folder, workers=workers or processors(), resume=resume, progress=progress)
+            except KeyboardInterrupt as error:
+                raise InterruptedWorkError(str(error) or "interrupted") from None
     status = ExitStatus.PASSED if record["counts"]["passed"] else ExitStatus.CHECK_FAILED
     if as_json:
         place = {"folder": str(folder), "report_path": str(folder / "study.html")}
