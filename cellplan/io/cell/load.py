@@ -192,10 +192,10 @@ def _read_meshes(valid: ValidEntries, sources: Sources) -> None:
         shapes += [(("robots", name, "attachments", index), it) for index, it in enumerate(robot.attachments)]
         shapes += [((*place, "geometry"), robot.tool.geometry)] if robot.tool.geometry is not None else []
     part = valid.part.geometry if valid.part is not None else None
-    if part is not None and part.mesh is not None and part.unit is not None:
+    if part is not None and part.mesh is not None:
         sources.mesh(part.mesh, part.unit, ("part", "geometry", "mesh"), requirement=require_solid)
     for path, shape in shapes:
-        if shape.mesh is not None and shape.unit is not None:
+        if shape.mesh is not None:
             sources.mesh(shape.mesh, shape.unit, (*path, "mesh"), requirement=None if shape.open else require_enclosing)
 
 
@@ -210,7 +210,7 @@ def _cell(
     """The cell, once there are no findings."""
     document = source.document
 
-    def mesh(written: str, unit: str) -> Mesh:
+    def mesh(written: str, unit: str | None) -> Mesh:
         """A mesh that was read before."""
         found = sources.mesh(written, unit, ())
         if found is None:

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.load import read_mesh
+from cellplan.geometry.mesh.load import read_drawing
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.cell.toolpath_csv import read_toolpath_csv
@@ -16,7 +16,7 @@ from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.files import digest_of_file
 from cellplan.io.input.findings import Finding, KeyPath, shown
 from cellplan.io.robots.bundled import load_bundled_table
-from cellplan.io.robots.joint_table import MESH_UNITS, RobotTable, load_robot_table
+from cellplan.io.robots.joint_table import RobotTable, load_robot_table
 from cellplan.io.robots.rules import limits_in_si, tightened
 from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot, load_urdf
 from cellplan.io.schema.robot import RobotEntry
@@ -43,14 +43,14 @@ class Sources:
         """Keep the folders and the document that findings refer to."""
         self._document = document
         self._folders = folders
-        self._meshes: dict[tuple[str, str], Mesh | None] = {}
+        self._meshes: dict[tuple[str, str | None], Mesh | None] = {}
         self._urdfs: dict[Hashable, UrdfRobot] = {}
         self.inputs: dict[str, str] = {}
         self.findings: list[Finding] = []
         self.errors: list[InputError] = []
 
     def mesh(
-        self, written: str, unit: str, path: KeyPath, *, requirement: Callable[[Mesh], None] | None = None
+        self, written: str, unit: str | None, path: KeyPath, *, requirement: Callable[[Mesh], None] | None = None
     ) -> Mesh | None:
         """Mesh in [m] that meets a requirement, which raises an input error otherwise; None after a finding."""
         if (written, unit) not in self._meshes:
@@ -104,14 +104,14 @@ class Sources:
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))
 
-    def _read_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
+    def _read_mesh(self, written: str, unit: str | None, path: KeyPath) -> Mesh | None:
         """Mesh in [m]; None after a finding."""
         place = self._file(written, path)
         if place is None:
             return None
         try:
             guard = Guard(file=written, worker="the mesh reader")
-            mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), place, guard=guard)
+            mesh = in_child(as_here(partial(read_drawing, unit=unit)), place, guard=guard)
             self.inputs[written] = digest_of_file(place, file=written)
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))

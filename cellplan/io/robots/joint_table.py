@@ -11,7 +11,7 @@ import numpy as np
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.load import read_mesh
+from cellplan.geometry.mesh.load import read_drawing
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.input.allowed_folders import AllowedFolders
@@ -27,7 +27,6 @@ from cellplan.io.shapes import link_solid, pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
 from cellplan.model.robot import BASE, Body, BodyAccuracy, Joint, JointKind, Link, RobotModel
 
-MESH_UNITS: Final[Mapping[str, float]] = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}  # [m]
 FOOT: Final = "base"  # word for the link that does not move
 TOOL_NAME: Final = re.compile(r"tool(_[0-9]+)?")  # these names belong to the bodies of the tool
 
@@ -104,18 +103,18 @@ class _Meshes:
         """Keep the folders and the document that findings refer to."""
         self._document, self._place = document, place
         self._folders = folders
-        self._read: dict[tuple[str, str], Mesh] = {}
+        self._read: dict[tuple[str, str | None], Mesh] = {}
         self.files: dict[str, Path] = {}
         self.findings: list[Finding] = []
 
-    def mesh(self, written: str, unit: str, *, index: int) -> Mesh | None:
+    def mesh(self, written: str, unit: str | None, *, index: int) -> Mesh | None:
         """Mesh in [m]; None after a finding."""
         if (written, unit) in self._read:
             return self._read[written, unit]
         try:
             path = self._folders.file(written)
             guard = Guard(file=written, worker="the mesh reader")
-            mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), path, guard=guard)
+            mesh = in_child(as_here(partial(read_drawing, unit=unit)), path, guard=guard)
         except InputError as error:
             self.findings.append(self._document.finding((*self._place, index, "mesh", "file"), str(error)))
             return None
@@ -123,7 +122,7 @@ class _Meshes:
         self._read[written, unit] = replace(mesh, is_leaky=not mesh.is_closed)
         return self._read[written, unit]
 
-    def known(self, written: str, unit: str, *, index: int) -> Mesh:
+    def known(self, written: str, unit: str | None, *, index: int) -> Mesh:
         """A mesh that was read before."""
         mesh = self.mesh(written, unit, index=index)
         if mesh is None:

@@ -6,6 +6,8 @@ from pydantic import ConfigDict, Field, model_validator
 
 from cellplan.io.schema.common import Coordinate, Entry, Name, PoseEntry, Size, Text, one_of_keys, require_one
 from cellplan.io.schema.shapes import (
+    MESH_FILE,
+    MESH_UNIT,
     OPEN_MESH,
     SOLID_SHAPES,
     BoxEntry,
@@ -65,8 +67,8 @@ class AttachmentEntry(OneShape):
     cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder.")
     capsule: CapsuleEntry | None = Field(default=None, description="Cylinder with round ends.")
     sphere: SphereEntry | None = Field(default=None, description="Ball.")
-    mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file.")
-    unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
+    mesh: Text | None = Field(default=None, description=f"{MESH_FILE}.")
+    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
     open: bool | None = Field(default=None, description=OPEN_MESH)
     at: PoseEntry = Field(
         default=PoseEntry(),

@@ -35,7 +35,7 @@ from cellplan.io.schema.robot import (
     TurningJerk,
     TurningSpeed,
 )
-from cellplan.io.schema.shapes import SOLID_SHAPES, MeshUnit, SphereEntry
+from cellplan.io.schema.shapes import MESH_FILE, MESH_UNIT, SOLID_SHAPES, MeshUnit, SphereEntry, require_unit_of
 
 BODY_LIMIT: Final = 200  # solids of one robot
 UNIT_ROOM: Final = 1e-3  # [-] room for axes written with four digits
@@ -108,9 +108,15 @@ class PlacedSphereEntry(SphereEntry):
 class PlacedMeshEntry(Entry):
     """A mesh in the base frame at the reference configuration."""
 
-    file: Text = Field(description="STL, OBJ or PLY file, relative to the table.")
-    unit: MeshUnit = Field(description="Unit of the file.")
+    file: Text = Field(description=f"{MESH_FILE}, relative to the table.")
+    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
     at: PoseEntry = Field(default=PoseEntry(), description="Pose of the drawing in the base frame.")
+
+    @model_validator(mode="after")
+    def _has_unit(self) -> Self:
+        """A unit, unless the file states it."""
+        require_unit_of(self.file, self.unit)
+        return self
 
 
 class LinkBodyEntry(Entry):

@@ -48,10 +48,17 @@ class UrdfOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UrdfRobot:
-    """A robot model and the mesh files it was read from, each once."""
+    """A robot model, and what it was read from.
+
+    Attributes:
+        model: The model.
+        mesh_files: Mesh files, each once.
+        remarks: What was read over, one line for each kind.
+    """
 
     model: RobotModel
     mesh_files: tuple[Path, ...]
+    remarks: tuple[str, ...] = ()
 
 
 def read_urdf(path: Path, options: UrdfOptions | None = None) -> RobotModel:
@@ -95,7 +102,7 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         ),
     )
     _require_complete(document, roles, model)
-    return UrdfRobot(model=model, mesh_files=tuple(shelf.files))
+    return UrdfRobot(model=model, mesh_files=tuple(shelf.files), remarks=shelf.remarks.lines)
 
 
 def _require_known_limits(document: UrdfDocument, roles: Roles, limits: Mapping[str, StatedLimits]) -> None:
