@@ -21,13 +21,13 @@ MIMIC = '<mimic joint="{}"/>'
         ([*ARM, "<link/>"], "r.urdf:5: link: expected <link> with the attribute 'name'"),
         (
             [*ARM, '<link name="a,b"/>'],
-            "r.urdf:5: link: expected a name of 1 to 120 letters, digits, '_', '-', '.' or '/' that does not start with "
-            "'-' or '.', got 'a,b'",
+            "r.urdf:5: link: expected a name of 1 to 120 letters, digits, '_', '-', '.' or '/' that does not "
+            "start with '-' or '.', got 'a,b'",
         ),
         (
             [*ARM, '<link name="../tip"/>'],
-            "r.urdf:5: link: expected a name of 1 to 120 letters, digits, '_', '-', '.' or '/' that does not start with "
-            "'-' or '.', got '../tip'",
+            "r.urdf:5: link: expected a name of 1 to 120 letters, digits, '_', '-', '.' or '/' that does not "
+            "start with '-' or '.', got '../tip'",
         ),
         (
             [*ARM[:2], joint("arm/a1", "base", "tip")],
