@@ -66,7 +66,10 @@ def _record(result: CellCheck) -> dict[str, Any]:
         "direction": {task.name: direction_record(task) for task in result.cell.tasks},
         "checks": [check_record(each) for each in result.checks],
         "open_surfaces": open_surfaces,
-        "remarks": [f"{result.cell.origin.at(key)}: {line}" for key, line in open_surface_notes(open_surfaces)],
+        "remarks": [
+            f"{result.cell.origin.at(key)}: {line}"
+            for key, line in (*result.cell.remarks, *open_surface_notes(open_surfaces))
+        ],
         "left_out": left_out_record(result.left_out),
     }
 

@@ -249,6 +249,7 @@ class Cell:
         checks: Required clearance and tolerances.
         origin: The document that the cell was read from.
         inputs: SHA-256 of every file that was read, by the path as written.
+        remarks: Key of the cell file, and what was read over in the file that it names.
     """
 
     name: str
@@ -261,6 +262,7 @@ class Cell:
     checks: CheckSettings
     origin: Origin
     inputs: Mapping[str, str]
+    remarks: tuple[tuple[str, str], ...] = ()
 
     def with_values(self, values: Mapping[str, object]) -> "Cell":
         """The cell of the same document with other values, validated like those of the file.

@@ -236,6 +236,7 @@ def _cell(
         checks=build_checks(whole.checks),
         origin=origin,
         inputs=dict(sorted(sources.inputs.items())),
+        remarks=tuple(sources.remarks),
     )
     parts = {key: getattr(cell, key) for key in PARTS}
     return replace(cell, origin=replace(cell.origin, source=replace(source, parts=parts)))

@@ -36,6 +36,7 @@ TURNING_LIMITS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "accelerati
 SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
 
 POSTURE_WORDS: Final = "auto or a list of joint angles"
+ARGUMENT_WORDS: Final = "a text, a number, true or false"
 POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
 
 Configuration = Annotated[
@@ -45,6 +46,12 @@ Configuration = Annotated[
 NamedConfiguration = Annotated[
     Annotated[Literal["auto"], Tag(f"<{POSITION_WORDS}>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
     by_kind(POSITION_WORDS, mapping=dict),
+]
+XacroArgument = Annotated[
+    Annotated[str, Tag(f"<{ARGUMENT_WORDS}>")]
+    | Annotated[bool, Tag("<boolean>")]
+    | Annotated[int | float, Tag("<number>")],
+    by_kind(ARGUMENT_WORDS, boolean=bool, number=(int, float)),
 ]
 
 
@@ -143,10 +150,16 @@ class RobotEntry(Entry):
     """A robot placed in the cell."""
 
     model: Text = Field(
-        description="Bundled robot, or path of a URDF (.urdf) or joint-axis table (.yaml) below the cell file's folder."
+        description="Bundled robot, or path of a URDF (.urdf, .xacro) or joint-axis table (.yaml) below the folder of "
+        "the cell file."
     )
     package_dirs: tuple[Text, ...] = Field(
-        default=(), description="Folders in which package://NAME/... of a URDF is looked up as FOLDER/NAME/...."
+        default=(),
+        description="Folders in which package://NAME/... of a URDF and $(find NAME)/... of a xacro file are looked up "
+        "as FOLDER/NAME/....",
+    )
+    xacro_args: dict[str, XacroArgument] = Field(
+        default={}, description="Values of the arguments of a xacro file, by name; its own defaults where absent."
     )
     flange: Text | None = Field(
         default=None,

@@ -2,18 +2,12 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from cellplan.io.robots.limits import StatedLimits, limit_findings, tightest
 from cellplan.io.robots.urdf.document import UrdfJoint
 from cellplan.io.robots.urdf.tree import in_user_unit
-
-MAX_TURN: Final = 4.0 * np.pi  # [rad] limits beyond two turns each way are mistakes of the unit
-MAX_TRAVEL: Final = 20.0  # [m]
-MAX_TURN_SPEED: Final = 100.0  # [rad/s] the fastest wrists reach 20
-MAX_TRAVEL_SPEED: Final = 10.0  # [m/s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +27,7 @@ def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJo
     """Limits of a driven joint: the tightest of the URDF's, the cell's and those of the joints that follow it.
 
     Raises:
-        InputError: A limit is missing, is widened by the cell, leaves no range or has an unlikely size.
+        InputError: A limit is missing or of an unlikely size, is widened by the cell, or leaves no range.
     """
     given = joint.limit
     own = StatedLimits(lower=given.lower, upper=given.upper, velocity=given.velocity)
@@ -49,11 +43,8 @@ def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJo
     if not lower < upper:
         ends = f"{in_user_unit(joint, lower)} and {in_user_unit(joint, upper)}"
         raise joint.error(f"expected a lower limit below the upper one, got {ends}")
-    found = Range(
-        lower=lower, upper=upper, velocity=velocity, rated_velocity=None if cell.velocity is None else given.velocity
-    )
-    _require_likely(joint, found)
-    return found
+    rated_velocity = None if cell.velocity is None else given.velocity
+    return Range(lower=lower, upper=upper, velocity=velocity, rated_velocity=rated_velocity)
 
 
 def _endless(joint: UrdfJoint, cell: StatedLimits) -> tuple[float, float]:
@@ -69,6 +60,8 @@ def _missing_positions(joint: UrdfJoint) -> str:
     """What to write in the cell when the URDF has no position limits."""
     unit = "mm" if joint.kind == "prismatic" else "deg"
     bounds = f"`limits: {{{joint.name}: {{lower_{unit}: …, upper_{unit}: …}}}}`"
+    if joint.limit.position_slip:
+        return f"{joint.limit.position_slip}: state {bounds} of the robot in the cell"
     if joint.kind == "continuous":
         return (
             f"is continuous: give it {bounds}, or `limits: {{{joint.name}: {{wrap: true}}}}` to let it turn without end"
@@ -80,8 +73,10 @@ def _velocity(joint: UrdfJoint, limits: StatedLimits) -> float:
     """Velocity limit."""
     if limits.velocity is None:
         unit = "mm_s" if joint.kind == "prismatic" else "deg_s"
-        cure = f"give it `limits: {{{joint.name}: {{velocity_{unit}: …}}}}`"
-        raise joint.error(f"has no positive velocity limit in the URDF: {cure}")
+        cure = f"`limits: {{{joint.name}: {{velocity_{unit}: …}}}}`"
+        if joint.limit.velocity_slip:
+            raise joint.error(f"{joint.limit.velocity_slip}: state {cure} of the robot in the cell")
+        raise joint.error(f"has no positive velocity limit in the URDF: give it {cure}")
     if not limits.velocity > 0.0:
         raise joint.error(f"expected a positive velocity limit, got {in_user_unit(joint, limits.velocity, '/s')}")
     return limits.velocity
@@ -98,15 +93,3 @@ def _within_follower(follower: UrdfJoint, lower: float, upper: float, *, velocit
     if limit.velocity is not None:
         velocity = min(velocity, limit.velocity / abs(mimic.multiplier))
     return lower, upper, velocity
-
-
-def _require_likely(joint: UrdfJoint, limits: Range) -> None:
-    """Refuse limits that look like degrees taken for radians or millimetres taken for metres."""
-    slides = joint.kind == "prismatic"
-    largest = max((abs(end) for end in (limits.lower, limits.upper) if np.isfinite(end)), default=0.0)
-    if largest > (MAX_TRAVEL if slides else MAX_TURN):
-        hint = "20 m, got {:g} m: is the unit mm?" if slides else "two turns, got {:g} rad: is the unit degrees?"
-        raise joint.error(f"expected position limits within {hint.format(largest)}")
-    if limits.velocity > (MAX_TRAVEL_SPEED if slides else MAX_TURN_SPEED):
-        hint = "10 m/s, got {:g} m/s: is the unit mm/s?" if slides else "100 rad/s, got {:g} rad/s: is it in deg/s?"
-        raise joint.error(f"expected a velocity limit of at most {hint.format(limits.velocity)}")

@@ -1,9 +1,11 @@
 """Robot from a URDF: joint axes and link bodies at the zero configuration, with nothing of the file lost."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
+from typing import Final
 
 from cellplan.errors import CellplanError
 from cellplan.geometry.transforms import Array
@@ -22,7 +24,10 @@ from cellplan.io.robots.urdf.tree import (
     links_in_order,
     zero_configuration,
 )
+from cellplan.io.robots.urdf.xacro import XacroSettings
 from cellplan.model.robot import FollowerJoint, Joint, JointKind, Link, RobotModel
+
+PLAIN_NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +40,8 @@ class UrdfOptions:
         limits: Limits by joint name; they tighten the URDF's or stand in for missing ones.
         locked: Position in [rad] or [m] of joints that are held still, by name.
         lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where it was not written.
-        within: Folders that its meshes must lie in; None for all.
+        within: Folders that its meshes and the files that it includes must lie in; None for all.
+        xacro_args: Values of the arguments of a xacro file, by name.
     """
 
     flange: str | None = None
@@ -44,6 +50,12 @@ class UrdfOptions:
     locked: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     lock_units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     within: AllowedFolders | None = None
+    xacro_args: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def xacro(self) -> XacroSettings:
+        """What a xacro file needs to be expanded."""
+        return XacroSettings(arguments=self.xacro_args, package_dirs=self.package_dirs, within=self.within)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,11 +65,13 @@ class UrdfRobot:
     Attributes:
         model: The model.
         mesh_files: Mesh files, each once.
+        included: Files that a xacro file includes, each once.
         remarks: What was read over, one line for each kind.
     """
 
     model: RobotModel
     mesh_files: tuple[Path, ...]
+    included: tuple[Path, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
@@ -80,11 +94,12 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         InputError: With file and line, for anything that cannot be taken over faithfully.
     """
     options = options or UrdfOptions()
-    document = read_document(path)
+    document = read_document(path, options.xacro)
     tree = build_tree(document)
     _require_lock_units(document, options.lock_units)
     flange = choose_flange(tree, options.flange)
     roles = assign_roles(tree, flange, options.locked)
+    _require_plain_names(roles)
     _require_known_limits(document, roles, options.limits)
     configuration = zero_configuration(tree, roles)
     shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
@@ -102,7 +117,14 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         ),
     )
     _require_complete(document, roles, model)
-    return UrdfRobot(model=model, mesh_files=tuple(shelf.files), remarks=shelf.remarks.lines)
+    return UrdfRobot(model=model, mesh_files=tuple(shelf.files), included=document.included, remarks=(*document.remarks, *shelf.remarks.lines))
+
+
+def _require_plain_names(roles: Roles) -> None:
+    """Joints that are driven head columns of tables and are keys of cells."""
+    for joint in roles.driven:
+        if not PLAIN_NAME.fullmatch(joint.name):
+            raise joint.error("is driven: expected a name of 1 to 60 letters, digits, '_', '-' or '.', got another one")
 
 
 def _require_known_limits(document: UrdfDocument, roles: Roles, limits: Mapping[str, StatedLimits]) -> None:
