@@ -238,8 +238,12 @@ class RobotEntry(Entry):
         joints: set[str] = set()
         for key, position in self.locked.items():
             if (key == OTHERS) != (position == "zero"):
-                expected = "zero" if key == OTHERS else "a number"
-                raise rule(f"expected {expected}, got {position}", f"locked.{key}")
+                text = (
+                    f"zero, got {position:g}"
+                    if key == OTHERS
+                    else "a number, got zero: only others may be zero in words"
+                )
+                raise rule(f"expected {text}", f"locked.{key}")
             joint, _, unit = key.rpartition("_")
             if key != OTHERS and unit not in {"deg", "mm"}:
                 raise rule("expected a joint name with its unit, such as finger_mm or flap_deg", f"locked.{key}")

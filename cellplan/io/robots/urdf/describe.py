@@ -31,6 +31,7 @@ from cellplan.model.robot_description import (
 TOOL_SIDE: Final = re.compile(r"(^|_)(tool\d*|flange|tcp|eef?|end_?effector)($|_)", re.IGNORECASE)
 NAMED_LOCKS: Final = 12  # more locked joints than these are locked together
 BEYOND_NAME: Final = re.compile(r"[^A-Za-z0-9_-]+")
+LONGEST_NAME: Final = 40  # characters of the name of a robot in a cell
 
 
 def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescription:
@@ -176,5 +177,5 @@ def _cell_lines(
         entry["locked"] = lock_positions(structure.loose, {}) if are_few else {OTHERS: "zero"}
     if lacking:
         entry["limits"] = limits_to_state(lacking)
-    name = BEYOND_NAME.sub("_", structure.tree.document.name)
+    name = BEYOND_NAME.sub("_", structure.tree.document.name)[:LONGEST_NAME]
     return with_blanks(cell_lines(name, entry))

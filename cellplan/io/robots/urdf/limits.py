@@ -117,9 +117,14 @@ def _lacking(joint: UrdfJoint, cell: StatedLimits) -> Lacking:
     limits, unit = tightest(_own(joint), cell), unit_of(joint).name
     ends = [] if cell.wraps else [name for name in ("lower", "upper") if getattr(limits, name) is None]
     keys = [f"{name}_{unit}" for name in ends] + ([f"velocity_{unit}_s"] if limits.velocity is None else [])
-    reasons = ["is continuous" if joint.kind == "continuous" else _stated(joint, "lower", "upper")] if ends else []
+    reasons = [_range_reason(joint)] if ends else []
     reasons += [_stated(joint, "velocity")] if limits.velocity is None else []
     return Lacking(joint=joint, keys=tuple(keys), reason=" and ".join(dict.fromkeys(reasons)))
+
+
+def _range_reason(joint: UrdfJoint) -> str:
+    """Why a joint has no range."""
+    return "is continuous" if joint.kind == "continuous" else _stated(joint, "lower", "upper")
 
 
 def _stated(joint: UrdfJoint, *names: str) -> str:
