@@ -129,7 +129,10 @@ def _package_places(name: str, folder: Path, *, package_dirs: tuple[Path, ...]) 
     if not plain:
         return [root / package for root in roots], "names no package, looked up without one"
     places = [
-        place for root in roots for place in (root / package / plain, root / plain) if _fits(root, place, package, plain)
+        place
+        for root in roots
+        for place in (root / package / plain, root / plain)
+        if _fits(root, place, package, plain)
     ]
     is_usual = not name.startswith("/") and rest == plain
     return list(dict.fromkeys(places)), None if is_usual else "has too many slashes, read as package://NAME/path"
