@@ -18,10 +18,13 @@ from cellplan.io.input.findings import Finding, KeyPath, shown
 from cellplan.io.robots.bundled import load_bundled_table
 from cellplan.io.robots.joint_table import MESH_UNITS, RobotTable, load_robot_table
 from cellplan.io.robots.rules import limits_in_si, tightened
+from cellplan.io.robots.urdf.gripper import GripperState
 from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot, load_urdf
+from cellplan.io.robots.urdf.srdf import Srdf, read_srdf
+from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import CsvEntry
-from cellplan.io.schema.units import Deg, Mm
+from cellplan.io.schema.units import Deg, Mm, si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import SampledPath, TimedPath
@@ -104,6 +107,19 @@ class Sources:
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))
 
+    def srdf(self, name: str, written: str) -> Srdf | None:
+        """SRDF of a robot; None after a finding."""
+        place = self._file(written, ("robots", name, "srdf"))
+        if place is None:
+            return None
+        try:
+            srdf = in_child(read_srdf, place, guard=Guard(file=written, worker="the SRDF reader"))
+            self.inputs[written] = digest_of_file(place, file=written)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return srdf
+
     def _read_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
         """Mesh in [m]; None after a finding."""
         place = self._file(written, path)
@@ -128,7 +144,7 @@ class Sources:
 
     def _only_for_urdf(self, name: str, entry: RobotEntry) -> Iterator[Finding]:
         """Keys that say something about a URDF."""
-        for key in ("package_dirs", "flange", "locked"):
+        for key in ("package_dirs", "flange", "locked", "srdf", "gripper"):
             if getattr(entry, key):
                 yield self._document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
 
@@ -172,6 +188,7 @@ class Sources:
             locked=dict(_locked_in_si(entry)),
             lock_units={joint: unit for joint, _, unit in (key.rpartition("_") for key in entry.locked)},
             within=self._folders,
+            gripper=_gripper_state(entry.gripper),
         )
         try:
             robot = _read_urdf(self._urdfs, entry.model, place, options=options)
@@ -204,11 +221,18 @@ class Sources:
 def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, options: UrdfOptions) -> UrdfRobot:
     """Robot of a URDF; robots that say the same of the same file share one."""
     locked = _items(options.locked), _items(options.lock_units)
-    key = (written, place, options.flange, options.package_dirs, _items(options.limits), locked)
+    key = (written, place, options.flange, options.package_dirs, _items(options.limits), locked, options.gripper)
     if key not in known:
         guard = Guard(file=written, worker="the URDF reader")
         known[key] = in_child(as_here(load_urdf), place, options, guard=guard)
     return known[key]
+
+
+def _gripper_state(entry: GripperEntry | None) -> GripperState | None:
+    """How far a gripper is open; None where the cell does not say it."""
+    if entry is None or (entry.opening_mm is None and entry.angle_deg is None):
+        return None
+    return GripperState(joints=entry.joints, opening=si_or_none(entry.opening_mm), angle=si_or_none(entry.angle_deg))
 
 
 def _items(table: Mapping[str, Hashable]) -> Hashable:

@@ -11,6 +11,7 @@ from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.robots.limits import StatedLimits
 from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_document
+from cellplan.io.robots.urdf.gripper import GripperState, gripper_locks, require_opposed
 from cellplan.io.robots.urdf.limits import joint_range
 from cellplan.io.robots.urdf.tree import (
     Roles,
@@ -36,6 +37,7 @@ class UrdfOptions:
         locked: Position in [rad] or [m] of joints that are held still, by name.
         lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where it was not written.
         within: Folders that its meshes must lie in; None for all.
+        gripper: How far its gripper is open; None to leave its joints to ``locked``.
     """
 
     flange: str | None = None
@@ -44,6 +46,7 @@ class UrdfOptions:
     locked: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     lock_units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     within: AllowedFolders | None = None
+    gripper: GripperState | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,7 +80,8 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     tree = build_tree(document)
     _require_lock_units(document, options.lock_units)
     flange = choose_flange(tree, options.flange)
-    roles = assign_roles(tree, flange, options.locked)
+    held = gripper_locks(tree, flange, options.gripper, options.locked)
+    roles = assign_roles(tree, flange, {**options.locked, **held})
     _require_known_limits(document, roles, options.limits)
     configuration = zero_configuration(tree, roles)
     shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
@@ -95,6 +99,7 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         ),
     )
     _require_complete(document, roles, model)
+    require_opposed(tree, options.gripper, locks=held, configuration=configuration, bodies=model.bodies)
     return UrdfRobot(model=model, mesh_files=tuple(shelf.files))
 
 
