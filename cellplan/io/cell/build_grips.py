@@ -3,12 +3,13 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
+from cellplan.geometry.shapes import Mesh
 from cellplan.io.cell.build_mounting import attachment_names
 from cellplan.io.input.findings import Finding, unknown_name
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.robot import RobotModel
+from cellplan.model.robot import Body, RobotModel
 
 TOOL: Final = "tool"
 
@@ -20,10 +21,13 @@ def tool_names(entry: RobotEntry) -> tuple[str, ...]:
 
 
 def gripper_bodies(entry: RobotEntry, model: RobotModel) -> tuple[str, ...]:
-    """Names of the link bodies that may work on the part as those of a tool do, in the order of the model."""
+    """Names of the link bodies that may work on the part as those of a tool do, in the order of the model.
+
+    Those with open meshes never do: how deep they are in the part cannot be judged.
+    """
     if entry.gripper is None:
         return ()
-    rigid = [body.name for body in model.bodies if body.link == model.flange_link]
+    rigid = [body.name for body in model.bodies if body.link == model.flange_link and not _is_leaky(body)]
     if entry.gripper.bodies is None:
         return tuple(rigid)
     meant = {body.name for word in entry.gripper.bodies for body in model.bodies_named(word)}
@@ -49,6 +53,9 @@ def grip_findings(valid: ValidEntries, models: Mapping[str, RobotModel], documen
             if word not in known:
                 text = unknown_name("a link body that is rigid with the flange", word, known)
                 yield document.finding(("robots", name, "gripper", "bodies", index), text)
+            elif any(map(_is_leaky, model.bodies_named(word))):
+                text = f"expected closed meshes, got open edges of '{word}': its depth in the part cannot be judged"
+                yield document.finding(("robots", name, "gripper", "bodies", index), text)
     for number, grasp in enumerate(valid.part.held_by if valid.part is not None else ()):
         if grasp.robot not in models:
             continue
@@ -57,6 +64,11 @@ def grip_findings(valid: ValidEntries, models: Mapping[str, RobotModel], documen
             if _plain(word, grasp.robot) not in names:
                 text = unknown_name(f"a body of '{grasp.robot}' that is rigid with its flange", word, names)
                 yield document.finding(("part", "held_by", number, "grip_bodies", index), text)
+
+
+def _is_leaky(body: Body) -> bool:
+    """Whether the mesh of a link is not closed."""
+    return isinstance(body.shape, Mesh) and body.shape.is_leaky
 
 
 def _plain(word: str, robot: str) -> str:

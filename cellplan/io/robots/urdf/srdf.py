@@ -91,10 +91,12 @@ def disabled_bodies(srdf: Srdf, model: RobotModel) -> tuple[tuple[str, str, str]
         raise InputError(f"{srdf.file}: expected the SRDF of '{model.name}', got one none of whose links it has")
     found = []
     for pair in srdf.pairs:
+        if pair.links[0] == pair.links[1]:
+            continue
         first, second = ([body.name for body in model.bodies if body.link_name == link] for link in pair.links)
         why = f"as {shown(pair.reason)}" if pair.reason else "without a reason"
         reason = f"disabled in {srdf.file} {why}"
-        found += [(one, other, reason) for one in first for other in second if one != other]
+        found += [(one, other, reason) for one in first for other in second]
     return tuple(found)
 
 
