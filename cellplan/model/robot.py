@@ -121,6 +121,7 @@ class Body:
         shape: The solid, in its own frame.
         X_BS: Pose of the shape's frame in B at the reference configuration (for tools: in F; for parts: in P).
         accuracy: How far the real link may stick out of it in [m]; None for what the robot states for all its bodies.
+        link_name: The link that it belongs to as the robot's file names it; None for bodies that a cell adds.
     """
 
     name: str
@@ -128,6 +129,7 @@ class Body:
     shape: Solid
     X_BS: Array
     accuracy: float | None = None
+    link_name: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,6 +175,7 @@ class RobotModel:
         flange_link: Index of the joint that carries the flange.
         X_BF: Flange (mechanical interface) in B at the reference configuration, z out of the flange.
         bodies: Link bodies.
+        disabled: Pairs of link bodies, by name, that its SRDF leaves out of collision checks, with the reason.
     """
 
     name: str
@@ -185,6 +188,7 @@ class RobotModel:
     links: tuple[Link, ...] = ()
     body_accuracy: BodyAccuracy | None = None
     payload: Payload | None = None
+    disabled: tuple[tuple[str, str, str], ...] = ()
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""
@@ -201,6 +205,11 @@ class RobotModel:
         if body.accuracy is not None or self.body_accuracy is None:
             return body.accuracy
         return self.body_accuracy.distance
+
+    def bodies_named(self, name: str) -> tuple[Body, ...]:
+        """All bodies of a link of the robot's file, or else the body that reports show under a name."""
+        of_link = tuple(body for body in self.bodies if body.link_name == name)
+        return of_link or tuple(body for body in self.bodies if body.name == name)
 
     @property
     def axes(self) -> tuple[Joint | FollowerJoint, ...]:

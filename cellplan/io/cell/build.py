@@ -1,17 +1,18 @@
 """Conversion of the entries of a cell file, in millimetres and degrees, to the model in metres and radians."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.cell.build_accelerations import acceleration_rule, controller_cycle
+from cellplan.io.cell.build_grips import grip_bodies, gripper_bodies
 from cellplan.io.cell.build_mounting import build_attachments, build_pedestal, floor_height_mm
 from cellplan.io.cell.rules import needs_surface
 from cellplan.io.robots.rules import home_configuration, start_posture
 from cellplan.io.schema import CellDocument
-from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry
+from cellplan.io.schema.cell import ChecksEntry, MotionEntry
 from cellplan.io.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
 from cellplan.io.schema.robot import ToolEntry
 from cellplan.io.schema.shapes import ObstacleEntry
@@ -85,6 +86,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         controller_cycle=controller_cycle(entry, document),
         attachments=build_attachments(entry.attachments, model, read_mesh),
         pedestal=build_pedestal(entry, document.environment),
+        gripper=gripper_bodies(entry, model),
     )
 
 
@@ -107,8 +109,9 @@ def _tool(entry: ToolEntry, read_mesh: MeshReader) -> Tool:
     )
 
 
-def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
-    """The workpiece."""
+def build_part(document: CellDocument, models: Mapping[str, RobotModel], read_mesh: MeshReader) -> Part:
+    """The workpiece, held by robots with their models."""
+    entry = document.part
     shape, X_PS = centred_solid(entry.geometry, read_mesh)
     return Part(
         shape=shape,
@@ -119,6 +122,7 @@ def build_part(entry: PartEntry, read_mesh: MeshReader) -> Part:
                 X_PT=pose_from_entry(grasp.at),
                 axes=_axis_numbers(grasp.axes),
                 depth=grasp.depth_mm.si,
+                bodies=grip_bodies(grasp.grip_bodies, grasp.robot, document.robots[grasp.robot], models[grasp.robot]),
             )
             for grasp in entry.held_by
         ),

@@ -18,8 +18,10 @@ from cellplan.io.cell.build import (
     resolved_document,
 )
 from cellplan.io.cell.build_accelerations import acceleration_findings
+from cellplan.io.cell.build_grips import grip_findings, tool_names
 from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings
 from cellplan.io.cell.build_solver import build_solver
+from cellplan.io.cell.build_srdf import apply_srdfs
 from cellplan.io.cell.changes import changed, plain_values
 from cellplan.io.cell.referenced_files import Sources
 from cellplan.io.cell.rules import rule_findings
@@ -106,10 +108,11 @@ def _read(source: CellFile) -> Cell:
     allowed = (*source.allow_dirs, *user_folders(source.folder))
     sources = Sources(document, AllowedFolders(folder=source.folder, allowed=allowed))
     sources.inputs[source.name] = document.digest
-    models = _models(valid, document, sources)
+    valid, models = apply_srdfs(valid, _models(valid, document, sources), sources, document)
     for name, model in models.items():
         findings += robot_findings(name, valid.robots[name], model, document)
         findings += mounting_findings(name, model, valid, document)
+    findings += grip_findings(valid, models, document)
     findings += acceleration_findings(valid, models, document)
     findings += _unknown_bodies(valid, models, document)
     findings += accuracy_findings(valid, models, document)
@@ -150,11 +153,8 @@ def _unknown_bodies(valid: ValidEntries, models: Mapping[str, RobotModel], docum
         return
     known = {"part", *valid.names["environment"]}
     for name, model in models.items():
-        tool = valid.robots[name].tool
-        count = len(tool.bodies) + (tool.geometry is not None)
         known |= {f"{name}/{body.name}" for body in model.bodies}
-        known |= {f"{name}/{body}" for body in mounted_names(valid.robots[name])}
-        known |= {f"{name}/tool" if number == 1 else f"{name}/tool_{number}" for number in range(1, count + 1)}
+        known |= {f"{name}/{body}" for body in (*mounted_names(valid.robots[name]), *tool_names(valid.robots[name]))}
     for index, pair in enumerate(valid.checks.exclude):
         for side, body in enumerate(pair.bodies):
             if body not in known:
@@ -228,7 +228,7 @@ def _cell(
     cell = Cell(
         name=whole.name,
         robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
-        part=build_part(whole.part, mesh),
+        part=build_part(whole, models, mesh),
         tasks=tuple(build_task(name, whole, targets.__getitem__, origin) for name in whole.tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),
         motion=build_motion(whole.motion),

@@ -18,11 +18,14 @@ from cellplan.io.input.findings import Finding, KeyPath, key_text, shown
 from cellplan.io.robots.bundled import load_bundled_table
 from cellplan.io.robots.joint_table import RobotTable, load_robot_table
 from cellplan.io.robots.rules import limits_in_si, tightened
+from cellplan.io.robots.urdf.gripper import GripperState
 from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot, load_urdf
+from cellplan.io.robots.urdf.srdf import Srdf, read_srdf
 from cellplan.io.robots.urdf.xacro import XACRO_SUFFIX
+from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import CsvEntry
-from cellplan.io.schema.units import Deg
+from cellplan.io.schema.units import Deg, si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import SampledPath, TimedPath
@@ -107,6 +110,19 @@ class Sources:
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))
 
+    def srdf(self, name: str, written: str) -> Srdf | None:
+        """SRDF of a robot; None after a finding."""
+        place = self._file(written, ("robots", name, "srdf"))
+        if place is None:
+            return None
+        try:
+            srdf = in_child(read_srdf, place, guard=Guard(file=written, worker="the SRDF reader"))
+            self.inputs[written] = digest_of_file(place, file=written)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return srdf
+
     def _read_mesh(self, written: str, unit: str | None, path: KeyPath) -> Mesh | None:
         """Mesh in [m]; None after a finding."""
         place = self._file(written, path)
@@ -131,7 +147,7 @@ class Sources:
 
     def _only_for_urdf(self, name: str, entry: RobotEntry) -> Iterator[Finding]:
         """Keys that say something about a URDF."""
-        for key in ("package_dirs", "xacro_args", "flange", "locked"):
+        for key in ("package_dirs", "xacro_args", "flange", "locked", "srdf", "gripper"):
             if getattr(entry, key):
                 yield self._document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
 
@@ -177,6 +193,7 @@ class Sources:
             locks_others=entry.locks_others,
             within=self._folders,
             xacro_args={key: _argument_text(value) for key, value in entry.xacro_args.items()},
+            gripper=_gripper_state(entry.gripper),
         )
         if entry.xacro_args and place.suffix.lower() != XACRO_SUFFIX:
             text = f"unexpected key, it applies to a file whose name ends in {XACRO_SUFFIX} only"
@@ -212,7 +229,7 @@ class Sources:
 
 def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, options: UrdfOptions) -> UrdfRobot:
     """Robot of a URDF; robots that say the same of the same file share one."""
-    locked = _items(options.locked), _items(options.lock_units), options.locks_others
+    locked = _items(options.locked), _items(options.lock_units), options.locks_others, options.gripper
     limits, arguments = _items(options.limits), _items(options.xacro_args)
     key = (written, place, options.flange, options.package_dirs, limits, locked, arguments)
     if key not in known:
@@ -224,6 +241,13 @@ def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, o
 def _argument_text(value: str | float) -> str:
     """An argument of a xacro file as its text says it."""
     return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _gripper_state(entry: GripperEntry | None) -> GripperState | None:
+    """How far a gripper is open; None where the cell does not say it."""
+    if entry is None or (entry.opening_mm is None and entry.angle_deg is None):
+        return None
+    return GripperState(joints=entry.joints, opening=si_or_none(entry.opening_mm), angle=si_or_none(entry.angle_deg))
 
 
 def _items(table: Mapping[str, Hashable]) -> Hashable:

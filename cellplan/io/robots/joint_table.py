@@ -141,7 +141,8 @@ def _bodies(table: RobotTableDocument, meshes: _Meshes) -> Iterator[Body]:
         taken.add(name)
         shape, X_BS = link_solid(entry, partial(meshes.known, index=index))
         accuracy = si_or_none(entry.accuracy_mm)
-        yield Body(name=name, link=links[entry.link], shape=shape, X_BS=X_BS, accuracy=accuracy)
+        link = links[entry.link]
+        yield Body(name=name, link=link, shape=shape, X_BS=X_BS, accuracy=accuracy, link_name=entry.link)
 
 
 def _free_name(link: str, taken: set[str]) -> str:

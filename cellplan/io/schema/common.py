@@ -79,6 +79,13 @@ def require_one(entry: BaseModel, names: Iterable[str]) -> None:
         raise rule(f"expected exactly one of the keys {', '.join(names)}, got {' and '.join(given) or 'none'}")
 
 
+def require_each_once(words: tuple[str, ...], key: str) -> None:
+    """Refuse a list that names something twice."""
+    for index, word in enumerate(words):
+        if word in words[:index]:
+            raise rule(f"expected each word once, got '{word}' twice", f"{key}[{index}]")
+
+
 def by_kind(words: str, **kinds: type | tuple[type, ...]) -> Discriminator:
     """Choice by the kind of value: a text takes the branch tagged ``<words>``, others the branch tagged by kind.
 

@@ -6,6 +6,7 @@ from pydantic import Field, Tag, model_validator
 
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
 from cellplan.io.schema.common import Angle, Coordinate, Coordinates, Entry, PoseEntry, Size, Text, by_kind, rule
+from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
 from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Quantity, Within
@@ -40,14 +41,14 @@ OTHERS: Final = "others"  # key of all joints that do not lead to the flange, wh
 LOCK_WORDS: Final = "a number, or zero for the key others"
 POSTURE_WORDS: Final = "auto or a list of joint angles"
 ARGUMENT_WORDS: Final = "a text, a number, true or false"
-POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
+POSITION_WORDS: Final = "auto, the name of a posture in the SRDF, or a mapping with one key per joint (a1_deg, rail_mm)"
 
 Configuration = Annotated[
     Annotated[Literal["auto"], Tag(f"<{POSTURE_WORDS}>")] | Annotated[tuple[Angle, ...], Tag("<list>")],
     by_kind(POSTURE_WORDS, list=tuple),
 ]
 NamedConfiguration = Annotated[
-    Annotated[Literal["auto"], Tag(f"<{POSITION_WORDS}>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
+    Annotated[Text, Tag(f"<{POSITION_WORDS}>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
     by_kind(POSITION_WORDS, mapping=dict),
 ]
 XacroArgument = Annotated[
@@ -183,6 +184,14 @@ class RobotEntry(Entry):
     payload: PayloadEntry | None = Field(
         default=None, description="What it may carry; when absent what the robot's own file says."
     )
+    srdf: Text | None = Field(
+        default=None,
+        description="Path of an SRDF for a URDF: pairs of its links that are not checked against each other, and named "
+        "postures for start and home.",
+    )
+    gripper: GripperEntry | None = Field(
+        default=None, description="The gripper that a URDF brings along: how far it is open, and what may work."
+    )
     pedestal: PedestalEntry | None = Field(
         default=None,
         description="Column or box from the floor to the base; it moves with the base and is judged like any body.",
@@ -199,7 +208,8 @@ class RobotEntry(Entry):
     )
     start: NamedConfiguration | None = Field(
         default=None,
-        description="Start posture, one key per joint with its unit (a1_deg, rail_mm); excludes start_deg.",
+        description="Start posture, one key per joint with its unit (a1_deg, rail_mm), or the name of a posture in the "
+        "SRDF (STATE, or GROUP/STATE where several groups have one); excludes start_deg.",
     )
     home_deg: Configuration | None = Field(
         default=None,
@@ -208,7 +218,7 @@ class RobotEntry(Entry):
     )
     home: NamedConfiguration | None = Field(
         default=None,
-        description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes home_deg.",
+        description="The same with one key per joint with its unit (a1_deg, rail_mm), or by name; excludes home_deg.",
     )
     weights: tuple[Weight, ...] | None = Field(
         default=None,

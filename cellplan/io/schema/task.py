@@ -16,6 +16,7 @@ from cellplan.io.schema.common import (
     Vector,
     by_kind,
     one_of_keys,
+    require_each_once,
     require_one,
     rule,
 )
@@ -200,13 +201,6 @@ class ToleranceEntry(Entry):
 ToolDepth = Annotated[Mm, Within(ge=0.0, le=DEEPEST_CUT_MM)]
 StandOff = Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
-
-
-def require_each_once(words: tuple[str, ...], key: str) -> None:
-    """Refuse a list that names something twice."""
-    for index, word in enumerate(words):
-        if word in words[:index]:
-            raise rule(f"expected each word once, got '{word}' twice", f"{key}[{index}]")
 
 
 class TaskEntry(Entry):

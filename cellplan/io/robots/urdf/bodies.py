@@ -73,9 +73,9 @@ def link_bodies(tree: UrdfTree, configuration: ZeroConfiguration, shelf: MeshShe
             name = link.name if place == 0 else _free_name(link.name, taken)
             taken.add(name)
             X_BS = configuration.X_BL[link.name] @ solid.X_LS
-            bodies.append(
-                Body(name=name, link=configuration.carrier[link.name], shape=_solid(link, solid, shelf), X_BS=X_BS)
-            )
+            carrier = configuration.carrier[link.name]
+            shape = _solid(link, solid, shelf)
+            bodies.append(Body(name=name, link=carrier, shape=shape, X_BS=X_BS, link_name=link.name))
     return tuple(bodies)
 
 

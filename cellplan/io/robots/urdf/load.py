@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -12,6 +12,7 @@ from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.robots.limits import StatedLimits
 from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_document
+from cellplan.io.robots.urdf.gripper import GripperState, gripper_locks, require_opposed
 from cellplan.io.robots.urdf.limits import joint_range, lacking_error, lacking_limits
 from cellplan.io.robots.urdf.locks import loose_error, loose_joints, require_sound_locks, rest_position
 from cellplan.io.robots.urdf.tree import (
@@ -45,6 +46,7 @@ class UrdfOptions:
         lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where it was not written.
         within: Folders that its meshes and the files that it includes must lie in; None for all.
         xacro_args: Values of the arguments of a xacro file, by name.
+        gripper: How far its gripper is open; None to leave its joints to ``locked``.
     """
 
     flange: str | None = None
@@ -55,6 +57,7 @@ class UrdfOptions:
     lock_units: Mapping[str, str] = field(default_factory=dict)
     within: AllowedFolders | None = None
     xacro_args: Mapping[str, str] = field(default_factory=dict)
+    gripper: GripperState | None = None
 
     @property
     def xacro(self) -> XacroSettings:
@@ -118,7 +121,9 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     """
     options = options or UrdfOptions()
     tree = build_tree(read_document(path, options.xacro))
-    structure = urdf_structure(tree, choose_flange(tree, options.flange), options)
+    flange = choose_flange(tree, options.flange)
+    held = gripper_locks(tree, flange, options.gripper, options.locked)
+    structure = urdf_structure(tree, flange, replace(options, locked={**options.locked, **held}))
     roles, document = structure.roles, tree.document
     _require_plain_names(roles)
     _require_known_limits(document, roles, options.limits)
@@ -130,8 +135,10 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         raise errors[0] if len(errors) == 1 else InvalidFileError(errors)
     shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
     bodies = link_bodies(tree, structure.configuration, shelf)
+    model = urdf_model(structure, bodies, limits=options.limits, source=path.name)
+    require_opposed(tree, options.gripper, locks=held, configuration=structure.configuration, bodies=model.bodies)
     return UrdfRobot(
-        model=urdf_model(structure, bodies, limits=options.limits, source=path.name),
+        model=model,
         mesh_files=tuple(shelf.files),
         included=document.included,
         remarks=(*document.remarks, *shelf.remarks.lines),
