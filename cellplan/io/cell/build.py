@@ -1,6 +1,7 @@
 """Conversion of the entries of a cell file, in millimetres and degrees, to the model in metres and radians."""
 
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -9,6 +10,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.io.cell.build_accelerations import acceleration_rule, controller_cycle
 from cellplan.io.cell.build_mounting import build_attachments, build_pedestal, floor_height_mm
 from cellplan.io.cell.rules import needs_surface
+from cellplan.io.robots.build_controller import build_controller
 from cellplan.io.robots.rules import home_configuration, start_posture
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.cell import ChecksEntry, MotionEntry, PartEntry
@@ -73,9 +75,10 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
     at_work = {task.robot for task in document.tasks.values()} | {grasp.robot for grasp in document.part.held_by}
     if name not in at_work and entry.home_deg is None and entry.home is None:
         home = start
+    controller = model.controller or build_controller(entry.controller, model.joints)
     return Robot(
         name=name,
-        model=model,
+        model=replace(model, controller=controller),
         X_WB=pose_from_entry(entry.base),
         tool=_tool(entry.tool, read_mesh),
         start=start,

@@ -6,6 +6,7 @@ from pydantic import Field, Tag, model_validator
 
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
 from cellplan.io.schema.common import Angle, Coordinate, Coordinates, Entry, PoseEntry, Size, Text, by_kind, rule
+from cellplan.io.schema.controller import ControllerEntry
 from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
 from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Within
@@ -197,6 +198,10 @@ class RobotEntry(Entry):
         default=None,
         description="Accelerations that its joints are judged against; a stated limit of a joint counts first. "
         "The cell's when absent.",
+    )
+    controller: ControllerEntry | None = Field(
+        default=None,
+        description="How its controller counts the joints; only for a robot whose own file does not state it.",
     )
     controller_cycle_ms: CycleTime | None = Field(
         default=None, description="Cycle of its controller, over which jerk is taken; the motion's when absent."
