@@ -16,6 +16,7 @@ from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.findings import Finding, KeyPath, raise_findings, shown, unknown_name
+from cellplan.io.robots.build_controller import build_controller, controller_findings
 from cellplan.io.robots.build_payload import build_payload, payload_findings
 from cellplan.io.robots.limits import RATES
 from cellplan.io.schema import RobotTableDocument
@@ -90,6 +91,8 @@ def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Findin
             yield document.finding((*place, index, "name"), text)
     turning = tuple(name for name, joint in table.joints.items() if joint.type == "revolute")
     yield from payload_findings(("payload",), table.payload, turning, document)
+    turns = {name: joint.type == "revolute" for name, joint in table.joints.items()}
+    yield from controller_findings(("controller",), table.controller, turns, document)
     named = [(index, body.name) for index, body in enumerate(table.solids) if body.name is not None]
     for order, (index, name) in enumerate(named):
         if name in {other for _, other in named[:order]}:
@@ -157,15 +160,17 @@ def _free_name(link: str, taken: set[str]) -> str:
 
 def _model(table: RobotTableDocument, bodies: tuple[Body, ...]) -> RobotModel:
     """The robot in [m] and [rad]."""
+    joints = tuple(_joint(name, entry, index - 1) for index, (name, entry) in enumerate(table.joints.items()))
     return RobotModel(
         name=table.robot,
         source=table.source,
-        joints=tuple(_joint(name, entry, index - 1) for index, (name, entry) in enumerate(table.joints.items())),
+        joints=joints,
         flange_link=len(table.joints) - 1,
         X_BF=pose_from_entry(table.flange),
         bodies=bodies,
         body_accuracy=_body_accuracy(table),
         payload=build_payload(table.payload),
+        controller=build_controller(table.controller, joints),
         links=tuple(
             Link(name=name, index=index - 1, X_BL=np.eye(4)) for index, name in enumerate((FOOT, *table.joints))
         ),

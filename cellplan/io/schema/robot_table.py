@@ -21,6 +21,7 @@ from cellplan.io.schema.common import (
     require_one,
     rule,
 )
+from cellplan.io.schema.controller import ControllerEntry
 from cellplan.io.schema.robot import (
     AXIS_LIMIT,
     SLIDING_LIMITS,
@@ -186,6 +187,11 @@ class RobotTableDocument(Entry):
     )
     payload: PayloadEntry | None = Field(
         default=None, description="What the robot may carry; the report says so when absent."
+    )
+    controller: ControllerEntry | None = Field(
+        default=None,
+        description="How its controller counts the joints; when absent the zero of the model is taken as the "
+        "controller's, and the report says so. Without keys: known to be the same.",
     )
 
     @property
