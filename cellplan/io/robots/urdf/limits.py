@@ -60,8 +60,8 @@ def _missing_positions(joint: UrdfJoint) -> str:
     """What to write in the cell when the URDF has no position limits."""
     unit = "mm" if joint.kind == "prismatic" else "deg"
     bounds = f"`limits: {{{joint.name}: {{lower_{unit}: …, upper_{unit}: …}}}}`"
-    if joint.limit.position_slip:
-        return f"{joint.limit.position_slip}: state {bounds} of the robot in the cell"
+    if joint.limit.position_fault:
+        return f"{joint.limit.position_fault}: state {bounds} of the robot in the cell"
     if joint.kind == "continuous":
         return (
             f"is continuous: give it {bounds}, or `limits: {{{joint.name}: {{wrap: true}}}}` to let it turn without end"
@@ -74,8 +74,8 @@ def _velocity(joint: UrdfJoint, limits: StatedLimits) -> float:
     if limits.velocity is None:
         unit = "mm_s" if joint.kind == "prismatic" else "deg_s"
         cure = f"`limits: {{{joint.name}: {{velocity_{unit}: …}}}}`"
-        if joint.limit.velocity_slip:
-            raise joint.error(f"{joint.limit.velocity_slip}: state {cure} of the robot in the cell")
+        if joint.limit.velocity_fault:
+            raise joint.error(f"{joint.limit.velocity_fault}: state {cure} of the robot in the cell")
         raise joint.error(f"has no positive velocity limit in the URDF: give it {cure}")
     if not limits.velocity > 0.0:
         raise joint.error(f"expected a positive velocity limit, got {in_user_unit(joint, limits.velocity, '/s')}")
