@@ -70,7 +70,7 @@ MIMIC = '<mimic joint="{}"/>'
             ],
             "r.urdf: expected at most 64 movable joints between 'l0' and 'l65', got 65",
         ),
-        (['<link name="base"/>'], "r.urdf: flange: expected the name of a link, as it could be any of: none"),
+        (['<link name="base"/>'], "r.urdf: expected a joint that moves a link, got none"),
         (
             ['<link name="base"/><link name="tool0"/>', joint("f", "base", "tool0", "", kind="fixed")],
             "r.urdf: expected a movable joint between 'base' and 'tool0', got none",
