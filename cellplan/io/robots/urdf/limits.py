@@ -64,7 +64,7 @@ def lacking_error(lacking: Sequence[Lacking]) -> InputError:
     if any(each.joint.kind == "continuous" and len(each.keys) > 1 for each in lacking):
         cure += "; a continuous joint turns without end with `wrap: true` in place of its lower and upper limit"
     if len(lacking) == 1:
-        return lacking[0].joint.error(f"lacks limits, as it {lacking[0].reason}: {cure}")
+        return lacking[0].joint.error(f"lacks limits ({lacking[0].reason}): {cure}")
     why = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
     return lacking[0].joint.element.error(f"{len(lacking)} joints lack limits ({why}): {cure}")
 

@@ -238,7 +238,7 @@ def test_locks_and_limits_are_asked_for_at_once(tmp_path: Path) -> None:
 
     locks, limits = str(caught.value).splitlines()
     assert f"`locked: {{{HELD}}}`" in locks
-    assert "r.urdf:4: joint 'a1': lacks limits, as it states no limits: " in limits
+    assert "r.urdf:4: joint 'a1': lacks limits (states no limits): " in limits
 
 
 def test_a_written_cell_keeps_its_locks_and_single_ones_can_be_changed(load: Load, tmp_path: Path) -> None:

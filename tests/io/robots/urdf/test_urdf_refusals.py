@@ -141,12 +141,12 @@ MIMIC = '<mimic joint="{}"/>'
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit velocity="3"/>', kind="prismatic")],
-            "r.urdf:4: joint 'a1': lacks limits, as it states no lower and upper limit: "
+            "r.urdf:4: joint 'a1': lacks limits (states no lower and upper limit): "
             f"{STATE}`limits: {{a1: {{lower_mm: …, upper_mm: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="-1" upper="1" velocity="0"/>')],
-            "r.urdf:4: joint 'a1': lacks limits, as it states velocity=\"0\": "
+            "r.urdf:4: joint 'a1': lacks limits (states velocity=\"0\"): "
             f"{STATE}`limits: {{a1: {{velocity_deg_s: …}}}}`",
         ),
         (
@@ -155,7 +155,7 @@ MIMIC = '<mimic joint="{}"/>'
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", LIMIT, kind="continuous")],
-            "r.urdf:4: joint 'a1': lacks limits, as it is continuous: "
+            "r.urdf:4: joint 'a1': lacks limits (is continuous): "
             f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`; "
             "a continuous joint turns without end with `wrap: true` in place of its lower and upper limit",
         ),
@@ -227,7 +227,7 @@ MIMIC = '<mimic joint="{}"/>'
 )
 def test_unsound_robots_are_refused_with_line_and_cure(tmp_path: Path, lines: list[str], message: str | None) -> None:
     message = message or (
-        "r.urdf:4: joint 'a1': lacks limits, as it states no limits: "
+        "r.urdf:4: joint 'a1': lacks limits (states no limits): "
         f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …, velocity_deg_s: …}}}}`"
     )
     assert refused(tmp_path, *lines) == message
