@@ -136,7 +136,7 @@ MIMIC = '<mimic joint="{}"/>'
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="0" velocity="3"/>')],
-            'r.urdf:4: joint \'a1\': lacks limits, as it states lower="0" upper="0": '
+            'r.urdf:4: joint \'a1\': lacks limits (states lower="0" upper="0"): '
             f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`",
         ),
         (
