@@ -60,11 +60,11 @@ def lacking_error(lacking: Sequence[Lacking]) -> InputError:
     for each in lacking:
         reasons.setdefault(each.reason, []).append(each.joint.name)
     limits = with_blanks(flow_text(limits_to_state(lacking)))
-    cure = f"state them in the cell, with a number for each {BLANK}: `limits: {limits}`"
+    cure = f"state limits in the cell, with a number for each {BLANK}: `limits: {limits}`"
     if any(each.joint.kind == "continuous" and len(each.keys) > 1 for each in lacking):
         cure += "; a continuous joint turns without end with `wrap: true` in place of its lower and upper limit"
     if len(lacking) == 1:
-        return lacking[0].joint.error(f"lacks limits ({lacking[0].reason}): {cure}")
+        return lacking[0].joint.error(f"{lacking[0].reason}: {cure}")
     why = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
     return lacking[0].joint.element.error(f"{len(lacking)} joints lack limits ({why}): {cure}")
 

@@ -10,7 +10,7 @@ from builders.urdf_texts import ARM, LIMIT, joint, refusal, refused
 from cellplan.io.robots.limits import StatedLimits
 from cellplan.io.robots.urdf.load import UrdfOptions
 
-STATE = "state them in the cell, with a number for each …: "
+STATE = "state limits in the cell, with a number for each …: "
 MIMIC = '<mimic joint="{}"/>'
 
 
@@ -136,18 +136,17 @@ MIMIC = '<mimic joint="{}"/>'
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="0" velocity="3"/>')],
-            'r.urdf:4: joint \'a1\': lacks limits (states lower="0" upper="0"): '
+            'r.urdf:4: joint \'a1\': states lower="0" upper="0": '
             f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit velocity="3"/>', kind="prismatic")],
-            "r.urdf:4: joint 'a1': lacks limits (states no lower and upper limit): "
+            "r.urdf:4: joint 'a1': states no lower and upper limit: "
             f"{STATE}`limits: {{a1: {{lower_mm: …, upper_mm: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="-1" upper="1" velocity="0"/>')],
-            "r.urdf:4: joint 'a1': lacks limits (states velocity=\"0\"): "
-            f"{STATE}`limits: {{a1: {{velocity_deg_s: …}}}}`",
+            f"r.urdf:4: joint 'a1': states velocity=\"0\": {STATE}`limits: {{a1: {{velocity_deg_s: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="x" upper="1" velocity="0"/>')],
@@ -155,7 +154,7 @@ MIMIC = '<mimic joint="{}"/>'
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", LIMIT, kind="continuous")],
-            "r.urdf:4: joint 'a1': lacks limits (is continuous): "
+            "r.urdf:4: joint 'a1': is continuous: "
             f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`; "
             "a continuous joint turns without end with `wrap: true` in place of its lower and upper limit",
         ),
@@ -227,7 +226,7 @@ MIMIC = '<mimic joint="{}"/>'
 )
 def test_unsound_robots_are_refused_with_line_and_cure(tmp_path: Path, lines: list[str], message: str | None) -> None:
     message = message or (
-        "r.urdf:4: joint 'a1': lacks limits (states no limits): "
+        "r.urdf:4: joint 'a1': states no limits: "
         f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …, velocity_deg_s: …}}}}`"
     )
     assert refused(tmp_path, *lines) == message
