@@ -63,7 +63,7 @@ def as_written(model: RobotModel, q: Array) -> Array:
         model: The robot.
         q: Configuration in [rad] or [m], shape (n,).
     """
-    return configuration_in_si(model, _in_file_units(model, q))
+    return configuration_in_si(model, in_file_units(model, q))
 
 
 def _robot(entry: Mapping[str, Any], robot: Robot, found: Array | None) -> dict[str, Any]:
@@ -83,7 +83,7 @@ def _configuration(key: str, model: RobotModel, q: Array | None) -> dict[str, An
     as_list = all(joint.is_revolute for joint in model.joints)
     if q is None:
         return {f"{key}_deg" if as_list else key: "auto"}
-    values = _in_file_units(model, q)
+    values = in_file_units(model, q)
     return {f"{key}_deg": values} if as_list else {key: dict(zip(start_keys(model), values, strict=True))}
 
 
@@ -144,7 +144,7 @@ def _pose(entry: Mapping[str, Any], X: Array) -> dict[str, Any]:
     return {"xyz_mm": xyz_mm, "rpy_deg": rpy_deg}
 
 
-def _in_file_units(model: RobotModel, q: Array) -> list[float]:
+def in_file_units(model: RobotModel, q: Array) -> list[float]:
     """A configuration in degrees and millimetres."""
     return [
         file_number(float(value), is_revolute=joint.is_revolute) for joint, value in zip(model.joints, q, strict=True)
