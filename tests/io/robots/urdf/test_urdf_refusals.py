@@ -138,7 +138,7 @@ MIMIC = '<mimic joint="{}"/>'
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="2" upper="-1" velocity="3"/>')],
             "r.urdf:4: joint 'a1': expected 'lower' below 'upper', got 2 and -1: "
-            "state `limits: {a1: {lower_deg: …, upper_deg: …}}` of the robot in the cell",
+            f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="0" velocity="3"/>')],
@@ -167,17 +167,17 @@ MIMIC = '<mimic joint="{}"/>'
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="-170" upper="170" velocity="3"/>')],
             "r.urdf:4: joint 'a1': expected position limits within two turns, got 170 rad (is the unit degrees?): "
-            "state `limits: {a1: {lower_deg: …, upper_deg: …}}` of the robot in the cell",
+            f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="500" velocity="3"/>', kind="prismatic")],
             "r.urdf:4: joint 'a1': expected position limits within 20 m, got 500 m (is the unit mm?): "
-            "state `limits: {a1: {lower_mm: …, upper_mm: …}}` of the robot in the cell",
+            f"{STATE}`limits: {{a1: {{lower_mm: …, upper_mm: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="5" velocity="156"/>')],
             "r.urdf:4: joint 'a1': expected a velocity limit of at most 100 rad/s, got 156 rad/s (is it in deg/s?): "
-            "state `limits: {a1: {velocity_deg_s: …}}` of the robot in the cell",
+            f"{STATE}`limits: {{a1: {{velocity_deg_s: …}}}}`",
         ),
         (
             [*ARM, '<link name="f"/>', joint("g", "base", "f")],
