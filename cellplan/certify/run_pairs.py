@@ -48,4 +48,4 @@ def _tool_at_work(scene: Scene, pair: ScenePair) -> int | None:
     """The tool of a pair of which contact is allowed near the tip, by its index."""
     if pair.rule is not Rule.PROCESS:
         return None
-    return next(end for end in (pair.first, pair.second) if scene.bodies[end].kind is Kind.TOOL)
+    return next(end for end in (pair.first, pair.second) if scene.bodies[end].kind is not Kind.PART)

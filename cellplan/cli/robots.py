@@ -1,8 +1,11 @@
-"""``cellplan robots``: the bundled robots with their reach, limits and source."""
+"""``cellplan robots``: the bundled robots, or one robot's file: flanges, joints, bodies and what a cell has to add."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from cellplan.cli.options import AsJson
 from cellplan.cli.output import json_failure, say, say_json
@@ -13,21 +16,91 @@ if TYPE_CHECKING:
 SCHEMA = "cellplan.robots/1"
 
 
-def robots(as_json: AsJson = False) -> None:
-    """List the bundled robots with reach, limits and source."""
-    with json_failure(SCHEMA, desired=as_json):
-        from cellplan.io.robots.bundled import bundled_names, load_bundled
+Model = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[MODEL]", help="URDF, xacro file, joint-axis table or bundled robot to describe.", show_default=False
+    ),
+]
+PackageDirs = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--package-dir",
+        metavar="DIR",
+        help="Look up package://NAME/... of a URDF as DIR/NAME/...; may be repeated.",
+        show_default=False,
+        exists=True,
+        file_okay=False,
+    ),
+]
+XacroArgs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--xacro-arg",
+        metavar="NAME=VALUE",
+        help="Set an argument of a xacro file; may be repeated.",
+        show_default=False,
+    ),
+]
+Flange = Annotated[str | None, typer.Option("--flange", metavar="LINK", help="Take this link of a URDF as the flange.")]
 
-        records = [_record(name, load_bundled(name)) for name in bundled_names()]
+
+def robots(
+    model: Model = None,
+    flange: Flange = None,
+    package_dir: PackageDirs = None,
+    xacro_arg: XacroArgs = None,
+    as_json: AsJson = False,
+) -> None:
+    """List the bundled robots with reach, limits and source, or describe one robot.
+
+    Of one robot: the possible flanges, joints with limits, what is missing, bodies and their size, and the lines to
+    write into a cell.
+    """
+    with json_failure(SCHEMA, desired=as_json):
+        if model is None and (flange or package_dir or xacro_arg):
+            raise typer.BadParameter("expected a URDF with --flange, --package-dir and --xacro-arg")
+        arguments = dict(_argument(text) for text in xacro_arg or [])
+        records = _listed() if model is None else [_described(model, flange, package_dir or [], arguments)]
     if as_json:
         say_json({"schema": SCHEMA, "robots": records})
-    else:
+    elif model is None:
         say("\n\n".join("\n".join(_lines(record)) for record in records))
+    else:
+        from cellplan.report.text.robot_description import description_lines
+
+        say("\n".join(description_lines(records[0])))
+
+
+def _listed() -> list[dict[str, Any]]:
+    """All bundled robots."""
+    from cellplan.io.robots.bundled import bundled_names, load_bundled
+
+    return [_record(name, load_bundled(name)) for name in bundled_names()]
+
+
+def _argument(text: str) -> tuple[str, str]:
+    """Name and value of an argument of a xacro file."""
+    name, sign, value = text.partition("=")
+    if not name or not sign:
+        raise typer.BadParameter(f"--xacro-arg: expected NAME=VALUE, got '{text}'")
+    return name, value
+
+
+def _described(model: str, flange: str | None, package_dirs: list[Path], xacro_args: dict[str, str]) -> dict[str, Any]:
+    """What one robot's file says."""
+    from cellplan.io.cell.robot_file import describe_robot
+    from cellplan.kinematics.reach import arm_reach
+    from cellplan.report.record.robot_description import description_record
+
+    described = describe_robot(model, flange=flange, package_dirs=package_dirs, xacro_args=xacro_args)
+    return description_record(described, None if described.model is None else arm_reach(described.model))
 
 
 def _record(name: str, model: RobotModel) -> dict[str, Any]:
     """One robot in printed units."""
     from cellplan.kinematics.reach import arm_reach
+    from cellplan.report.record.controller import zero_record
     from cellplan.report.record.joint_limits import joint_record
 
     return {
@@ -35,6 +108,7 @@ def _record(name: str, model: RobotModel) -> dict[str, Any]:
         "source": model.source,
         "reach_mm": round(1e3 * arm_reach(model), 1),
         "bodies": len(model.bodies),
+        "zero": zero_record(model),
         "joints": [joint_record(joint) for joint in model.joints],
     }
 
@@ -47,4 +121,5 @@ def _lines(record: dict[str, Any]) -> list[str]:
     for joint in record["joints"]:
         limits, speed = limits_text(joint)
         lines.append(f"  {joint['name']:<10} {limits:<22} {speed}")
-    return lines
+    zero = record["zero"]
+    return [*lines, f"  {zero['line']}" + (f" ({zero['source']})" if zero["is_stated"] else "")]

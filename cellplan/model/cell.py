@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
@@ -13,7 +13,7 @@ from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
 from cellplan.model.joint_limits import JointLimits
-from cellplan.model.mounting import Pedestal
+from cellplan.model.mounting import Mount
 from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
@@ -65,7 +65,8 @@ class Robot:
         acceleration: Accelerations that its joints are checked against.
         controller_cycle: Cycle of its controller in [s], over which jerk is computed.
         attachments: Solids mounted on its links, their poses ``X_BS`` in B while all joints read zero.
-        pedestal: Pedestal below the base; None for a base on the floor or on an obstacle.
+        pedestal: What the base stands on, hangs from or is fixed to; None for a base on the floor or on an obstacle.
+        gripper: Names of link bodies of its model that make up a gripper, which may work on the part as a tool does.
     """
 
     name: str
@@ -78,7 +79,15 @@ class Robot:
     acceleration: AccelerationRule = USUAL_ACCELERATION
     controller_cycle: float = USUAL_CYCLE
     attachments: tuple[Body, ...] = ()
-    pedestal: Pedestal | None = None
+    pedestal: Mount | None = None
+    gripper: tuple[str, ...] = ()
+
+    @property
+    def bodies_at_work(self) -> tuple[Body, ...]:
+        """What may touch the part near the tool tip: the tool's bodies and the gripper's, with their poses in F."""
+        X_FB = inverse(self.model.X_BF)
+        own = (body for body in self.model.bodies if body.name in self.gripper)
+        return (*self.tool.bodies, *(replace(body, X_BS=X_FB @ body.X_BS) for body in own))
 
     def __repr__(self) -> str:
         """One line without arrays."""
@@ -97,13 +106,15 @@ class Grasp:
         X_PT: The holder's tool tip in the part frame.
         axes: Components of the tool's motion on the part that a further holder keeps at zero, in the order x, y, z,
             rx, ry, rz.
-        depth: By how much in [m] what is rigid with the holder's flange may reach into the part.
+        depth: By how much in [m] what grips may reach into the part.
+        bodies: Names of the bodies that grip, as reports show them; None for all that is rigid with the flange.
     """
 
     robot: str
     X_PT: Array
     axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
     depth: float = 0.002
+    bodies: tuple[str, ...] | None = None
 
     @property
     def name(self) -> str:

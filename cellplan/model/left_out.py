@@ -7,9 +7,10 @@ from typing import Final
 
 
 class LeftOutKind(StrEnum):
-    """Why less than the clearance is required of bodies that are not two links of one robot's file."""
+    """Why less than the clearance is required; links of one robot that are joined or always touch are not listed."""
 
     EXCLUDED = "excluded"  # named under checks.exclude
+    SRDF = "srdf"  # two links of one robot that its SRDF names
     GRIP = "grip"  # the part and what holds it
     MOUNTED = "mounted"  # fixed to each other
     STANDING = "standing"  # one stands on the other
@@ -21,6 +22,7 @@ class LeftOutKind(StrEnum):
 
 TITLES: Final = {
     LeftOutKind.EXCLUDED: "excluded by the cell",
+    LeftOutKind.SRDF: "disabled by the robot's SRDF",
     LeftOutKind.GRIP: "grip",
     LeftOutKind.MOUNTED: "mounted on each other",
     LeftOutKind.STANDING: "standing on each other",

@@ -8,6 +8,7 @@ import numpy as np
 
 from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import Array, is_rigid
+from cellplan.model.controller import ControllerZero
 from cellplan.model.payload import Payload
 from cellplan.model.units import DisplayUnit, joint_unit
 
@@ -121,6 +122,7 @@ class Body:
         shape: The solid, in its own frame.
         X_BS: Pose of the shape's frame in B at the reference configuration (for tools: in F; for parts: in P).
         accuracy: How far the real link may stick out of it in [m]; None for what the robot states for all its bodies.
+        link_name: The link that it belongs to as the robot's file names it; None for bodies that a cell adds.
     """
 
     name: str
@@ -128,6 +130,7 @@ class Body:
     shape: Solid
     X_BS: Array
     accuracy: float | None = None
+    link_name: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,9 +173,11 @@ class RobotModel:
         links: Links on which something can be mounted, by the names of the robot's file.
         body_accuracy: How good the link bodies are that do not say it themselves; None when it is not stated.
         payload: What it may carry; None when it is not stated.
+        controller: How its controller counts the joints; None when it is not stated.
         flange_link: Index of the joint that carries the flange.
         X_BF: Flange (mechanical interface) in B at the reference configuration, z out of the flange.
         bodies: Link bodies.
+        disabled: Pairs of link bodies, by name, that its SRDF leaves out of collision checks, with the reason.
     """
 
     name: str
@@ -185,6 +190,8 @@ class RobotModel:
     links: tuple[Link, ...] = ()
     body_accuracy: BodyAccuracy | None = None
     payload: Payload | None = None
+    disabled: tuple[tuple[str, str, str], ...] = ()
+    controller: ControllerZero | None = None
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""
@@ -201,6 +208,11 @@ class RobotModel:
         if body.accuracy is not None or self.body_accuracy is None:
             return body.accuracy
         return self.body_accuracy.distance
+
+    def bodies_named(self, name: str) -> tuple[Body, ...]:
+        """All bodies of a link of the robot's file, or else the body that reports show under a name."""
+        of_link = tuple(body for body in self.bodies if body.link_name == name)
+        return of_link or tuple(body for body in self.bodies if body.name == name)
 
     @property
     def axes(self) -> tuple[Joint | FollowerJoint, ...]:

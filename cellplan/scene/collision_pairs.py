@@ -16,7 +16,7 @@ from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody
 from cellplan.scene.grips import grip_watch
 from cellplan.scene.left_out import left_out
-from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair
+from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair, works_like_a_tool
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
 from cellplan.scene.permanent_contacts import apply_design
 
@@ -92,7 +92,8 @@ class _ContactZones:
         """The pair with the rule of its zone, if it has one."""
         other, part = sorted((pair.first, pair.second), key=lambda index: self._bodies[index].kind is Kind.PART)
         tool = self._bodies[other]
-        if self._bodies[part].kind is Kind.PART and tool.kind is Kind.TOOL and tool.robot in self._at_work:
+        is_work = tool.robot in self._at_work and works_like_a_tool(tool, self._cell)
+        if self._bodies[part].kind is Kind.PART and is_work:
             return self._at_tip(pair, other, part)
         if (grasp := grasp_of(self._bodies[pair.first], self._bodies[pair.second], self._cell)) is None:
             return pair

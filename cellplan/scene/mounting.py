@@ -71,13 +71,39 @@ def is_rigid_with_flange(body: SceneBody, cell: Cell) -> bool:
     return body.link == cell.robot(body.robot).model.flange_link
 
 
+def works_like_a_tool(body: SceneBody, cell: Cell) -> bool:
+    """Whether a body may touch the part near the tool tip while its robot works: a tool's, or a gripper's."""
+    if body.kind is not Kind.LINK or body.robot is None:
+        return body.kind is Kind.TOOL
+    names = cell.robot(body.robot).gripper
+    return body.name.removeprefix(f"{body.robot}/") in names and is_rigid_with_flange(body, cell)
+
+
 def grasp_of(a: SceneBody, b: SceneBody, cell: Cell) -> Grasp | None:
-    """The grasp that two bodies belong to: the part, and a body that is rigid with the flange of a holder."""
+    """The grasp that two bodies belong to: the part, and a body that a holder grips with."""
+    found = _held_beside(a, b, cell)
+    return None if found is None or _keeps_away(*found) else found[1]
+
+
+def keeps_out_of_grip(a: SceneBody, b: SceneBody, cell: Cell) -> bool:
+    """Whether two bodies are the part, and one that is rigid with the flange of a holder but is not to grip."""
+    found = _held_beside(a, b, cell)
+    return found is not None and _keeps_away(*found)
+
+
+def _held_beside(a: SceneBody, b: SceneBody, cell: Cell) -> tuple[SceneBody, Grasp] | None:
+    """A body that is rigid with the flange of a holder and its grasp, when the other one is the part."""
     if Kind.PART not in (a.kind, b.kind):
         return None
     other = a if b.kind is Kind.PART else b
     held = (grasp for grasp in cell.part.held_by if grasp.robot == other.robot)
-    return next(held, None) if is_rigid_with_flange(other, cell) else None
+    grasp = next(held, None) if is_rigid_with_flange(other, cell) else None
+    return None if grasp is None else (other, grasp)
+
+
+def _keeps_away(body: SceneBody, grasp: Grasp) -> bool:
+    """Whether a body is none of those that the grasp names."""
+    return grasp.bodies is not None and body.name not in grasp.bodies
 
 
 def left_out_kind(a: SceneBody, b: SceneBody) -> LeftOutKind | None:
@@ -121,6 +147,9 @@ def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Seque
     """
     for mounted, links in faults:
         body, others = bodies[mounted], [bodies[link].name for link in links]
+        outside = [bodies[link].name for link in links if keeps_out_of_grip(body, bodies[link], cell)]
+        if outside:
+            raise _outside_grip(cell, str(bodies[links[0]].robot), outside)
         more = len(others) - MAX_NAMED
         named = ", ".join(others[:MAX_NAMED])
         if more > 0:
@@ -133,6 +162,18 @@ def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Seque
             f"{where}: expected {what} clear of the links of '{robot}' beyond {beyond}, got one that touches {named} "
             f"in every configuration: {question} If contact is permitted, name the pairs under checks.exclude"
         )
+
+
+def _outside_grip(cell: Cell, robot: str, names: Sequence[str]) -> InputError:
+    """A part that touches what is rigid with the flange of its holder, but is not to grip it."""
+    number = [grasp.robot for grasp in cell.part.held_by].index(robot)
+    more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
+    where = cell.origin.at(f"part.held_by[{number}].grip_bodies")
+    return InputError(
+        f"{where}: expected a part clear of all bodies of '{robot}' that are not named, got one that touches "
+        f"{', '.join(names[:MAX_NAMED])}{more}: is the grasp right, and the gripper open far enough? If they are to "
+        "grip, name them"
+    )
 
 
 def _key(cell: Cell, body: SceneBody, robot: str) -> str:

@@ -14,7 +14,7 @@ from cellplan.model.robot import BASE
 from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody, is_ground
 from cellplan.scene.link_tree import NO_BODY, LinkTree
-from cellplan.scene.mounting import Mount, grasp_of, left_out_kind, mounted_pair
+from cellplan.scene.mounting import Mount, grasp_of, keeps_out_of_grip, left_out_kind, mounted_pair
 
 MOUNTED = (Kind.ATTACHMENT, Kind.PEDESTAL)  # bodies that the user puts on or below a robot: nothing excuses them
 
@@ -71,7 +71,7 @@ def sort_pairs(cell: Cell, bodies: Sequence[SceneBody]) -> tuple[list[ScenePair]
         InputError: An exclusion of the cell names something that is no body.
     """
     trees = {robot.name: LinkTree(robot.model) for robot in cell.robots}
-    by_user = _user_exclusions(cell, bodies)
+    by_user, by_file = _user_exclusions(cell, bodies), _disabled(cell, bodies)
     watched, excluded = [], []
     for i, j in _index_pairs(bodies):
         mounting = _mounting(bodies[i], bodies[j], cell=cell, trees=trees)
@@ -79,6 +79,8 @@ def sort_pairs(cell: Cell, bodies: Sequence[SceneBody]) -> tuple[list[ScenePair]
             excluded.append(Excluded(i, j, by_user[i, j], LeftOutKind.EXCLUDED))
         elif mounting:
             excluded.append(Excluded(i, j, mounting, left_out_kind(bodies[i], bodies[j])))
+        elif (i, j) in by_file:
+            excluded.append(Excluded(i, j, by_file[i, j], LeftOutKind.SRDF))
         else:
             watched.append(_watched(cell.checks, bodies, i, j))
     return watched, excluded
@@ -158,6 +160,17 @@ def _user_exclusions(cell: Cell, bodies: Sequence[SceneBody]) -> dict[tuple[int,
     return reasons
 
 
+def _disabled(cell: Cell, bodies: Sequence[SceneBody]) -> dict[tuple[int, int], str]:
+    """Reasons of the pairs that the SRDF of a robot leaves out, by their indices in order: links of that robot only."""
+    index = {body.name: i for i, body in enumerate(bodies) if body.kind is Kind.LINK}
+    reasons = {}
+    for robot in cell.robots:
+        for first, second, reason in robot.model.disabled:
+            i, j = sorted(index[f"{robot.name}/{name}"] for name in (first, second))
+            reasons[i, j] = reason
+    return reasons
+
+
 def _mounting(a: SceneBody, b: SceneBody, *, cell: Cell, trees: Mapping[str, LinkTree]) -> str | None:
     """Why two bodies are joined by their mounting, or None."""
     mounted = mounted_pair(a, b, (0, 0), cell)
@@ -166,7 +179,7 @@ def _mounting(a: SceneBody, b: SceneBody, *, cell: Cell, trees: Mapping[str, Lin
     if mounted is not None:
         is_first = grasp_of(a, b, cell) is cell.part.held_by[0]
         return f"holds the part: may touch, at most {MM * mounted.limit:g} mm deep" if is_first else None
-    if a.robot is None or a.robot != b.robot:
+    if a.robot is None or a.robot != b.robot or keeps_out_of_grip(a, b, cell):
         return None
     return _joined(a, b, trees[a.robot])
 

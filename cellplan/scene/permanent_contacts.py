@@ -26,6 +26,7 @@ from cellplan.scene.mounting import (
     MountedPair,
     grasp_of,
     is_of_own_file,
+    keeps_out_of_grip,
     refuse_wrong_mounting,
 )
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, near_in_chain, stands_on
@@ -37,6 +38,7 @@ CONSTANT_DISTANCE_TOL: Final = (
     1e-3  # [m] a distance that varies by less over all configurations is a matter of mounting, not of motion
 )
 CONTACT_TOL: Final = 1e-6  # [m] poses are worked out to less than that: what stands on a floor may seem to float
+FAULT_ORDER: Final = (Kind.PART, Kind.TOOL, Kind.ATTACHMENT, Kind.PEDESTAL, Kind.LINK)  # what is wrongly mounted first
 UNLIMITED_RANGE: Final = np.pi  # [rad] or [m] range sampled to either side of zero where a joint has no limit
 
 
@@ -69,6 +71,7 @@ def apply_design(
 
     - two links of its own file, with at most two joints between them or with a bar of a linkage, that touch in all of
       them: left out; else checked for contact, not for distance;
+    - a held part that touches what is rigid with the flange but is not named to grip: an error of the cell;
     - a tool or a held part that touches a link in all of them: an error of the cell, see ``refuse_wrong_mounting``;
     - a tool or a held part against a link, at most two joints away, nearer than the demanded clearance in all of them,
       or at a distance that hardly changes between them: checked for contact.
@@ -93,10 +96,11 @@ def apply_design(
             _mount_behind(design, sampled, pair, holder)
         elif sampled.always_touch(pair, holder):
             is_decided = True
-            body, link = sorted((pair.first, pair.second), key=lambda index: bodies[index].kind is Kind.LINK)
+            body, link = sorted((pair.first, pair.second), key=lambda index: FAULT_ORDER.index(bodies[index].kind))
             faults.setdefault((body, holder), []).append(link)
         else:
-            is_decided = near_in_chain(pair, sampled.views[holder], cell=cell)
+            is_near = near_in_chain(pair, sampled.views[holder], cell=cell)
+            is_decided = is_near and not keeps_out_of_grip(a, b, cell)
             if is_decided:
                 design.kept.append(_relaxed(pair, sampled, holder))
         if not is_decided:
@@ -210,7 +214,8 @@ def _is_behind_flange(a: SceneBody, b: SceneBody, cell: Cell) -> bool:
     """Whether a tool, or a part that no tool holds, is on a flange without a body, and the other is the link before."""
     mounted, link = (b, a) if a.kind is Kind.LINK else (a, b)
     robot = cell.robot(str(link.robot))
-    if mounted.kind is not Kind.TOOL and (mounted.kind is not Kind.PART or robot.tool.bodies):
+    grips = any(grasp.robot == robot.name and grasp.bodies is not None for grasp in cell.part.held_by)
+    if mounted.kind is not Kind.TOOL and (mounted.kind is not Kind.PART or robot.tool.bodies or grips):
         return False
     return link.kind is Kind.LINK and LinkTree(robot.model).carrier(robot.model.flange_link) == link.link
 

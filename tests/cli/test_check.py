@@ -9,7 +9,7 @@ from builders.stored_cells import write_cell
 from cellplan.cli.main import run
 
 
-def test_a_sound_cell_is_told_with_postures_and_paths_and_nothing_is_written(
+def test_a_sound_cell_is_reported_with_postures_and_paths_and_nothing_is_written(
     cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -68,9 +68,9 @@ def path_depth(cell: Cell, task: Task, X_PT: Array) -> ToolDepth | None:
     """
     if task.relative_to is not Frame.PART or not set(AXIS_COMPONENTS) <= set(task.axes):
         return None
-    tool = cell.robot(task.robot).tool
+    robot = cell.robot(task.robot)
     X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone
-    along = line_depths(tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not tool.bodies)
+    along = line_depths(robot.tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not robot.bodies_at_work)
     return ToolDepth(
         task=task.name, robot=task.robot, depth=float(along.max()), at_s=None, limit=task.tool_depth, body=AXIS
     )
@@ -84,11 +84,11 @@ def _task_depth(
     robot = cell.robot(task.robot)
     fine_times, X_PT = _tool_on_part(cell, task, times, chains=chains, q=q)
     X_ST = inverse(cell.part.X_PS) @ X_PT
-    tool, zone = robot.tool, cell.checks.contact_zone
-    along = line_depths(tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not tool.bodies)
+    X_FT, bodies, zone = robot.tool.X_FT, robot.bodies_at_work, cell.checks.contact_zone
+    along = line_depths(X_FT, cell.part.shape, X_ST, zone=zone, is_all=not bodies)
     deepest = [(AXIS, int(np.argmax(along)), float(along.max()))]
-    for body in tool.bodies:
-        columns = body_columns(body.shape, inverse(tool.X_FT) @ body.X_BS, zone)
+    for body in bodies:
+        columns = body_columns(body.shape, inverse(X_FT) @ body.X_BS, zone)
         deepest.append((body.name, *_deepest(columns, cell, X_ST)))
     name, row, depth = max(deepest, key=lambda entry: entry[2])
     return ToolDepth(

@@ -18,8 +18,10 @@ from cellplan.io.cell.build import (
     resolved_document,
 )
 from cellplan.io.cell.build_accelerations import acceleration_findings
-from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings
+from cellplan.io.cell.build_grips import grip_findings, tool_names
+from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings, on_mount, rail_entries
 from cellplan.io.cell.build_solver import build_solver
+from cellplan.io.cell.build_srdf import apply_srdfs
 from cellplan.io.cell.changes import changed, plain_values
 from cellplan.io.cell.referenced_files import Sources
 from cellplan.io.cell.rules import rule_findings
@@ -106,10 +108,11 @@ def _read(source: CellFile) -> Cell:
     allowed = (*source.allow_dirs, *user_folders(source.folder))
     sources = Sources(document, AllowedFolders(folder=source.folder, allowed=allowed))
     sources.inputs[source.name] = document.digest
-    models = _models(valid, document, sources)
+    valid, models = apply_srdfs(valid, _models(valid, document, sources), sources, document)
     for name, model in models.items():
         findings += robot_findings(name, valid.robots[name], model, document)
         findings += mounting_findings(name, model, valid, document)
+    findings += grip_findings(valid, models, document)
     findings += acceleration_findings(valid, models, document)
     findings += _unknown_bodies(valid, models, document)
     findings += accuracy_findings(valid, models, document)
@@ -131,7 +134,10 @@ def _models(valid: ValidEntries, document: YamlDocument, sources: Sources) -> di
         written = document.root["robots"][name]
         if name not in found and isinstance(written, dict) and isinstance(written.get("model"), str):
             sources.look_for_model(name, written["model"])
-    return {name: with_statements(valid.robots[name], model) for name, model in found.items() if model is not None}
+    models = {name: model for name, model in found.items() if model is not None}
+    return {
+        name: on_mount(valid.robots[name], with_statements(valid.robots[name], model)) for name, model in models.items()
+    }
 
 
 def _targets(valid: ValidEntries, sources: Sources) -> Targets:
@@ -150,11 +156,8 @@ def _unknown_bodies(valid: ValidEntries, models: Mapping[str, RobotModel], docum
         return
     known = {"part", *valid.names["environment"]}
     for name, model in models.items():
-        tool = valid.robots[name].tool
-        count = len(tool.bodies) + (tool.geometry is not None)
         known |= {f"{name}/{body.name}" for body in model.bodies}
-        known |= {f"{name}/{body}" for body in mounted_names(valid.robots[name])}
-        known |= {f"{name}/tool" if number == 1 else f"{name}/tool_{number}" for number in range(1, count + 1)}
+        known |= {f"{name}/{body}" for body in (*mounted_names(valid.robots[name]), *tool_names(valid.robots[name]))}
     for index, pair in enumerate(valid.checks.exclude):
         for side, body in enumerate(pair.bodies):
             if body not in known:
@@ -190,12 +193,13 @@ def _read_meshes(valid: ValidEntries, sources: Sources) -> None:
         place: KeyPath = ("robots", name, "tool")
         shapes += [((*place, "bodies", index), body) for index, body in enumerate(robot.tool.bodies)]
         shapes += [(("robots", name, "attachments", index), it) for index, it in enumerate(robot.attachments)]
+        shapes += [(("robots", name, "mount", "rail", key, index), it) for key, index, it in rail_entries(robot)]
         shapes += [((*place, "geometry"), robot.tool.geometry)] if robot.tool.geometry is not None else []
     part = valid.part.geometry if valid.part is not None else None
-    if part is not None and part.mesh is not None and part.unit is not None:
+    if part is not None and part.mesh is not None:
         sources.mesh(part.mesh, part.unit, ("part", "geometry", "mesh"), requirement=require_solid)
     for path, shape in shapes:
-        if shape.mesh is not None and shape.unit is not None:
+        if shape.mesh is not None:
             sources.mesh(shape.mesh, shape.unit, (*path, "mesh"), requirement=None if shape.open else require_enclosing)
 
 
@@ -210,7 +214,7 @@ def _cell(
     """The cell, once there are no findings."""
     document = source.document
 
-    def mesh(written: str, unit: str) -> Mesh:
+    def mesh(written: str, unit: str | None) -> Mesh:
         """A mesh that was read before."""
         found = sources.mesh(written, unit, ())
         if found is None:
@@ -228,7 +232,7 @@ def _cell(
     cell = Cell(
         name=whole.name,
         robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
-        part=build_part(whole.part, mesh),
+        part=build_part(whole, models, mesh),
         tasks=tuple(build_task(name, whole, targets.__getitem__, origin) for name in whole.tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),
         motion=build_motion(whole.motion),

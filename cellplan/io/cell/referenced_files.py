@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.load import read_mesh
+from cellplan.geometry.mesh.load import read_drawing
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.cell.toolpath_csv import read_toolpath_csv
@@ -16,13 +16,16 @@ from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.files import digest_of_file
 from cellplan.io.input.findings import Finding, KeyPath, key_text, shown
 from cellplan.io.robots.bundled import load_bundled_table
-from cellplan.io.robots.joint_table import MESH_UNITS, RobotTable, load_robot_table
+from cellplan.io.robots.joint_table import RobotTable, load_robot_table
 from cellplan.io.robots.rules import limits_in_si, tightened
+from cellplan.io.robots.urdf.gripper import GripperState
 from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot, load_urdf
+from cellplan.io.robots.urdf.srdf import Srdf, read_srdf
 from cellplan.io.robots.urdf.xacro import XACRO_SUFFIX
+from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import CsvEntry
-from cellplan.io.schema.units import Deg, Mm
+from cellplan.io.schema.units import Deg, si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import SampledPath, TimedPath
@@ -45,7 +48,7 @@ class Sources:
         """Keep the folders and the document that findings refer to."""
         self._document = document
         self._folders = folders
-        self._meshes: dict[tuple[str, str], Mesh | None] = {}
+        self._meshes: dict[tuple[str, str | None], Mesh | None] = {}
         self._urdfs: dict[Hashable, UrdfRobot] = {}
         self.inputs: dict[str, str] = {}
         self.findings: list[Finding] = []
@@ -53,7 +56,7 @@ class Sources:
         self.remarks: list[tuple[str, str]] = []
 
     def mesh(
-        self, written: str, unit: str, path: KeyPath, *, requirement: Callable[[Mesh], None] | None = None
+        self, written: str, unit: str | None, path: KeyPath, *, requirement: Callable[[Mesh], None] | None = None
     ) -> Mesh | None:
         """Mesh in [m] that meets a requirement, which raises an input error otherwise; None after a finding."""
         if (written, unit) not in self._meshes:
@@ -107,14 +110,27 @@ class Sources:
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))
 
-    def _read_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
+    def srdf(self, name: str, written: str) -> Srdf | None:
+        """SRDF of a robot; None after a finding."""
+        place = self._file(written, ("robots", name, "srdf"))
+        if place is None:
+            return None
+        try:
+            srdf = in_child(read_srdf, place, guard=Guard(file=written, worker="the SRDF reader"))
+            self.inputs[written] = digest_of_file(place, file=written)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return srdf
+
+    def _read_mesh(self, written: str, unit: str | None, path: KeyPath) -> Mesh | None:
         """Mesh in [m]; None after a finding."""
         place = self._file(written, path)
         if place is None:
             return None
         try:
             guard = Guard(file=written, worker="the mesh reader")
-            mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), place, guard=guard)
+            mesh = in_child(as_here(partial(read_drawing, unit=unit)), place, guard=guard)
             self.inputs[written] = digest_of_file(place, file=written)
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))
@@ -131,7 +147,7 @@ class Sources:
 
     def _only_for_urdf(self, name: str, entry: RobotEntry) -> Iterator[Finding]:
         """Keys that say something about a URDF."""
-        for key in ("package_dirs", "xacro_args", "flange", "locked"):
+        for key in ("package_dirs", "xacro_args", "flange", "locked", "srdf", "gripper"):
             if getattr(entry, key):
                 yield self._document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
 
@@ -172,10 +188,12 @@ class Sources:
             flange=entry.flange,
             package_dirs=folders,
             limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items()},
-            locked=dict(_locked_in_si(entry)),
-            lock_units={joint: unit for joint, _, unit in (key.rpartition("_") for key in entry.locked)},
+            locked={joint: at.si for joint, at in entry.locked_joints.items()},
+            lock_units={joint: "deg" if isinstance(at, Deg) else "mm" for joint, at in entry.locked_joints.items()},
+            locks_others=entry.locks_others,
             within=self._folders,
             xacro_args={key: _argument_text(value) for key, value in entry.xacro_args.items()},
+            gripper=_gripper_state(entry.gripper),
         )
         if entry.xacro_args and place.suffix.lower() != XACRO_SUFFIX:
             text = f"unexpected key, it applies to a file whose name ends in {XACRO_SUFFIX} only"
@@ -211,7 +229,7 @@ class Sources:
 
 def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, options: UrdfOptions) -> UrdfRobot:
     """Robot of a URDF; robots that say the same of the same file share one."""
-    locked = _items(options.locked), _items(options.lock_units)
+    locked = _items(options.locked), _items(options.lock_units), options.locks_others, options.gripper
     limits, arguments = _items(options.limits), _items(options.xacro_args)
     key = (written, place, options.flange, options.package_dirs, limits, locked, arguments)
     if key not in known:
@@ -225,13 +243,13 @@ def _argument_text(value: str | float) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
+def _gripper_state(entry: GripperEntry | None) -> GripperState | None:
+    """How far a gripper is open; None where the cell does not say it."""
+    if entry is None or (entry.opening_mm is None and entry.angle_deg is None):
+        return None
+    return GripperState(joints=entry.joints, opening=si_or_none(entry.opening_mm), angle=si_or_none(entry.angle_deg))
+
+
 def _items(table: Mapping[str, Hashable]) -> Hashable:
     """What a table says, as part of a key."""
     return tuple(sorted(table.items(), key=lambda item: item[0]))
-
-
-def _locked_in_si(entry: RobotEntry) -> Iterator[tuple[str, float]]:
-    """Positions of locked joints in [rad] or [m], by joint name."""
-    for key, value in entry.locked.items():
-        joint, _, unit = key.rpartition("_")
-        yield joint, Deg(value).si if unit == "deg" else Mm(value).si

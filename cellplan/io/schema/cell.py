@@ -15,6 +15,7 @@ from cellplan.io.schema.common import (
     Reason,
     Text,
     by_kind,
+    require_each_once,
     rule,
 )
 from cellplan.io.schema.robot import Mass, RobotEntry
@@ -28,7 +29,6 @@ from cellplan.io.schema.task import (
     TaskEntry,
     TimeLawChoice,
     ToolDepth,
-    require_each_once,
 )
 from cellplan.io.schema.units import Deg, Mm, Ms, Within
 
@@ -36,6 +36,7 @@ SCHEMA_VERSION: Final = 1
 ROBOT_LIMIT: Final = 64
 TASK_LIMIT: Final = 200
 OBSTACLE_LIMIT: Final = 500
+GRIP_LIMIT: Final = 200  # bodies of one gripper
 WIDEST_CONTACT_MM: Final = 50.0  # farther from its tip a tool that touches the part collides with it
 SAMPLE_LIMIT: Final = 2_000_000  # tables longer than this fill disks, not controllers
 ALL_AXES: Final[tuple[TaskAxis, ...]] = ("x", "y", "z", "rx", "ry", "rz")
@@ -54,7 +55,14 @@ class GraspEntry(Entry):
     )
     depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = Field(
         default=Mm(2.0),
-        description="Largest penetration of the part by the holder's flange, tool and all that is rigid with them.",
+        description="Largest penetration of the part by the bodies that grip.",
+    )
+    grip_bodies: tuple[Text, ...] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=GRIP_LIMIT,
+        description="The bodies that grip: links, or bodies as reports name them, that are rigid with the flange. They "
+        "may touch the part, up to depth_mm; nothing else may. All that is rigid with the flange when absent.",
     )
 
     @model_validator(mode="after")

@@ -1,14 +1,30 @@
 """Robots of a cell: model, place, tool, start posture, weights and limits."""
 
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import Field, Tag, model_validator
+from pydantic import ConfigDict, Field, Tag, model_validator
 
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
-from cellplan.io.schema.common import Angle, Coordinate, Coordinates, Entry, PoseEntry, Size, Text, by_kind, rule
-from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
+from cellplan.io.schema.common import (
+    Angle,
+    Coordinate,
+    Coordinates,
+    Direction,
+    Entry,
+    Name,
+    PoseEntry,
+    Size,
+    Text,
+    by_kind,
+    one_of_keys,
+    require_one,
+    rule,
+)
+from cellplan.io.schema.controller import ControllerEntry
+from cellplan.io.schema.gripper import GripperEntry
+from cellplan.io.schema.mounting import AttachmentEntry, HangingEntry, PedestalEntry, RailBodyEntry, WallEntry
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
-from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Within
+from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Quantity, Within
 
 LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a wrong unit
 FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a wrong unit
@@ -18,6 +34,8 @@ WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses
 HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
 ROUGHEST_MM: Final = 1_000.0  # bodies that are farther off stand for nothing
 AXIS_LIMIT: Final = 64  # joints of one robot
+SOLID_LIMIT: Final = 50  # solids of a track or a carriage
+MOUNTS: Final = ("pedestal", "tilted", "hanging", "wall", "rail")
 
 JointAngle = Annotated[Deg, Within(ge=-LARGEST_JOINT_DEG, le=LARGEST_JOINT_DEG)]
 TurningSpeed = Annotated[DegPerS, Within(gt=0.0, le=FASTEST_DEG_S)]
@@ -30,21 +48,24 @@ Mass = Annotated[float, Field(ge=0.0, le=HEAVIEST_KG)]
 Accuracy = Annotated[Mm, Within(ge=0.0, le=ROUGHEST_MM)]
 LoadFigure = Annotated[float, Field(gt=0.0, le=HEAVIEST_KG)]
 Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
-JointPosition = Annotated[float, Field(ge=-100_000.0, le=100_000.0)]
+FARTHEST: Final = 100_000.0  # [deg] or [mm] of a joint
+JointPosition = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 
 TURNING_LIMITS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
 SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
 
+OTHERS: Final = "others"  # key of all joints that do not lead to the flange, where they are locked together
+LOCK_WORDS: Final = "a number, or zero for the key others"
 POSTURE_WORDS: Final = "auto or a list of joint angles"
 ARGUMENT_WORDS: Final = "a text, a number, true or false"
-POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
+POSITION_WORDS: Final = "auto, the name of a posture in the SRDF, or a mapping with one key per joint (a1_deg, rail_mm)"
 
 Configuration = Annotated[
     Annotated[Literal["auto"], Tag(f"<{POSTURE_WORDS}>")] | Annotated[tuple[Angle, ...], Tag("<list>")],
     by_kind(POSTURE_WORDS, list=tuple),
 ]
 NamedConfiguration = Annotated[
-    Annotated[Literal["auto"], Tag(f"<{POSITION_WORDS}>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
+    Annotated[Text, Tag(f"<{POSITION_WORDS}>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
     by_kind(POSITION_WORDS, mapping=dict),
 ]
 XacroArgument = Annotated[
@@ -52,6 +73,12 @@ XacroArgument = Annotated[
     | Annotated[bool, Tag("<boolean>")]
     | Annotated[int | float, Tag("<number>")],
     by_kind(ARGUMENT_WORDS, boolean=bool, number=(int, float)),
+]
+
+
+LockedPosition = Annotated[
+    Annotated[Literal["zero"], Tag(f"<{LOCK_WORDS}>")] | Annotated[JointPosition, Tag("<number>")],
+    by_kind(LOCK_WORDS, number=(int, float)),
 ]
 
 
@@ -146,6 +173,51 @@ class PayloadEntry(Entry):
     source: Text = Field(default="not stated", description="Where the figures come from.")
 
 
+class RailEntry(Entry):
+    """A rail that carries the robot: a prismatic joint before its first one."""
+
+    name: Name = Field(default="rail", description="Name of the joint, in tables, start postures and reports.")
+    axis: Direction = Field(description="Direction of the rail in the base frame: one of +x, -x, … or a vector.")
+    lower_mm: Coordinate = Field(description="Lowest position.")
+    upper_mm: Coordinate = Field(description="Highest position.")
+    velocity_mm_s: SlidingSpeed = Field(description="Largest speed.")
+    acceleration_mm_s2: SlidingAcceleration | None = Field(default=None, description="Largest acceleration, if known.")
+    jerk_mm_s3: SlidingJerk | None = Field(default=None, description="Largest jerk, if known.")
+    track: tuple[RailBodyEntry, ...] = Field(
+        default=(), max_length=SOLID_LIMIT, description="Solids that stand still: ROBOT/track, ROBOT/track_2, …."
+    )
+    carriage: tuple[RailBodyEntry, ...] = Field(
+        default=(), max_length=SOLID_LIMIT, description="Solids that ride along: ROBOT/carriage, ROBOT/carriage_2, …."
+    )
+
+    @model_validator(mode="after")
+    def _has_a_range(self) -> Self:
+        """Lower below upper."""
+        if not self.lower_mm < self.upper_mm:
+            raise rule(f"expected a number above lower_mm = {self.lower_mm:g}, got {self.upper_mm:g}", "upper_mm")
+        return self
+
+
+class MountEntry(Entry):
+    """How a robot is mounted: exactly one of the keys."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*MOUNTS))
+
+    pedestal: PedestalEntry | None = Field(default=None, description="Upright on a pedestal, as with the key pedestal.")
+    tilted: PedestalEntry | None = Field(
+        default=None, description="Tilted on an upright column that is cut off along the plane of the base."
+    )
+    hanging: HangingEntry | None = Field(default=None, description="Upside down below a ceiling.")
+    wall: WallEntry | None = Field(default=None, description="On a bracket behind its base, at a wall or elsewhere.")
+    rail: RailEntry | None = Field(default=None, description="On a carriage that moves along a rail.")
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        """Exactly one way."""
+        require_one(self, MOUNTS)
+        return self
+
+
 class RobotEntry(Entry):
     """A robot placed in the cell."""
 
@@ -174,9 +246,20 @@ class RobotEntry(Entry):
     payload: PayloadEntry | None = Field(
         default=None, description="What it may carry; when absent what the robot's own file says."
     )
+    srdf: Text | None = Field(
+        default=None,
+        description="Path of an SRDF for a URDF: pairs of its links that are not checked against each other, and named "
+        "postures for start and home.",
+    )
+    gripper: GripperEntry | None = Field(
+        default=None, description="The gripper that a URDF brings along: how far it is open, and what may work."
+    )
     pedestal: PedestalEntry | None = Field(
         default=None,
         description="Column or box from the floor to the base; it moves with the base and is judged like any body.",
+    )
+    mount: MountEntry | None = Field(
+        default=None, description="How the base is mounted, with the bodies that this takes; excludes pedestal."
     )
     tool: ToolEntry = Field(
         default=ToolEntry(), description="What the robot carries; without it the flange is the tool tip."
@@ -190,7 +273,8 @@ class RobotEntry(Entry):
     )
     start: NamedConfiguration | None = Field(
         default=None,
-        description="Start posture, one key per joint with its unit (a1_deg, rail_mm); excludes start_deg.",
+        description="Start posture, one key per joint with its unit (a1_deg, rail_mm), or the name of a posture in the "
+        "SRDF (STATE, or GROUP/STATE where several groups have one); excludes start_deg.",
     )
     home_deg: Configuration | None = Field(
         default=None,
@@ -199,7 +283,7 @@ class RobotEntry(Entry):
     )
     home: NamedConfiguration | None = Field(
         default=None,
-        description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes home_deg.",
+        description="The same with one key per joint with its unit (a1_deg, rail_mm), or by name; excludes home_deg.",
     )
     weights: tuple[Weight, ...] | None = Field(
         default=None,
@@ -211,30 +295,67 @@ class RobotEntry(Entry):
         description="Accelerations that its joints are judged against; a stated limit of a joint counts first. "
         "The cell's when absent.",
     )
+    controller: ControllerEntry | None = Field(
+        default=None,
+        description="How its controller counts the joints; only for a robot whose own file does not state it.",
+    )
     controller_cycle_ms: CycleTime | None = Field(
         default=None, description="Cycle of its controller, over which jerk is taken; the motion's when absent."
     )
-    locked: dict[str, JointPosition] = Field(
+    locked: dict[str, LockedPosition] = Field(
         default={},
-        description="Positions of URDF joints that do not lead to the flange, by joint name with its unit (finger_mm).",
+        description="Positions of URDF joints that do not lead to the flange, by joint name with its unit (finger_mm); "
+        "`others: zero` holds all that are not named at zero, or at the nearest position within their limits.",
+        json_schema_extra={
+            "patternProperties": {
+                "_(deg|mm)$": {"type": "number", "minimum": -FARTHEST, "maximum": FARTHEST},
+                f"^{OTHERS}$": {"const": "zero"},
+            },
+            "additionalProperties": False,
+        },
     )
 
     @model_validator(mode="after")
     def _starts_once(self) -> Self:
-        """Start posture and home are given at most once each; locked joints name their unit."""
+        """Start posture, home and mount are given at most once each."""
         if self.start_deg is not None and self.start is not None:
             raise rule("expected either start_deg or start, got both", "start")
         if self.home_deg is not None and self.home is not None:
             raise rule("expected either home_deg or home, got both", "home")
+        if self.pedestal is not None and self.mount is not None:
+            raise rule("expected either pedestal or mount, got both", "mount")
+        return self
+
+    @model_validator(mode="after")
+    def _locks_once(self) -> Self:
+        """Locked joints name their unit, and only the others together are locked without one."""
         joints: set[str] = set()
-        for key in self.locked:
+        for key, position in self.locked.items():
+            if (key == OTHERS) != (position == "zero"):
+                text = (
+                    f"zero, got {position:g}"
+                    if key == OTHERS
+                    else "a number, got zero: only others may be zero in words"
+                )
+                raise rule(f"expected {text}", f"locked.{key}")
             joint, _, unit = key.rpartition("_")
-            if unit not in {"deg", "mm"}:
+            if key != OTHERS and unit not in {"deg", "mm"}:
                 raise rule("expected a joint name with its unit, such as finger_mm or flap_deg", f"locked.{key}")
             if joint in joints:
                 raise rule(f"expected each joint once, got '{joint}' in deg and in mm", f"locked.{key}")
             joints.add(joint)
         return self
+
+    @property
+    def locked_joints(self) -> dict[str, Quantity]:
+        """Positions of the joints that are locked by name, without the others."""
+        named = {key.rpartition("_"): position for key, position in self.locked.items() if position != "zero"}
+        return {joint: Deg(position) if unit == "deg" else Mm(position) for (joint, _, unit), position in named.items()}
+
+    @property
+    def locks_others(self) -> bool:
+        """Whether every movable joint that does not lead to the flange and is not named is locked."""
+        return OTHERS in self.locked
 
     @property
     def given_start(self) -> tuple[float, ...] | dict[str, Any] | None:

@@ -6,16 +6,18 @@ from pydantic import ConfigDict, Field, Tag, model_validator
 
 from cellplan.io.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
 from cellplan.io.schema.common import (
+    DIRECTION_WORDS,
     Angle,
     Coordinate,
+    Direction,
     Entry,
     Name,
-    SignedAxis,
     Size,
     Text,
     Vector,
     by_kind,
     one_of_keys,
+    require_each_once,
     require_one,
     rule,
 )
@@ -31,7 +33,6 @@ MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
 Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
 
-DIRECTION_WORDS: Final = "+x, -x, +y, -y, +z, -z or a direction [x, y, z]"
 TOOL_AXIS_WORDS: Final = f"normal, {DIRECTION_WORDS}"
 LAW_WORDS: Final = "constant, trapezoid, quintic or {trapezoid: {ramp: 0.25}}"
 CORNER_WORDS: Final = "stop or {blend_mm: 2}"
@@ -97,10 +98,6 @@ class CsvEntry(Entry):
 CsvChoice = Annotated[
     Annotated[Text, Tag(f"<{CSV_WORDS}>")] | Annotated[CsvEntry, Tag("<mapping>")],
     by_kind(CSV_WORDS, mapping=dict),
-]
-Direction = Annotated[
-    Annotated[SignedAxis, Tag(f"<{DIRECTION_WORDS}>")] | Annotated[Vector, Tag("<list>")],
-    by_kind(DIRECTION_WORDS, list=tuple),
 ]
 ToolAxis = Annotated[
     Annotated[Literal["normal", "+x", "-x", "+y", "-y", "+z", "-z"], Tag(f"<{TOOL_AXIS_WORDS}>")]
@@ -200,13 +197,6 @@ class ToleranceEntry(Entry):
 ToolDepth = Annotated[Mm, Within(ge=0.0, le=DEEPEST_CUT_MM)]
 StandOff = Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
-
-
-def require_each_once(words: tuple[str, ...], key: str) -> None:
-    """Refuse a list that names something twice."""
-    for index, word in enumerate(words):
-        if word in words[:index]:
-            raise rule(f"expected each word once, got '{word}' twice", f"{key}[{index}]")
 
 
 class TaskEntry(Entry):

@@ -17,8 +17,7 @@ from cellplan.io.robots.urdf.spelling import check_spelling
 from cellplan.io.robots.urdf.xacro import XACRO_SUFFIX, XacroSettings, expand_xacro
 from cellplan.io.robots.urdf.xml import Element, origin_of, read_xml
 
-MAX_LINKS: Final = 200
-MAX_MOVABLE: Final = 64
+MAX_LINKS: Final = 1000  # a humanoid with two hands has 130
 MAX_SIZE: Final = 20.0  # [m] larger bodies are a wrong unit
 MAX_RANGE: Final = 4.0 * np.pi  # [rad] limits beyond two turns each way are mistakes of the unit
 MAX_TRAVEL: Final = 20.0  # [m]
@@ -162,9 +161,6 @@ def read_document(path: Path, settings: XacroSettings | None = None) -> UrdfDocu
     if not 1 <= len(links) <= MAX_LINKS:
         hint = ": is it a file of macros that others include?" if included is not None and not links else ""
         raise InputError(f"{path.name}: expected 1 to {MAX_LINKS} links, got {len(links)}{hint}")
-    movable = sum(joint.kind in MOVABLE for joint in joints.values())
-    if movable > MAX_MOVABLE:
-        raise InputError(f"{path.name}: expected at most {MAX_MOVABLE} movable joints, got {movable}")
     _require_nothing_hidden(root, links, joints)
     return UrdfDocument(
         file=path.name, name=_name(root), links=links, joints=joints, remarks=remarks.lines, included=included or ()

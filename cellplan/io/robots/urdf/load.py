@@ -2,20 +2,22 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final
 
-from cellplan.errors import CellplanError
+from cellplan.errors import CellplanError, InvalidFileError
 from cellplan.geometry.transforms import Array
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.robots.limits import StatedLimits
 from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_document
-from cellplan.io.robots.urdf.limits import joint_range
+from cellplan.io.robots.urdf.gripper import GripperState, gripper_locks, require_opposed
+from cellplan.io.robots.urdf.limits import joint_range, lacking_error, lacking_limits
+from cellplan.io.robots.urdf.locks import loose_error, loose_joints, require_sound_locks, rest_position
 from cellplan.io.robots.urdf.tree import (
     Roles,
+    UrdfTree,
     ZeroConfiguration,
     assign_roles,
     build_tree,
@@ -25,7 +27,7 @@ from cellplan.io.robots.urdf.tree import (
     zero_configuration,
 )
 from cellplan.io.robots.urdf.xacro import XacroSettings
-from cellplan.model.robot import FollowerJoint, Joint, JointKind, Link, RobotModel
+from cellplan.model.robot import Body, FollowerJoint, Joint, JointKind, Link, RobotModel
 
 PLAIN_NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 
@@ -39,18 +41,23 @@ class UrdfOptions:
         package_dirs: Folders in which ``package://`` names are looked up.
         limits: Limits by joint name; they tighten the URDF's or stand in for missing ones.
         locked: Position in [rad] or [m] of joints that are held still, by name.
+        locks_others: Whether all other movable joints that do not lead to the flange are held still where
+            `rest_position` says.
         lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where it was not written.
         within: Folders that its meshes and the files that it includes must lie in; None for all.
         xacro_args: Values of the arguments of a xacro file, by name.
+        gripper: How far its gripper is open; None to leave its joints to ``locked``.
     """
 
     flange: str | None = None
     package_dirs: tuple[Path, ...] = ()
-    limits: Mapping[str, StatedLimits] = field(default_factory=lambda: MappingProxyType({}))
-    locked: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    lock_units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    limits: Mapping[str, StatedLimits] = field(default_factory=dict)
+    locked: Mapping[str, float] = field(default_factory=dict)
+    locks_others: bool = False
+    lock_units: Mapping[str, str] = field(default_factory=dict)
     within: AllowedFolders | None = None
-    xacro_args: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    xacro_args: Mapping[str, str] = field(default_factory=dict)
+    gripper: GripperState | None = None
 
     @property
     def xacro(self) -> XacroSettings:
@@ -80,6 +87,25 @@ def read_urdf(path: Path, options: UrdfOptions | None = None) -> RobotModel:
     return load_urdf(path, options).model
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UrdfStructure:
+    """What each joint of a URDF does for one flange, before its limits and bodies are read.
+
+    Attributes:
+        tree: Links and joints.
+        flange: Name of the flange link.
+        loose: Movable joints off the chain that are not locked by name, at rest.
+        roles: What each joint does.
+        configuration: Poses of all links while every driven joint reads zero.
+    """
+
+    tree: UrdfTree
+    flange: str
+    loose: tuple[UrdfJoint, ...]
+    roles: Roles
+    configuration: ZeroConfiguration
+
+
 def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     """Read a URDF and its collision meshes.
 
@@ -94,30 +120,76 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         InputError: With file and line, for anything that cannot be taken over faithfully.
     """
     options = options or UrdfOptions()
-    document = read_document(path, options.xacro)
-    tree = build_tree(document)
-    _require_lock_units(document, options.lock_units)
+    tree = build_tree(read_document(path, options.xacro))
     flange = choose_flange(tree, options.flange)
-    roles = assign_roles(tree, flange, options.locked)
+    held = gripper_locks(tree, flange, options.gripper, options.locked)
+    structure = urdf_structure(tree, flange, replace(options, locked={**options.locked, **held}))
+    roles, document = structure.roles, tree.document
     _require_plain_names(roles)
     _require_known_limits(document, roles, options.limits)
-    configuration = zero_configuration(tree, roles)
+    lacking = lacking_limits(roles.driven, options.limits)
+    errors = [lacking_error(lacking)] if lacking else []
+    if structure.loose and not options.locks_others:
+        errors.insert(0, loose_error(tree, structure.flange, structure.loose, options.locked))
+    if errors:
+        raise errors[0] if len(errors) == 1 else InvalidFileError(errors)
     shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
+    bodies = link_bodies(tree, structure.configuration, shelf)
+    model = urdf_model(structure, bodies, limits=options.limits, source=path.name)
+    require_opposed(tree, options.gripper, locks=held, configuration=structure.configuration, bodies=model.bodies)
+    return UrdfRobot(
+        model=model,
+        mesh_files=tuple(shelf.files),
+        included=document.included,
+        remarks=(*document.remarks, *shelf.remarks.lines),
+    )
+
+
+def urdf_structure(tree: UrdfTree, flange: str, options: UrdfOptions) -> UrdfStructure:
+    """What each joint does, with every loose joint at rest.
+
+    Raises:
+        InputError: A lock or a mimic is unsound, or no joint is driven.
+    """
+    require_sound_locks(tree.document, options.locked, options.lock_units)
+    loose = loose_joints(tree, flange, options.locked)
+    held = {**{joint.name: rest_position(joint) for joint in loose}, **options.locked}
+    roles = assign_roles(tree, flange, held)
+    return UrdfStructure(
+        tree=tree, flange=flange, loose=loose, roles=roles, configuration=zero_configuration(tree, roles)
+    )
+
+
+def urdf_model(
+    structure: UrdfStructure, bodies: tuple[Body, ...], *, limits: Mapping[str, StatedLimits], source: str
+) -> RobotModel:
+    """The robot model.
+
+    Args:
+        structure: What each joint does.
+        bodies: Bodies of its links.
+        limits: Limits of the cell by joint name.
+        source: Name of the file.
+
+    Raises:
+        InputError: Limits are missing or unsound.
+    """
+    document, roles, configuration = structure.tree.document, structure.roles, structure.configuration
     model = RobotModel(
         name=document.name,
-        source=path.name,
-        joints=tuple(_driven(joint, roles, configuration, limits=options.limits) for joint in roles.driven),
+        source=source,
+        joints=tuple(_driven(joint, roles, configuration, limits=limits) for joint in roles.driven),
         followers=tuple(_follower(joint, roles, configuration) for joint in roles.followers),
-        flange_link=configuration.carrier[flange],
-        X_BF=configuration.X_BL[flange],
-        bodies=link_bodies(tree, configuration, shelf),
+        flange_link=configuration.carrier[structure.flange],
+        X_BF=configuration.X_BL[structure.flange],
+        bodies=bodies,
         links=tuple(
             Link(name=link.name, index=configuration.carrier[link.name], X_BL=configuration.X_BL[link.name])
-            for link in links_in_order(tree)
+            for link in links_in_order(structure.tree)
         ),
     )
     _require_complete(document, roles, model)
-    return UrdfRobot(model=model, mesh_files=tuple(shelf.files), included=document.included, remarks=document.remarks)
+    return model
 
 
 def _require_plain_names(roles: Roles) -> None:
@@ -135,15 +207,6 @@ def _require_known_limits(document: UrdfDocument, roles: Roles, limits: Mapping[
         if name not in driven:
             reason = "is fixed" if joint.is_fixed else "follows another joint" if joint.mimic else "is locked"
             raise joint.error(f"has limits in the cell, but it {reason}")
-
-
-def _require_lock_units(document: UrdfDocument, units: Mapping[str, str]) -> None:
-    """A joint that slides is held still in millimetres, one that turns in degrees."""
-    for name, unit in units.items():
-        joint = known_joint(document, name, "locked")
-        required = "mm" if joint.kind == "prismatic" else "deg"
-        if unit != required and not joint.is_fixed:
-            raise joint.error(f"is {joint.kind}: expected to be locked in {required}, got {unit}")
 
 
 def _driven(

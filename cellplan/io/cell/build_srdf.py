@@ -1,0 +1,103 @@
+"""SRDFs of the robots of a cell: pairs that they disable, and start postures and homes that are named by them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
+from cellplan.io.cell.referenced_files import Sources
+from cellplan.io.cell.write import in_file_units
+from cellplan.io.input.findings import unknown_name
+from cellplan.io.robots.rules import start_keys
+from cellplan.io.robots.urdf.srdf import Srdf, disabled_bodies, posture_of
+from cellplan.io.schema.partial import ValidEntries
+from cellplan.io.schema.robot import POSITION_WORDS, RobotEntry
+from cellplan.io.schema.units import Deg, Mm
+from cellplan.io.yaml.reader import YamlDocument
+from cellplan.model.robot import RobotModel
+
+AUTO: Final = "auto"
+
+
+def apply_srdfs(
+    valid: ValidEntries, models: Mapping[str, RobotModel], sources: Sources, document: YamlDocument
+) -> tuple[ValidEntries, dict[str, RobotModel]]:
+    """The entries with named postures written out, and the models with the pairs that their SRDFs disable.
+
+    What is wrong with an SRDF, or with a name, is added to the findings of the sources.
+
+    Args:
+        valid: The entries of the cell.
+        models: Robot models by name.
+        sources: Reads the files.
+        document: The cell file.
+    """
+    found, robots = dict(models), dict(valid.robots)
+    for name, model in models.items():
+        entry = valid.robots[name]
+        srdf = None if entry.srdf is None else sources.srdf(name, entry.srdf)
+        try:
+            if srdf is not None:
+                found[name] = replace(model, disabled=disabled_bodies(srdf, model))
+        except InputError as error:
+            sources.errors.append(error)
+        if entry.srdf is None or srdf is not None:
+            robots[name] = _Postures(name, model, srdf, sources, document).written_out(entry)
+    whole = valid.whole
+    if whole is not None:
+        whole = whole.model_copy(
+            update={"robots": {name: robots.get(name, whole.robots[name]) for name in whole.robots}}
+        )
+    return replace(valid, robots=robots, whole=whole), found
+
+
+@dataclass(frozen=True, slots=True)
+class _Postures:
+    """Named postures of one robot."""
+
+    name: str
+    model: RobotModel
+    srdf: Srdf | None
+    sources: Sources
+    document: YamlDocument
+
+    def written_out(self, entry: RobotEntry) -> RobotEntry:
+        """The entry with positions in place of names; a name that means none stays, after a finding."""
+        written = {"start": entry.start, "home": entry.home}
+        found = {key: self._positions(key, word) for key, word in written.items() if isinstance(word, str)}
+        return entry.model_copy(update={key: value for key, value in found.items() if value is not None})
+
+    def _positions(self, key: str, word: str) -> dict[str, float] | None:
+        """Positions of a posture by joint, in the units of a cell file; None for ``auto`` and after a finding."""
+        if word == AUTO:
+            return None
+        path = ("robots", self.name, key)
+        if self.srdf is None:
+            text = f"expected {POSITION_WORDS}, got '{word}' without the key srdf"
+            self.sources.findings.append(self.document.finding(path, text))
+            return None
+        try:
+            q = posture_of(self.srdf, word, self.model)
+        except InputError as error:
+            self.sources.errors.append(error)
+            return None
+        if q is None:
+            text = unknown_name(f"a posture of {self.srdf.file}", word, self.srdf.posture_names)
+            self.sources.findings.append(self.document.finding(path, text))
+            return None
+        return dict(zip(start_keys(self.model), _within_limits(self.model, q), strict=True))
+
+
+def _within_limits(model: RobotModel, q: Array) -> list[float]:
+    """Degrees and millimetres that do not read back outside the limits that a configuration is within."""
+    numbers = in_file_units(model, q)
+    for index, joint in enumerate(model.joints):
+        unit = Deg if joint.is_revolute else Mm
+        while unit(numbers[index]).si > joint.upper:
+            numbers[index] = float(np.nextafter(numbers[index], -np.inf))
+        while unit(numbers[index]).si < joint.lower:
+            numbers[index] = float(np.nextafter(numbers[index], np.inf))
+    return numbers

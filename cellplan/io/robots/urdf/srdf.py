@@ -1,0 +1,148 @@
+"""SRDF of a robot: pairs of its links that need not be checked against each other, and named postures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
+from cellplan.io.input.findings import listed, shown
+from cellplan.io.robots.urdf.xml import Element, read_xml
+from cellplan.model.robot import RobotModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DisabledPair:
+    """Two links that the file leaves out of collision checks, and its word for why."""
+
+    links: tuple[str, str]
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NamedPosture:
+    """A state of a group: its joints by name, as elements of the file."""
+
+    name: str
+    group: str
+    element: Element
+    joints: Mapping[str, Element]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Srdf:
+    """What is used of an SRDF.
+
+    Attributes:
+        file: Name in messages.
+        pairs: Pairs of links that are disabled.
+        postures: Named postures.
+    """
+
+    file: str
+    pairs: tuple[DisabledPair, ...]
+    postures: tuple[NamedPosture, ...]
+
+    @property
+    def posture_names(self) -> tuple[str, ...]:
+        """Names by which postures can be called: ``STATE``, and ``GROUP/STATE`` where several groups have it."""
+        names = [posture.name for posture in self.postures]
+        return tuple(
+            posture.name if names.count(posture.name) == 1 else f"{posture.group}/{posture.name}"
+            for posture in self.postures
+        )
+
+
+def read_srdf(path: Path) -> Srdf:
+    """Read the disabled pairs and the named postures of an SRDF; groups, end effectors and the like are not used.
+
+    Raises:
+        InputError: With file and line: it is no plain SRDF, or an entry that is used is incomplete.
+    """
+    root = read_xml(path)
+    if root.tag != "robot":
+        raise root.error(f"expected an SRDF, whose root element is <robot>, got <{root.tag}>")
+    macro = next((child for child in root.children if child.tag.startswith("xacro:")), None)
+    if macro is not None:
+        raise macro.error(f"expected a plain SRDF, got <{macro.tag}>: expand it first")
+    pairs = tuple(
+        DisabledPair(
+            links=(pair.text("link1", pair.tag), pair.text("link2", pair.tag)),
+            reason=pair.attributes.get("reason", "").strip(),
+        )
+        for pair in root.all("disable_collisions")
+    )
+    return Srdf(file=path.name, pairs=pairs, postures=tuple(map(_posture, root.all("group_state"))))
+
+
+def disabled_bodies(srdf: Srdf, model: RobotModel) -> tuple[tuple[str, str, str], ...]:
+    """The pairs of link bodies of a robot that its SRDF disables, each with the reason as reports show it.
+
+    Pairs with a link that the robot does not have, such as one of a gripper that it does not carry, say nothing.
+
+    Raises:
+        InputError: The robot has none of the links: the file is another robot's.
+    """
+    links = {link.name for link in model.links}
+    named = {link for pair in srdf.pairs for link in pair.links}
+    if named and not named & links:
+        raise InputError(f"{srdf.file}: expected the SRDF of '{model.name}', got one none of whose links it has")
+    found = []
+    for pair in srdf.pairs:
+        if pair.links[0] == pair.links[1]:
+            continue
+        first, second = ([body.name for body in model.bodies if body.link_name == link] for link in pair.links)
+        why = f"as {shown(pair.reason)}" if pair.reason else "without a reason"
+        reason = f"disabled in {srdf.file} {why}"
+        found += [(one, other, reason) for one in first for other in second]
+    return tuple(found)
+
+
+def posture_of(srdf: Srdf, name: str, model: RobotModel) -> Array | None:
+    """Joint positions of a named posture in [rad] or [m], shape (n,); None when there is none of this name.
+
+    Where several groups have a state of the name, those that lack joints of the chain to the flange are passed over.
+
+    Raises:
+        InputError: Joints are missing, several groups differ, or a value is no number or outside the joint's limits.
+    """
+    named = [each for each in srdf.postures if name in (each.name, f"{each.group}/{each.name}")]
+    if not named:
+        return None
+    complete = [each for each in named if set(model.joint_names) <= set(each.joints)]
+    if not complete:
+        missing = [joint for joint in model.joint_names if joint not in named[0].joints]
+        text = f"expected a value of every joint between base and flange, missing: {listed(missing)}"
+        raise named[0].element.error(f"group_state '{name}': {text}")
+    found = [_positions(each, model) for each in complete]
+    if any(not np.array_equal(q, found[0]) for q in found):
+        names = listed(f"{each.group}/{each.name}" for each in complete)
+        raise complete[1].element.error(f"group_state '{name}': expected one posture of this name, got {names}")
+    return found[0]
+
+
+def _posture(state: Element) -> NamedPosture:
+    """A named posture."""
+    name = state.text("name", "group_state")
+    joints: dict[str, Element] = {}
+    for joint in state.all("joint"):
+        key = joint.text("name", f"group_state '{name}'")
+        if key in joints:
+            raise joint.error(f"group_state '{name}': expected each joint once, got '{key}' twice")
+        joints[key] = joint
+    return NamedPosture(name=name, group=state.attributes.get("group", ""), element=state, joints=joints)
+
+
+def _positions(posture: NamedPosture, model: RobotModel) -> Array:
+    """Values of the joints of the chain, within their limits."""
+    values = np.empty(len(model.joints))
+    for index, joint in enumerate(model.joints):
+        element, owner = posture.joints[joint.name], f"group_state '{posture.name}': joint '{joint.name}'"
+        values[index] = element.number("value", owner)
+        if not joint.lower <= values[index] <= joint.upper:
+            unit = "rad" if joint.is_revolute else "m"
+            allowed = f"expected a value from {joint.lower:.9g} to {joint.upper:.9g} {unit}"
+            raise element.error(f"{owner}: {allowed}, its limits here, got {values[index]:.9g}")
+    return values
