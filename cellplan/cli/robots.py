@@ -18,7 +18,9 @@ SCHEMA = "cellplan.robots/1"
 
 Model = Annotated[
     str | None,
-    typer.Argument(metavar="[MODEL]", help="URDF, joint-axis table or bundled robot to describe.", show_default=False),
+    typer.Argument(
+        metavar="[MODEL]", help="URDF, xacro file, joint-axis table or bundled robot to describe.", show_default=False
+    ),
 ]
 PackageDirs = Annotated[
     list[Path] | None,
@@ -31,11 +33,24 @@ PackageDirs = Annotated[
         file_okay=False,
     ),
 ]
+XacroArgs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--xacro-arg",
+        metavar="NAME=VALUE",
+        help="Set an argument of a xacro file; may be repeated.",
+        show_default=False,
+    ),
+]
 Flange = Annotated[str | None, typer.Option("--flange", metavar="LINK", help="Take this link of a URDF as the flange.")]
 
 
 def robots(
-    model: Model = None, flange: Flange = None, package_dir: PackageDirs = None, as_json: AsJson = False
+    model: Model = None,
+    flange: Flange = None,
+    package_dir: PackageDirs = None,
+    xacro_arg: XacroArgs = None,
+    as_json: AsJson = False,
 ) -> None:
     """List the bundled robots with reach, limits and source, or describe one robot.
 
@@ -43,9 +58,10 @@ def robots(
     write into a cell.
     """
     with json_failure(SCHEMA, desired=as_json):
-        if model is None and (flange or package_dir):
-            raise typer.BadParameter("expected a URDF with --flange and --package-dir")
-        records = _listed() if model is None else [_described(model, flange, package_dir or [])]
+        if model is None and (flange or package_dir or xacro_arg):
+            raise typer.BadParameter("expected a URDF with --flange, --package-dir and --xacro-arg")
+        arguments = dict(_argument(text) for text in xacro_arg or [])
+        records = _listed() if model is None else [_described(model, flange, package_dir or [], arguments)]
     if as_json:
         say_json({"schema": SCHEMA, "robots": records})
     elif model is None:
@@ -63,13 +79,21 @@ def _listed() -> list[dict[str, Any]]:
     return [_record(name, load_bundled(name)) for name in bundled_names()]
 
 
-def _described(model: str, flange: str | None, package_dirs: list[Path]) -> dict[str, Any]:
+def _argument(text: str) -> tuple[str, str]:
+    """Name and value of an argument of a xacro file."""
+    name, sign, value = text.partition("=")
+    if not name or not sign:
+        raise typer.BadParameter(f"--xacro-arg: expected NAME=VALUE, got '{text}'")
+    return name, value
+
+
+def _described(model: str, flange: str | None, package_dirs: list[Path], xacro_args: dict[str, str]) -> dict[str, Any]:
     """What one robot's file says."""
     from cellplan.io.cell.robot_file import describe_robot
     from cellplan.kinematics.reach import arm_reach
     from cellplan.report.record.robot_description import description_record
 
-    described = describe_robot(model, flange=flange, package_dirs=package_dirs)
+    described = describe_robot(model, flange=flange, package_dirs=package_dirs, xacro_args=xacro_args)
     return description_record(described, None if described.model is None else arm_reach(described.model))
 
 

@@ -93,6 +93,7 @@ class RobotDescription:
         links: The links that have bodies.
         cell_lines: What to write into a cell, as YAML.
         model: The robot; None where limits are missing.
+        remarks: What was not read, one line for each kind.
     """
 
     name: str
@@ -108,3 +109,4 @@ class RobotDescription:
     links: tuple[LinkSize, ...]
     cell_lines: str
     model: RobotModel | None
+    remarks: tuple[str, ...] = ()

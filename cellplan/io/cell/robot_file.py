@@ -1,6 +1,6 @@
 """Robot files before they stand in a cell: what a URDF, a joint-axis table or a bundled robot says."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -18,13 +18,20 @@ from cellplan.model.robot import RobotModel
 from cellplan.model.robot_description import DescribedJoint, LinkSize, RobotDescription
 
 
-def describe_robot(written: str, *, flange: str | None = None, package_dirs: Sequence[Path] = ()) -> RobotDescription:
+def describe_robot(
+    written: str,
+    *,
+    flange: str | None = None,
+    package_dirs: Sequence[Path] = (),
+    xacro_args: Mapping[str, str] | None = None,
+) -> RobotDescription:
     """What a robot's file says, and what a cell has to add.
 
     Args:
         written: Name of a bundled robot, or path of a URDF or of a joint-axis table.
         flange: Link of a URDF taken as the flange; None for the usual one.
         package_dirs: Folders in which ``package://`` names of a URDF are looked up.
+        xacro_args: Values of the arguments of a xacro file, by name; None for its defaults.
 
     Raises:
         InputError: The file cannot be read, or an option does not apply to it.
@@ -33,11 +40,11 @@ def describe_robot(written: str, *, flange: str | None = None, package_dirs: Seq
     if suffix in URDF_SUFFIXES | TABLE_SUFFIXES and not path.is_file():
         raise InputError(f"{written}: expected an existing file, got none")
     if suffix in URDF_SUFFIXES:
-        options = UrdfOptions(flange=flange, package_dirs=tuple(package_dirs))
+        options = UrdfOptions(flange=flange, package_dirs=tuple(package_dirs), xacro_args=dict(xacro_args or {}))
         guard = Guard(file=written, worker="the URDF reader")
         return in_child(as_here(describe_urdf), path, path.as_posix(), options, guard=guard)
-    if flange is not None or package_dirs:
-        raise InputError(f"{written}: expected --flange and --package-dir with a URDF only")
+    if flange is not None or package_dirs or xacro_args:
+        raise InputError(f"{written}: expected --flange, --package-dir and --xacro-arg with a URDF only")
     if suffix not in TABLE_SUFFIXES:
         return _described(load_bundled(written), written)
     return _described(load_robot_table(path, file=written, folders=AllowedFolders(folder=path.parent)).model, written)

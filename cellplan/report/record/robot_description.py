@@ -6,6 +6,7 @@ from typing import Any
 from cellplan.geometry.transforms import rpy_from_rotation
 from cellplan.model.robot_description import DescribedJoint, DescribedMimic, RobotDescription
 from cellplan.model.units import DEG, MM, joint_unit
+from cellplan.report.record.controller import zero_record
 
 
 def description_record(described: RobotDescription, reach: float | None) -> dict[str, Any]:
@@ -15,12 +16,13 @@ def description_record(described: RobotDescription, reach: float | None) -> dict
         described: What the file says.
         reach: Largest distance of the flange from the first axis in [m]; None where it is not known.
     """
-    X = described.X_BF
+    X, model = described.X_BF, described.model
     return {
         "name": described.name,
         "source": described.source,
         "reach_mm": None if reach is None else round(MM * reach, 1),
         "bodies": sum(len(link.shapes) for link in described.links),
+        "zero": None if model is None else zero_record(model),
         "joints": [_joint(joint) for joint in described.joints],
         "base": described.base,
         "flange": described.flange,
@@ -43,6 +45,7 @@ def description_record(described: RobotDescription, reach: float | None) -> dict
             for each in described.links
         ],
         "cell_lines": described.cell_lines,
+        "remarks": list(described.remarks),
     }
 
 

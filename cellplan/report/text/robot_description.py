@@ -13,11 +13,13 @@ def description_lines(record: dict[str, Any]) -> list[str]:
     return [
         record["name"],
         f"  {_reach(record)}{record['source']}",
+        *([] if record["zero"] is None else [f"  {record['zero']['line']}"]),
         *_flange_lines(record),
         *_block("joints from base to flange:", [_joint_row(joint) for joint in record["joints"]]),
         *_block("joints that follow others:", [_mimic_row(mimic) for mimic in record["mimics"]]),
         *_block("off the chain, to be locked:", [(key, f"{value:g}") for key, value in record["locked"].items()]),
         *_block("bodies and the box round them in mm:", [_link_row(link) for link in record["links"]]),
+        *(f"  note: {remark}" for remark in record["remarks"]),
         f"to be written into a cell in this folder{_blanks(record)}:",
         "",
         record["cell_lines"].rstrip("\n"),

@@ -178,4 +178,4 @@ def test_every_bundled_robot_is_described_with_its_bodies() -> None:
 def test_options_of_urdfs_are_refused_for_other_robots() -> None:
     with pytest.raises(InputError) as caught:
         describe_robot("kuka_kr6", flange="tool0")
-    assert str(caught.value) == "kuka_kr6: expected --flange and --package-dir with a URDF only"
+    assert str(caught.value) == "kuka_kr6: expected --flange, --package-dir and --xacro-arg with a URDF only"

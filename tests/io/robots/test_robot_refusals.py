@@ -170,7 +170,7 @@ Refuse = Callable[..., list[str]]
             "model: abb_irb1600",
             "model: abb_irb160",
             "c:8: robots.worker.model: expected a bundled robot (abb_irb1600, kuka_kr6, planar_3r, reis_rv20_16, "
-            "staubli_rx90l, staubli_rx90l_as_printed) or a .urdf or .yaml file, got 'abb_irb160', did you mean "
+            "staubli_rx90l, staubli_rx90l_as_printed) or a .urdf, .xacro or .yaml file, got 'abb_irb160', did you mean "
             "'abb_irb1600'?",
         ),
         (

@@ -40,18 +40,17 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
     Args:
         path: The file.
         written: Its name as the lines for a cell have it.
-        options: Flange and package folders.
+        options: Flange, package folders and arguments of a xacro file.
 
     Raises:
         InputError: With file and line, for anything but missing limits and locks.
     """
-    tree = build_tree(read_document(path))
+    tree = build_tree(read_document(path, options.xacro))
     choices = tuple(_choices(tree))
     flange, is_usual = _flange(tree, choices, options.flange)
     structure = urdf_structure(tree, flange, options)
-    bodies = link_bodies(
-        tree, structure.configuration, MeshShelf(folder=path.parent, package_dirs=options.package_dirs)
-    )
+    shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs)
+    bodies = link_bodies(tree, structure.configuration, shelf)
     lacking = lacking_limits(structure.roles.driven, {})
     model = None if lacking else urdf_model(structure, bodies, limits={}, source=path.name)
     return RobotDescription(
@@ -66,8 +65,9 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
         mimics=tuple(_mimics(tree)),
         locked=lock_positions(structure.loose, {}),
         links=tuple(_links(structure, bodies)),
-        cell_lines=_cell_lines(structure, lacking, written=written, package_dirs=options.package_dirs),
+        cell_lines=_cell_lines(structure, lacking, written=written, options=options),
         model=model,
+        remarks=(*tree.document.remarks, *shelf.remarks.lines),
     )
 
 
@@ -164,13 +164,13 @@ def _links(structure: UrdfStructure, bodies: tuple[Body, ...]) -> Iterator[LinkS
             yield LinkSize(link=link.name, shapes=shapes, size=size_along(own, X_BL))
 
 
-def _cell_lines(
-    structure: UrdfStructure, lacking: tuple[Lacking, ...], *, written: str, package_dirs: tuple[Path, ...]
-) -> str:
+def _cell_lines(structure: UrdfStructure, lacking: tuple[Lacking, ...], *, written: str, options: UrdfOptions) -> str:
     """The robot as a cell states it, with … for every value that the file lacks."""
     entry: dict[str, object] = {"model": written}
-    if package_dirs:
-        entry["package_dirs"] = [folder.as_posix() for folder in package_dirs]
+    if options.package_dirs:
+        entry["package_dirs"] = [folder.as_posix() for folder in options.package_dirs]
+    if options.xacro_args:
+        entry["xacro_args"] = options.xacro_args
     entry["flange"] = structure.flange
     if structure.loose:
         are_few = len(structure.loose) <= NAMED_LOCKS

@@ -56,11 +56,11 @@ def lacking_error(lacking: Sequence[Lacking]) -> InputError:
     for each in lacking:
         reasons.setdefault(each.reason, []).append(each.joint.name)
     limits = with_blanks(flow_text(limits_to_state(lacking)))
-    cure = f"state them in the cell, with a number for each {BLANK}: `limits: {limits}`"
+    cure = f"state limits in the cell, with a number for each {BLANK}: `limits: {limits}`"
     if any(each.joint.kind == "continuous" and len(each.keys) > 1 for each in lacking):
         cure += "; a continuous joint turns without end with `wrap: true` in place of its lower and upper limit"
     if len(lacking) == 1:
-        return lacking[0].joint.error(f"lacks limits, as it {lacking[0].reason}: {cure}")
+        return lacking[0].joint.error(f"{lacking[0].reason}: {cure}")
     why = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
     return lacking[0].joint.element.error(f"{len(lacking)} joints lack limits ({why}): {cure}")
 
@@ -111,8 +111,8 @@ def _lacking(joint: UrdfJoint, cell: StatedLimits) -> Lacking:
     limits, unit = tightest(_own(joint), cell), unit_of(joint).name
     ends = [] if cell.wraps else [name for name in ("lower", "upper") if getattr(limits, name) is None]
     keys = [f"{name}_{unit}" for name in ends] + ([f"velocity_{unit}_s"] if limits.velocity is None else [])
-    reasons = [joint.limit.position_slip or _range_reason(joint)] if ends else []
-    reasons += [joint.limit.velocity_slip or _stated(joint, "velocity")] if limits.velocity is None else []
+    reasons = [joint.limit.position_fault or _range_reason(joint)] if ends else []
+    reasons += [joint.limit.velocity_fault or _stated(joint, "velocity")] if limits.velocity is None else []
     return Lacking(joint=joint, keys=tuple(keys), reason=" and ".join(dict.fromkeys(reasons)))
 
 

@@ -183,7 +183,7 @@ def test_a_hundred_joints_are_read_when_all_but_the_chain_are_locked(tmp_path: P
 def test_one_message_lists_every_limit_to_be_stated(tmp_path: Path) -> None:
     assert refused(tmp_path, *BARE) == (
         'r.urdf:6: 3 joints lack limits (j1: states lower="0.0" upper="0.0" and states velocity="0.0"; '
-        "j2: is continuous; no: states no limits): state them in the cell, with a number for each …: "
+        "j2: is continuous; no: states no limits): state limits in the cell, with a number for each …: "
         "`limits: {j1: {lower_deg: …, upper_deg: …, velocity_deg_s: …}, j2: {lower_deg: …, upper_deg: …}, "
         '"no": {lower_mm: …, upper_mm: …, velocity_mm_s: …}}`; '
         "a continuous joint turns without end with `wrap: true` in place of its lower and upper limit"
@@ -238,7 +238,7 @@ def test_locks_and_limits_are_asked_for_at_once(tmp_path: Path) -> None:
 
     locks, limits = str(caught.value).splitlines()
     assert f"`locked: {{{HELD}}}`" in locks
-    assert "r.urdf:4: joint 'a1': lacks limits, as it states no limits: " in limits
+    assert "r.urdf:4: joint 'a1': states no limits: " in limits
 
 
 def test_a_written_cell_keeps_its_locks_and_single_ones_can_be_changed(load: Load, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from builders.urdf_texts import ARM, LIMIT, joint, refusal, refused
 from cellplan.io.robots.limits import StatedLimits
 from cellplan.io.robots.urdf.load import UrdfOptions
 
-STATE = "state them in the cell, with a number for each …: "
+STATE = "state limits in the cell, with a number for each …: "
 MIMIC = '<mimic joint="{}"/>'
 
 
@@ -75,7 +75,7 @@ MIMIC = '<mimic joint="{}"/>'
             ],
             "r.urdf: expected at most 64 movable joints between 'l0' and 'l65', got 65",
         ),
-        (['<link name="base"/>'], "r.urdf: flange: expected the name of a link, as it could be any of: none"),
+        (['<link name="base"/>'], "r.urdf: expected a joint that moves a link, got none"),
         (
             ['<link name="base"/><link name="tool0"/>', joint("f", "base", "tool0", "", kind="fixed")],
             "r.urdf: expected a movable joint between 'base' and 'tool0', got none",
@@ -138,22 +138,21 @@ MIMIC = '<mimic joint="{}"/>'
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="2" upper="-1" velocity="3"/>')],
             "r.urdf:4: joint 'a1': expected 'lower' below 'upper', got 2 and -1: "
-            "state `limits: {a1: {lower_deg: …, upper_deg: …}}` of the robot in the cell",
+            f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="0" velocity="3"/>')],
-            'r.urdf:4: joint \'a1\': lacks limits, as it states lower="0" upper="0": '
+            'r.urdf:4: joint \'a1\': states lower="0" upper="0": '
             f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit velocity="3"/>', kind="prismatic")],
-            "r.urdf:4: joint 'a1': lacks limits, as it states no lower and upper limit: "
+            "r.urdf:4: joint 'a1': states no lower and upper limit: "
             f"{STATE}`limits: {{a1: {{lower_mm: …, upper_mm: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="-1" upper="1" velocity="0"/>')],
-            "r.urdf:4: joint 'a1': lacks limits, as it states velocity=\"0\": "
-            f"{STATE}`limits: {{a1: {{velocity_deg_s: …}}}}`",
+            f"r.urdf:4: joint 'a1': states velocity=\"0\": {STATE}`limits: {{a1: {{velocity_deg_s: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="x" upper="1" velocity="0"/>')],
@@ -161,24 +160,24 @@ MIMIC = '<mimic joint="{}"/>'
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", LIMIT, kind="continuous")],
-            "r.urdf:4: joint 'a1': lacks limits, as it is continuous: "
+            "r.urdf:4: joint 'a1': is continuous: "
             f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`; "
             "a continuous joint turns without end with `wrap: true` in place of its lower and upper limit",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="-170" upper="170" velocity="3"/>')],
             "r.urdf:4: joint 'a1': expected position limits within two turns, got 170 rad (is the unit degrees?): "
-            "state `limits: {a1: {lower_deg: …, upper_deg: …}}` of the robot in the cell",
+            f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="500" velocity="3"/>', kind="prismatic")],
             "r.urdf:4: joint 'a1': expected position limits within 20 m, got 500 m (is the unit mm?): "
-            "state `limits: {a1: {lower_mm: …, upper_mm: …}}` of the robot in the cell",
+            f"{STATE}`limits: {{a1: {{lower_mm: …, upper_mm: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="5" velocity="156"/>')],
             "r.urdf:4: joint 'a1': expected a velocity limit of at most 100 rad/s, got 156 rad/s (is it in deg/s?): "
-            "state `limits: {a1: {velocity_deg_s: …}}` of the robot in the cell",
+            f"{STATE}`limits: {{a1: {{velocity_deg_s: …}}}}`",
         ),
         (
             [*ARM, '<link name="f"/>', joint("g", "base", "f")],
@@ -236,7 +235,7 @@ MIMIC = '<mimic joint="{}"/>'
 )
 def test_unsound_robots_are_refused_with_line_and_cure(tmp_path: Path, lines: list[str], message: str | None) -> None:
     message = message or (
-        "r.urdf:4: joint 'a1': lacks limits, as it states no limits: "
+        "r.urdf:4: joint 'a1': states no limits: "
         f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …, velocity_deg_s: …}}}}`"
     )
     assert refused(tmp_path, *lines) == message

@@ -194,7 +194,7 @@ NO_END = "expected macros, includes and expressions that end, got some that call
             {},
             "r.xacro:2: expected no variable of the environment, got $(env HOME): use an argument, `xacro_args`",
         ),
-        ([], {}, "r.xacro: expected 1 to 200 links, got 0: is it a file of macros that others include?"),
+        ([], {}, "r.xacro: expected 1 to 1000 links, got 0: is it a file of macros that others include?"),
         (
             ['<foreign:element name="x"/>'],
             {},
