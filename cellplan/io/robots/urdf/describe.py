@@ -28,7 +28,7 @@ from cellplan.model.robot_description import (
     RobotDescription,
 )
 
-TOOL_SIDE: Final = re.compile(r"(^|_)(tool\d*|flange|tcp|eef?|end_?effector)($|_)", re.IGNORECASE)
+TOOL_SIDE: Final = re.compile(r"(^|[^a-z0-9])(tool\d*|flange|tcp|eef?|end_?effector)($|[^a-z0-9])", re.IGNORECASE)
 NAMED_LOCKS: Final = 12  # more locked joints than these are locked together
 BEYOND_NAME: Final = re.compile(r"[^A-Za-z0-9_-]+")
 LONGEST_NAME: Final = 40  # characters of the name of a robot in a cell
