@@ -63,7 +63,7 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
         X_BF=structure.configuration.X_BL[flange],
         joints=tuple(_joints(structure, lacking, model)),
         mimics=tuple(_mimics(tree)),
-        locked=lock_positions(structure.loose, {}),
+        locked=lock_positions(structure.unlocked, {}),
         links=tuple(_links(structure, bodies)),
         cell_lines=_cell_lines(structure, lacking, written=written, options=options),
         model=model,
@@ -172,9 +172,9 @@ def _cell_lines(structure: UrdfStructure, lacking: tuple[Lacking, ...], *, writt
     if options.xacro_args:
         entry["xacro_args"] = options.xacro_args
     entry["flange"] = structure.flange
-    if structure.loose:
-        are_few = len(structure.loose) <= NAMED_LOCKS
-        entry["locked"] = lock_positions(structure.loose, {}) if are_few else {OTHERS: "zero"}
+    if structure.unlocked:
+        are_few = len(structure.unlocked) <= NAMED_LOCKS
+        entry["locked"] = lock_positions(structure.unlocked, {}) if are_few else {OTHERS: "zero"}
     if lacking:
         entry["limits"] = limits_to_state(lacking)
     name = BEYOND_NAME.sub("_", structure.tree.document.name)[:LONGEST_NAME]
