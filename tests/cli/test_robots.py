@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from builders.xacro_texts import write_arm
 
 from cellplan.cli.main import run
 
@@ -132,3 +133,26 @@ def test_a_bad_file_is_one_line(
     Path("bad.urdf").write_text('<robot name="r"><link name="a"/><joint name="x" type="fixed"/></robot>', "utf-8")
     assert run(["robots", *arguments]) == 2
     assert capsys.readouterr().err == message
+
+
+def test_a_xacro_file_is_described_with_its_arguments_and_what_was_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_arm(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    arguments = ["--package-dir", "packages", "--xacro-arg", "prefix=", "--xacro-arg", "length=0.7"]
+
+    assert run(["robots", "arm.urdf.xacro", *arguments]) == 0
+
+    text = capsys.readouterr().out
+    assert "    upper  100 x 100 x 700  box\n" in text
+    assert "note: segment.xacro:6: joint 'upper_joint': attribute 'damping' of <limit> is not known" in text
+    assert text.endswith(
+        "  rig:\n    model: arm.urdf.xacro\n    package_dirs: [packages]\n"
+        '    xacro_args: {prefix: "", length: "0.7"}\n    flange: lower\n'
+    )
+
+
+def test_an_argument_without_a_value_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["robots", "arm.urdf.xacro", "--xacro-arg", "prefix"]) == 2
+    assert "--xacro-arg: expected NAME=VALUE, got 'prefix'" in capsys.readouterr().err

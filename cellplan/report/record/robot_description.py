@@ -76,7 +76,7 @@ def _mimic(mimic: DescribedMimic) -> dict[str, Any]:
 
 
 def _rounded(value: float) -> float:
-    """A place or an angle without the dust of the last digits."""
+    """A place or an angle to four decimals, zero without a sign."""
     return round(float(value), 4) + 0.0
 
 

@@ -155,15 +155,22 @@ def test_many_joints_off_the_chain_are_locked_together_in_the_lines(tmp_path: Pa
     assert made.cell_lines.endswith("    flange: tool0\n    locked: {others: zero}\n")
 
 
-def test_without_a_usual_flange_the_one_behind_the_most_joints_is_shown(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("names", "flange"),
+    [(("a", "b", "c"), "c"), (("arm/ee_link", "b", "c"), "arm/ee_link"), (("a", "tcp", "c"), "tcp")],
+)
+def test_without_a_usual_flange_a_name_decides_and_then_the_number_of_joints(
+    tmp_path: Path, names: tuple[str, str, str], flange: str
+) -> None:
     path = tmp_path / "pair.urdf"
-    joints = [joint(f"j{child}", parent, child) for parent, child in (("base", "a"), ("base", "b"), ("b", "c"))]
-    path.write_text(text("pair", *map(element, ("base", "a", "b", "c")), *joints), encoding="utf-8")
+    a, b, c = names
+    joints = [joint(f"j{index}", *ends) for index, ends in enumerate((("base", a), ("base", b), (b, c)))]
+    path.write_text(text("pair", *map(element, ("base", *names)), *joints), encoding="utf-8")
 
     made = describe_robot(str(path))
 
-    assert (made.flange, made.is_usual, [each.link for each in made.flanges]) == ("c", False, ["a", "c"])
-    assert made.cell_lines.endswith("    flange: c\n    locked: {ja_deg: 0}\n")
+    assert (made.flange, made.is_usual) == (flange, False)
+    assert {each.link for each in made.flanges} == {a, c, flange}
 
 
 def test_every_bundled_robot_is_described_with_its_bodies() -> None:

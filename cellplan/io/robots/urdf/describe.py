@@ -28,7 +28,7 @@ from cellplan.model.robot_description import (
     RobotDescription,
 )
 
-TOOL_SIDE: Final = re.compile(r"(^|_)(tool\d*|flange|tcp|eef?|end_?effector)($|_)", re.IGNORECASE)
+TOOL_SIDE: Final = re.compile(r"(^|[^a-z0-9])(tool\d*|flange|tcp|eef?|end_?effector)($|[^a-z0-9])", re.IGNORECASE)
 NAMED_LOCKS: Final = 12  # more locked joints than these are locked together
 BEYOND_NAME: Final = re.compile(r"[^A-Za-z0-9_-]+")
 LONGEST_NAME: Final = 40  # characters of the name of a robot in a cell
@@ -63,7 +63,7 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
         X_BF=structure.configuration.X_BL[flange],
         joints=tuple(_joints(structure, lacking, model)),
         mimics=tuple(_mimics(tree)),
-        locked=lock_positions(structure.loose, {}),
+        locked=lock_positions(structure.unlocked, {}),
         links=tuple(_links(structure, bodies)),
         cell_lines=_cell_lines(structure, lacking, written=written, options=options),
         model=model,
@@ -172,9 +172,9 @@ def _cell_lines(structure: UrdfStructure, lacking: tuple[Lacking, ...], *, writt
     if options.xacro_args:
         entry["xacro_args"] = options.xacro_args
     entry["flange"] = structure.flange
-    if structure.loose:
-        are_few = len(structure.loose) <= NAMED_LOCKS
-        entry["locked"] = lock_positions(structure.loose, {}) if are_few else {OTHERS: "zero"}
+    if structure.unlocked:
+        are_few = len(structure.unlocked) <= NAMED_LOCKS
+        entry["locked"] = lock_positions(structure.unlocked, {}) if are_few else {OTHERS: "zero"}
     if lacking:
         entry["limits"] = limits_to_state(lacking)
     name = BEYOND_NAME.sub("_", structure.tree.document.name)[:LONGEST_NAME]

@@ -14,7 +14,7 @@ from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_document
 from cellplan.io.robots.urdf.gripper import GripperState, gripper_locks, require_opposed
 from cellplan.io.robots.urdf.limits import joint_range, lacking_error, lacking_limits
-from cellplan.io.robots.urdf.locks import loose_error, loose_joints, require_sound_locks, rest_position
+from cellplan.io.robots.urdf.locks import require_sound_locks, rest_position, unlocked_error, unlocked_joints
 from cellplan.io.robots.urdf.tree import (
     Roles,
     UrdfTree,
@@ -94,14 +94,14 @@ class UrdfStructure:
     Attributes:
         tree: Links and joints.
         flange: Name of the flange link.
-        loose: Movable joints off the chain that are not locked by name, at rest.
+        unlocked: Movable joints off the chain that are not locked by name, at rest.
         roles: What each joint does.
         configuration: Poses of all links while every driven joint reads zero.
     """
 
     tree: UrdfTree
     flange: str
-    loose: tuple[UrdfJoint, ...]
+    unlocked: tuple[UrdfJoint, ...]
     roles: Roles
     configuration: ZeroConfiguration
 
@@ -129,8 +129,8 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     _require_known_limits(document, roles, options.limits)
     lacking = lacking_limits(roles.driven, options.limits)
     errors = [lacking_error(lacking)] if lacking else []
-    if structure.loose and not options.locks_others:
-        errors.insert(0, loose_error(tree, structure.flange, structure.loose, options.locked))
+    if structure.unlocked and not options.locks_others:
+        errors.insert(0, unlocked_error(tree, structure.flange, structure.unlocked, options.locked))
     if errors:
         raise errors[0] if len(errors) == 1 else InvalidFileError(errors)
     shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
@@ -146,17 +146,17 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
 
 
 def urdf_structure(tree: UrdfTree, flange: str, options: UrdfOptions) -> UrdfStructure:
-    """What each joint does, with every loose joint at rest.
+    """What each joint does, with every unlocked joint at rest.
 
     Raises:
         InputError: A lock or a mimic is unsound, or no joint is driven.
     """
     require_sound_locks(tree.document, options.locked, options.lock_units)
-    loose = loose_joints(tree, flange, options.locked)
-    held = {**{joint.name: rest_position(joint) for joint in loose}, **options.locked}
+    unlocked = unlocked_joints(tree, flange, options.locked)
+    held = {**{joint.name: rest_position(joint) for joint in unlocked}, **options.locked}
     roles = assign_roles(tree, flange, held)
     return UrdfStructure(
-        tree=tree, flange=flange, loose=loose, roles=roles, configuration=zero_configuration(tree, roles)
+        tree=tree, flange=flange, unlocked=unlocked, roles=roles, configuration=zero_configuration(tree, roles)
     )
 
 

@@ -12,7 +12,7 @@ from cellplan.io.schema.units import file_number
 from cellplan.io.yaml.writer import flow_text
 
 
-def loose_joints(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> tuple[UrdfJoint, ...]:
+def unlocked_joints(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> tuple[UrdfJoint, ...]:
     """Joints that move by themselves, do not lead to the flange and are not locked by name."""
     on_chain = {joint.name for joint in tree.path_to(flange)}
     return tuple(
@@ -40,25 +40,26 @@ def lock_positions(joints: Sequence[UrdfJoint], locked: Mapping[str, float]) -> 
     return {f"{joint.name}_{unit_of(joint).name}": _number(joint, locked.get(joint.name)) for joint in joints}
 
 
-def loose_error(tree: UrdfTree, flange: str, loose: Sequence[UrdfJoint], locked: Mapping[str, float]) -> InputError:
+def unlocked_error(
+    tree: UrdfTree, flange: str, unlocked: Sequence[UrdfJoint], locked: Mapping[str, float]
+) -> InputError:
     """What to write in the cell when joints are neither locked nor lead to the flange, in one line for all of them.
 
     Args:
         tree: The links and joints.
         flange: Name of the flange link.
-        loose: These joints, at least one.
+        unlocked: These joints, at least one.
         locked: Position in [rad] or [m] of the joints that are locked by name; the line repeats them.
     """
     named = [tree.document.joints[name] for name in locked]
+    text = flow_text(lock_positions([*named, *unlocked], locked))
     where = f"not between the base and the flange '{flange}'"
-    cure = (
-        f"still with `locked: {flow_text(lock_positions([*named, *loose], locked))}` or with `locked: {{others: zero}}`"
-    )
-    if len(loose) == 1:
-        return loose[0].error(f"moves, but is {where}: hold it {cure}")
-    return loose[0].element.error(
-        f"{len(loose)} joints move, but are {where}: hold them {cure}, at zero or at the nearest position within their "
-        "limits"
+    cure = f"still with `locked: {text}` or with `locked: {{others: zero}}`"
+    if len(unlocked) == 1:
+        return unlocked[0].error(f"moves, but is {where}: hold it {cure}")
+    return unlocked[0].element.error(
+        f"{len(unlocked)} joints move, but are {where}: hold them {cure}, "
+        "at zero or at the nearest position within their limits"
     )
 
 
