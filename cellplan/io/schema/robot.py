@@ -37,7 +37,9 @@ TURNING_LIMITS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "accelerati
 SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
 
 POSTURE_WORDS: Final = "auto or a list of joint angles"
-POSITION_WORDS: Final = "auto, the name of a posture in the SRDF, or a mapping with one key per joint (a1_deg, rail_mm)"
+POSITION_WORDS: Final = (
+    "auto, the name of a configuration in the SRDF, or a mapping with one key per joint (a1_deg, rail_mm)"
+)
 
 Configuration = Annotated[
     Annotated[Literal["auto"], Tag(f"<{POSTURE_WORDS}>")] | Annotated[tuple[Angle, ...], Tag("<list>")],
@@ -165,7 +167,7 @@ class RobotEntry(Entry):
     srdf: Text | None = Field(
         default=None,
         description="Path of an SRDF for a URDF: pairs of its links that are not checked against each other, and named "
-        "postures for start and home.",
+        "configurations for start and home.",
     )
     gripper: GripperEntry | None = Field(
         default=None, description="The gripper that a URDF brings along: how far it is open, and what may work."
@@ -186,8 +188,8 @@ class RobotEntry(Entry):
     )
     start: NamedConfiguration | None = Field(
         default=None,
-        description="Start posture, one key per joint with its unit (a1_deg, rail_mm), or the name of a posture in the "
-        "SRDF (STATE, or GROUP/STATE where several groups have one); excludes start_deg.",
+        description="Start posture, one key per joint with its unit (a1_deg, rail_mm); auto finds one; else the name "
+        "of a configuration in the SRDF (STATE, or GROUP/STATE where several groups have one). Excludes start_deg.",
     )
     home_deg: Configuration | None = Field(
         default=None,
