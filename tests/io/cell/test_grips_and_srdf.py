@@ -88,8 +88,8 @@ def test_a_gripper_is_open_as_far_as_the_cell_says(load: Load) -> None:
         (
             "    srdf: arm.srdf\n",
             "",
-            "c:7: robots.holder.start: expected auto, the name of a configuration in the SRDF, or a mapping with one key "
-            "per joint (a1_deg, rail_mm), got 'ready' without the key srdf",
+            "c:7: robots.holder.start: expected auto, the name of a configuration in the SRDF, or a mapping with one "
+            "key per joint (a1_deg, rail_mm), got 'ready' without the key srdf",
         ),
         (
             "srdf: arm.srdf",
