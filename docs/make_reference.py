@@ -271,8 +271,12 @@ def words(field: dict[str, Any]) -> str:
 def container_words(field: dict[str, Any]) -> str:
     """What may stand in a list or under free names."""
     if field["type"] == "object":
-        inner = field.get("additionalProperties") or next(iter(field["patternProperties"].values()))
-        return f"by name: {words(inner)}"
+        arms = (
+            [field["additionalProperties"]]
+            if field.get("additionalProperties")
+            else field["patternProperties"].values()
+        )
+        return f"by name: {' or '.join(words(arm) for arm in arms)}"
     if "prefixItems" in field:
         return f"list of {len(field['prefixItems'])}: {words(field['prefixItems'][0])}"
     return f"list: {words(field.get('items', {}))}"

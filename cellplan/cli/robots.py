@@ -1,8 +1,11 @@
-"""``cellplan robots``: the bundled robots with their reach, limits and source."""
+"""``cellplan robots``: the bundled robots, or one robot's file: flanges, joints, bodies and what a cell has to add."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from cellplan.cli.options import AsJson
 from cellplan.cli.output import json_failure, say, say_json
@@ -13,16 +16,61 @@ if TYPE_CHECKING:
 SCHEMA = "cellplan.robots/1"
 
 
-def robots(as_json: AsJson = False) -> None:
-    """List the bundled robots with reach, limits and source."""
-    with json_failure(SCHEMA, desired=as_json):
-        from cellplan.io.robots.bundled import bundled_names, load_bundled
+Model = Annotated[
+    str | None,
+    typer.Argument(metavar="[MODEL]", help="URDF, joint-axis table or bundled robot to describe.", show_default=False),
+]
+PackageDirs = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--package-dir",
+        metavar="DIR",
+        help="Look up package://NAME/... of a URDF as DIR/NAME/...; may be repeated.",
+        show_default=False,
+        exists=True,
+        file_okay=False,
+    ),
+]
+Flange = Annotated[str | None, typer.Option("--flange", metavar="LINK", help="Take this link of a URDF as the flange.")]
 
-        records = [_record(name, load_bundled(name)) for name in bundled_names()]
+
+def robots(
+    model: Model = None, flange: Flange = None, package_dir: PackageDirs = None, as_json: AsJson = False
+) -> None:
+    """List the bundled robots with reach, limits and source, or describe one robot.
+
+    Of one robot: the possible flanges, joints with limits, what is missing, bodies and their size, and the lines to
+    write into a cell.
+    """
+    with json_failure(SCHEMA, desired=as_json):
+        if model is None and (flange or package_dir):
+            raise typer.BadParameter("expected a URDF with --flange and --package-dir")
+        records = _listed() if model is None else [_described(model, flange, package_dir or [])]
     if as_json:
         say_json({"schema": SCHEMA, "robots": records})
-    else:
+    elif model is None:
         say("\n\n".join("\n".join(_lines(record)) for record in records))
+    else:
+        from cellplan.report.text.robot_description import description_lines
+
+        say("\n".join(description_lines(records[0])))
+
+
+def _listed() -> list[dict[str, Any]]:
+    """All bundled robots."""
+    from cellplan.io.robots.bundled import bundled_names, load_bundled
+
+    return [_record(name, load_bundled(name)) for name in bundled_names()]
+
+
+def _described(model: str, flange: str | None, package_dirs: list[Path]) -> dict[str, Any]:
+    """What one robot's file says."""
+    from cellplan.io.cell.robot_file import describe_robot
+    from cellplan.kinematics.reach import arm_reach
+    from cellplan.report.record.robot_description import description_record
+
+    described = describe_robot(model, flange=flange, package_dirs=package_dirs)
+    return description_record(described, None if described.model is None else arm_reach(described.model))
 
 
 def _record(name: str, model: RobotModel) -> dict[str, Any]:

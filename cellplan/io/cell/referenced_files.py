@@ -24,7 +24,7 @@ from cellplan.io.robots.urdf.srdf import Srdf, read_srdf
 from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import CsvEntry
-from cellplan.io.schema.units import Deg, Mm, si_or_none
+from cellplan.io.schema.units import Deg, si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import SampledPath, TimedPath
@@ -185,8 +185,9 @@ class Sources:
             flange=entry.flange,
             package_dirs=folders,
             limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items()},
-            locked=dict(_locked_in_si(entry)),
-            lock_units={joint: unit for joint, _, unit in (key.rpartition("_") for key in entry.locked)},
+            locked={joint: at.si for joint, at in entry.locked_joints.items()},
+            lock_units={joint: "deg" if isinstance(at, Deg) else "mm" for joint, at in entry.locked_joints.items()},
+            locks_others=entry.locks_others,
             within=self._folders,
             gripper=_gripper_state(entry.gripper),
         )
@@ -220,7 +221,7 @@ class Sources:
 
 def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, options: UrdfOptions) -> UrdfRobot:
     """Robot of a URDF; robots that say the same of the same file share one."""
-    locked = _items(options.locked), _items(options.lock_units)
+    locked = _items(options.locked), _items(options.lock_units), options.locks_others
     key = (written, place, options.flange, options.package_dirs, _items(options.limits), locked, options.gripper)
     if key not in known:
         guard = Guard(file=written, worker="the URDF reader")
@@ -238,10 +239,3 @@ def _gripper_state(entry: GripperEntry | None) -> GripperState | None:
 def _items(table: Mapping[str, Hashable]) -> Hashable:
     """What a table says, as part of a key."""
     return tuple(sorted(table.items(), key=lambda item: item[0]))
-
-
-def _locked_in_si(entry: RobotEntry) -> Iterator[tuple[str, float]]:
-    """Positions of locked joints in [rad] or [m], by joint name."""
-    for key, value in entry.locked.items():
-        joint, _, unit = key.rpartition("_")
-        yield joint, Deg(value).si if unit == "deg" else Mm(value).si

@@ -10,7 +10,7 @@ from cellplan.io.cell.build_accelerations import written_rule
 from cellplan.io.robots.rules import configuration_in_si, start_keys
 from cellplan.io.schema.cell import MotionEntry
 from cellplan.io.schema.robot import RobotEntry
-from cellplan.io.schema.units import Deg, Mm, in_si
+from cellplan.io.schema.units import Deg, Mm, file_number, in_si
 from cellplan.io.yaml.writer import yaml_text
 from cellplan.model.cell import Cell, CheckSettings, Part, Robot
 from cellplan.model.robot import RobotModel
@@ -19,7 +19,6 @@ from cellplan.model.task import SampledPath, Task, TimedPath
 from cellplan.model.units import MM
 
 CONFIGURATIONS: Final = frozenset({"start", "start_deg", "home", "home_deg"})
-NEIGHBOURS: Final = 3  # units in the last place round the quotient in which the written number is sought
 
 
 def render_cell(cell: Cell, starts: Mapping[str, Array] | None = None) -> str:
@@ -75,7 +74,7 @@ def _robot(entry: Mapping[str, Any], robot: Robot, found: Array | None) -> dict[
     written |= _configuration("home", robot.model, robot.home)
     written["weights"] = [float(weight) for weight in robot.weights]
     written["acceleration"] = written_rule(robot)
-    written["controller_cycle_ms"] = _file_number(robot.controller_cycle, is_revolute=False)
+    written["controller_cycle_ms"] = file_number(robot.controller_cycle, is_revolute=False)
     return {key: written[key] for key in RobotEntry.model_fields if key in written}
 
 
@@ -115,7 +114,7 @@ def _solver(entry: Mapping[str, Any], solver: SolverSettings) -> dict[str, Any]:
     used = {
         "method": solver.method,
         "integrator": str(Integrator.ACCURATE if solver.is_accurate else Integrator.EULER),
-        "accuracy_mm": _file_number(solver.accuracy, is_revolute=False),
+        "accuracy_mm": file_number(solver.accuracy, is_revolute=False),
         "gain_per_s": solver.gain,
         "damping": "auto" if solver.damping is None else solver.damping,
         "seed": solver.seed,
@@ -140,25 +139,13 @@ def _pose(entry: Mapping[str, Any], X: Array) -> dict[str, Any]:
     """A pose with the numbers of the file; with new numbers if it was changed since."""
     if np.array_equal(pose(in_si(map(Mm, entry["xyz_mm"])), in_si(map(Deg, entry["rpy_deg"]))), X):
         return dict(entry)
-    xyz_mm = [_file_number(float(value), is_revolute=False) for value in X[:3, 3]]
-    rpy_deg = [_file_number(float(value), is_revolute=True) for value in rpy_from_rotation(X[:3, :3])]
+    xyz_mm = [file_number(float(value), is_revolute=False) for value in X[:3, 3]]
+    rpy_deg = [file_number(float(value), is_revolute=True) for value in rpy_from_rotation(X[:3, :3])]
     return {"xyz_mm": xyz_mm, "rpy_deg": rpy_deg}
 
 
 def in_file_units(model: RobotModel, q: Array) -> list[float]:
     """A configuration in degrees and millimetres."""
     return [
-        _file_number(float(value), is_revolute=joint.is_revolute) for joint, value in zip(model.joints, q, strict=True)
+        file_number(float(value), is_revolute=joint.is_revolute) for joint, value in zip(model.joints, q, strict=True)
     ]
-
-
-def _file_number(value: float, *, is_revolute: bool) -> float:
-    """Number of degrees or millimetres with the fewest digits that reads back to the value, or else nearly so."""
-    quotient = float(np.rad2deg(value)) if is_revolute else value * MM
-    candidates = [float(f"{quotient:.{digits}g}") for digits in range(1, 18)]
-    above = below = quotient
-    for _ in range(NEIGHBOURS):
-        above, below = float(np.nextafter(above, np.inf)), float(np.nextafter(below, -np.inf))
-        candidates += [above, below]
-    unit = Deg if is_revolute else Mm
-    return next((number for number in candidates if unit(number).si == value), quotient)

@@ -9,7 +9,7 @@ from cellplan.io.schema.common import Angle, Coordinate, Coordinates, Entry, Pos
 from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
-from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Within
+from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Quantity, Within
 
 LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a wrong unit
 FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a wrong unit
@@ -31,11 +31,14 @@ Mass = Annotated[float, Field(ge=0.0, le=HEAVIEST_KG)]
 Accuracy = Annotated[Mm, Within(ge=0.0, le=ROUGHEST_MM)]
 LoadFigure = Annotated[float, Field(gt=0.0, le=HEAVIEST_KG)]
 Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
-JointPosition = Annotated[float, Field(ge=-100_000.0, le=100_000.0)]
+FARTHEST: Final = 100_000.0  # [deg] or [mm] of a joint
+JointPosition = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 
 TURNING_LIMITS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
 SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
 
+OTHERS: Final = "others"  # key of all joints that do not lead to the flange, where they are locked together
+LOCK_WORDS: Final = "a number, or zero for the key others"
 POSTURE_WORDS: Final = "auto or a list of joint angles"
 POSITION_WORDS: Final = (
     "auto, the name of a configuration in the SRDF, or a mapping with one key per joint (a1_deg, rail_mm)"
@@ -48,6 +51,12 @@ Configuration = Annotated[
 NamedConfiguration = Annotated[
     Annotated[Text, Tag(f"<{POSITION_WORDS}>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
     by_kind(POSITION_WORDS, mapping=dict),
+]
+
+
+LockedPosition = Annotated[
+    Annotated[Literal["zero"], Tag(f"<{LOCK_WORDS}>")] | Annotated[JointPosition, Tag("<number>")],
+    by_kind(LOCK_WORDS, number=(int, float)),
 ]
 
 
@@ -213,27 +222,58 @@ class RobotEntry(Entry):
     controller_cycle_ms: CycleTime | None = Field(
         default=None, description="Cycle of its controller, over which jerk is taken; the motion's when absent."
     )
-    locked: dict[str, JointPosition] = Field(
+    locked: dict[str, LockedPosition] = Field(
         default={},
-        description="Positions of URDF joints that do not lead to the flange, by joint name with its unit (finger_mm).",
+        description="Positions of URDF joints that do not lead to the flange, by joint name with its unit (finger_mm); "
+        "`others: zero` holds all that are not named at zero, or at the nearest position within their limits.",
+        json_schema_extra={
+            "patternProperties": {
+                "_(deg|mm)$": {"type": "number", "minimum": -FARTHEST, "maximum": FARTHEST},
+                f"^{OTHERS}$": {"const": "zero"},
+            },
+            "additionalProperties": False,
+        },
     )
 
     @model_validator(mode="after")
     def _starts_once(self) -> Self:
-        """Start posture and home are given at most once each; locked joints name their unit."""
+        """Start posture and home are given at most once each."""
         if self.start_deg is not None and self.start is not None:
             raise rule("expected either start_deg or start, got both", "start")
         if self.home_deg is not None and self.home is not None:
             raise rule("expected either home_deg or home, got both", "home")
+        return self
+
+    @model_validator(mode="after")
+    def _locks_once(self) -> Self:
+        """Locked joints name their unit, and only the others together are locked without one."""
         joints: set[str] = set()
-        for key in self.locked:
+        for key, position in self.locked.items():
+            if (key == OTHERS) != (position == "zero"):
+                text = (
+                    f"zero, got {position:g}"
+                    if key == OTHERS
+                    else "a number, got zero: only others may be zero in words"
+                )
+                raise rule(f"expected {text}", f"locked.{key}")
             joint, _, unit = key.rpartition("_")
-            if unit not in {"deg", "mm"}:
+            if key != OTHERS and unit not in {"deg", "mm"}:
                 raise rule("expected a joint name with its unit, such as finger_mm or flap_deg", f"locked.{key}")
             if joint in joints:
                 raise rule(f"expected each joint once, got '{joint}' in deg and in mm", f"locked.{key}")
             joints.add(joint)
         return self
+
+    @property
+    def locked_joints(self) -> dict[str, Quantity]:
+        """Positions of the joints that are locked by name, without the others."""
+        named = {key.rpartition("_"): position for key, position in self.locked.items() if position != "zero"}
+        return {joint: Deg(position) if unit == "deg" else Mm(position) for (joint, _, unit), position in named.items()}
+
+    @property
+    def locks_others(self) -> bool:
+        """Whether every movable joint that does not lead to the flange and is not named is locked."""
+        return OTHERS in self.locked
 
     @property
     def given_start(self) -> tuple[float, ...] | dict[str, Any] | None:

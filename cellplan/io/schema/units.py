@@ -3,14 +3,16 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Self
+from typing import Final, Self
 
 import numpy as np
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.units import MM
+from cellplan.model.units import MM, joint_unit
+
+NEIGHBOURS: Final = 3  # units in the last place round the quotient in which the written number is sought
 
 
 class Quantity(float):
@@ -90,3 +92,22 @@ def in_si(values: Iterable[Quantity]) -> Array:
 def si_or_none(value: Quantity | None) -> float | None:
     """A quantity in SI units; None stays None."""
     return None if value is None else value.si
+
+
+def file_number(value: float, *, is_revolute: bool, within: tuple[float, float] | None = None) -> float:
+    """Number of degrees or millimetres with the fewest digits that reads back to the value, or else nearly so.
+
+    Args:
+        value: In [rad] or [m].
+        is_revolute: Whether it is an angle.
+        within: Lowest and highest value that it may read back to instead.
+    """
+    quotient = value * joint_unit(is_revolute=is_revolute).scale
+    candidates = [float(f"{quotient:.{digits}g}") for digits in range(1, 18)]
+    above = below = quotient
+    for _ in range(NEIGHBOURS):
+        above, below = float(np.nextafter(above, np.inf)), float(np.nextafter(below, -np.inf))
+        candidates += [above, below]
+    unit = Deg if is_revolute else Mm
+    lower, upper = within or (value, value)
+    return next((number for number in candidates if lower <= unit(number).si <= upper), quotient)

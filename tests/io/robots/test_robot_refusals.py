@@ -147,6 +147,26 @@ Refuse = Callable[..., list[str]]
             "c:11: robots.worker.locked.finger: expected a joint name with its unit, such as finger_mm or flap_deg",
         ),
         (
+            "weights: [1, 1, 1, 1, 1, 1]",
+            "locked: {others: 10}",
+            "c:11: robots.worker.locked.others: expected zero, got 10",
+        ),
+        (
+            "weights: [1, 1, 1, 1, 1, 1]",
+            "locked: {finger_mm: zero}",
+            "c:11: robots.worker.locked.finger_mm: expected a number, got zero: only others may be zero in words",
+        ),
+        (
+            "weights: [1, 1, 1, 1, 1, 1]",
+            "locked: {others: nil}",
+            "c:11: robots.worker.locked.others: expected a number, or zero for the key others, got 'nil'",
+        ),
+        (
+            "weights: [1, 1, 1, 1, 1, 1]",
+            "locked: {finger_mm: 1e9}",
+            "c:11: robots.worker.locked.finger_mm: expected a number of millimetres of at most 100000, got 1000000000",
+        ),
+        (
             "model: abb_irb1600",
             "model: abb_irb160",
             "c:8: robots.worker.model: expected a bundled robot (abb_irb1600, kuka_kr6, planar_3r, reis_rv20_16, "

@@ -1,15 +1,19 @@
 """Joint limits: those of the URDF, tightened or supplied by the cell."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from cellplan.errors import InputError
+from cellplan.io.input.findings import shown
 from cellplan.io.robots.limits import StatedLimits, limit_findings, tightest
 from cellplan.io.robots.urdf.document import UrdfJoint
-from cellplan.io.robots.urdf.tree import in_user_unit
+from cellplan.io.robots.urdf.tree import in_user_unit, unit_of
+from cellplan.io.yaml.writer import flow_text
 
+BLANK: Final = "…"  # a value that the user has to state
 MAX_TURN: Final = 4.0 * np.pi  # [rad] limits beyond two turns each way are mistakes of the unit
 MAX_TRAVEL: Final = 20.0  # [m]
 MAX_TURN_SPEED: Final = 100.0  # [rad/s] the fastest wrists reach 20
@@ -29,31 +33,108 @@ class Range:
     rated_velocity: float | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Lacking:
+    """What a driven joint lacks.
+
+    Attributes:
+        joint: The joint.
+        keys: Keys of the limits that the cell has to state, such as ``velocity_deg_s``.
+        reason: What the URDF states instead.
+    """
+
+    joint: UrdfJoint
+    keys: tuple[str, ...]
+    reason: str
+
+
+def lacking_limits(joints: Iterable[UrdfJoint], cell: Mapping[str, StatedLimits]) -> tuple[Lacking, ...]:
+    """The joints that have no complete limits, neither by the URDF nor by the cell."""
+    found = (_lacking(joint, cell.get(joint.name, StatedLimits())) for joint in joints)
+    return tuple(lacking for lacking in found if lacking.keys)
+
+
+def lacking_error(lacking: Sequence[Lacking]) -> InputError:
+    """What to write in the cell when limits are missing, in one line for all joints, at least one."""
+    reasons: dict[str, list[str]] = {}
+    for each in lacking:
+        reasons.setdefault(each.reason, []).append(each.joint.name)
+    limits = with_blanks(flow_text(limits_to_state(lacking)))
+    cure = f"state limits in the cell, with a number for each {BLANK}: `limits: {limits}`"
+    if any(each.joint.kind == "continuous" and len(each.keys) > 1 for each in lacking):
+        cure += "; a continuous joint turns without end with `wrap: true` in place of its lower and upper limit"
+    if len(lacking) == 1:
+        return lacking[0].joint.error(f"{lacking[0].reason}: {cure}")
+    why = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
+    return lacking[0].joint.element.error(f"{len(lacking)} joints lack limits ({why}): {cure}")
+
+
+def limits_to_state(lacking: Iterable[Lacking]) -> dict[str, dict[str, str]]:
+    """The limits that a cell has to state, with … for every number."""
+    return {each.joint.name: dict.fromkeys(each.keys, BLANK) for each in lacking}
+
+
+def with_blanks(text: str) -> str:
+    """YAML in which every … stands without quotes, for the user to replace it."""
+    return text.replace(f'"{BLANK}"', BLANK)
+
+
 def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJoint]) -> Range:
     """Limits of a driven joint: the tightest of the URDF's, the cell's and those of the joints that follow it.
 
     Raises:
         InputError: A limit is missing, is widened by the cell, leaves no range or has an unlikely size.
     """
-    given = joint.limit
-    own = StatedLimits(lower=given.lower, upper=given.upper, velocity=given.velocity)
+    own = _own(joint)
     for key, text in limit_findings(own, cell, is_revolute=joint.kind != "prismatic"):
         raise joint.error(f"{key}: {text}")
     limits = tightest(own, cell)
     lower, upper = _endless(joint, cell) if cell.wraps else (limits.lower, limits.upper)
-    if lower is None or upper is None:
-        raise joint.error(_missing_positions(joint))
-    velocity = _velocity(joint, limits)
+    if lower is None or upper is None or limits.velocity is None:
+        raise lacking_error([_lacking(joint, cell)])
+    velocity = limits.velocity
+    if not velocity > 0.0:
+        raise joint.error(f"expected a positive velocity limit, got {in_user_unit(joint, velocity, '/s')}")
     for follower in followers:
         lower, upper, velocity = _within_follower(follower, lower, upper, velocity=velocity)
     if not lower < upper:
         ends = f"{in_user_unit(joint, lower)} and {in_user_unit(joint, upper)}"
         raise joint.error(f"expected a lower limit below the upper one, got {ends}")
     found = Range(
-        lower=lower, upper=upper, velocity=velocity, rated_velocity=None if cell.velocity is None else given.velocity
+        lower=lower, upper=upper, velocity=velocity, rated_velocity=None if cell.velocity is None else own.velocity
     )
     _require_likely(joint, found)
     return found
+
+
+def _own(joint: UrdfJoint) -> StatedLimits:
+    """Limits of the URDF."""
+    return StatedLimits(lower=joint.limit.lower, upper=joint.limit.upper, velocity=joint.limit.velocity)
+
+
+def _lacking(joint: UrdfJoint, cell: StatedLimits) -> Lacking:
+    """What one joint lacks; no keys where it is complete."""
+    limits, unit = tightest(_own(joint), cell), unit_of(joint).name
+    ends = [] if cell.wraps else [name for name in ("lower", "upper") if getattr(limits, name) is None]
+    keys = [f"{name}_{unit}" for name in ends] + ([f"velocity_{unit}_s"] if limits.velocity is None else [])
+    reasons = [_range_reason(joint)] if ends else []
+    reasons += [_stated(joint, "velocity")] if limits.velocity is None else []
+    return Lacking(joint=joint, keys=tuple(keys), reason=" and ".join(dict.fromkeys(reasons)))
+
+
+def _range_reason(joint: UrdfJoint) -> str:
+    """Why a joint has no range."""
+    return "is continuous" if joint.kind == "continuous" else _stated(joint, "lower", "upper")
+
+
+def _stated(joint: UrdfJoint, *names: str) -> str:
+    """What the file says where a limit is missing: ``states velocity="0"``."""
+    limit = next(iter(joint.element.all("limit")), None)
+    if limit is None:
+        return "states no limits"
+    given = {name: limit.attributes[name] for name in names if name in limit.attributes}
+    text = " ".join(f'{name}="{shown(value)[1:-1]}"' for name, value in given.items())
+    return f"states {text}" if text else f"states no {' and '.join(names)} limit"
 
 
 def _endless(joint: UrdfJoint, cell: StatedLimits) -> tuple[float, float]:
@@ -63,28 +144,6 @@ def _endless(joint: UrdfJoint, cell: StatedLimits) -> tuple[float, float]:
     if cell.lower is not None or cell.upper is not None:
         raise joint.error("expected either `wrap: true` or limits, got both")
     return -np.inf, np.inf
-
-
-def _missing_positions(joint: UrdfJoint) -> str:
-    """What to write in the cell when the URDF has no position limits."""
-    unit = "mm" if joint.kind == "prismatic" else "deg"
-    bounds = f"`limits: {{{joint.name}: {{lower_{unit}: …, upper_{unit}: …}}}}`"
-    if joint.kind == "continuous":
-        return (
-            f"is continuous: give it {bounds}, or `limits: {{{joint.name}: {{wrap: true}}}}` to let it turn without end"
-        )
-    return f"has no room between 'lower' and 'upper' in the URDF: give it {bounds}"
-
-
-def _velocity(joint: UrdfJoint, limits: StatedLimits) -> float:
-    """Velocity limit."""
-    if limits.velocity is None:
-        unit = "mm_s" if joint.kind == "prismatic" else "deg_s"
-        cure = f"give it `limits: {{{joint.name}: {{velocity_{unit}: …}}}}`"
-        raise joint.error(f"has no positive velocity limit in the URDF: {cure}")
-    if not limits.velocity > 0.0:
-        raise joint.error(f"expected a positive velocity limit, got {in_user_unit(joint, limits.velocity, '/s')}")
-    return limits.velocity
 
 
 def _within_follower(follower: UrdfJoint, lower: float, upper: float, *, velocity: float) -> tuple[float, float, float]:

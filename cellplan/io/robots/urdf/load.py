@@ -3,18 +3,19 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 
-from cellplan.errors import CellplanError
+from cellplan.errors import CellplanError, InvalidFileError
 from cellplan.geometry.transforms import Array
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.robots.limits import StatedLimits
 from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_document
 from cellplan.io.robots.urdf.gripper import GripperState, gripper_locks, require_opposed
-from cellplan.io.robots.urdf.limits import joint_range
+from cellplan.io.robots.urdf.limits import joint_range, lacking_error, lacking_limits
+from cellplan.io.robots.urdf.locks import loose_error, loose_joints, require_sound_locks, rest_position
 from cellplan.io.robots.urdf.tree import (
     Roles,
+    UrdfTree,
     ZeroConfiguration,
     assign_roles,
     build_tree,
@@ -23,7 +24,7 @@ from cellplan.io.robots.urdf.tree import (
     links_in_order,
     zero_configuration,
 )
-from cellplan.model.robot import FollowerJoint, Joint, JointKind, Link, RobotModel
+from cellplan.model.robot import Body, FollowerJoint, Joint, JointKind, Link, RobotModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +36,8 @@ class UrdfOptions:
         package_dirs: Folders in which ``package://`` names are looked up.
         limits: Limits by joint name; they tighten the URDF's or stand in for missing ones.
         locked: Position in [rad] or [m] of joints that are held still, by name.
+        locks_others: Whether all other movable joints that do not lead to the flange are held still where
+            `rest_position` says.
         lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where it was not written.
         within: Folders that its meshes must lie in; None for all.
         gripper: How far its gripper is open; None to leave its joints to ``locked``.
@@ -42,9 +45,10 @@ class UrdfOptions:
 
     flange: str | None = None
     package_dirs: tuple[Path, ...] = ()
-    limits: Mapping[str, StatedLimits] = field(default_factory=lambda: MappingProxyType({}))
-    locked: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    lock_units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    limits: Mapping[str, StatedLimits] = field(default_factory=dict)
+    locked: Mapping[str, float] = field(default_factory=dict)
+    locks_others: bool = False
+    lock_units: Mapping[str, str] = field(default_factory=dict)
     within: AllowedFolders | None = None
     gripper: GripperState | None = None
 
@@ -62,6 +66,27 @@ def read_urdf(path: Path, options: UrdfOptions | None = None) -> RobotModel:
     return load_urdf(path, options).model
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UrdfStructure:
+    """What each joint of a URDF does for one flange, before its limits and bodies are read.
+
+    Attributes:
+        tree: Links and joints.
+        flange: Name of the flange link.
+        gripper: Positions in [rad] or [m] of the joints that open its gripper, by name.
+        loose: Movable joints off the chain that are neither locked by name nor the gripper's, at rest.
+        roles: What each joint does.
+        configuration: Poses of all links while every driven joint reads zero.
+    """
+
+    tree: UrdfTree
+    flange: str
+    gripper: Mapping[str, float]
+    loose: tuple[UrdfJoint, ...]
+    roles: Roles
+    configuration: ZeroConfiguration
+
+
 def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     """Read a URDF and its collision meshes.
 
@@ -76,31 +101,73 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         InputError: With file and line, for anything that cannot be taken over faithfully.
     """
     options = options or UrdfOptions()
-    document = read_document(path)
-    tree = build_tree(document)
-    _require_lock_units(document, options.lock_units)
-    flange = choose_flange(tree, options.flange)
-    held = gripper_locks(tree, flange, options.gripper, options.locked)
-    roles = assign_roles(tree, flange, {**options.locked, **held})
-    _require_known_limits(document, roles, options.limits)
-    configuration = zero_configuration(tree, roles)
+    tree = build_tree(read_document(path))
+    structure = urdf_structure(tree, choose_flange(tree, options.flange), options)
+    roles = structure.roles
+    _require_known_limits(tree.document, roles, options.limits)
+    lacking = lacking_limits(roles.driven, options.limits)
+    errors = [lacking_error(lacking)] if lacking else []
+    if structure.loose and not options.locks_others:
+        errors.insert(0, loose_error(tree, structure.flange, structure.loose, options.locked))
+    if errors:
+        raise errors[0] if len(errors) == 1 else InvalidFileError(errors)
     shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
+    bodies = link_bodies(tree, structure.configuration, shelf)
+    require_opposed(
+        tree, options.gripper, locks=structure.gripper, configuration=structure.configuration, bodies=bodies
+    )
+    return UrdfRobot(
+        model=urdf_model(structure, bodies, limits=options.limits, source=path.name), mesh_files=tuple(shelf.files)
+    )
+
+
+def urdf_structure(tree: UrdfTree, flange: str, options: UrdfOptions) -> UrdfStructure:
+    """What each joint does, with every loose joint at rest.
+
+    Raises:
+        InputError: A lock or a mimic is unsound, or no joint is driven.
+    """
+    require_sound_locks(tree.document, options.locked, options.lock_units)
+    gripper = gripper_locks(tree, flange, options.gripper, options.locked)
+    named = {**options.locked, **gripper}
+    loose = loose_joints(tree, flange, named)
+    roles = assign_roles(tree, flange, {**{joint.name: rest_position(joint) for joint in loose}, **named})
+    configuration = zero_configuration(tree, roles)
+    return UrdfStructure(
+        tree=tree, flange=flange, gripper=gripper, loose=loose, roles=roles, configuration=configuration
+    )
+
+
+def urdf_model(
+    structure: UrdfStructure, bodies: tuple[Body, ...], *, limits: Mapping[str, StatedLimits], source: str
+) -> RobotModel:
+    """The robot model.
+
+    Args:
+        structure: What each joint does.
+        bodies: Bodies of its links.
+        limits: Limits of the cell by joint name.
+        source: Name of the file.
+
+    Raises:
+        InputError: Limits are missing or unsound.
+    """
+    document, roles, configuration = structure.tree.document, structure.roles, structure.configuration
     model = RobotModel(
         name=document.name,
-        source=path.name,
-        joints=tuple(_driven(joint, roles, configuration, limits=options.limits) for joint in roles.driven),
+        source=source,
+        joints=tuple(_driven(joint, roles, configuration, limits=limits) for joint in roles.driven),
         followers=tuple(_follower(joint, roles, configuration) for joint in roles.followers),
-        flange_link=configuration.carrier[flange],
-        X_BF=configuration.X_BL[flange],
-        bodies=link_bodies(tree, configuration, shelf),
+        flange_link=configuration.carrier[structure.flange],
+        X_BF=configuration.X_BL[structure.flange],
+        bodies=bodies,
         links=tuple(
             Link(name=link.name, index=configuration.carrier[link.name], X_BL=configuration.X_BL[link.name])
-            for link in links_in_order(tree)
+            for link in links_in_order(structure.tree)
         ),
     )
     _require_complete(document, roles, model)
-    require_opposed(tree, options.gripper, locks=held, configuration=configuration, bodies=model.bodies)
-    return UrdfRobot(model=model, mesh_files=tuple(shelf.files))
+    return model
 
 
 def _require_known_limits(document: UrdfDocument, roles: Roles, limits: Mapping[str, StatedLimits]) -> None:
@@ -111,15 +178,6 @@ def _require_known_limits(document: UrdfDocument, roles: Roles, limits: Mapping[
         if name not in driven:
             reason = "is fixed" if joint.is_fixed else "follows another joint" if joint.mimic else "is locked"
             raise joint.error(f"has limits in the cell, but it {reason}")
-
-
-def _require_lock_units(document: UrdfDocument, units: Mapping[str, str]) -> None:
-    """A joint that slides is held still in millimetres, one that turns in degrees."""
-    for name, unit in units.items():
-        joint = known_joint(document, name, "locked")
-        required = "mm" if joint.kind == "prismatic" else "deg"
-        if unit != required and not joint.is_fixed:
-            raise joint.error(f"is {joint.kind}: expected to be locked in {required}, got {unit}")
 
 
 def _driven(

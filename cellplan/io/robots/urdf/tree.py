@@ -11,10 +11,12 @@ from cellplan.geometry.transforms import Array, pose_from, rotation_about
 from cellplan.io.input.findings import did_you_mean, listed
 from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, UrdfLink
 from cellplan.model.robot import BASE
+from cellplan.model.units import DisplayUnit, joint_unit
 
 FLANGE_NAMES: Final = ("tool0", "flange")  # taken as the flange in this order when the user names none
 
 SHOWN_NAMES: Final = 12  # more names than these make a message unreadable
+MAX_DRIVEN: Final = 64  # joints between base and flange: more are no arm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -119,21 +121,32 @@ def choose_flange(tree: UrdfTree, desired: str | None) -> str:
     for name in FLANGE_NAMES:
         if name in links:
             return name
-    parents = {joint.parent for joint in tree.joints}
-    leaves = [name for name in links if name not in parents and _moves(tree, name)]
-    if len(leaves) != 1:
+    leaves = moving_leaves(tree)
+    if not leaves:
+        raise InputError(f"{tree.document.file}: expected a joint that moves a link, got none")
+    if len(leaves) > 1:
         names = listed(leaves)
         raise InputError(f"{tree.document.file}: flange: expected the name of a link, as it could be any of: {names}")
     return leaves[0]
 
 
+def moving_leaves(tree: UrdfTree) -> list[str]:
+    """Links that carry no other link and are moved by a joint other than a mimic, in the order of the file."""
+    parents = {joint.parent for joint in tree.joints}
+    return [name for name in tree.document.links if name not in parents and _moves(tree, name)]
+
+
 def assign_roles(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> Roles:
     """Say for every joint whether it is driven, follows a driven one or stands still.
 
+    Args:
+        tree: The links and joints.
+        flange: Name of the flange link.
+        locked: Position in [rad] or [m] of every joint that is held still, those off the chain included.
+
     Raises:
-        InputError: A movable joint off the chain is not locked, or a lock or a mimic is unsound.
+        InputError: A mimic is unsound, or there is no driven joint, or there are too many.
     """
-    _require_sound_locks(tree.document, locked)
     on_chain = {joint.name for joint in tree.path_to(flange)}
     driven: list[UrdfJoint] = []
     followers: list[UrdfJoint] = []
@@ -151,16 +164,12 @@ def assign_roles(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> Ro
                 followers.append(joint)
         elif joint.name in locked:
             still[joint.name] = locked[joint.name]
-        elif joint.name in on_chain:
-            driven.append(joint)
         else:
-            unit = "mm" if joint.kind == "prismatic" else "deg"
-            cure = f"hold it still with `locked: {{{joint.name}_{unit}: …}}`"
-            raise joint.error(f"moves, but is not between the base and the flange '{flange}': {cure}")
-    if not driven:
-        raise InputError(
-            f"{tree.document.file}: expected a movable joint between '{tree.root}' and '{flange}', got none"
-        )
+            driven.append(joint)
+    if not 1 <= len(driven) <= MAX_DRIVEN:
+        what, got = ("a", "none") if not driven else (f"at most {MAX_DRIVEN}", len(driven))
+        between = f"movable joint{'s' if driven else ''} between '{tree.root}' and '{flange}'"
+        raise InputError(f"{tree.document.file}: expected {what} {between}, got {got}")
     return Roles(driven=tuple(driven), followers=tuple(followers), still=still)
 
 
@@ -205,26 +214,15 @@ def _moves(tree: UrdfTree, link: str) -> bool:
     return any(not joint.is_fixed and joint.mimic is None for joint in tree.path_to(link))
 
 
-def _require_sound_locks(document: UrdfDocument, locked: Mapping[str, float]) -> None:
-    """Only movable joints that lead can be locked, and only where they can go."""
-    for name, position in locked.items():
-        joint = known_joint(document, name, "locked")
-        if joint.is_fixed:
-            raise joint.error("is locked by the cell, but it is fixed anyway")
-        if joint.mimic:
-            raise joint.error(f"is locked by the cell, but it follows '{joint.mimic.leader}': lock that one")
-        lower = -np.inf if joint.limit.lower is None else joint.limit.lower
-        upper = np.inf if joint.limit.upper is None else joint.limit.upper
-        if not (np.isfinite(position) and lower - 1e-9 <= position <= upper + 1e-9):  # rounding of degrees
-            allowed = f"{in_user_unit(joint, lower)} to {in_user_unit(joint, upper)}"
-            raise joint.error(f"expected to be locked within {allowed}, got {in_user_unit(joint, position)}")
+def unit_of(joint: UrdfJoint) -> DisplayUnit:
+    """Unit in which a cell writes the position of a joint, and messages show it."""
+    return joint_unit(is_revolute=joint.kind != "prismatic")
 
 
 def in_user_unit(joint: UrdfJoint, value: float, per: str = "") -> str:
     """A position in [rad] or [m] as a message says it: in degrees or mm."""
-    if joint.kind == "prismatic":
-        return f"{1e3 * value:.6g} mm{per}"
-    return f"{np.degrees(value):.6g} deg{per}"
+    unit = unit_of(joint)
+    return f"{unit.scale * value:.6g} {unit.name}{per}"
 
 
 def _leader(joint: UrdfJoint, document: UrdfDocument) -> UrdfJoint:

@@ -10,6 +10,7 @@ from builders.urdf_texts import ARM, LIMIT, joint, refusal, refused
 from cellplan.io.robots.limits import StatedLimits
 from cellplan.io.robots.urdf.load import UrdfOptions
 
+STATE = "state limits in the cell, with a number for each …: "
 MIMIC = '<mimic joint="{}"/>'
 
 
@@ -41,7 +42,7 @@ MIMIC = '<mimic joint="{}"/>'
             "r.urdf:4: joint 'a1': unknown parent link 'bas', did you mean 'base'?",
         ),
         ([*ARM[:2], joint("a1", "base", "top")], "r.urdf:4: joint 'a1': unknown child link 'top', did you mean 'tip'?"),
-        (["<gazebo/>"], "r.urdf: expected 1 to 200 links, got 0"),
+        (["<gazebo/>"], "r.urdf: expected 1 to 1000 links, got 0"),
         (
             [*ARM[:2], joint("a1", "base", "tip", f'<axis xzy="0 1 0"/>{LIMIT}')],
             "r.urdf:4: joint 'a1': unknown attribute 'xzy' in <axis>, did you mean 'xyz'?",
@@ -61,15 +62,15 @@ MIMIC = '<mimic joint="{}"/>'
             ],
             "r.urdf:3: link 'base': unknown attribute 'scales' in <mesh>, did you mean 'scale'?",
         ),
-        ([f'<link name="l{i}"/>' for i in range(201)], "r.urdf: expected 1 to 200 links, got 201"),
+        ([f'<link name="l{i}"/>' for i in range(1001)], "r.urdf: expected 1 to 1000 links, got 1001"),
         (
             [
                 '<link name="l0"/>',
                 *(f'<link name="l{i + 1}"/>{joint(f"j{i}", f"l{i}", f"l{i + 1}")}' for i in range(65)),
             ],
-            "r.urdf: expected at most 64 movable joints, got 65",
+            "r.urdf: expected at most 64 movable joints between 'l0' and 'l65', got 65",
         ),
-        (['<link name="base"/>'], "r.urdf: flange: expected the name of a link, as it could be any of: none"),
+        (['<link name="base"/>'], "r.urdf: expected a joint that moves a link, got none"),
         (
             ['<link name="base"/><link name="tool0"/>', joint("f", "base", "tool0", "", kind="fixed")],
             "r.urdf: expected a movable joint between 'base' and 'tool0', got none",
@@ -135,18 +136,17 @@ MIMIC = '<mimic joint="{}"/>'
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="0" velocity="3"/>')],
-            "r.urdf:4: joint 'a1': has no room between 'lower' and 'upper' in the URDF: "
-            "give it `limits: {a1: {lower_deg: …, upper_deg: …}}`",
+            'r.urdf:4: joint \'a1\': states lower="0" upper="0": '
+            f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit velocity="3"/>', kind="prismatic")],
-            "r.urdf:4: joint 'a1': has no room between 'lower' and 'upper' in the URDF: "
-            "give it `limits: {a1: {lower_mm: …, upper_mm: …}}`",
+            "r.urdf:4: joint 'a1': states no lower and upper limit: "
+            f"{STATE}`limits: {{a1: {{lower_mm: …, upper_mm: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="-1" upper="1" velocity="0"/>')],
-            "r.urdf:4: joint 'a1': has no positive velocity limit in the URDF: "
-            "give it `limits: {a1: {velocity_deg_s: …}}`",
+            f"r.urdf:4: joint 'a1': states velocity=\"0\": {STATE}`limits: {{a1: {{velocity_deg_s: …}}}}`",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="x" upper="1" velocity="0"/>')],
@@ -154,8 +154,9 @@ MIMIC = '<mimic joint="{}"/>'
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", LIMIT, kind="continuous")],
-            "r.urdf:4: joint 'a1': is continuous: give it `limits: {a1: {lower_deg: …, upper_deg: …}}`, "
-            "or `limits: {a1: {wrap: true}}` to let it turn without end",
+            "r.urdf:4: joint 'a1': is continuous: "
+            f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`; "
+            "a continuous joint turns without end with `wrap: true` in place of its lower and upper limit",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="-170" upper="170" velocity="3"/>')],
@@ -182,7 +183,7 @@ MIMIC = '<mimic joint="{}"/>'
                 joint("g", "tip", "f"),
             ],
             "r.urdf:8: joint 'g': moves, but is not between the base and the flange 'tool0': "
-            "hold it still with `locked: {g_deg: …}`",
+            "hold it still with `locked: {g_deg: 0}` or with `locked: {others: zero}`",
         ),
         (
             [*ARM, '<link name="tool0"/>', joint("m", "tip", "tool0", MIMIC.format("a1"))],
@@ -225,8 +226,8 @@ MIMIC = '<mimic joint="{}"/>'
 )
 def test_unsound_robots_are_refused_with_line_and_cure(tmp_path: Path, lines: list[str], message: str | None) -> None:
     message = message or (
-        "r.urdf:4: joint 'a1': has no room between 'lower' and 'upper' in the URDF: "
-        "give it `limits: {a1: {lower_deg: …, upper_deg: …}}`"
+        "r.urdf:4: joint 'a1': states no limits: "
+        f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …, velocity_deg_s: …}}}}`"
     )
     assert refused(tmp_path, *lines) == message
 
@@ -300,7 +301,7 @@ def test_unsound_options_are_refused(
 def test_a_gripper_must_be_locked_and_a_flange_must_exist(tmp_path: Path) -> None:
     assert refused(tmp_path, *GRIPPER) == (
         "r.urdf:8: joint 'finger': moves, but is not between the base and the flange 'tool0': "
-        "hold it still with `locked: {finger_mm: …}`"
+        "hold it still with `locked: {finger_mm: 0}` or with `locked: {others: zero}`"
     )
     options = UrdfOptions(flange="tool", locked={"finger": 0.0})
     assert refused(tmp_path, *GRIPPER, options=options) == "r.urdf: flange: unknown link 'tool', did you mean 'tool0'?"

@@ -1,0 +1,181 @@
+"""What a URDF says before a cell adds anything: possible flanges, joints, what is missing, bodies and their size."""
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from textwrap import indent
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.shapes import support
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
+from cellplan.io.robots.urdf.document import read_document
+from cellplan.io.robots.urdf.limits import Lacking, lacking_limits, limits_to_state, with_blanks
+from cellplan.io.robots.urdf.load import UrdfOptions, UrdfStructure, urdf_model, urdf_structure
+from cellplan.io.robots.urdf.locks import lock_positions
+from cellplan.io.robots.urdf.tree import UrdfTree, build_tree, choose_flange, links_in_order, moving_leaves
+from cellplan.io.schema.robot import OTHERS
+from cellplan.io.yaml.writer import flow_text, yaml_text
+from cellplan.model.robot import Body, RobotModel
+from cellplan.model.robot_description import (
+    DescribedJoint,
+    DescribedMimic,
+    FlangeChoice,
+    LinkSize,
+    RobotDescription,
+)
+
+TOOL_SIDE: Final = re.compile(r"(^|_)(tool\d*|flange|tcp|eef?|end_?effector)($|_)", re.IGNORECASE)
+NAMED_LOCKS: Final = 12  # more locked joints than these are locked together
+BEYOND_NAME: Final = re.compile(r"[^A-Za-z0-9_-]+")
+LONGEST_NAME: Final = 40  # characters of the name of a robot in a cell
+
+
+def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescription:
+    """What a URDF says for one flange: the named one, the usual one, or the one behind the most joints.
+
+    Args:
+        path: The file.
+        written: Its name as the lines for a cell have it.
+        options: Flange and package folders.
+
+    Raises:
+        InputError: With file and line, for anything but missing limits and locks.
+    """
+    tree = build_tree(read_document(path))
+    choices = tuple(_choices(tree))
+    flange, is_usual = _flange(tree, choices, options.flange)
+    structure = urdf_structure(tree, flange, options)
+    bodies = link_bodies(
+        tree, structure.configuration, MeshShelf(folder=path.parent, package_dirs=options.package_dirs)
+    )
+    lacking = lacking_limits(structure.roles.driven, {})
+    model = None if lacking else urdf_model(structure, bodies, limits={}, source=path.name)
+    return RobotDescription(
+        name=tree.document.name,
+        source=path.name,
+        base=tree.root,
+        flange=flange,
+        is_usual=is_usual,
+        flanges=choices,
+        X_BF=structure.configuration.X_BL[flange],
+        joints=tuple(_joints(structure, lacking, model)),
+        mimics=tuple(_mimics(tree)),
+        locked=lock_positions(structure.loose, {}),
+        links=tuple(_links(structure, bodies)),
+        cell_lines=_cell_lines(structure, lacking, written=written, package_dirs=options.package_dirs),
+        model=model,
+    )
+
+
+def size_along(bodies: tuple[Body, ...], X_BL: Array) -> Array:
+    """Edges of the box along the axes of a frame L that holds bodies, in [m], shape (3,).
+
+    Args:
+        bodies: At least one.
+        X_BL: Pose of L in the base while all joints read zero.
+    """
+    sides = np.vstack([np.eye(3), -np.eye(3)])
+    reach = []
+    for body in bodies:
+        X_LS = inverse(X_BL) @ body.X_BS
+        reach.append(support(body.shape, sides @ X_LS[:3, :3]) + sides @ X_LS[:3, 3])
+    farthest = np.max(reach, axis=0)
+    size: Array = farthest[:3] + farthest[3:]
+    return size
+
+
+def cell_lines(name: str, entry: Mapping[str, object]) -> str:
+    """A robot as it stands in a cell, one key to a line."""
+    return f"robots:\n  {flow_text(name)}:\n{indent(yaml_text(entry), '    ')}"
+
+
+def _choices(tree: UrdfTree) -> Iterator[FlangeChoice]:
+    """Last links and links with the name of a flange, as far as a joint moves them, in the order of the file."""
+    leaves = moving_leaves(tree)
+    for link in links_in_order(tree):
+        chain = [joint for joint in tree.path_to(link.name) if not joint.is_fixed]
+        if not chain or (link.name not in leaves and not TOOL_SIDE.search(link.name)):
+            continue
+        mimic = next((joint.name for joint in chain if joint.mimic), None)
+        yield FlangeChoice(
+            link=link.name,
+            joints=tuple(joint.name for joint in chain if joint.mimic is None),
+            obstacle="" if mimic is None else f"carried by the mimic joint {mimic}",
+        )
+
+
+def _flange(tree: UrdfTree, choices: tuple[FlangeChoice, ...], desired: str | None) -> tuple[str, bool]:
+    """The flange to be described, and whether it is the usual one."""
+    try:
+        return choose_flange(tree, desired), desired is None
+    except InputError:
+        fit = [choice for choice in choices if not choice.obstacle]
+        if desired is not None or not fit:
+            raise
+        return max(fit, key=lambda choice: (bool(TOOL_SIDE.search(choice.link)), len(choice.joints))).link, False
+
+
+def _joints(
+    structure: UrdfStructure, lacking: tuple[Lacking, ...], model: RobotModel | None
+) -> Iterator[DescribedJoint]:
+    """The driven joints, with the limits of those that follow them where none is missing."""
+    without = {each.joint.name: each for each in lacking}
+    complete = {} if model is None else {joint.name: joint for joint in model.joints}
+    for joint in structure.roles.driven:
+        limits, gap = complete.get(joint.name, joint.limit), without.get(joint.name)
+        yield DescribedJoint(
+            name=joint.name,
+            kind=joint.kind,
+            lower=limits.lower,
+            upper=limits.upper,
+            velocity=limits.velocity,
+            missing=() if gap is None else gap.keys,
+            reason="" if gap is None else gap.reason,
+        )
+
+
+def _mimics(tree: UrdfTree) -> Iterator[DescribedMimic]:
+    """All joints that follow others."""
+    for joint in tree.joints:
+        if joint.mimic is not None:
+            mimic = joint.mimic
+            yield DescribedMimic(
+                name=joint.name,
+                leader=mimic.leader,
+                ratio=mimic.multiplier,
+                offset=mimic.offset,
+                is_revolute=joint.kind != "prismatic",
+            )
+
+
+def _links(structure: UrdfStructure, bodies: tuple[Body, ...]) -> Iterator[LinkSize]:
+    """The links that have bodies; these come in the order of links and of their elements."""
+    first = 0
+    for link in links_in_order(structure.tree):
+        own = bodies[first : first + len(link.solids)]
+        first += len(own)
+        if own:
+            shapes = tuple(type(body.shape).__name__.lower() for body in own)
+            X_BL = structure.configuration.X_BL[link.name]
+            yield LinkSize(link=link.name, shapes=shapes, size=size_along(own, X_BL))
+
+
+def _cell_lines(
+    structure: UrdfStructure, lacking: tuple[Lacking, ...], *, written: str, package_dirs: tuple[Path, ...]
+) -> str:
+    """The robot as a cell states it, with … for every value that the file lacks."""
+    entry: dict[str, object] = {"model": written}
+    if package_dirs:
+        entry["package_dirs"] = [folder.as_posix() for folder in package_dirs]
+    entry["flange"] = structure.flange
+    if structure.loose:
+        are_few = len(structure.loose) <= NAMED_LOCKS
+        entry["locked"] = lock_positions(structure.loose, {}) if are_few else {OTHERS: "zero"}
+    if lacking:
+        entry["limits"] = limits_to_state(lacking)
+    name = BEYOND_NAME.sub("_", structure.tree.document.name)[:LONGEST_NAME]
+    return with_blanks(cell_lines(name, entry))
