@@ -3,10 +3,10 @@
 The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
-- compute: ``solve``, ``screen``, ``rehearse``
+- compute: ``solve``, ``screen``, ``sweep``, ``rehearse``
 - verify: ``verify``, ``open_gate``
 - write: ``write_run``, ``write_rehearsal``, ``export_program``
-- inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``
+- inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``
 - results: ``Solution``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``
 - errors: ``CellplanError``
 
@@ -38,11 +38,14 @@ if TYPE_CHECKING:
     from cellplan.pipeline.screen import screen
     from cellplan.pipeline.solution import Solution
     from cellplan.pipeline.solve import solve
+    from cellplan.pipeline.sweep import SweepJob, sweep
     from cellplan.pipeline.verify import verify
     from cellplan.pipeline.write_run import write_run
     from cellplan.planning.layout_screening import Candidates, Screening
+    from cellplan.study.variants import Axis
 
 _HOME: Final = {
+    "Axis": "study.variants",
     "Candidates": "planning.layout_screening",
     "Cell": "model.cell",
     "CellplanError": "errors",
@@ -54,6 +57,7 @@ _HOME: Final = {
     "Robot": "model.cell",
     "Screening": "planning.layout_screening",
     "Solution": "pipeline.solution",
+    "SweepJob": "pipeline.sweep",
     "Task": "model.task",
     "Toolpath": "model.toolpath",
     "export_program": "pipeline.export",
@@ -63,12 +67,14 @@ _HOME: Final = {
     "rehearse": "pipeline.rehearsal.rehearse",
     "screen": "pipeline.screen",
     "solve": "pipeline.solve",
+    "sweep": "pipeline.sweep",
     "verify": "pipeline.verify",
     "write_rehearsal": "pipeline.rehearsal.write",
     "write_run": "pipeline.write_run",
 }
 
 __all__ = [
+    "Axis",
     "Candidates",
     "Cell",
     "CellplanError",
@@ -80,6 +86,7 @@ __all__ = [
     "Robot",
     "Screening",
     "Solution",
+    "SweepJob",
     "Task",
     "Toolpath",
     "__version__",
@@ -90,6 +97,7 @@ __all__ = [
     "rehearse",
     "screen",
     "solve",
+    "sweep",
     "verify",
     "write_rehearsal",
     "write_run",

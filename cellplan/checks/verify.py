@@ -14,7 +14,12 @@ from cellplan.checks.joints.drift import check_joint_drift, repeatability
 from cellplan.checks.joints.limits import check_joints, joint_uses
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.joints.payload import check_payload, load_uses
-from cellplan.checks.tools.between_checks import check_closures_between, check_task_between, look_between, with_between
+from cellplan.checks.tools.between_checks import (
+    check_between_rows,
+    check_closures_between,
+    check_task_between,
+    with_between,
+)
 from cellplan.checks.tools.closure import check_closure, closure_accuracy
 from cellplan.checks.tools.conditioning import conditioning
 from cellplan.checks.tools.speeds import robot_speed
@@ -125,7 +130,7 @@ def _errors(
         task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
     )
     closures = closure_accuracy(scene.cell, scene.chains, q, X_WP)
-    return look_between(scene, schedule, q, accuracy=accuracy, closures=closures)
+    return check_between_rows(scene, schedule, q, accuracy=accuracy, closures=closures)
 
 
 def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccuracy]) -> list[Check]:

@@ -16,6 +16,12 @@ class OutputError(CellplanError):
     """The result of a command could not be written to its standard output."""
 
 
+class InterruptedWorkError(CellplanError):
+    """A command was interrupted and can go on from where it stopped."""
+
+    status = ExitStatus.INTERRUPTED
+
+
 def exit_status(error: BaseException) -> ExitStatus:
     """Exit status that an exception ends the program with."""
     if isinstance(error, KeyboardInterrupt):
@@ -31,7 +37,8 @@ def error_lines(error: BaseException) -> list[str]:
         return [_one_line(str(finding)) for finding in error.findings]
     if isinstance(error, CellplanError):
         line = _one_line(str(error))
-        return [line if LOCATED.match(line) else f"error: {line}"]
+        is_plain = LOCATED.match(line) or isinstance(error, InterruptedWorkError)
+        return [line if is_plain else f"error: {line}"]
     what = _one_line(str(error)) or "no message"
     return [f"internal error: {type(error).__name__}: {what} (set {DEBUG_VARIABLE}=1 to see the traceback)"]
 

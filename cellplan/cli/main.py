@@ -18,6 +18,7 @@ from cellplan.cli.rehearse import rehearse
 from cellplan.cli.robots import robots
 from cellplan.cli.schema import schema
 from cellplan.cli.solve import solve
+from cellplan.cli.sweep import sweep
 from cellplan.cli.verify import verify
 from cellplan.errors import ExitStatus
 
@@ -55,6 +56,7 @@ app.command()(explain)
 app.command()(solve)
 app.command()(verify)
 app.command()(export)
+app.command()(sweep)
 app.command()(rehearse)
 app.command()(robots)
 app.command()(schema)

@@ -76,6 +76,7 @@ def _described(model: str, flange: str | None, package_dirs: list[Path]) -> dict
 def _record(name: str, model: RobotModel) -> dict[str, Any]:
     """One robot in printed units."""
     from cellplan.kinematics.reach import arm_reach
+    from cellplan.report.record.controller import zero_record
     from cellplan.report.record.joint_limits import joint_record
 
     return {
@@ -83,6 +84,7 @@ def _record(name: str, model: RobotModel) -> dict[str, Any]:
         "source": model.source,
         "reach_mm": round(1e3 * arm_reach(model), 1),
         "bodies": len(model.bodies),
+        "zero": zero_record(model),
         "joints": [joint_record(joint) for joint in model.joints],
     }
 
@@ -95,4 +97,5 @@ def _lines(record: dict[str, Any]) -> list[str]:
     for joint in record["joints"]:
         limits, speed = limits_text(joint)
         lines.append(f"  {joint['name']:<10} {limits:<22} {speed}")
-    return lines
+    zero = record["zero"]
+    return [*lines, f"  {zero['line']}" + (f" ({zero['source']})" if zero["is_stated"] else "")]

@@ -3,8 +3,8 @@
 The same mechanism runs work of our own in the background.
 """
 
-from cellplan.guard.background import BackgroundProcess
+from cellplan.guard.background import BackgroundProcess, processors
 from cellplan.guard.isolated_call import in_child
 from cellplan.guard.worker_process import Guard
 
-__all__ = ["BackgroundProcess", "Guard", "in_child"]
+__all__ = ["BackgroundProcess", "Guard", "in_child", "processors"]

@@ -30,7 +30,7 @@ ALONG: Final = {
     "z": np.eye(3),
 }  # rotations that bring the z axis of a round shape onto the named axis
 
-MeshReader = Callable[[str, str], Mesh]  # (file as written, unit) -> mesh in [m]
+MeshReader = Callable[[str, str | None], Mesh]  # (file as written, unit) -> mesh in [m]
 
 
 def pose_from_entry(entry: PoseEntry | None) -> Array:
@@ -40,15 +40,22 @@ def pose_from_entry(entry: PoseEntry | None) -> Array:
     return pose(in_si(entry.xyz_mm), in_si(entry.rpy_deg))
 
 
+def direction(written: str | tuple[float, float, float]) -> Array:
+    """Unit vector of a word such as ``+x`` or of a vector of any length."""
+    if isinstance(written, str):
+        vector = np.zeros(3)
+        vector["xyz".index(written[-1])] = -1.0 if written.startswith("-") else 1.0
+        return vector
+    unit: Array = np.array(written) / np.linalg.norm(written)
+    return unit
+
+
 def centred_solid(
     entry: PartShapeEntry | ToolBodyEntry | ObstacleEntry | AttachmentEntry, read_mesh: MeshReader
 ) -> tuple[Solid, Array]:
     """Solid of a shape that is centred on its frame, and the pose of the solid's own frame in it."""
-    match entry:
-        case PartShapeEntry(mesh=str(file), unit=str(unit)) | ToolBodyEntry(mesh=str(file), unit=str(unit)):
-            return read_mesh(file, unit), np.eye(4)
-        case ObstacleEntry(mesh=str(file), unit=str(unit)) | AttachmentEntry(mesh=str(file), unit=str(unit)):
-            return read_mesh(file, unit), np.eye(4)
+    if entry.mesh is not None:
+        return read_mesh(entry.mesh, entry.unit), np.eye(4)
     round_shape = entry.cylinder or getattr(entry, "capsule", None)
     X = np.eye(4)
     if round_shape is not None:
@@ -66,7 +73,7 @@ def obstacle_shape(entry: ObstacleEntry, read_mesh: MeshReader) -> tuple[Shape, 
 
 def tool_solid(entry: ToolShapeEntry, X_FT: Array, read_mesh: MeshReader) -> tuple[Solid, Array]:
     """Solid that ends at the tool tip, and its pose in the flange frame."""
-    if entry.mesh is not None and entry.unit is not None:
+    if entry.mesh is not None:
         return read_mesh(entry.mesh, entry.unit), np.eye(4)
     solid = _primitive(entry.box or entry.cylinder or entry.capsule or entry.sphere)
     return solid, X_FT @ pose((0.0, 0.0, -_half_length(solid)))

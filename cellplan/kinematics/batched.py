@@ -14,7 +14,7 @@ from cellplan.geometry.transforms import Array, skew
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.robot import BASE
 
-IN_CACHE: Final = 512  # entries of a batch whose arrays stay in the processor's cache: more at once are slower
+CACHE_BLOCK: Final = 512  # entries of a batch whose arrays stay in the processor's cache: more at once are slower
 
 
 @dataclass(frozen=True, slots=True, eq=False)

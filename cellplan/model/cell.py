@@ -13,7 +13,7 @@ from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
 from cellplan.model.joint_limits import JointLimits
-from cellplan.model.mounting import Pedestal
+from cellplan.model.mounting import Mount
 from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
@@ -65,7 +65,7 @@ class Robot:
         acceleration: Accelerations that its joints are checked against.
         controller_cycle: Cycle of its controller in [s], over which jerk is computed.
         attachments: Solids mounted on its links, their poses ``X_BS`` in B while all joints read zero.
-        pedestal: Pedestal below the base; None for a base on the floor or on an obstacle.
+        pedestal: What the base stands on, hangs from or is fixed to; None for a base on the floor or on an obstacle.
         gripper: Names of link bodies of its model that make up a gripper, which may work on the part as a tool does.
     """
 
@@ -79,7 +79,7 @@ class Robot:
     acceleration: AccelerationRule = USUAL_ACCELERATION
     controller_cycle: float = USUAL_CYCLE
     attachments: tuple[Body, ...] = ()
-    pedestal: Pedestal | None = None
+    pedestal: Mount | None = None
     gripper: tuple[str, ...] = ()
 
     @property
@@ -260,6 +260,7 @@ class Cell:
         checks: Required clearance and tolerances.
         origin: The document that the cell was read from.
         inputs: SHA-256 of every file that was read, by the path as written.
+        remarks: Key of the cell file, and what was read over in the file that it names.
     """
 
     name: str
@@ -272,6 +273,7 @@ class Cell:
     checks: CheckSettings
     origin: Origin
     inputs: Mapping[str, str]
+    remarks: tuple[tuple[str, str], ...] = ()
 
     def with_values(self, values: Mapping[str, object]) -> "Cell":
         """The cell of the same document with other values, validated like those of the file.

@@ -11,7 +11,7 @@ from cellplan.geometry.curves.arc_length import QuickParameters
 from cellplan.geometry.curves.curve import Interval
 from cellplan.geometry.transforms import Array, rotation_about
 from cellplan.model.approach_retract import stand_off
-from cellplan.model.task import INSTANT_ROOM, Task, TimeLawKind
+from cellplan.model.task import TIME_TOLERANCE, Task, TimeLawKind
 from cellplan.model.time_law import advance, reached_at
 from cellplan.model.toolpath import TOOL_Z, Toolpath
 
@@ -128,7 +128,7 @@ class ClockedPath:
         if path.is_timed:
             cycle, t = self._own_times(times, path.duration)
             return *path.at(t), cycle * path.length + path.arc.lengths(t)
-        return self._by_time_law(times, self._stretches(times + INSTANT_ROOM))
+        return self._by_time_law(times, self._stretches(times + TIME_TOLERANCE))
 
     def _stretches(self, times: Array) -> NDArray[np.intp]:
         """Number of the stretch that times in [s] fall into, shape (N,); the nearest before and after all."""
@@ -150,7 +150,7 @@ class ClockedPath:
         begin, duration = self.corners[stretch], self.corners[stretch + 1] - self.corners[stretch]
         elapsed = np.clip(times - begin, 0.0, duration)
         elapsed = np.where(
-            elapsed <= INSTANT_ROOM, 0.0, np.where(duration - elapsed <= INSTANT_ROOM, duration, elapsed)
+            elapsed <= TIME_TOLERANCE, 0.0, np.where(duration - elapsed <= TIME_TOLERANCE, duration, elapsed)
         )
         law = advance(task.time_law, elapsed / duration)
         if toolpath.runs_on:
@@ -190,4 +190,4 @@ class ClockedPath:
 def distinct(times: Array) -> Array:
     """Times in increasing order, one for those that are nearer to each other than rounding, shape (n,)."""
     ordered = np.sort(times)
-    return ordered[np.diff(ordered, prepend=-np.inf) > INSTANT_ROOM]
+    return ordered[np.diff(ordered, prepend=-np.inf) > TIME_TOLERANCE]

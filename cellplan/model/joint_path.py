@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.geometry.curves.chebyshev import chebyshev
 from cellplan.geometry.transforms import Array
-from cellplan.model.task import INSTANT_ROOM
+from cellplan.model.task import TIME_TOLERANCE
 
 CUBIC = 3
 
@@ -65,7 +65,7 @@ class JointPath:
             derivative: 0 for positions, 1 for velocities, 2 for accelerations.
         """
         q = np.tile(self.start if derivative == 0 else np.zeros_like(self.start), (len(sigma), 1))
-        cuts = np.searchsorted(sigma, self.breaks[1:] + INSTANT_ROOM, side="right")
+        cuts = np.searchsorted(sigma, self.breaks[1:] + TIME_TOLERANCE, side="right")
         first = 0
         for begin, length, nodes, last in zip(
             self.breaks[:-1], np.diff(self.breaks), self.nodes, cuts.tolist(), strict=True

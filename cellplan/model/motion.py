@@ -12,7 +12,7 @@ from cellplan.model.clocked_path import ClockedPath, distinct
 from cellplan.model.phase import Phase
 from cellplan.model.plan import Plan, rows_of
 from cellplan.model.solver import Integrator
-from cellplan.model.task import INSTANT_ROOM, Task
+from cellplan.model.task import TIME_TOLERANCE, Task
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,7 +85,7 @@ class Schedule:
         """Times of all paths within the clock, and its ends."""
         end = float(self.times[-1])
         every = np.concatenate([self.extra_breaks, *found])
-        inner = distinct(every[(every > INSTANT_ROOM) & (every < end - INSTANT_ROOM)])
+        inner = distinct(every[(every > TIME_TOLERANCE) & (every < end - TIME_TOLERANCE)])
         return np.concatenate([[0.0], inner, [end]])
 
 

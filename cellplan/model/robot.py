@@ -8,6 +8,7 @@ import numpy as np
 
 from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import Array, is_rigid
+from cellplan.model.controller import ControllerZero
 from cellplan.model.payload import Payload
 from cellplan.model.units import DisplayUnit, joint_unit
 
@@ -172,6 +173,7 @@ class RobotModel:
         links: Links on which something can be mounted, by the names of the robot's file.
         body_accuracy: How good the link bodies are that do not say it themselves; None when it is not stated.
         payload: What it may carry; None when it is not stated.
+        controller: How its controller counts the joints; None when it is not stated.
         flange_link: Index of the joint that carries the flange.
         X_BF: Flange (mechanical interface) in B at the reference configuration, z out of the flange.
         bodies: Link bodies.
@@ -189,6 +191,7 @@ class RobotModel:
     body_accuracy: BodyAccuracy | None = None
     payload: Payload | None = None
     disabled: tuple[tuple[str, str, str], ...] = ()
+    controller: ControllerZero | None = None
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""

@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.origin import Origin
 
-INSTANT_ROOM: Final = 1e-9  # [s] times nearer than this are the same: rounding of sums of durations
+TIME_TOLERANCE: Final = 1e-9  # [s] times nearer than this are the same: rounding of sums of durations
 
 
 class PlaneName(StrEnum):
@@ -281,7 +281,7 @@ class Task:
 
     def first_judged(self, times: Array) -> int:
         """Index of the first of these times in [s], shape (N,), at which errors are judged; at most the last."""
-        first = int(np.searchsorted(times, self.judged_from - INSTANT_ROOM))
+        first = int(np.searchsorted(times, self.judged_from - TIME_TOLERANCE))
         return min(first, len(times) - 1) if self.settle > 0.0 else 0
 
     def __repr__(self) -> str:

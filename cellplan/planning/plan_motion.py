@@ -9,7 +9,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.motion import Motion, NearestSingular, Resolution
 from cellplan.model.progress import Progress, silent
 from cellplan.model.solver import Integrator
-from cellplan.model.task import INSTANT_ROOM
+from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.collocation.cyclic import closed_path
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath
 from cellplan.planning.collocation.run import AccurateRun
@@ -55,7 +55,7 @@ def _sampled(
 ) -> Motion:
     """The path at the samples of the clock; from where it ends, Euler's steps."""
     last = len(times) - 1
-    reached = int(np.searchsorted(times, path.end + INSTANT_ROOM, side="right")) - 1
+    reached = int(np.searchsorted(times, path.end + TIME_TOLERANCE, side="right")) - 1
     q = path.at(times[: reached + 1])
     q[0] = path.start
     lost = None

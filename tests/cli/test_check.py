@@ -4,11 +4,12 @@ import json
 from pathlib import Path
 
 import pytest
+from builders.stored_cells import write_cell
 
 from cellplan.cli.main import run
 
 
-def test_a_sound_cell_is_told_with_postures_and_paths_and_nothing_is_written(
+def test_a_sound_cell_is_reported_with_postures_and_paths_and_nothing_is_written(
     cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -42,3 +43,15 @@ def test_a_start_off_its_task_is_bad_input(cells: Path, tmp_path: Path, capsys: 
     assert (status, out) == (2, "")
     assert f"{path}:25: robots.kuka.start_deg" in err
     assert err.count("\n") == 1
+
+
+def test_names_that_were_read_over_are_notes_of_the_check(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cell = write_cell(tmp_path / "cell")
+    urdf = cell.parent / "robots" / "right.urdf"
+    urdf.write_text(urdf.read_text(encoding="utf-8").replace("effort=", "command_effort="), encoding="utf-8")
+
+    assert run(["check", str(cell)]) == 0
+    note = next(line for line in capsys.readouterr().out.splitlines() if "command_effort" in line)
+
+    assert note.startswith(f"  note: {cell}:10: robots.right.model: right.urdf:")
+    assert note.endswith("attribute 'command_effort' of <limit> is not known and was not read (and 2 more)")

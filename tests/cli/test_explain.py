@@ -29,7 +29,7 @@ def changed(cells: Path, name: str, folder: Path, old: str, new: str) -> Path:
     return path
 
 
-def test_four_robots_are_told_as_graph_circuits_and_arrow(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_four_robots_are_reported_as_graph_circuits_and_arrow(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = explained(cells / "four_robots.yaml", capsys)
 
     assert lines[:6] == [
@@ -94,7 +94,7 @@ def test_a_start_that_is_to_be_found_leaves_the_rank_open(cells: Path, capsys: p
     assert (matrix["rank"], matrix["redundancy"], matrix["starts_to_find"]) == (None, None, ["right"])
 
 
-def test_a_stretched_arm_is_told_to_be_singular(
+def test_a_stretched_arm_is_reported_to_be_singular(
     cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Reis at rest and the wrist of the circle's arm stretched: two of its axes coincide."""
@@ -132,7 +132,9 @@ def test_the_part_at_rest_leaves_no_redundancy(cells: Path, tmp_path: Path, caps
     assert explained(path, capsys)[-1] == "  degree of redundancy: 18 - 18 = 0"
 
 
-def test_free_spin_and_too_few_joints_are_told(cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_free_spin_and_too_few_joints_are_reported(
+    cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = changed(cells, "planar_pair.yaml", tmp_path, "axes: [x, y, rz]", "free: [spin]")
     path.write_text(path.read_text(encoding="utf-8").replace("simultaneous", "part_at_rest"), encoding="utf-8")
 

@@ -18,7 +18,7 @@ from cellplan.cli.main import run
 PROGRAM = [sys.executable, "-m", "cellplan"]
 
 
-def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_version_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["--version"])
 
     assert (status, capsys.readouterr().out) == (0, f"cellplan {cellplan.__version__}\n")
@@ -30,7 +30,7 @@ def test_help_names_every_command_and_nothing_unfinished(capsys: pytest.CaptureF
     reported = capsys.readouterr().out
     assert status == 0
     commands = [line.split()[0] for line in reported.partition("Commands:")[2].splitlines() if line.strip()]
-    assert commands == ["check", "explain", "solve", "verify", "export", "rehearse", "robots", "schema"]
+    assert commands == ["check", "explain", "solve", "verify", "export", "sweep", "rehearse", "robots", "schema"]
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_a_missing_cell_file_is_one_line(capsys: pytest.CaptureFixture[str], tmp
     assert "absent.yaml" in err
 
 
-def test_a_reader_that_goes_away_is_told_in_one_line() -> None:
+def test_a_reader_that_goes_away_is_reported_in_one_line() -> None:
     read_end, write_end = os.pipe()
     os.close(read_end)
 
@@ -68,7 +68,7 @@ def test_a_reader_that_goes_away_is_told_in_one_line() -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
-def test_a_full_disk_is_told_in_one_line() -> None:
+def test_a_full_disk_is_reported_in_one_line() -> None:
     with Path("/dev/full").open("w") as full:
         ended = subprocess.run([*PROGRAM, "--version"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
 

@@ -32,7 +32,7 @@ def everything_in(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-def test_a_cell_out_of_tolerance_is_told_by_how_much(pair: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_cell_out_of_tolerance_is_reported_by_how_much(pair: str, capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["rehearse", pair, "--errors", "errors.yaml"])
 
     out, err = capsys.readouterr()

@@ -30,7 +30,7 @@ def hasty_pair(cells: Path, tmp_path: Path) -> Path:
     return path
 
 
-def test_a_sound_cell_is_told_and_written(
+def test_a_sound_cell_is_reported_and_written(
     coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "out"

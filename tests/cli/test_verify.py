@@ -19,7 +19,7 @@ def copy(sound: Path, tmp_path: Path) -> Copy:
     )
 
 
-def test_a_sound_run_is_told_with_its_figures(copy: Copy, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_sound_run_is_reported_with_its_figures(copy: Copy, capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["verify", str(copy.run), "--cell", str(copy.cell)])
 
     out, err = capsys.readouterr()

@@ -74,7 +74,7 @@ def every_call_fails_once(
 
 @pytest.mark.parametrize("older", [False, True], ids=["no older run", "an older run"])
 @pytest.mark.parametrize("number", ERRORS, ids=lambda number: errno.errorcode[number])
-def test_no_failing_call_leaves_a_cut_file_or_goes_unnoticed(tmp_path: Path, number: int, older: bool) -> None:
+def test_no_failing_call_leaves_a_cut_file_or_goes_unreported(tmp_path: Path, number: int, older: bool) -> None:
     assert every_call_fails_once(tmp_path, write_files, number=number, older=older) > 4 * len(FILES)
 
 
@@ -86,7 +86,7 @@ def solution() -> Solution:
 
 
 @pytest.mark.slow
-def test_no_failing_call_of_a_solve_leaves_a_cut_file_or_goes_unnoticed(tmp_path: Path, solution: Solution) -> None:
+def test_no_failing_call_of_a_solve_leaves_a_cut_file_or_goes_unreported(tmp_path: Path, solution: Solution) -> None:
     def write(folder: Path) -> None:
         write_run(solution, folder)
 

@@ -24,7 +24,7 @@ def test_a_crash_is_one_line_that_names_the_signal(work: str, how: str) -> None:
     assert str(caught.value) == f"arm.urdf: the URDF reader crashed ({how})"
 
 
-def test_an_end_without_an_answer_is_told_with_its_status() -> None:
+def test_an_end_without_an_answer_is_reported_with_its_status() -> None:
     with pytest.raises(OverrunError, match=r"^arm.urdf: the URDF reader crashed \(exit status 7\)$"):
         in_child(crashing_jobs.leave, guard=READER)
 

@@ -106,7 +106,7 @@ def test_a_file_of_nothing_but_its_version_states_an_exact_cell(load):
          "e:2: measurement.position_noise_mm: expected a finite number, got .nan"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_told_with_its_place(refuse, text, finding):
+def test_what_is_wrong_is_reported_with_its_place(refuse, text, finding):
     assert refuse(text) == [finding]
 
 

@@ -63,7 +63,7 @@ def test_axes_are_the_screws_of_the_combined_model(name: str) -> None:
             assert not found[index, lane, :, len(robot.model.joints) :].any()
 
 
-def test_each_lane_may_have_its_own_bases_and_tools() -> None:
+def test_each_batch_entry_may_have_its_own_bases_and_tools() -> None:
     rng, template = np.random.default_rng(3), mixed_cell(5)
     chains, q = BatchChains(template), configurations(template, LANES)
     cells = []
@@ -87,7 +87,7 @@ def test_each_lane_may_have_its_own_bases_and_tools() -> None:
     np.testing.assert_allclose(twice, np.repeat(found, 2, axis=1), atol=ROUNDING)
 
 
-def test_one_placement_stands_for_all_lanes() -> None:
+def test_one_placement_stands_for_the_whole_batch() -> None:
     cell = random_cell(2, operators=1)
     placement = BatchChains(cell).placement(cell)
     assert placement.of(np.array([4, 7])) is placement

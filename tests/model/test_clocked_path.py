@@ -30,7 +30,7 @@ from cellplan.geometry.transforms import Array, rotation_exp, rotation_vector
 from cellplan.model.cell import Part
 from cellplan.model.clocked_path import ClockedPath, distinct
 from cellplan.model.motion import Schedule
-from cellplan.model.task import INSTANT_ROOM, SpacePolylinePath, StraightMove, Task, TimedPath, TimeLaw, TimeLawKind
+from cellplan.model.task import TIME_TOLERANCE, SpacePolylinePath, StraightMove, Task, TimedPath, TimeLaw, TimeLawKind
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_path, schedule_tasks
 
@@ -276,7 +276,7 @@ def test_breaks_of_all_tasks_are_joined_within_the_clock() -> None:
     assert tasks.times[-1] == pytest.approx(2.45)
     inner = tasks.paths[0].corners[1:3]
     assert tasks.breaks == pytest.approx([0.0, 0.7, 1.0, *inner, 2.0, 2.4, 2.45], abs=1e-9)
-    assert np.diff(tasks.breaks).min() > INSTANT_ROOM
+    assert np.diff(tasks.breaks).min() > TIME_TOLERANCE
 
 
 def test_without_tasks_the_clock_is_one_interval() -> None:
@@ -287,7 +287,7 @@ def test_instants_nearer_than_rounding_are_one() -> None:
     assert distinct(np.array([2.0, 1.0, 1.0 + 1e-12, 2.0])).tolist() == [1.0, 2.0]
 
 
-def test_knots_that_nobody_counts_are_refused() -> None:
+def test_knots_beyond_the_limit_are_refused() -> None:
     task = task_on(sampled(RING[:-1], is_smooth=True, is_closed=True), tool_axis=-EZ, repeat=200_000)
     task = replace(task, duration=1e3)
     path = clock_path(clocked(task), task, build_toolpath(task, ROLLER))

@@ -122,7 +122,7 @@ def test_explain_shows_the_closure_as_a_block_and_counts_the_freedom(planar):
     assert "grasps of co-holders, which close kinematic loops; left carries the part frame" in lines
 
 
-def test_explain_tells_the_real_circuit_up_one_holder_and_down_the_other(cells):
+def test_explain_states_the_real_circuit_up_one_holder_and_down_the_other(cells):
     lines = structure_lines(structure_record(explain(load_cell(cells / "load_sharing.yaml"))))
     place = lines.index("  1  right      +A2 +B2 +C2 +D2 +E2 +F2")
     assert lines[place + 1] == "     left       -F2 -E2 -D2 -C2 -B2 -A2"

@@ -98,7 +98,7 @@ def test_a_longer_tool_changes_the_start_of_its_own_robot_only(job: SimpleNamesp
     assert np.max(np.abs(others)) <= 1e-12  # [rad] rounding
 
 
-def test_what_is_out_of_reach_is_lost_and_harms_nobody(job: SimpleNamespace) -> None:
+def test_what_is_out_of_reach_is_lost_and_affects_no_other(job: SimpleNamespace) -> None:
     places = shifts(4, 0.05)
     places[2, 1] += FAR
     alone = screen_layouts(job.cell, job.schedule, candidates(job, places[[0, 1, 3]]), moving=job.moving)

@@ -192,7 +192,7 @@ def test_nothing_is_left_out_of_a_cell_without_anything_mounted() -> None:
     assert Scene.from_cell(make_cell(placed("a", arm_model()))).left_out == ()
 
 
-def test_a_robot_whose_links_have_no_bodies_is_told() -> None:
+def test_a_robot_whose_links_have_no_bodies_is_reported() -> None:
     bare = replace(arm_model(), bodies=())
     scene = Scene.from_cell(make_cell(placed("a", arm_model()), placed("b", bare)))
 
@@ -214,7 +214,7 @@ def test_the_order_of_the_robots_changes_no_verdict_on_pairs() -> None:
     assert verdicts(one) == verdicts(other)
 
 
-def test_things_of_the_surroundings_are_told_to_be_unjudged_among_themselves() -> None:
+def test_things_of_the_surroundings_are_reported_as_unjudged_among_themselves() -> None:
     things = (thing("floor", HalfSpace()), thing("ball", Sphere(0.1), pose((2.0, 0.0, 0.0))))
 
     scene = Scene.from_cell(make_cell(placed("a", arm_model()), things=things))

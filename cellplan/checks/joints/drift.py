@@ -9,7 +9,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.report import Check, JointDrift, Repeatability
-from cellplan.model.task import INSTANT_ROOM
+from cellplan.model.task import TIME_TOLERANCE
 
 REVOLUTE_DRIFT_TOL: Final = float(np.deg2rad(0.001))  # [rad] below the repeatability of any arm's joints
 PRISMATIC_DRIFT_TOL: Final = 1e-6  # [m] likewise
@@ -83,10 +83,10 @@ def _cycle_times(schedule: Schedule) -> Array:
     if not schedule.tasks or not all(scheduled.cycle_ends for scheduled in schedule.tasks):
         return np.zeros(0)
     bounds = [np.array([scheduled.task.start, *scheduled.cycle_ends]) for scheduled in schedule.tasks]
-    is_common = all(len(b) == len(bounds[0]) and np.abs(b - bounds[0]).max() <= INSTANT_ROOM for b in bounds)
+    is_common = all(len(b) == len(bounds[0]) and np.abs(b - bounds[0]).max() <= TIME_TOLERANCE for b in bounds)
     cycle_times = bounds[0] if is_common else np.array([min(b[0] for b in bounds), max(b[-1] for b in bounds)])
     settled = max(scheduled.task.judged_from for scheduled in schedule.tasks)
-    return cycle_times[cycle_times >= settled - INSTANT_ROOM]
+    return cycle_times[cycle_times >= settled - TIME_TOLERANCE]
 
 
 def _limit(drift: JointDrift) -> float:

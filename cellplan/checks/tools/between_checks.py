@@ -17,7 +17,7 @@ from cellplan.scene.scene import Scene
 BETWEEN: Final = "_between_rows"  # what the name of a check ends with
 
 
-def look_between(
+def check_between_rows(
     scene: Scene,
     schedule: Schedule,
     q: Mapping[str, Array],

@@ -21,14 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.certify.lever_arms import LeverArms
-from cellplan.checks.tools.tracking import errors_on_part, part_poses, seen_from_task
+from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_to_task_frame
 from cellplan.geometry.arrays import Indices
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.between_rows import BetweenError, BetweenRows
 from cellplan.model.cell import Relation
 from cellplan.model.motion import Schedule
 from cellplan.model.report import ClosureAccuracy, TaskAccuracy
-from cellplan.model.task import INSTANT_ROOM, Frame, Task
+from cellplan.model.task import TIME_TOLERANCE, Frame, Task
 from cellplan.scene.scene import Scene
 
 SUBDIVISION_COUNT: Final = 10  # [-] subdivisions of a step
@@ -100,7 +100,7 @@ class ErrorsBetweenRows:
         ]
         every = [self._worst(one, kind) for one in found for kind in range(2)]
         step = min((error.longest_step for error in every if error.longest_step is not None), default=None)
-        if step is not None and _stops_at_once(tools, corners[jump_times > self._schedule.times[-1] - INSTANT_ROOM]):
+        if step is not None and _stops_at_once(tools, corners[jump_times > self._schedule.times[-1] - TIME_TOLERANCE]):
             step = _fitting(step, float(self._schedule.times[-1]))
         every = [error if error.longest_step is None else replace(error, longest_step=step) for error in every]
         results = [BetweenRows(position=a, orientation=b) for a, b in zip(every[::2], every[1::2], strict=True)]
@@ -163,7 +163,7 @@ class ErrorsBetweenRows:
         for place, tool in enumerate(tools):
             relation, X_WT = tool.relation, chains[tool.relation.robot].tool_poses(q[tool.relation.robot])
             if isinstance(relation, Task):
-                X_PT, desired = seen_from_task(relation, X_WT, X_WP), poses_desired[tool.place or 0]
+                X_PT, desired = relative_to_task_frame(relation, X_WT, X_WP), poses_desired[tool.place or 0]
             else:
                 X_PT = inverse(X_WP) @ X_WT
                 desired = np.broadcast_to(relation.X_PT, X_PT.shape)
@@ -201,7 +201,7 @@ class ErrorsBetweenRows:
         """
         times, step = self._schedule.times, self._schedule.step
         jump_times = self._schedule.jumps
-        jump_times = jump_times[(jump_times > times[0] + INSTANT_ROOM) & (jump_times <= times[-1])]
+        jump_times = jump_times[(jump_times > times[0] + TIME_TOLERANCE) & (jump_times <= times[-1])]
         errors = np.zeros((len(jump_times), len(tools), 2))
         around = [self._schedule.poses(np.clip(jump_times + shift * step, times[0], times[-1])) for shift in SIDES]
         for place, tool in enumerate(tools):
@@ -250,7 +250,7 @@ class ErrorsBetweenRows:
         if not np.any(errors > allowed) or np.any(rows >= allowed):
             return None
         corners = np.where(found.corners[:, kind] > KINK_FRACTION * allowed, found.corners[:, kind], 0.0)
-        corners[(found.jump_times < times[found.tool.first]) | (found.jump_times > times[-1] - INSTANT_ROOM)] = 0.0
+        corners[(found.jump_times < times[found.tool.first]) | (found.jump_times > times[-1] - TIME_TOLERANCE)] = 0.0
         share = min(1.0, (allowed - float(rows.max())) / max(float(corners.max(initial=0.0)), allowed))
         near = np.searchsorted(times, found.jump_times[corners > 0.0])
         over = errors > allowed
@@ -303,7 +303,7 @@ def _sag(off: Array, relation: Relation) -> Array:
 def _within_steps(times: Array, others: Array) -> tuple[Indices, Array]:
     """Steps and shares of them for those times that lie between two rows."""
     k = np.clip(np.searchsorted(times, others, side="right") - 1, 0, len(times) - 2)
-    inside = (others > times[k] + INSTANT_ROOM) & (others < times[k + 1] - INSTANT_ROOM)
+    inside = (others > times[k] + TIME_TOLERANCE) & (others < times[k + 1] - TIME_TOLERANCE)
     k, others = k[inside], others[inside]
     return k, (others - times[k]) / (times[k + 1] - times[k])
 
@@ -324,7 +324,7 @@ def _fitting(step: float, duration: float) -> float:
     """The longest step in [s] of two digits, no longer than one of two digits, with which the last row is the end."""
     digit = 10.0 ** (math.floor(math.log10(step)) - 1)
     steps = (float(f"{count * digit:.2g}") for count in range(round(step / digit), 0, -1))
-    return next((one for one in steps if abs(duration - one * round(duration / one)) < INSTANT_ROOM), step)
+    return next((one for one in steps if abs(duration - one * round(duration / one)) < TIME_TOLERANCE), step)
 
 
 def _shorter(step: float, share: float) -> float:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cellplan.checks.tools.tracking import seen_from_task
+from cellplan.checks.tools.tracking import relative_to_task_frame
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.acceleration import STEADY_FRACTION, ProcessSpeed
@@ -59,7 +59,7 @@ def _process_speed(scheduled: TaskSchedule, times: Array, X_WT: Array, *, X_WP: 
     steps = np.flatnonzero((times[:-1] >= begin - tolerance) & (times[1:] <= scheduled.end + tolerance))
     if not len(steps) or not scheduled.length > 0.0:
         return None
-    points = seen_from_task(task, X_WT, X_WP)[:, :3, 3]
+    points = relative_to_task_frame(task, X_WT, X_WP)[:, :3, 3]
     speeds = (np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(times))[steps]
     lengths = np.diff(times)[steps]
     peak = float(speeds.max())

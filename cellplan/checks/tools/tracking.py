@@ -32,10 +32,10 @@ def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP:
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """
     X_WT = chain.tool_poses(q)
-    return pose_accuracy(scheduled, seen_from_task(scheduled.task, X_WT, X_WP))
+    return pose_accuracy(scheduled, relative_to_task_frame(scheduled.task, X_WT, X_WP))
 
 
-def seen_from_task(task: Task, X_WT: Array, X_WP: Array) -> Array:
+def relative_to_task_frame(task: Task, X_WT: Array, X_WP: Array) -> Array:
     """Tool poses relative to what a task is given in: the part, or the world, shape (N, 4, 4)."""
     return X_WT if task.relative_to is Frame.WORLD else inverse(X_WP) @ X_WT
 

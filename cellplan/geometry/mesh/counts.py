@@ -70,6 +70,37 @@ def winding_numbers(triangles: Array, points: Array) -> Array:
     return winding
 
 
+def ray_winding(triangles: Array, points: Array) -> Indices:
+    """How often a closed surface winds round points that are not on it, by its crossings of rays along x, shape (N,).
+
+    The side of each edge is evaluated from its lower end only, so that a ray through an edge or a vertex crosses the
+    surface there as often as it does beside it.
+
+    Args:
+        triangles: Corner points in [m], shape (M, 3, 3).
+        points: Shape (N, 3), in the frame of the mesh.
+    """
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    low, high = np.minimum(np.minimum(a, b), c).T.copy(), np.maximum(np.maximum(a, b), c).T.copy()
+    near = (
+        np.flatnonzero((low[2] <= z) & (high[2] > z) & (low[1] <= y) & (high[1] >= y) & (high[0] > x))
+        for x, y, z in points
+    )
+    return np.array([_crossings(triangles[each] - point) for each, point in zip(near, points, strict=True)], dtype=int)
+
+
+def _crossings(corner: Array) -> int:
+    """How often the ray from the origin along x leaves through triangles, less how often it enters through one."""
+    flat, is_low = corner[:, :, 1:], corner[:, :, 2] <= 0.0
+    rises = is_low.astype(np.int64) - np.roll(is_low, -1, axis=1)  # 1 where an edge goes up past the ray, -1 down
+    ahead, goes_up = np.roll(flat, -1, axis=1), (rises > 0)[..., None]
+    low, high = np.where(goes_up, flat, ahead), np.where(goes_up, ahead, flat)
+    is_left = low[..., 0] * (high[..., 1] - low[..., 1]) > low[..., 1] * (high[..., 0] - low[..., 0])
+    turns = np.sum(rises * is_left, axis=1)
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return int(np.sum(turns[_dot(normal, corner[:, 0]) * normal[:, 0] > 0.0]))
+
+
 def components(count: int, pairs: Indices) -> Indices:
     """Smallest member of the connected group of each of ``count`` things, joined by pairs of shape (K, 2)."""
     label = np.arange(count)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Indices
-from cellplan.geometry.mesh.counts import components, count_edges, face_volumes, shells, winding_numbers
+from cellplan.geometry.mesh.counts import components, count_edges, face_volumes, ray_winding, shells
 from cellplan.geometry.transforms import Array
 
 MAX_PIECES: Final = 5000  # [-] an assembly with its screws has some hundreds
@@ -90,7 +90,7 @@ def turn_outward(vertices: Array, faces: Indices, *, source: str) -> Indices:
 def _all_within(around: Array, points: Array) -> bool:
     """Whether a surface, triangles of shape (M, 3, 3), winds round all of some points, tested at a few of them."""
     step = max(1, len(points) // PROBE_COUNT)
-    return all(winding_numbers(around, points[k : k + 1])[0] >= 0.5 for k in range(0, len(points), step))
+    return bool(np.all(ray_winding(around, points[::step]) >= 1))
 
 
 def _boxes(vertices: Array, faces: Indices, label: Indices, *, count: int) -> tuple[Array, Array]:

@@ -1,6 +1,7 @@
 """Meshes: read from files, checked to be sound, and queried by rays and for what lies inside."""
 
 import stat
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -10,16 +11,18 @@ from numpy.typing import ArrayLike
 from cellplan.cache import key_of
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.cache import keep_mesh, recall_mesh
+from cellplan.geometry.mesh.collada_file import parse_collada
 from cellplan.geometry.mesh.healing import require_few_pieces
+from cellplan.geometry.mesh.polygons import Triangles
 from cellplan.geometry.mesh.rays import RayHits, ray_hits
-from cellplan.geometry.mesh.stl_obj import FORMATS, parse_mesh, require_likely_count
+from cellplan.geometry.mesh.stl_obj import parse_mesh, require_likely_count
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.mesh.topology import components, count_edges, make_mesh, mesh_volume, winding_numbers
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 
 __all__ = [
-    "FORMATS",
+    "MESH_UNITS",
     "RayHits",
     "contains",
     "corner_normals",
@@ -28,12 +31,14 @@ __all__ = [
     "mesh_volume",
     "open_edges",
     "ray_hits",
+    "read_drawing",
     "read_mesh",
     "require_enclosing",
     "require_solid",
     "tessellate",
 ]
 
+MESH_UNITS: Final[Mapping[str, float]] = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}  # [m]
 MAX_BYTES: Final = 100_000_000
 MIN_EXTENT: Final = 1e-3  # [m] smaller things in a robot cell are errors of the unit
 MAX_EXTENT: Final = 20.0  # [m] larger ones as well
@@ -42,13 +47,15 @@ CREASE: Final = np.radians(30.0)  # [rad] sharper edges stay edges when normals 
 
 
 def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
-    """Read an STL, OBJ or PLY file and check that nothing of it got lost.
+    """Read an STL, OBJ, PLY or COLLADA file and check that nothing of it got lost.
 
-    What was read once is found again by the bytes of the file, as long as they and the reading code are the same.
+    What was read once is found again by the bytes of the file, as long as they and the reading code are the same. The
+    unit of a COLLADA file is honoured, its up axis is not, as in the programs that URDFs are made for.
 
     Args:
         path: The file; its suffix gives the format.
-        scale: Metres per unit of the file, one number or one for each axis; negative ones mirror.
+        scale: Metres per unit of the file, for COLLADA a factor after its own unit; one number or one for each axis;
+            negative ones mirror.
 
     Returns:
         The mesh in [m]: equal vertices welded, triangles without area dropped, outward facing when it is closed.
@@ -56,23 +63,49 @@ def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
     Raises:
         InputError: The file cannot be read, is damaged, too large, not finite or of an unlikely size.
     """
+    return _kept_mesh(path, np.asarray(scale, dtype=float), unit=None, is_upright=False)
+
+
+def read_drawing(path: Path, *, unit: str | None) -> Mesh:
+    """Read a mesh file that stands alone, with z up: as `read_mesh`, but a COLLADA file's up axis is turned to z.
+
+    Args:
+        path: The file; its suffix gives the format.
+        unit: A key of `MESH_UNITS`. A COLLADA file states its unit, so that it may be None, and must not differ.
+
+    Raises:
+        InputError: As for `read_mesh`; a COLLADA file states another unit.
+    """
+    factor = 1.0 if _is_collada(path.name) else MESH_UNITS[unit or ""]
+    return _kept_mesh(path, np.asarray(factor), unit=unit, is_upright=True)
+
+
+def _kept_mesh(path: Path, scale: Array, *, unit: str | None, is_upright: bool) -> Mesh:
+    """Mesh in [m], recalled or read."""
     data = _read_bytes(path)
-    key = key_of("mesh", data, path.suffix.lower().encode(), np.asarray(scale, dtype=float).tobytes())
+    way = f"{path.suffix.lower()} {unit} {is_upright}" if _is_collada(path.name) else path.suffix.lower()
+    key = key_of("mesh", data, way.encode(), scale.tobytes())
     kept = recall_mesh(key, source=path.name)
     if kept is not None:
         return kept
-    mesh = _checked_mesh(data, path.name, scale=scale)
+    if _is_collada(path.name):
+        loose, meter = parse_collada(data, path.name, is_upright=is_upright)
+        if unit is not None and not np.isclose(meter, MESH_UNITS[unit], rtol=1e-6, atol=0.0):
+            raise InputError(f"{path.name}: states a unit of {meter:g} m, got unit: {unit}: leave out the unit")
+    else:
+        loose = parse_mesh(data, path.name)
+    mesh = _checked_mesh(loose, path.name, scale=scale)
     keep_mesh(key, mesh)
     return mesh
 
 
-def _checked_mesh(data: bytes, name: str, *, scale: float | ArrayLike) -> Mesh:
-    """Mesh in [m] from the bytes of a file."""
-    vertices, faces = parse_mesh(data, name)
+def _checked_mesh(loose: Triangles, name: str, *, scale: Array) -> Mesh:
+    """Mesh in [m] from loose triangles."""
+    vertices, faces = loose
     require_likely_count(len(faces), name)
     if not np.all(np.isfinite(vertices)):
         raise InputError(f"{name}: expected finite coordinates, got {int(np.sum(~np.isfinite(vertices)))} others")
-    factors = np.broadcast_to(np.asarray(scale, dtype=float), (3,))
+    factors = np.broadcast_to(scale, (3,))
     if not np.all(np.isfinite(factors)) or np.any(factors == 0.0):
         raise InputError(f"{name}: expected scale factors that are finite and not zero, got {factors.tolist()}")
     with np.errstate(over="ignore"):
@@ -82,6 +115,11 @@ def _checked_mesh(data: bytes, name: str, *, scale: float | ArrayLike) -> Mesh:
     mesh = make_mesh(vertices, outward, source=name)
     require_few_pieces(mesh.faces, source=name)
     return mesh
+
+
+def _is_collada(name: str) -> bool:
+    """Whether a file is COLLADA, by its name."""
+    return name.lower().endswith(".dae")
 
 
 def require_solid(mesh: Mesh) -> None:

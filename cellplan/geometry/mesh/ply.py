@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.polygons import Polygons, Triangles, fan
+from cellplan.geometry.mesh.numbers import text_numbers
+from cellplan.geometry.mesh.polygons import Polygons, Triangles, polygons_as_triangles
 
 TYPES: Final = {
     name: code
@@ -28,8 +29,6 @@ ORDERS: Final = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii":
 INDEX_NAMES: Final = ("vertex_indices", "vertex_index")
 MAX_ROWS: Final = 1_500_000  # the largest allowed mesh with three vertices of its own for each triangle
 MAX_LISTS: Final = 500_000  # rows with lists: one for each triangle of the largest allowed mesh
-MAX_WORDS: Final = 15_000_000  # of a text file: ten columns for each vertex of the largest allowed mesh
-CHUNK: Final = 1_000_000  # [bytes] of text made into numbers at once
 MAX_INDEX: Final = 2**31  # beyond any index that such a file can hold
 MAX_CORNERS: Final = 1000  # more in one face is a damaged file
 
@@ -64,7 +63,7 @@ class _Values:
         self._order = order
         self._body = body
         self.place = 0
-        self._words = _numbers(body) if not order else np.zeros(0)
+        self._words = text_numbers(body) if not order else np.zeros(0)
 
     def take(self, kind: str, count: int) -> NDArray[np.float64]:
         """The next ``count`` numbers of one type."""
@@ -126,23 +125,7 @@ def parse_ply(data: bytes, name: str) -> Triangles:
         raise InputError(
             f"{name}: expected the end of the file after the numbers that the PLY header declares, got more"
         )
-    return fan(vertices, polygons, name)
-
-
-def _numbers(body: bytes) -> NDArray[np.float64]:
-    """All numbers of a text, piece by piece, for a list of all words would take ten times its memory."""
-    if b"_" in body:  # NumPy reads 1_000 as a number, as Python does
-        raise ValueError("a number contains '_'")
-    pieces, start, count = [np.zeros(0)], 0, 0
-    while start < len(body):
-        end = start + CHUNK
-        while end < len(body) and not body[end : end + 1].isspace():
-            end += 1
-        pieces.append(np.array(body[start:end].split(), dtype=np.float64))
-        start, count = end, count + len(pieces[-1])
-        if count > MAX_WORDS:
-            raise ValueError(f"it has more than {MAX_WORDS} numbers")
-    return np.concatenate(pieces)
+    return polygons_as_triangles(vertices, polygons, name)
 
 
 def _header(data: bytes, name: str) -> tuple[str, list[_Element], bytes]:

@@ -18,7 +18,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.numbers import plain_word
 from cellplan.geometry.mesh.ply import parse_ply
-from cellplan.geometry.mesh.polygons import Polygons, Triangles, fan
+from cellplan.geometry.mesh.polygons import Polygons, Triangles, polygons_as_triangles
 
 STL_HEADER: Final = 84  # [bytes] 80 of comment and 4 of count
 STL_TRIANGLE: Final = 50  # [bytes]
@@ -38,7 +38,6 @@ MIN_TRIANGLES: Final = 4  # a tetrahedron
 MAX_TRIANGLES: Final = 500_000
 MAX_LINE: Final = 100_000  # [characters] of an OBJ file: a longer line is no face
 OBJ_SILENT: Final = frozenset({"vt", "vn", "g", "o", "s", "l", "p", "usemtl", "mtllib"})
-FORMATS: Final = ("stl", "obj", "ply")
 
 
 def parse_mesh(data: bytes, name: str) -> Triangles:
@@ -57,10 +56,8 @@ def parse_mesh(data: bytes, name: str) -> Triangles:
                 return _parse_obj(data, name)
             case "ply":
                 return parse_ply(data, name)
-            case "dae":
-                raise InputError(f"{name}: COLLADA files are not read: convert the mesh to STL, OBJ or PLY")
             case suffix:
-                raise InputError(f"{name}: expected a mesh file .stl, .obj or .ply, got '.{suffix}'")
+                raise InputError(f"{name}: expected a mesh file .stl, .obj, .ply or .dae, got '.{suffix}'")
 
 
 def require_likely_count(triangles: int, name: str) -> None:
@@ -170,7 +167,7 @@ def _parse_obj(data: bytes, name: str) -> Triangles:
             require_no_more(len(polygons), MAX_TRIANGLES, "faces", place=place)
         elif words[0] not in OBJ_SILENT:
             raise InputError(f"{place}: expected vertices and flat faces, got '{words[0]}', which is not supported")
-    return fan(np.array(vertices, dtype=float).reshape(-1, 3), polygons, name)
+    return polygons_as_triangles(np.array(vertices, dtype=float).reshape(-1, 3), polygons, name)
 
 
 def _obj_lines(data: bytes, name: str) -> Iterable[tuple[int, list[str]]]:

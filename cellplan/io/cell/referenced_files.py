@@ -8,19 +8,20 @@ from pathlib import Path, PurePosixPath
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.load import read_mesh
+from cellplan.geometry.mesh.load import read_drawing
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.cell.toolpath_csv import read_toolpath_csv
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.files import digest_of_file
-from cellplan.io.input.findings import Finding, KeyPath, shown
+from cellplan.io.input.findings import Finding, KeyPath, key_text, shown
 from cellplan.io.robots.bundled import load_bundled_table
-from cellplan.io.robots.joint_table import MESH_UNITS, RobotTable, load_robot_table
+from cellplan.io.robots.joint_table import RobotTable, load_robot_table
 from cellplan.io.robots.rules import limits_in_si, tightened
 from cellplan.io.robots.urdf.gripper import GripperState
 from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot, load_urdf
 from cellplan.io.robots.urdf.srdf import Srdf, read_srdf
+from cellplan.io.robots.urdf.xacro import XACRO_SUFFIX
 from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import CsvEntry
@@ -29,7 +30,7 @@ from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import SampledPath, TimedPath
 
-URDF_SUFFIXES = frozenset({".urdf"})
+URDF_SUFFIXES = frozenset({".urdf", XACRO_SUFFIX})
 TABLE_SUFFIXES = frozenset({".yaml", ".yml"})
 
 
@@ -40,20 +41,22 @@ class Sources:
         inputs: SHA-256 of every file that was read, by the path as written.
         findings: About the names in the cell file.
         errors: About the files themselves.
+        remarks: Key of the cell file, and what was read over in the file that it names.
     """
 
     def __init__(self, document: YamlDocument, folders: AllowedFolders) -> None:
         """Keep the folders and the document that findings refer to."""
         self._document = document
         self._folders = folders
-        self._meshes: dict[tuple[str, str], Mesh | None] = {}
+        self._meshes: dict[tuple[str, str | None], Mesh | None] = {}
         self._urdfs: dict[Hashable, UrdfRobot] = {}
         self.inputs: dict[str, str] = {}
         self.findings: list[Finding] = []
         self.errors: list[InputError] = []
+        self.remarks: list[tuple[str, str]] = []
 
     def mesh(
-        self, written: str, unit: str, path: KeyPath, *, requirement: Callable[[Mesh], None] | None = None
+        self, written: str, unit: str | None, path: KeyPath, *, requirement: Callable[[Mesh], None] | None = None
     ) -> Mesh | None:
         """Mesh in [m] that meets a requirement, which raises an input error otherwise; None after a finding."""
         if (written, unit) not in self._meshes:
@@ -120,14 +123,14 @@ class Sources:
             return None
         return srdf
 
-    def _read_mesh(self, written: str, unit: str, path: KeyPath) -> Mesh | None:
+    def _read_mesh(self, written: str, unit: str | None, path: KeyPath) -> Mesh | None:
         """Mesh in [m]; None after a finding."""
         place = self._file(written, path)
         if place is None:
             return None
         try:
             guard = Guard(file=written, worker="the mesh reader")
-            mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), place, guard=guard)
+            mesh = in_child(as_here(partial(read_drawing, unit=unit)), place, guard=guard)
             self.inputs[written] = digest_of_file(place, file=written)
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))
@@ -144,7 +147,7 @@ class Sources:
 
     def _only_for_urdf(self, name: str, entry: RobotEntry) -> Iterator[Finding]:
         """Keys that say something about a URDF."""
-        for key in ("package_dirs", "flange", "locked", "srdf", "gripper"):
+        for key in ("package_dirs", "xacro_args", "flange", "locked", "srdf", "gripper"):
             if getattr(entry, key):
                 yield self._document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
 
@@ -189,19 +192,24 @@ class Sources:
             lock_units={joint: "deg" if isinstance(at, Deg) else "mm" for joint, at in entry.locked_joints.items()},
             locks_others=entry.locks_others,
             within=self._folders,
+            xacro_args={key: _argument_text(value) for key, value in entry.xacro_args.items()},
             gripper=_gripper_state(entry.gripper),
         )
+        if entry.xacro_args and place.suffix.lower() != XACRO_SUFFIX:
+            text = f"unexpected key, it applies to a file whose name ends in {XACRO_SUFFIX} only"
+            self.findings.append(self._document.key_finding(("robots", name, "xacro_args"), text))
         try:
             robot = _read_urdf(self._urdfs, entry.model, place, options=options)
             self.inputs[entry.model] = digest_of_file(place, file=entry.model)
-            for mesh in robot.mesh_files:
-                if not self._folders.holds(mesh):
-                    text = f"expected meshes below the folder of the cell file, got {shown(mesh.name)} from elsewhere"
+            self.remarks += [(key_text(path), remark) for remark in robot.remarks]
+            for file in (*robot.included, *robot.mesh_files):
+                if not self._folders.holds(file):
+                    text = f"expected files below the folder of the cell file, got {shown(file.name)} from elsewhere"
                     self.findings.append(self._document.finding(path, f"{text}; allow it with --allow-dir"))
                     return None
-                way = os.path.relpath(mesh.resolve(), place.parent.resolve()).replace(os.sep, "/")
+                way = os.path.relpath(file.resolve(), place.parent.resolve()).replace(os.sep, "/")
                 key = posixpath.normpath(posixpath.join(posixpath.dirname(entry.model), way))
-                self.inputs[key] = digest_of_file(mesh, file=mesh.name)
+                self.inputs[key] = digest_of_file(file, file=file.name)
         except InputError as error:
             self.errors.append(error)
             return None
@@ -221,12 +229,18 @@ class Sources:
 
 def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, options: UrdfOptions) -> UrdfRobot:
     """Robot of a URDF; robots that say the same of the same file share one."""
-    locked = _items(options.locked), _items(options.lock_units), options.locks_others
-    key = (written, place, options.flange, options.package_dirs, _items(options.limits), locked, options.gripper)
+    locked = _items(options.locked), _items(options.lock_units), options.locks_others, options.gripper
+    limits, arguments = _items(options.limits), _items(options.xacro_args)
+    key = (written, place, options.flange, options.package_dirs, limits, locked, arguments)
     if key not in known:
         guard = Guard(file=written, worker="the URDF reader")
         known[key] = in_child(as_here(load_urdf), place, options, guard=guard)
     return known[key]
+
+
+def _argument_text(value: str | float) -> str:
+    """An argument of a xacro file as its text says it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _gripper_state(entry: GripperEntry | None) -> GripperState | None:

@@ -11,11 +11,12 @@ import numpy as np
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.load import read_mesh
+from cellplan.geometry.mesh.load import read_drawing
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.findings import Finding, KeyPath, raise_findings, shown, unknown_name
+from cellplan.io.robots.build_controller import build_controller, controller_findings
 from cellplan.io.robots.build_payload import build_payload, payload_findings
 from cellplan.io.robots.limits import RATES
 from cellplan.io.schema import RobotTableDocument
@@ -27,7 +28,6 @@ from cellplan.io.shapes import link_solid, pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
 from cellplan.model.robot import BASE, Body, BodyAccuracy, Joint, JointKind, Link, RobotModel
 
-MESH_UNITS: Final[Mapping[str, float]] = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}  # [m]
 FOOT: Final = "base"  # word for the link that does not move
 TOOL_NAME: Final = re.compile(r"tool(_[0-9]+)?")  # these names belong to the bodies of the tool
 
@@ -91,6 +91,8 @@ def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Findin
             yield document.finding((*place, index, "name"), text)
     turning = tuple(name for name, joint in table.joints.items() if joint.type == "revolute")
     yield from payload_findings(("payload",), table.payload, turning, document)
+    turns = {name: joint.type == "revolute" for name, joint in table.joints.items()}
+    yield from controller_findings(("controller",), table.controller, turns, document)
     named = [(index, body.name) for index, body in enumerate(table.solids) if body.name is not None]
     for order, (index, name) in enumerate(named):
         if name in {other for _, other in named[:order]}:
@@ -104,18 +106,18 @@ class _Meshes:
         """Keep the folders and the document that findings refer to."""
         self._document, self._place = document, place
         self._folders = folders
-        self._read: dict[tuple[str, str], Mesh] = {}
+        self._read: dict[tuple[str, str | None], Mesh] = {}
         self.files: dict[str, Path] = {}
         self.findings: list[Finding] = []
 
-    def mesh(self, written: str, unit: str, *, index: int) -> Mesh | None:
+    def mesh(self, written: str, unit: str | None, *, index: int) -> Mesh | None:
         """Mesh in [m]; None after a finding."""
         if (written, unit) in self._read:
             return self._read[written, unit]
         try:
             path = self._folders.file(written)
             guard = Guard(file=written, worker="the mesh reader")
-            mesh = in_child(as_here(partial(read_mesh, scale=MESH_UNITS[unit])), path, guard=guard)
+            mesh = in_child(as_here(partial(read_drawing, unit=unit)), path, guard=guard)
         except InputError as error:
             self.findings.append(self._document.finding((*self._place, index, "mesh", "file"), str(error)))
             return None
@@ -123,7 +125,7 @@ class _Meshes:
         self._read[written, unit] = replace(mesh, is_leaky=not mesh.is_closed)
         return self._read[written, unit]
 
-    def known(self, written: str, unit: str, *, index: int) -> Mesh:
+    def known(self, written: str, unit: str | None, *, index: int) -> Mesh:
         """A mesh that was read before."""
         mesh = self.mesh(written, unit, index=index)
         if mesh is None:
@@ -158,15 +160,17 @@ def _free_name(link: str, taken: set[str]) -> str:
 
 def _model(table: RobotTableDocument, bodies: tuple[Body, ...]) -> RobotModel:
     """The robot in [m] and [rad]."""
+    joints = tuple(_joint(name, entry, index - 1) for index, (name, entry) in enumerate(table.joints.items()))
     return RobotModel(
         name=table.robot,
         source=table.source,
-        joints=tuple(_joint(name, entry, index - 1) for index, (name, entry) in enumerate(table.joints.items())),
+        joints=joints,
         flange_link=len(table.joints) - 1,
         X_BF=pose_from_entry(table.flange),
         bodies=bodies,
         body_accuracy=_body_accuracy(table),
         payload=build_payload(table.payload),
+        controller=build_controller(table.controller, joints),
         links=tuple(
             Link(name=name, index=index - 1, X_BL=np.eye(4)) for index, name in enumerate((FOOT, *table.joints))
         ),

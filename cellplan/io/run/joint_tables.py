@@ -50,6 +50,7 @@ class TableHeader:
         digests: SHA-256 in hexadecimal by what it is the digest of (``cell``, ``program``).
         remark: What else has to be known of the rows; empty for the program of the cell as it is written.
         accelerations: The largest acceleration and jerk of the robot's joints; empty for rows that are not checked.
+        zero: From which zero the joint positions count; empty for rows that are not checked.
     """
 
     cell: str
@@ -58,6 +59,7 @@ class TableHeader:
     digests: Mapping[str, str]
     remark: str = ""
     accelerations: str = ""
+    zero: str = ""
 
 
 def render_table(
@@ -171,12 +173,14 @@ def parse_header(text: str, source: str) -> TableHeader:
         digests=digests,
         remark=fields.get("remark", ""),
         accelerations=fields.get("accelerations", ""),
+        zero=fields.get("zero", ""),
     )
 
 
 def _render_header(robot: str, header: TableHeader) -> str:
     fields = {"robot": robot, "cell": header.cell, "mode": header.mode}
     fields |= {f"{name} digest": f"{_SHA256}{digest}" for name, digest in header.digests.items()}
+    fields |= {"zero": header.zero} if header.zero else {}
     fields |= {"remark": header.remark} if header.remark else {}
     fields |= {"accelerations": header.accelerations} if header.accelerations else {}
     fields["verdict"] = header.verdict

@@ -21,6 +21,7 @@ from cellplan.io.schema.common import (
     require_one,
     rule,
 )
+from cellplan.io.schema.controller import ControllerEntry
 from cellplan.io.schema.robot import (
     AXIS_LIMIT,
     SLIDING_LIMITS,
@@ -35,7 +36,7 @@ from cellplan.io.schema.robot import (
     TurningJerk,
     TurningSpeed,
 )
-from cellplan.io.schema.shapes import SOLID_SHAPES, MeshUnit, SphereEntry
+from cellplan.io.schema.shapes import MESH_FILE, MESH_UNIT, SOLID_SHAPES, MeshUnit, SphereEntry, require_unit_of
 
 BODY_LIMIT: Final = 200  # solids of one robot
 UNIT_ROOM: Final = 1e-3  # [-] room for axes written with four digits
@@ -108,9 +109,15 @@ class PlacedSphereEntry(SphereEntry):
 class PlacedMeshEntry(Entry):
     """A mesh in the base frame at the reference configuration."""
 
-    file: Text = Field(description="STL, OBJ or PLY file, relative to the table.")
-    unit: MeshUnit = Field(description="Unit of the file.")
+    file: Text = Field(description=f"{MESH_FILE}, relative to the table.")
+    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
     at: PoseEntry = Field(default=PoseEntry(), description="Pose of the drawing in the base frame.")
+
+    @model_validator(mode="after")
+    def _has_unit(self) -> Self:
+        """A unit, unless the file states it."""
+        require_unit_of(self.file, self.unit)
+        return self
 
 
 class LinkBodyEntry(Entry):
@@ -180,6 +187,11 @@ class RobotTableDocument(Entry):
     )
     payload: PayloadEntry | None = Field(
         default=None, description="What the robot may carry; the report says so when absent."
+    )
+    controller: ControllerEntry | None = Field(
+        default=None,
+        description="How its controller counts the joints; when absent the zero of the model is taken as the "
+        "controller's, and the report says so. Without keys: known to be the same.",
     )
 
     @property

@@ -85,18 +85,19 @@ OPEN_MESH: Final = (
     "Take a mesh that is not closed as a surface: touching it counts, being inside it does not. An open mesh is "
     "refused otherwise."
 )
-_UNIT_RULE = "missing, expected the unit of the mesh: mm, m or inch"
+MESH_FILE: Final = "STL, OBJ, PLY or COLLADA (.dae) file"
+MESH_UNIT: Final = (
+    "Unit of the mesh file; required with STL, OBJ and PLY. A COLLADA file states its own, and its up axis becomes z: "
+    "a unit given here must be the same."
+)
 
 
-def require_unit(entry: Entry) -> None:
-    """A mesh file does not say its unit, so the cell must; nothing else may."""
-    has_mesh, has_unit = (getattr(entry, key) is not None for key in ("mesh", "unit"))
-    if has_mesh and not has_unit:
-        raise rule(_UNIT_RULE, "unit")
-    if has_unit and not has_mesh:
+def require_unit_of(file: str | None, unit: str | None) -> None:
+    """Most mesh files do not say their unit, so the cell must; nothing else may."""
+    if unit is None and file is not None and not file.lower().endswith(".dae"):
+        raise rule("missing, expected the unit of the mesh: mm, m or inch", "unit")
+    if unit is not None and file is None:
         raise rule("unexpected key, a unit requires a mesh", "unit")
-    if getattr(entry, "open", None) is not None and not has_mesh:
-        raise rule("unexpected key, open requires a mesh", "open")
 
 
 class OneShape(Entry):
@@ -108,7 +109,10 @@ class OneShape(Entry):
     def _is_one_shape(self) -> Self:
         """Exactly one shape, with a unit if it is a mesh."""
         require_one(self, self.shapes)
-        require_unit(self)
+        file = getattr(self, "mesh", None)
+        require_unit_of(file, getattr(self, "unit", None))
+        if getattr(self, "open", None) is not None and file is None:
+            raise rule("unexpected key, open requires a mesh", "open")
         return self
 
 
@@ -121,10 +125,8 @@ class PartShapeEntry(OneShape):
     box: BoxEntry | None = Field(default=None, description="Cuboid centred on the part frame.")
     cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder centred on the part frame.")
     sphere: SphereEntry | None = Field(default=None, description="Ball centred on the part frame.")
-    mesh: Text | None = Field(
-        default=None, description="STL, OBJ or PLY file of a closed surface, drawn in the part frame."
-    )
-    unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
+    mesh: Text | None = Field(default=None, description=f"{MESH_FILE} of a closed surface, drawn in the part frame.")
+    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
 
 
 class ToolShapeEntry(OneShape):
@@ -143,8 +145,8 @@ class ToolShapeEntry(OneShape):
         default=None, description="Capsule along the tool's z axis, from -length to 0."
     )
     sphere: SphereEntry | None = Field(default=None, description="Ball that touches the tool tip from behind.")
-    mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file, drawn in the flange frame.")
-    unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
+    mesh: Text | None = Field(default=None, description=f"{MESH_FILE}, drawn in the flange frame.")
+    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
     open: bool | None = Field(default=None, description=OPEN_MESH)
 
 
@@ -158,8 +160,8 @@ class ToolBodyEntry(OneShape):
     cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder.")
     capsule: CapsuleEntry | None = Field(default=None, description="Cylinder with round ends.")
     sphere: SphereEntry | None = Field(default=None, description="Ball.")
-    mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file.")
-    unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
+    mesh: Text | None = Field(default=None, description=f"{MESH_FILE}.")
+    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
     open: bool | None = Field(default=None, description=OPEN_MESH)
     at: PoseEntry = Field(default=PoseEntry(), description="Pose of the solid in the flange frame.")
 
@@ -175,8 +177,8 @@ class ObstacleEntry(OneShape):
     cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder.")
     capsule: CapsuleEntry | None = Field(default=None, description="Cylinder with round ends.")
     sphere: SphereEntry | None = Field(default=None, description="Ball.")
-    mesh: Text | None = Field(default=None, description="STL, OBJ or PLY file.")
-    unit: MeshUnit | None = Field(default=None, description="Unit of the mesh file; required with a mesh.")
+    mesh: Text | None = Field(default=None, description=f"{MESH_FILE}.")
+    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
     open: bool | None = Field(default=None, description=OPEN_MESH)
     at: PoseEntry | None = Field(
         default=None, description="Pose of the shape in the world; the world frame when absent. Not with a plane."

@@ -133,17 +133,19 @@ def _verified(scene: Scene, rows: StoredRows, place: int, *, progress: Progress)
 def _refuse_other_headers(
     stored: StoredRun, cell: Cell, clock: ProgramClock, motions: Sequence[VerifiedMotion]
 ) -> None:
-    """Refuse a table whose header names other accelerations than its rows have, or holds lines that say more.
+    """Refuse a table whose header names other accelerations than its rows have or another zero, or says more.
 
-    Other versions may name no accelerations, and may have other lines.
+    Other versions may name neither, and may have other lines.
     """
     is_same = _is_of_this_version(stored)
     headers = table_headers(cell, clock.plan.program, [motion.report for motion in motions], digests={})
     for robot, text in stored.tables.items():
         file = stored.file("", f"tables/{robot}.csv")
-        got, expected = parse_header(text, file).accelerations, headers[robot].accelerations
-        if got != expected and (got or is_same):
-            raise InputError(f"{file}: accelerations: expected {shown(expected)}, got {shown(got)}")
+        header = parse_header(text, file)
+        for key in ("accelerations", "zero"):
+            got, expected = getattr(header, key), getattr(headers[robot], key)
+            if got != expected and (got or is_same):
+                raise InputError(f"{file}: {key}: expected {shown(expected)}, got {shown(got)}")
         line = other_header_line(text, file) if is_same else None
         if line is not None:
             raise InputError(f"{file}:{line}: unexpected header line; solve the cell again")

@@ -11,6 +11,7 @@ from cellplan.model.idle import not_in_program
 from cellplan.model.phase import NOT_IN_PROGRAM, Phase
 from cellplan.model.report import Report
 from cellplan.report.record.accelerations import table_line
+from cellplan.report.record.controller import zero_text
 from cellplan.report.record.idle import missing_moves
 from cellplan.report.record.merging import merge_accelerations
 
@@ -36,7 +37,10 @@ def table_headers(
     )
     moved = zip(phases, reports, strict=True)
     accelerations = merge_accelerations([_on_clock(report.accelerations, phase.begin) for phase, report in moved])
-    return {robot.name: replace(header, accelerations=table_line(accelerations, robot.name)) for robot in cell.robots}
+    return {
+        robot.name: replace(header, accelerations=table_line(accelerations, robot.name), zero=zero_text(robot.model))
+        for robot in cell.robots
+    }
 
 
 def left_out_of_program(cell: Cell, phases: Sequence[Phase]) -> str:

@@ -16,7 +16,7 @@ from cellplan.model.clock import Clock
 from cellplan.model.motion import ClockTable, JointTable, Motion, Schedule
 from cellplan.model.phase import Hold, Phase
 from cellplan.model.plan import Plan, rows_of
-from cellplan.model.task import INSTANT_ROOM
+from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import TIME_DECIMALS, schedule_tasks
 
@@ -152,5 +152,5 @@ def _within(times: Array, stretches: Sequence[tuple[float, float]]) -> NDArray[n
     """Whether times in [s], shape (N,), lie in one of some stretches, ends included, shape (N,)."""
     inside = np.zeros(len(times), dtype=bool)
     for begin, end in stretches:
-        inside |= (times >= begin - INSTANT_ROOM) & (times <= end + INSTANT_ROOM)
+        inside |= (times >= begin - TIME_TOLERANCE) & (times <= end + TIME_TOLERANCE)
     return inside

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.batched import IN_CACHE
+from cellplan.kinematics.batched import CACHE_BLOCK
 from cellplan.planning.collocation.batch_targets import sampled
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.solver import largest
@@ -32,8 +32,8 @@ def brought_onto_tasks(motion: MotionTask, q: Array) -> Array:
     tasks = BatchTasks(cell, motion.relations, motion.moving)
     placement, everything = tasks.chains.placement(cell), np.ones(cell.joint_count)
     brought = q.copy()
-    for first in range(0, len(q), IN_CACHE):
-        some = slice(first, first + IN_CACHE)
+    for first in range(0, len(q), CACHE_BLOCK):
+        some = slice(first, first + CACHE_BLOCK)
         desired, at = sampled(schedule, some, grasps), q[some].T
         still, before = np.zeros_like(at), largest(tasks.errors(at, desired[0], placement))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # what is not a number is left out below

@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.motion import Schedule
-from cellplan.model.task import INSTANT_ROOM
+from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath, joined
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.euler.cycle_closing import SAME_POSE, closing_drift, not_back
@@ -84,6 +84,6 @@ def _closing(run: AccurateRun, problem: TrackingProblem, q: Array, *, begin: flo
 def _whole(run: AccurateRun, q: Array, *, begin: float, end: float, drift: Array | None = None) -> CollocatedPath:
     """Motion up to a time, not less far."""
     path = run.path(q, begin=begin, end=end, drift=drift)
-    if path.end < end - INSTANT_ROOM:
+    if path.end < end - TIME_TOLERANCE:
         raise _NoConvergenceError("collocation did not converge over the first cycle")
     return path

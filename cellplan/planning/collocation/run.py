@@ -6,12 +6,12 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.batched import IN_CACHE
+from cellplan.kinematics.batched import CACHE_BLOCK
 from cellplan.model.cell import Cell
 from cellplan.model.clocked_path import distinct
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.task import INSTANT_ROOM
+from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.collocation.batch_targets import desired_motion, in_windows, sampled
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath
@@ -110,15 +110,15 @@ class AccurateRun:
 
     def gaps(self, begin: float, end: float) -> Array:
         """How far each tool is desired at one time from where it is desired at a later one, in pose entries."""
-        inside = np.array([begin, end - INSTANT_ROOM])
-        X, _ = self._on_paths(np.array([begin, end]), inside, inside + INSTANT_ROOM)
+        inside = np.array([begin, end - TIME_TOLERANCE])
+        X, _ = self._on_paths(np.array([begin, end]), inside, inside + TIME_TOLERANCE)
         return np.abs(np.diff(X[:3]))[..., 0].max(axis=(0, 1))
 
     def errors(self, schedule: Schedule, q: Array) -> Array:
         """Largest tool errors in [m] or [rad] at the first N samples, at configurations of shape (N, nq)."""
         worst = np.empty(len(q))
-        for first in range(0, len(q), IN_CACHE):
-            some = slice(first, min(first + IN_CACHE, len(q)))
+        for first in range(0, len(q), CACHE_BLOCK):
+            some = slice(first, min(first + CACHE_BLOCK, len(q)))
             X, _ = sampled(schedule, some, self._grasps, self._offset)
             worst[some] = largest(self._tasks.errors(q[some].T, X, self._placement))
         return worst
@@ -134,11 +134,11 @@ class AccurateRun:
 
     def _stretches(self, begin: float, end: float) -> list[Array]:
         """Breaks between two times, cut where a joint fails; none when there is no time between them."""
-        if end - begin <= INSTANT_ROOM:
+        if end - begin <= TIME_TOLERANCE:
             return []
-        inner = self._breaks[(self._breaks > begin + INSTANT_ROOM) & (self._breaks < end - INSTANT_ROOM)]
+        inner = self._breaks[(self._breaks > begin + TIME_TOLERANCE) & (self._breaks < end - TIME_TOLERANCE)]
         breaks = np.concatenate([[begin], inner, [end]])
-        is_lock = np.min(np.abs(breaks[:, None] - self._locked_since), axis=1) <= INSTANT_ROOM
+        is_lock = np.min(np.abs(breaks[:, None] - self._locked_since), axis=1) <= TIME_TOLERANCE
         cuts = [0, *(np.flatnonzero(is_lock[1:-1]) + 1).tolist(), len(breaks) - 1]
         return [breaks[low : high + 1] for low, high in pairwise(cuts)]
 

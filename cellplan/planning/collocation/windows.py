@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.curves.chebyshev import chebyshev
 from cellplan.geometry.transforms import Array
-from cellplan.model.task import INSTANT_ROOM
+from cellplan.model.task import TIME_TOLERANCE
 
 NONE: Final = np.zeros(0)
 DEGREES: Final = (6, 12, 24)  # of polynomials: a panel that is not exact enough gets the next one, or is cut
@@ -172,7 +172,7 @@ def windows_between(
     longest = SHARE_OF_MOTION * whole
     panels: list[Panel] = []
     for begin, end in pairwise(breaks.tolist()):
-        inner = knots[np.searchsorted(knots, begin + INSTANT_ROOM) : np.searchsorted(knots, end - INSTANT_ROOM)]
+        inner = knots[np.searchsorted(knots, begin + TIME_TOLERANCE) : np.searchsorted(knots, end - TIME_TOLERANCE)]
         for group in _groups([begin, *inner.tolist(), end], fine=FINE_SHARES[0] * whole, longest=longest):
             panels += _over(group) if len(group) > 2 else _even(*group, whole=whole, longest=longest, highest=highest)
     return grouped(panels, longest=longest)

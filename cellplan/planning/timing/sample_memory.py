@@ -10,7 +10,7 @@ MOST_VALUES: Final = 10_000_000  # [-] samples times joints: 24 joints for seven
 BYTES_OF_A_VALUE: Final = 600  # [bytes] that a solve takes for each at most: measured 420 with few bodies
 
 
-def require_room(cell: Cell, samples: int) -> None:
+def require_memory(cell: Cell, samples: int) -> None:
     """Refuse a clock whose samples of all joints do not fit an ordinary machine.
 
     Raises:

@@ -12,15 +12,15 @@ from cellplan.model.approach_retract import stand_off
 from cellplan.model.cell import Cell
 from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.task import INSTANT_ROOM, Task
+from cellplan.model.task import TIME_TOLERANCE, Task
 from cellplan.model.time_law import peak_rate, reached_at
 from cellplan.model.toolpath import Toolpath
-from cellplan.planning.timing.sample_memory import require_room
+from cellplan.planning.timing.sample_memory import require_memory
 
 MOST_SAMPLES: Final = 2_000_000  # tables longer than this fill disks, not controllers
 ROTATIONS: Final = 3  # components of a task from here on are rotations
 FEWEST_STEPS: Final = 10  # a task of fewer has so few samples that checks at them say nothing about its path
-STEP_ROOM: Final = 1e-9  # [-] share of a step by which the last task may outlast the clock: rounding of a quotient
+STEP_TOLERANCE: Final = 1e-9  # [-] share of a step by which the last task may outlast the clock: rounding of a quotient
 WHOLE_TURN: Final = 1e-9  # [rad] a turn per cycle this near to whole turns brings the tool back
 TIME_DECIMALS: Final = 12  # decimals kept of k * step, so that 0.001 * 3 reads 0.003
 
@@ -98,7 +98,7 @@ def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
     for path in paths:
         task, whole = path.task, path.end - path.start
         duration = whole / task.repeat
-        if duration < least * (1.0 - STEP_ROOM) - INSTANT_ROOM:
+        if duration < least * (1.0 - STEP_TOLERANCE) - TIME_TOLERANCE:
             key = "duration_s" if task.feed is None else "feed_mm_s"
             own = "path" if path.toolpath.is_timed else key
             what = "a task" if task.repeat == 1 else "a cycle"
@@ -106,7 +106,7 @@ def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
                 f"{task.where(own)}: expected {what} of at least {least:g} s "
                 f"({FEWEST_STEPS} times motion.step_s), got {duration:g} s; slow the task down or shorten the step"
             )
-        if task.settle > whole - least * (1.0 - STEP_ROOM) + INSTANT_ROOM:
+        if task.settle > whole - least * (1.0 - STEP_TOLERANCE) + TIME_TOLERANCE:
             raise InputError(
                 f"{task.where('settle_s')}: expected a time that leaves at least {least:g} s "
                 f"({FEWEST_STEPS} times motion.step_s) of the task's {whole:g} s to be judged, got {task.settle:g}"
@@ -119,20 +119,20 @@ def _step_count(cell: Cell, paths: Sequence[ClockedPath]) -> int:
         _examine_end(cell, path)
     clock = cell.motion.duration
     cycle = max((path.over for path in paths), default=cell.motion.step) if clock is None else clock
-    steps = np.ceil(cycle / cell.motion.step - STEP_ROOM)
+    steps = np.ceil(cycle / cell.motion.step - STEP_TOLERANCE)
     if not steps < MOST_SAMPLES:
         raise InputError(
             f"{cell.origin.at('motion.step_s')}: expected a step that makes at most {MOST_SAMPLES} samples, "
             f"got {cell.motion.step:g} s for a cycle of {cycle:g} s; make the step longer"
         )
-    require_room(cell, int(steps) + 1)
+    require_memory(cell, int(steps) + 1)
     return max(int(steps), 1)
 
 
 def _examine_end(cell: Cell, path: ClockedPath) -> None:
     """Refuse a task that ends after the clock, with the time that it needs."""
     clock, task, length = cell.motion.duration, path.task, path.toolpath.length * path.task.repeat
-    if clock is None or path.over <= clock * (1.0 + STEP_ROOM):
+    if clock is None or path.over <= clock * (1.0 + STEP_TOLERANCE):
         return
     key, why = "duration_s", ""
     if task.feed is not None:
@@ -148,7 +148,7 @@ def _examine_end(cell: Cell, path: ClockedPath) -> None:
 
 def _rounded_up(seconds: float) -> float:
     """A time in [s] in milliseconds, never shorter than it is."""
-    return float(np.ceil(1e3 * seconds - STEP_ROOM) / 1e3)
+    return float(np.ceil(1e3 * seconds - STEP_TOLERANCE) / 1e3)
 
 
 def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
@@ -156,7 +156,7 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
     task, corners = path.task, path.corners
     X_PT, V_PT_P, travelled = path.targets(times)
     corners = corners[[0, -1]] if path.toolpath.is_timed else corners
-    rests = (times < corners[0] - INSTANT_ROOM) | (times > corners[-1] - INSTANT_ROOM)
+    rests = (times < corners[0] - TIME_TOLERANCE) | (times > corners[-1] - TIME_TOLERANCE)
     V_PT_P[rests] = 0.0
     _even_out_jumps(times, corners, X_PT, V_PT_P=V_PT_P)
     stand_off(times, task, X_PT, V_PT_P=V_PT_P, end=path.end)
@@ -191,7 +191,7 @@ def _even_out_jumps(times: Array, corners: Array, X_PT: Array, *, V_PT_P: Array)
     """
     before = np.searchsorted(times, corners, side="right") - 1
     after = np.minimum(before + 1, len(times) - 1)
-    is_between = (corners - times[before] > INSTANT_ROOM) & (times[after] - corners > INSTANT_ROOM)
+    is_between = (corners - times[before] > TIME_TOLERANCE) & (times[after] - corners > TIME_TOLERANCE)
     k = np.unique(before[is_between])
     step = np.diff(times)[k, None]
     turns = X_PT[k + 1, :3, :3] @ np.swapaxes(X_PT[k, :3, :3], 1, 2)

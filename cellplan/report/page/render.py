@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any, Final
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check
@@ -112,7 +112,7 @@ def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) ->
     return _render("rehearsal.html", record, cell, parts)
 
 
-def _render(template: str, record: Record, cell: Cell, parts: Mapping[str, object]) -> str:
+def _render(name: str, record: Record, cell: Cell, parts: Mapping[str, object]) -> str:
     texts = {
         "modes": MODES,
         "classes": CLASSES,
@@ -121,7 +121,12 @@ def _render(template: str, record: Record, cell: Cell, parts: Mapping[str, objec
         "many": len(cell.robots) > MAX_UNFOLDED,
     }
     colours = robot_colours(cell)
-    return _environment().get_template(template).render(r=record, colours=colours, ink=ROBOTS[-1], **texts, **parts)
+    return template(name).render(r=record, colours=colours, ink=ROBOTS[-1], **texts, **parts)
+
+
+def template(name: str) -> Template:
+    """The template of a page by its file name."""
+    return _environment().get_template(name)
 
 
 @cache

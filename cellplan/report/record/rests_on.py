@@ -7,6 +7,8 @@ from cellplan.model.cell import Cell
 from cellplan.model.payload import LoadUse
 from cellplan.model.units import MM
 from cellplan.report.record.common import Number, number
+from cellplan.report.record.controller import ZeroRecord, zero_record
+from cellplan.report.record.missing_tools import missing_tools
 from cellplan.report.record.payload import LoadRecord, loads_record, unjudged_loads
 
 
@@ -24,6 +26,7 @@ class RestsOnRecord(TypedDict):
     bodies: Annotated[dict[str, BodiesRecord], "by robot: accuracy of its link bodies"]
     body_accuracy: Annotated[str, "`report`, or `add`: the accuracy of both bodies is added to the required clearance"]
     payload: Annotated[dict[str, LoadRecord], "by robot: load and rated load"]
+    zero: Annotated[dict[str, ZeroRecord], "by robot: the zero that its joint positions count from"]
     lines: Annotated[list[str], "one line on each value that was not stated and therefore not judged"]
 
 
@@ -33,7 +36,8 @@ def rests_on_record(cell: Cell, loads: Sequence[LoadUse]) -> RestsOnRecord:
         "bodies": bodies_record(cell),
         "body_accuracy": "add" if cell.checks.adds_accuracy else "report",
         "payload": loads_record(loads),
-        "lines": [*unstated_bodies(cell), *unjudged_loads(loads)],
+        "zero": {robot.name: zero_record(robot.model) for robot in cell.robots},
+        "lines": [*(text for _, text in missing_tools(cell)), *unstated_bodies(cell), *unjudged_loads(loads)],
     }
 
 

@@ -84,6 +84,7 @@ class HeadRecord(OriginRecord):
     not_in_program: Annotated[list[str], "moves that the program does not contain"]
     rests_on: Annotated[RestsOnRecord, "assumptions on which the values rest"]
     open_surfaces: Annotated[list[OpenSurfaceRecord], "bodies whose mesh is not closed"]
+    remarks: Annotated[list[str], "what was read over in the files of robots"]
     left_out: Annotated[list[LeftOutRecord], "pairs that were not judged in full"]
     solver: Annotated[SolverRecord, "how the motion was computed"]
     caution: Annotated[str, "limits of an offline result"]
@@ -148,6 +149,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
         "closest_pairs": closest_pairs_record(clearance),
         "clearance_proof": clearance_proof_record(clearance),
         "open_surfaces": open_surfaces_record(cell),
+        "remarks": [text for _, text in cell.remarks],
         "left_out": left_out_record(clearance.left_out),
         "closure": closures_record(report, cell),
         "solver": solver_record(cell.solver, motion),

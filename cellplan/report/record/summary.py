@@ -80,6 +80,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "runs": {name: _run_entry(name, report, cell) for name, report in reports.items()},
         "tasks": {name: record for report in runs for name, record in tasks_record(report, cell).items()},
         "open_surfaces": open_surfaces_record(cell),
+        "remarks": [text for _, text in cell.remarks],
         "closure": worst_closures_record(runs, cell),
         "joints": joints_record(
             merge_joint_uses(use for report in runs for use in report.joints), accelerations.joints

@@ -46,6 +46,7 @@ def figure_lines(record: Record) -> list[str]:
         *_clearance_lines(record["clearance"]["whole"]),
         *_slack_lines(record["solver"]["slack"]),
         *_fallback_lines(record["solver"]),
+        *(f"  note: {line}" for line in record.get("remarks", [])),
         *(f"  note: {line}" for _, line in open_surface_notes(record.get("open_surfaces", []))),
         *(f"  grip: {line}" for line in grip_notes(record)),
         *(f"  {line}" for line in record.get("rests_on", {}).get("lines", [])),

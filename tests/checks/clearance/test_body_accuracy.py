@@ -40,7 +40,7 @@ def judged(cell: Cell) -> tuple[ClearanceReport, Check]:
     return report, next(check for check in checks if check.name == "clearance" and check.subject == "environment")
 
 
-def test_a_stated_accuracy_is_told_and_asks_for_no_more_distance() -> None:
+def test_a_stated_accuracy_is_reported_and_asks_for_no_more_distance() -> None:
     report, check = judged(cell_of(0.010, near=GOOD, adds=False))
 
     minimum = report.minima[ClearanceClass.ENVIRONMENT]
@@ -73,7 +73,7 @@ def test_exact_bodies_pass_with_the_demand_of_the_cell_though_the_accuracy_is_ad
     assert check.limit == pytest.approx(5.0)
 
 
-def test_bodies_of_which_nobody_says_how_good_they_are_are_named_in_one_line() -> None:
+def test_bodies_without_stated_accuracy_are_named_in_one_line() -> None:
     assert unstated_bodies(cell_of(0.01, near=None, adds=False)) == ["accuracy of bodies of a not stated"]
     assert unstated_bodies(cell_of(0.01, near=GOOD, adds=False)) == []
 

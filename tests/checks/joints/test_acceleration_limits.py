@@ -82,7 +82,7 @@ def test_a_motion_that_starts_at_speed_fails_at_any_step_and_says_why(steps: int
     assert first.message.endswith("; its velocity is discontinuous")
 
 
-def test_unlimited_accelerations_are_told_with_the_reason_and_not_judged() -> None:
+def test_unlimited_accelerations_are_reported_with_the_reason_and_not_judged() -> None:
     rule = AccelerationRule(full_speed_in=(), is_unlimited=True, reason="a study")
     accelerations, checks = found(ruled(rule, {"q1": {"acceleration": 0.1, "jerk": 0.1}}), turning(times_of(STEPS)))
 
@@ -102,7 +102,7 @@ def test_jerk_is_held_where_a_limit_is_stated(limit: float, passed: bool) -> Non
     assert check.value == pytest.approx(np.degrees(60.0), rel=0.02)
 
 
-def test_the_instant_at_which_a_joint_fails_is_left_out_and_told() -> None:
+def test_the_instant_at_which_a_joint_fails_is_left_out_and_reported() -> None:
     cell = planar_arm_cell()
     times = times_of(STEPS)
     share = np.minimum(smooth(times), smooth(np.array([0.0, 0.5, 1.0]))[1])  # stops at once in the middle
@@ -115,7 +115,7 @@ def test_the_instant_at_which_a_joint_fails_is_left_out_and_told() -> None:
     assert [left.what for left in accelerations.not_judged] == ["accelerations at 0.500 s, when arm/q1 fails"]
 
 
-def test_tool_and_part_are_told_in_the_world_and_the_part_may_be_limited() -> None:
+def test_tool_and_part_are_reported_in_the_world_and_the_part_may_be_limited() -> None:
     cell = planar_arm_cell()
     cell = replace(cell, robots=(replace(cell.robots[0], start=np.zeros(4)),))
     q = np.zeros((STEPS + 1, 4))

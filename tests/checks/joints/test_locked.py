@@ -60,7 +60,7 @@ def test_sliding_joints_speak_millimetres():
     assert "moves by 50 mm" in check.message
 
 
-def test_a_failure_after_the_end_of_a_run_is_told():
+def test_a_failure_after_the_end_of_a_run_is_reported():
     (check,) = check_locked(locked_cell(("q2", 9.0)), TIMES, moving_until(4.0))
     assert check.passed
     assert check.message == "joint arm/q2 is locked from 9.000 s on, after the end at 4.000 s"

@@ -8,7 +8,7 @@ import pytest
 from builders.scene_builders import fixed_part, joint, make_cell, placed, schedule, work
 
 from cellplan import load_cell, solve
-from cellplan.checks.tools.between_checks import check_task_between, look_between
+from cellplan.checks.tools.between_checks import check_between_rows, check_task_between
 from cellplan.checks.tools.tracking import part_poses, task_accuracy
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
@@ -68,7 +68,7 @@ def looked(
     jump_times = np.array([0.35] if corner else jumps)
     known = Known(times=plain.times, tasks=(scheduled,), jump_times=jump_times, corner=corner)
     accuracy = task_accuracy(scheduled, scene.chains["arm"], q=q, X_WP=part_poses(cell, scene.chains, {"arm": q}))
-    ((found,), _) = look_between(scene, known, {"arm": q}, accuracy=(accuracy,), closures=())
+    ((found,), _) = check_between_rows(scene, known, {"arm": q}, accuracy=(accuracy,), closures=())
     assert found.between is not None
     return found.between, check_task_between(found, tolerance)
 

@@ -67,7 +67,9 @@ def test_lines_beside_a_round_body_do_not_hit() -> None:
 
 
 @pytest.mark.parametrize("shape", [Box((0.3, 0.3, 0.4)), Cylinder(0.15, 0.4), Sphere(0.2)], ids=str)
-def test_laid_curves_move_within_the_surface_and_their_normals_turn_as_told(shape: Box | Cylinder | Sphere) -> None:
+def test_projected_curves_move_within_the_surface_and_their_normals_turn_as_stated(
+    shape: Box | Cylinder | Sphere,
+) -> None:
     circle = CircleCurve(centre=X[:3, 3], first=np.array([0.03, 0.01, 0.0]), second=np.array([0.0, 0.02, 0.04]))
     u, h, whole = np.linspace(0.0, 6.0, 41), 1e-5, (0.0, 2.0 * np.pi)
     for patch in patches_facing(shape, X, TILTED):

@@ -276,7 +276,7 @@ def test_findings_about_a_robot_table_follow_those_about_the_cell(refuse: Refuse
     ]
 
 
-def test_names_that_do_not_exist_are_told_beside_other_mistakes_of_the_same_entry(refuse: Refuse) -> None:
+def test_names_that_do_not_exist_are_reported_beside_other_mistakes_of_the_same_entry(refuse: Refuse) -> None:
     findings = refuse(
         ("model: kuka_kr6", "model: kuka_kr7\n    bse: {}"),
         ("radius_mm: 250", "radius_mm: -250"),

@@ -125,7 +125,7 @@ def test_planar_paths_start_where_the_interface_says(load: Load) -> None:
     np.testing.assert_allclose(path.corners, [(0.02, 0), (0, 0.01), (-0.02, 0), (0, -0.01)], atol=1e-15)
 
 
-def test_closed_shapes_start_where_they_are_told_and_run_as_they_are_told(load: Load) -> None:
+def test_closed_shapes_start_where_they_are_reported_and_run_as_they_are_reported(load: Load) -> None:
     circle = "circle: {radius_mm: 100, plane: xy}"
 
     started = load((circle, "circle: {radius_mm: 100, plane: yz, direction: clockwise, start_at: -z}")).tasks[0].path
@@ -282,7 +282,7 @@ def test_files_elsewhere_need_leave_also_through_links(load: Load, refuse: Refus
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes in the file system")
-def test_a_damaged_mesh_is_told_with_the_line_that_names_it(refuse: Refuse, tmp_path: Path) -> None:
+def test_a_damaged_mesh_is_reported_with_the_line_that_names_it(refuse: Refuse, tmp_path: Path) -> None:
     (tmp_path / "part.stl").write_bytes(b"\x89PNG")
 
     reported = refuse(("{cylinder: {radius_mm: 250, length_mm: 500, axis: x}}", "{mesh: part.stl, unit: mm}"))

@@ -98,7 +98,7 @@ def test_the_accuracy_is_read_in_millimetres(load: Load, settings: str, accuracy
         ),
     ],
 )
-def test_what_is_in_the_way_of_the_accurate_mode_is_told_line_by_line(
+def test_what_is_in_the_way_of_the_accurate_mode_is_reported_line_by_line(
     refuse: Refuse, settings: str, findings: list[str]
 ) -> None:
     assert refuse(with_solver(f"integrator: accurate, {settings}")) == findings

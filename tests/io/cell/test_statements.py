@@ -134,7 +134,7 @@ def test_a_mistake_in_a_cell_is_named_with_its_place(
     assert refuse((old, new)) == [message]
 
 
-def test_an_accuracy_that_nobody_states_cannot_be_added(load: Callable[..., Cell], tmp_path: Path) -> None:
+def test_an_unstated_accuracy_cannot_be_added(load: Callable[..., Cell], tmp_path: Path) -> None:
     table(tmp_path, f"bodies: [{SOLID}]\n")
     adding = ("motion: {duration_s: 4}", "motion: {duration_s: 4}\nchecks: {body_accuracy: add}")
     own, no_weights = ("model: abb_irb1600", "model: one.yaml"), (f"{WEIGHTS}\n", "")

@@ -155,7 +155,7 @@ def test_axes_and_quaternions_that_are_not_of_length_one_are_refused(read) -> No
     ]
 
 
-def test_nobody_has_to_read_more_than_twenty_findings(read) -> None:
+def test_at_most_twenty_findings_are_listed(read) -> None:
     lines = findings_of(read, HEADER + "a,0,0\n" * 100)
 
     assert len(lines) == 21

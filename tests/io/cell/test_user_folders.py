@@ -62,7 +62,7 @@ def test_the_configuration_names_folders(home: Path) -> None:
         ("\nallow_dir: []\n", "config.yaml:2: allow_dir: unknown key; allowed: allow_dirs"),
     ],
 )
-def test_a_wrong_configuration_is_told_with_its_line(home: Path, text: str, message: str) -> None:
+def test_a_wrong_configuration_is_reported_with_its_line(home: Path, text: str, message: str) -> None:
     write_config(home, text)
 
     with pytest.raises(InvalidFileError) as caught:

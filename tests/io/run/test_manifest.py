@@ -47,7 +47,7 @@ def test_what_is_made_from_a_run_later_is_no_part_of_it(run: tuple[Path, Manifes
     assert reported(folder, manifest) == []
 
 
-def test_every_difference_is_told_by_name(run: tuple[Path, Manifest]) -> None:
+def test_every_difference_is_reported_by_name(run: tuple[Path, Manifest]) -> None:
     folder, manifest = run
     (folder / "report.json").unlink()
     (folder / "tables" / "a.csv").write_bytes((folder / "tables" / "b.csv").read_bytes())
@@ -77,7 +77,7 @@ def test_links_and_pipes_are_never_followed(run: tuple[Path, Manifest], tmp_path
     ]
 
 
-def test_a_folder_that_became_a_link_is_told_once(run: tuple[Path, Manifest], tmp_path: Path) -> None:
+def test_a_folder_that_became_a_link_is_reported_once(run: tuple[Path, Manifest], tmp_path: Path) -> None:
     folder, manifest = run
     (folder / "tables").rename(tmp_path / "aside")
     (folder / "tables").symlink_to(tmp_path / "aside")
@@ -112,7 +112,7 @@ def test_a_manifest_of_another_form_is_refused(run: tuple[Path, Manifest], chang
     assert str(refusal.value).startswith(finding)
 
 
-def test_a_manifest_laid_out_by_somebody_else_is_refused(run: tuple[Path, Manifest]) -> None:
+def test_a_manifest_in_another_layout_is_refused(run: tuple[Path, Manifest]) -> None:
     data = (run[0] / "manifest.json").read_bytes()
 
     with pytest.raises(InputError, match="its layout is not that of cellplan"):

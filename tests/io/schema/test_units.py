@@ -92,7 +92,9 @@ def entries(model: Any, found: dict[Any, None]) -> dict[Any, None]:
 
 
 def numbers(value: Any) -> list[Any]:
-    return [item for part in value for item in numbers(part)] if isinstance(value, tuple) else [value]
+    """All numbers of a default; a mapping without entries has none."""
+    parts = tuple(value.values()) if isinstance(value, dict) else value
+    return [item for part in parts for item in numbers(part)] if isinstance(parts, tuple) else [parts]
 
 
 @pytest.mark.parametrize("model", [CellDocument, RobotTableDocument])

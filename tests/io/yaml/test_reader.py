@@ -205,7 +205,7 @@ def test_numbers_read_back_to_the_same_value(number: float) -> None:
         ("a: [\n 1,\n 2\nb: 3\n", 1),
     ],
 )
-def test_what_is_left_open_is_told_where_it_opens(text: str, line: int) -> None:
+def test_what_is_left_open_is_reported_where_it_opens(text: str, line: int) -> None:
     with pytest.raises(InputError) as caught:
         parse_yaml(text.encode(), file="f.yaml")
 
@@ -214,7 +214,7 @@ def test_what_is_left_open_is_told_where_it_opens(text: str, line: int) -> None:
 
 
 @pytest.mark.parametrize(("text", "line"), [("a:\n  - {x: 1,\n     y: 2\n     z: 3}\n", 4), ("a: 1\nb: ]\n", 2)])
-def test_other_slips_are_told_where_the_parser_stumbles(text: str, line: int) -> None:
+def test_other_slips_are_reported_where_the_parser_stumbles(text: str, line: int) -> None:
     with pytest.raises(InputError) as caught:
         parse_yaml(text.encode(), file="f.yaml")
 

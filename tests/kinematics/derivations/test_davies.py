@@ -247,7 +247,7 @@ def test_a_further_holder_closes_a_real_circuit_without_a_virtual_chain():
     assert np.abs(J @ speeds).max() <= SOLVE_TOL * np.abs(speeds).max()  # neither tool strays on the part
 
 
-def test_what_a_grasp_leaves_open_is_a_joint_that_nobody_measures():
+def test_what_a_grasp_leaves_open_is_a_joint_that_is_not_measured():
     cell = sharing(random_cell(52, operators=2, joints=6), 1, axes=(0, 1, 2))
     q = np.random.default_rng(52).uniform(-1.5, 1.5, cell.joint_count)
     net = network(cell, q)

@@ -67,7 +67,7 @@ def test_a_renamed_cell_file_is_still_the_same(copy: Path) -> None:
     assert open_gate(copy / "run", cell=copy / "cell" / "renamed.yaml").remarks == ()
 
 
-def test_nobody_else_can_make_a_verified_run(sound: Path) -> None:
+def test_only_the_gate_makes_a_verified_run(sound: Path) -> None:
     run = open_gate(sound / "run", cell=sound / "cell" / "small.yaml")
     with pytest.raises(TypeError, match=r"created by cellplan\.open_gate only"):
         replace(run, token=None)
@@ -93,7 +93,7 @@ def test_every_exporter_takes_a_verified_run_and_nothing_else() -> None:
                 assert annotations == [VerifiedRun.__name__], f"{path.name}: {node.name}"
 
 
-def test_other_versions_are_told_and_do_not_matter(copy: Path) -> None:
+def test_other_versions_are_reported_and_do_not_matter(copy: Path) -> None:
     for name in ("manifest.json", "report.json"):
         edit_json(copy / "run" / name, lambda record: record["versions"].update(pin="3.0.0"))
     page = copy / "run" / "report.html"
@@ -123,7 +123,7 @@ def test_a_report_of_another_version_of_cellplan_may_have_other_keys(copy: Path)
     )
 
 
-def test_a_failed_run_is_told_with_its_reason(tmp_path: Path) -> None:
+def test_a_failed_run_is_reported_with_its_reason(tmp_path: Path) -> None:
     cell = write_cell(tmp_path / "cell")
     by_steps = cell.read_text().replace("position_mm: 1,", "position_mm: 0.0001,") + "solver: {integrator: euler}\n"
     cell.write_text(by_steps, encoding="utf-8")
@@ -189,7 +189,7 @@ def test_what_was_set_when_the_cell_was_solved_is_reported(sound: Path, tmp_path
         ),
     ],
 )
-def test_a_run_with_another_integrator_passes_and_tells_what_was_chosen(
+def test_a_run_with_another_integrator_passes_and_states_what_was_chosen(
     sound: Path, tmp_path: Path, choices: dict[str, Any], remarks: list[str]
 ) -> None:
     cell = load_cell(sound / "cell" / "small.yaml")

@@ -59,7 +59,7 @@ def test_all_phases_stand_in_one_table_per_robot_with_a_line_between_them(solved
             assert np.array_equal(rows, run.report.q[robot])
 
 
-def test_the_clock_tells_phase_length_and_process_of_every_row(solved: tuple[Path, Solution]) -> None:
+def test_the_clock_states_phase_length_and_process_of_every_row(solved: tuple[Path, Solution]) -> None:
     text = (solved[0].parent / "run" / "tables" / "clock.csv").read_text()
     clock = parse_clock(text, "clock.csv").table
 

@@ -121,7 +121,7 @@ def test_noise_above_the_tolerance_stalls(pair):
     assert made.checks[0].message.startswith("true position error of task 'circle' after correction: ")
 
 
-def test_used_up_rounds_are_told(pair):
+def test_used_up_rounds_are_reported(pair):
     (trial,) = rehearse(pair, SMALL, feedback=True, rounds=1).runs[0].trials
 
     assert trial.correction.outcome is Outcome.UNFINISHED

@@ -151,7 +151,7 @@ def test_elimination_gives_the_inverse_of_the_cholesky_factor(size: int) -> None
         np.testing.assert_allclose(found[:, size:, lane], F @ B[..., lane], atol=1e-9)
 
 
-def test_lanes_that_are_not_positive_are_no_numbers_and_leave_the_others_alone() -> None:
+def test_batch_entries_that_are_not_positive_are_no_numbers_and_leave_the_others_alone() -> None:
     M = np.stack([np.eye(3), -np.eye(3), 2.0 * np.eye(3)], axis=-1)
     with np.errstate(invalid="ignore"):
         found = eliminated(M)

@@ -202,7 +202,7 @@ def test_a_motion_goes_on_from_anywhere() -> None:
     assert run.path(case.start, begin=0.4, end=0.4).panels == []
 
 
-def test_progress_is_told_from_zero_to_one() -> None:
+def test_progress_runs_from_zero_to_one() -> None:
     case, reported = triangles(CELLS["single"]), []
     run = AccurateRun(case.task, progress=lambda _stage, share: reported.append(share))
     run.path(case.start, begin=0.0, end=1.0)

@@ -121,7 +121,7 @@ def test_lost_path_is_named_with_its_instant():
         integrate_schedule(MotionTask(cell, broken, [r.name for r in cell.robots], start))
 
 
-def test_task_that_nobody_may_move_for_is_refused_without_damping():
+def test_task_without_free_joints_is_refused_without_damping():
     cell = random_cell(31, operators=1)
     cell = replace(cell, solver=replace(cell.solver, damping=0.0))
     start = np.random.default_rng(0).uniform(-1, 1, cell.joint_count)

@@ -124,7 +124,7 @@ def test_speeds_are_bounded_by_the_damping_wherever_the_arm_stands(q, near, meas
     assert np.linalg.norm(speeds) <= 1.01 * np.linalg.norm(xdot) * 5.0  # 1.01: lambda is a little below its largest
 
 
-def test_secondary_motion_stays_unnoticed_in_a_damped_configuration():
+def test_secondary_motion_does_not_show_in_a_damped_configuration():
     drift = np.array([0.4, -0.7, 0.9])
     J, _, with_drift = one_step((0.3, 0.05, 0.1), damping=0.1, drift=drift)
     _, _, without = one_step((0.3, 0.05, 0.1), damping=0.1)

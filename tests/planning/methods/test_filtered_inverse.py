@@ -112,7 +112,7 @@ def test_filter_that_has_not_begun_moves_nothing(method):
 
 
 @pytest.mark.parametrize("method", METHODS[1:])
-def test_secondary_motion_stays_unnoticed_while_the_filter_lags(method):
+def test_secondary_motion_does_not_show_while_the_filter_lags(method):
     q, drift = np.array([0.2, 0.9, -1.4]), np.array([0.3, -0.2, 0.5])
     speeds = []
     for desired in (None, lambda _k, _q: drift):

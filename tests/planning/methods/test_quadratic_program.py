@@ -144,7 +144,7 @@ def test_speed_and_acceleration_limits_are_kept_within_the_redundancy():
     assert largest_error(schedule, motion.q) < 5e-5
 
 
-def test_what_is_too_fast_for_the_joints_is_given_up_and_told():
+def test_what_is_too_fast_for_the_joints_is_given_up_and_reported():
     slow = {f"q{i}": {"velocity": 0.7} for i in range(1, 5)}
     schedule, motion = arm_motion(**slow)
     assert motion.slack.max() > 0.1

@@ -41,7 +41,7 @@ def test_paths_of_the_four_robots_start_where_they_should() -> None:
     assert np.allclose(starts["rectangle"][:3, 2], [0.0, depth / 0.25, -0.5], atol=1e-15)
 
 
-def test_circle_laid_on_a_cylinder_lies_on_it_with_the_exact_normal() -> None:
+def test_circle_projected_onto_a_cylinder_lies_on_it_with_the_exact_normal() -> None:
     path = build_toolpath(ON_ROLLER["circle"], ROLLER)
 
     X = path.poses(np.linspace(0.0, path.length, 1001))

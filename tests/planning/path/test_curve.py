@@ -44,7 +44,7 @@ def test_shapes_run_the_way_round_that_is_asked_for_seen_from_every_side(axis: i
         assert np.allclose(p[-1], p[0], atol=1e-12)
 
 
-def test_a_circle_starts_where_it_is_told_and_runs_on_from_there() -> None:
+def test_a_circle_starts_at_its_stated_point_and_runs_on_from_there() -> None:
     path = replace(circle(0.1, PlaneName.XY), start=(0.6, -0.8), direction=RunDirection.CLOCKWISE)
 
     toolpath = build_toolpath(task_on(path, tool_axis=-EZ), ROLLER)

@@ -21,7 +21,7 @@ def test_figures_that_differ_by_more_are_no_tie():
     assert best_first(np.array([[0.2 + 1e-8, 0.5], [0.2, 0.6]])) == [0, 1]
 
 
-def test_what_no_figure_tells_apart_stays_in_its_order():
+def test_what_no_figure_states_apart_stays_in_its_order():
     assert best_first(np.array([[1.0], [1.0], [1.0]])) == [0, 1, 2]
     assert best_first(np.zeros((0, 3))) == []
 

@@ -40,7 +40,7 @@ def share_left_free(report, robots):
     return min(ranges, *(1 - use.peak_velocity / use.velocity_limit for use in used))
 
 
-def test_the_coarse_clock_foretells_what_the_full_motion_leaves_free(cell):
+def test_the_coarse_clock_forestates_what_the_full_motion_leaves_free(cell):
     trial = trials_of(cell).judge(start_of(cell))
 
     np.testing.assert_array_equal(trial.start, start_of(cell))  # given configurations stay on their turn

@@ -10,7 +10,7 @@ from cellplan import load_cell
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.sample_memory import MOST_VALUES, require_room
+from cellplan.planning.timing.sample_memory import MOST_VALUES, require_memory
 from cellplan.planning.timing.schedule import clock_paths
 
 SHIPPED = Path(__file__).parents[3] / "cells" / "planar_pair.yaml"  # two arms of three joints, 12 s
@@ -24,9 +24,9 @@ def test_what_fits_is_taken_and_one_sample_more_is_not() -> None:
     cell = load_cell(SHIPPED)
     most = MOST_VALUES // 6
 
-    require_room(cell, most)
+    require_memory(cell, most)
     with pytest.raises(InputError, match=f"got {most + 1} x 6, which take about 6 GB of memory"):
-        require_room(cell, most + 1)
+        require_memory(cell, most + 1)
 
 
 def test_a_clock_that_is_too_fine_is_refused_before_it_is_made_and_the_cure_helps() -> None:

@@ -90,7 +90,7 @@ def test_more_rows_than_joints_have_no_gradient() -> None:
     np.testing.assert_array_equal(Tasks(cell, held=True).gradient(q), 0.0)
 
 
-def test_nobody_who_moves_has_no_gradient() -> None:
+def test_no_moving_joint_has_no_gradient() -> None:
     cell = random_cell(6, operators=2, joints=7)
     q = np.random.default_rng(6).uniform(-1.0, 1.0, cell.joint_count)
     tasks = Tasks(cell, held=True)

@@ -239,7 +239,7 @@ def test_joints_that_do_not_come_back_have_a_table(passed_run: Any) -> None:
     assert "Repeatability" not in page_of(passed_run)
 
 
-def test_a_failed_joint_is_told_in_plain_words(passed_run: Any) -> None:
+def test_a_failed_joint_is_reported_in_plain_words(passed_run: Any) -> None:
     locked = (LockedJoint(robot="kuka", joint="B2", since=2.0),)
     cell = replace(passed_run.cell, motion=replace(passed_run.cell.motion, locked=locked))
 

@@ -119,7 +119,7 @@ def test_the_worst_of_several_runs_counts() -> None:
         ),
     ],
 )
-def test_the_header_of_a_table_tells_the_largest_acceleration_and_jerk(
+def test_the_header_of_a_table_states_the_largest_acceleration_and_jerk(
     joints: tuple[JointAcceleration, ...], line: str
 ) -> None:
     assert table_line(replace(FOUND, joints=joints), "kuka") == line

@@ -17,7 +17,7 @@ def test_a_record_without_any_says_so_and_one_that_is_silent_says_nothing() -> N
     assert left_out_notes({}) == []
 
 
-def test_grips_of_several_runs_are_told_once() -> None:
+def test_grips_of_several_runs_are_reported_once() -> None:
     grip = {"name": "grip_depth", "message": "a/hand is 0 mm deep in part, allowed 2 mm"}
 
     assert grip_notes({"checks": [grip, {"name": "clearance", "message": "fine"}, grip]}) == [grip["message"]]

@@ -116,7 +116,7 @@ def test_whole_cell_is_certified_only_when_every_class_is(passed_run: Any) -> No
     assert whole_of({**certified, part: replace(certified[part], certified=False)})["certified"] is False
 
 
-def test_closest_pairs_and_the_proof_are_told(passed_run: Any) -> None:
+def test_closest_pairs_and_the_proof_are_reported(passed_run: Any) -> None:
     record = record_of(passed_run)
     assert record["closest_pairs"][0] == {
         "pair": ["staubli/C3", "staubli/C6"],
@@ -229,7 +229,7 @@ def test_conversion_leaves_no_noise() -> None:
     assert (number(math.nan), number(math.inf), number(None), number(-0.0)) == (None, None, None, 0.0)
 
 
-def test_failed_joints_are_told_with_instant_and_place(passed_run: Any, failed_run: Any) -> None:
+def test_failed_joints_are_reported_with_instant_and_place(passed_run: Any, failed_run: Any) -> None:
     for run, is_kept in ((passed_run, True), (failed_run, None)):
         locked = (LockedJoint(robot="kuka", joint="B2", since=2.0),)
         cell = replace(run.cell, motion=replace(run.cell.motion, locked=locked))
@@ -243,7 +243,7 @@ def test_failed_joints_are_told_with_instant_and_place(passed_run: Any, failed_r
     assert record_of(passed_run)["locked_joints"] == []
 
 
-def test_speeds_in_the_world_are_told_in_millimetres_per_second(passed_run: Any) -> None:
+def test_speeds_in_the_world_are_reported_in_millimetres_per_second(passed_run: Any) -> None:
     speeds = record_of(passed_run)["speeds"]
     assert speeds["kuka"] == {
         "tool_peak_mm_s": 300.0,
@@ -263,7 +263,7 @@ def closure(size: float, turn: float, times: Any) -> ClosureAccuracy:
     )
 
 
-def test_closures_are_told_by_robot_with_what_is_allowed(passed_run: Any) -> None:
+def test_closures_are_reported_by_robot_with_what_is_allowed(passed_run: Any) -> None:
     report = replace(passed_run.report, closures=(closure(2e-6, 1e-5, passed_run.report.times),))
 
     record = read(as_json(run_record(report, cell=passed_run.cell, provenance=passed_run.provenance)))["closure"]
@@ -277,7 +277,7 @@ def test_closures_are_told_by_robot_with_what_is_allowed(passed_run: Any) -> Non
     assert record_of(passed_run)["closure"] == {}
 
 
-def test_the_summary_tells_the_worst_closure_of_all_runs(pairwise_runs: Any) -> None:
+def test_the_summary_states_the_worst_closure_of_all_runs(pairwise_runs: Any) -> None:
     first = pairwise_runs["circle"]
     sizes = {"circle": (1e-6, 3e-5), "rhombus": (2e-6, 1e-5)}
     reports = {
@@ -308,7 +308,7 @@ def drifting(run: Any) -> Any:
     return replace(run, report=replace(run.report, repeatability=found))
 
 
-def test_the_drift_of_every_joint_is_told_by_task_or_for_all(passed_run: Any, pairwise_runs: Any) -> None:
+def test_the_drift_of_every_joint_is_reported_by_task_or_for_all(passed_run: Any, pairwise_runs: Any) -> None:
     assert record_of(passed_run)["repeatability"] == {}
     found = record_of(drifting(passed_run))["repeatability"]["all"]
     runs = {name: drifting(run) for name, run in pairwise_runs.items()}

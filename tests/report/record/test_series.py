@@ -90,7 +90,7 @@ def test_what_the_steps_took_stands_in_the_series_and_in_short(passed_run: Any) 
     assert record["solver"]["slack"]["max_at_s"] == 0.7
 
 
-def test_what_nobody_counted_is_null(passed_run: Any) -> None:
+def test_what_was_not_counted_is_null(passed_run: Any) -> None:
     uncounted = replace(motion_of(passed_run), iterations=None, slack=None)
     for motion in (None, uncounted):
         record = written(passed_run, motion)

@@ -64,7 +64,7 @@ def test_every_method_has_a_name_for_people(method: MethodName) -> None:
     assert more == []
 
 
-def test_an_easy_motion_by_the_usual_method_is_told_in_one_sentence() -> None:
+def test_an_easy_motion_by_the_usual_method_is_reported_in_one_sentence() -> None:
     assert said(settings(gain_per_s=650, integrator="euler"), motion([1, 1], [0, 0])) == [
         "Method: weighted pseudo-inverse, Euler steps of 1 ms; pose errors are fed back with a gain of 650 per second."
     ]
@@ -80,14 +80,14 @@ def test_an_easy_motion_by_the_usual_method_is_told_in_one_sentence() -> None:
         (1.5e-4, "below 0.16 mm"),
     ],
 )
-def test_an_error_between_nodes_is_never_told_smaller_than_it_is(error_between: float, words: str) -> None:
+def test_an_error_between_nodes_is_never_reported_smaller_than_it_is(error_between: float, words: str) -> None:
     assert said(settings(), resolved(error_between=error_between)) == [
         "Method: weighted pseudo-inverse.",
         f"Accurate mode: 96 nodes in 9 panels, error between nodes {words}.",
     ]
 
 
-def test_a_fall_back_to_steps_is_told_with_its_instant_and_gain() -> None:
+def test_a_fall_back_to_steps_is_reported_with_its_instant_and_gain() -> None:
     solver = settings(gain_per_s=650)
     back = "continued with Euler steps of 1 ms; pose errors are fed back with a gain of 650 per second."
 
@@ -98,7 +98,7 @@ def test_a_fall_back_to_steps_is_told_with_its_instant_and_gain() -> None:
     assert whole[1:] == [f"Collocation failed at 0.000 s; {back}"]
 
 
-def test_without_the_motion_the_accuracy_asked_for_is_told() -> None:
+def test_without_the_motion_the_accuracy_asked_for_is_reported() -> None:
     assert said(settings(accuracy_mm=2e-5))[1:] == ["Accurate mode: error between nodes at most 0.00002 mm."]
 
 
@@ -127,7 +127,7 @@ def test_settings_that_rule_the_accurate_mode_out_are_never_said_to_be_accurate(
     assert "Euler steps" in said(changed)[0]
 
 
-def test_goals_weights_iterations_and_slack_are_told_when_there_are_any() -> None:
+def test_goals_weights_iterations_and_slack_are_reported_when_there_are_any() -> None:
     solver = settings(
         "quadratic_program",
         secondary={"joint_limits": {"gain": 2}, "obstacles": {"within_mm": 150}},

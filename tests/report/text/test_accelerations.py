@@ -39,7 +39,7 @@ def test_the_worst_joint_the_largest_jerk_tool_and_part_have_a_line_each() -> No
     ]
 
 
-def test_what_was_not_judged_is_told_once_for_each_reason() -> None:
+def test_what_was_not_judged_is_reported_once_for_each_reason() -> None:
     left = [{"robot": name, "what": "accelerations and jerk", "reason": "a study"} for name in ("holder", "pen")]
     failing = {"robot": None, "what": "accelerations at 2.000 s, when pen/B1 fails", "reason": "it stops at once"}
 

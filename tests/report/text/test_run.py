@@ -35,7 +35,7 @@ def record() -> dict[str, Any]:
     }
 
 
-def test_a_passed_run_is_told_in_a_few_lines(record: dict[str, Any], tmp_path: Path) -> None:
+def test_a_passed_run_is_reported_in_a_few_lines(record: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "tables").mkdir()
 
     assert summary_lines(record, tmp_path) == [
@@ -50,7 +50,7 @@ def test_a_passed_run_is_told_in_a_few_lines(record: dict[str, Any], tmp_path: P
     ]
 
 
-def test_a_method_of_ones_own_choice_and_what_it_gave_up_are_told(record: dict[str, Any], tmp_path: Path) -> None:
+def test_a_method_of_ones_own_choice_and_what_it_gave_up_are_reported(record: dict[str, Any], tmp_path: Path) -> None:
     record["solver"] = {"method": "quadratic_program", "slack": {"max": 0.01234, "max_at_s": 1.5, "unit": "m/s"}}
 
     lines = summary_lines(record, tmp_path)
@@ -59,7 +59,7 @@ def test_a_method_of_ones_own_choice_and_what_it_gave_up_are_told(record: dict[s
     assert "  task slack up to 0.012 (m/s) at 1.500 s" in lines
 
 
-def test_where_the_accurate_mode_gave_up_is_told(record: dict[str, Any], tmp_path: Path) -> None:
+def test_where_the_accurate_mode_gave_up_is_reported(record: dict[str, Any], tmp_path: Path) -> None:
     record["solver"] |= {"integrator": "accurate", "resolution": {"panels": 3, "euler_from_s": 1.25, "lost": None}}
     reported = summary_lines(record, tmp_path)
     record["solver"]["resolution"]["euler_from_s"] = None

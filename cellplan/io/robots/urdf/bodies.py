@@ -9,9 +9,11 @@ from cellplan.errors import InputError
 from cellplan.geometry.mesh.load import is_flat, read_mesh
 from cellplan.geometry.shapes import Mesh, Solid
 from cellplan.io.input.allowed_folders import AllowedFolders
-from cellplan.io.input.findings import listed
+from cellplan.io.input.findings import listed, shown
 from cellplan.io.robots.urdf.document import UrdfLink, UrdfMesh, UrdfSolid
+from cellplan.io.robots.urdf.remarks import Remarks
 from cellplan.io.robots.urdf.tree import UrdfTree, ZeroConfiguration, links_in_order
+from cellplan.io.robots.urdf.xml import Element
 from cellplan.model.robot import Body
 
 PACKAGE: Final = "package://"
@@ -27,21 +29,25 @@ class MeshShelf:
         package_dirs: Folders that hold packages (or are one).
         within: Folders that a mesh must lie in to be read; None for all.
         files: Mesh files read so far, in the order of first use.
+        remarks: Names of meshes that only some programs understand, one line for each kind.
     """
 
     folder: Path
     package_dirs: tuple[Path, ...]
     within: AllowedFolders | None = None
     files: list[Path] = field(default_factory=list)
+    remarks: Remarks = field(default_factory=Remarks)
     _read: dict[tuple[Path, tuple[float, float, float]], Mesh] = field(default_factory=dict)
 
-    def mesh(self, desired: UrdfMesh) -> Mesh:
-        """The mesh in [m].
+    def mesh(self, desired: UrdfMesh, element: Element) -> Mesh:
+        """The mesh in [m] that an element names.
 
         Raises:
             InputError: It is not found, cannot be read, or is flat.
         """
-        path = find_mesh(desired.uri, self.folder, package_dirs=self.package_dirs, within=self.within)
+        path, remark = find_mesh(desired.uri, self.folder, package_dirs=self.package_dirs, within=self.within)
+        if remark is not None:
+            self.remarks.add(remark, f"mesh {shown(desired.uri)}: {remark}", element)
         key = (path, desired.scale)
         if key not in self._read:
             mesh = read_mesh(path, scale=desired.scale)
@@ -73,23 +79,27 @@ def link_bodies(tree: UrdfTree, configuration: ZeroConfiguration, shelf: MeshShe
     return tuple(bodies)
 
 
-def find_mesh(uri: str, folder: Path, *, package_dirs: tuple[Path, ...], within: AllowedFolders | None = None) -> Path:
-    """File that a mesh name means: ``package://NAME/…``, or relative to the URDF.
+def find_mesh(
+    uri: str, folder: Path, *, package_dirs: tuple[Path, ...], within: AllowedFolders | None = None
+) -> tuple[Path, str | None]:
+    """File that a mesh name means, and a remark where other programs may read the name otherwise.
 
     ``package://NAME/rest`` is looked up as ``DIR/NAME/rest``, then in a DIR that is itself called NAME, then in the
-    folder of the URDF and those above it, in the same two ways. Absolute paths and ``file://`` count only below the
-    URDF's folder or a package folder. Nothing outside the folders ``within`` is accessed.
+    folder of the URDF and those above it, in the same two ways; ``package:///NAME/rest`` likewise, and where no
+    package is named, ``rest`` below the same folders. Other names are relative to the URDF. Absolute paths and
+    ``file://`` count below the URDF's folder, a package folder or a folder of ``within``; a name that only begins with
+    a slash is looked up without it. Nothing outside the folders ``within`` is accessed.
 
     Raises:
         InputError: There is no such file; the message names every place that was tried.
     """
+    cure = ": name the folder that holds the package in `package_dirs`"
     if uri.startswith(PACKAGE):
-        package, _, rest = uri.removeprefix(PACKAGE).partition("/")
-        tried = _package_places(package, rest, folder, package_dirs=package_dirs)
-        cure = ": name the folder that holds the package in `package_dirs`"
+        places, remark = _package_places(uri.removeprefix(PACKAGE), folder, package_dirs=package_dirs)
+        tried = dict.fromkeys(places, remark)
     else:
-        tried = [_plain_place(uri, folder, package_dirs=package_dirs)]
-        cure = ""
+        tried = _plain_places(uri, folder, package_dirs=package_dirs, within=within)
+        cure = "" if len(tried) == 1 else cure
     inside = [place for place in tried if within is None or within.holds(place)]
     if tried and not inside:
         raise InputError(
@@ -98,7 +108,7 @@ def find_mesh(uri: str, folder: Path, *, package_dirs: tuple[Path, ...], within:
     found = next((place for place in inside if _is_file(place)), None)
     if found is None:
         raise InputError(f"no such mesh file, tried {listed(str(place) for place in inside)}{cure}")
-    return found
+    return found, tried[found]
 
 
 def _is_file(place: Path) -> bool:
@@ -109,16 +119,29 @@ def _is_file(place: Path) -> bool:
         return False
 
 
-def _package_places(package: str, rest: str, folder: Path, *, package_dirs: tuple[Path, ...]) -> list[Path]:
-    """Places where a file of a package may lie."""
-    if not package or package in (".", "..") or not rest:
+def _package_places(name: str, folder: Path, *, package_dirs: tuple[Path, ...]) -> tuple[list[Path], str | None]:
+    """Places where a file of a package may lie, and what is unusual about its name."""
+    package, _, rest = name.lstrip("/").partition("/")
+    plain = rest.lstrip("/")
+    if not package or package in (".", "..") or (not plain and not name.startswith("/")):
         raise InputError("expected package://NAME/path")
-    above = [folder, *folder.parents] if folder.is_absolute() else [folder, *folder.resolve().parents]
-    roots = [*package_dirs, *above[: LEVELS_UP + 1]]
+    roots = _roots(folder, package_dirs)
+    if not plain:
+        return [root / package for root in roots], "names no package, looked up without one"
     places = [
-        place for root in roots for place in (root / package / rest, root / rest) if _fits(root, place, package, rest)
+        place
+        for root in roots
+        for place in (root / package / plain, root / plain)
+        if _fits(root, place, package, plain)
     ]
-    return list(dict.fromkeys(places))
+    is_usual = not name.startswith("/") and rest == plain
+    return list(dict.fromkeys(places)), None if is_usual else "has too many slashes, read as package://NAME/path"
+
+
+def _roots(folder: Path, package_dirs: tuple[Path, ...]) -> list[Path]:
+    """Folders in which packages are looked up."""
+    above = [folder, *folder.parents] if folder.is_absolute() else [folder, *folder.resolve().parents]
+    return [*package_dirs, *above[: LEVELS_UP + 1]]
 
 
 def _fits(root: Path, place: Path, package: str, rest: str) -> bool:
@@ -126,18 +149,23 @@ def _fits(root: Path, place: Path, package: str, rest: str) -> bool:
     return place != root / rest or root.resolve().name == package
 
 
-def _plain_place(uri: str, folder: Path, *, package_dirs: tuple[Path, ...]) -> Path:
-    """Place of a file named by a path or by ``file://``."""
+def _plain_places(
+    uri: str, folder: Path, *, package_dirs: tuple[Path, ...], within: AllowedFolders | None
+) -> dict[Path, str | None]:
+    """Places of a file named by a path or by ``file://``, and what is unusual about its name at each."""
     scheme, mark, rest = uri.partition("://")
     if mark and scheme != "file":
         raise InputError(f"expected a path, package:// or file://, got {scheme}://")
     path = Path(unquote(rest) if mark else uri)
     if not path.is_absolute():
-        return folder / path
-    allowed = [folder, *package_dirs]
-    if not any(path.resolve().is_relative_to(root.resolve()) for root in allowed):
+        return {folder / path: None}
+    allowed = [folder, *package_dirs, *(() if within is None else (within.folder, *within.allowed))]
+    if any(path.resolve().is_relative_to(root.resolve()) for root in allowed):
+        return {path: "is an absolute path, which other machines will not have"}
+    below = [root / path.relative_to(path.anchor) for root in _roots(folder, package_dirs)]
+    if not any(_is_file(place) for place in below if within is None or within.holds(place)):
         raise InputError("expected an absolute path below the URDF's folder or one of `package_dirs`")
-    return path
+    return dict.fromkeys(below, "begins with a slash, looked up below the folders of the URDF and of packages")
 
 
 def _solid(link: UrdfLink, solid: UrdfSolid, shelf: MeshShelf) -> Solid:
@@ -145,7 +173,7 @@ def _solid(link: UrdfLink, solid: UrdfSolid, shelf: MeshShelf) -> Solid:
     if not isinstance(solid.shape, UrdfMesh):
         return solid.shape
     try:
-        return shelf.mesh(solid.shape)
+        return shelf.mesh(solid.shape, solid.element)
     except InputError as error:
         place = solid.element.tag if solid.element.tag == "collision" else "visual, used as it has no collision element"
         raise solid.element.error(f"link '{link.name}' ({place}): mesh '{solid.shape.uri}': {error}") from None

@@ -1,8 +1,8 @@
 """URDF as it is written: links with solids, joints with limits and mimics, checked one by one and counted."""
 
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -12,23 +12,22 @@ from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Sphere
 from cellplan.geometry.transforms import Array
 from cellplan.io.input.findings import did_you_mean, shown
+from cellplan.io.robots.urdf.remarks import Remarks
+from cellplan.io.robots.urdf.spelling import check_spelling
+from cellplan.io.robots.urdf.xacro import XACRO_SUFFIX, XacroSettings, expand_xacro
 from cellplan.io.robots.urdf.xml import Element, origin_of, read_xml
 
 MAX_LINKS: Final = 1000  # a humanoid with two hands has 130
 MAX_SIZE: Final = 20.0  # [m] larger bodies are a wrong unit
-NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,39}")  # the same everywhere: safe in tables and file names
+MAX_RANGE: Final = 4.0 * np.pi  # [rad] limits beyond two turns each way are mistakes of the unit
+MAX_TRAVEL: Final = 20.0  # [m]
+MAX_TURN_SPEED: Final = 100.0  # [rad/s] the fastest wrists reach 20
+MAX_TRAVEL_SPEED: Final = 10.0  # [m/s]
+INFINITE: Final = frozenset(sign + word for sign in ("", "+", "-") for word in ("inf", "infinity"))
+NAME: Final = re.compile(r"[A-Za-z0-9_/][A-Za-z0-9_./-]{0,119}")  # joints that are driven have stricter ones
 MOVABLE: Final = ("revolute", "continuous", "prismatic")
 REFUSED: Final = ("floating", "planar")
-LINK_CHILDREN: Final = ("inertial", "visual", "collision")
-JOINT_CHILDREN: Final = ("origin", "parent", "child", "axis", "limit", "mimic", "dynamics", "calibration")
-SAFETY: Final = "safety_controller"
-ATTRIBUTES: Final[Mapping[str, tuple[str, ...]]] = {
-    "origin": ("xyz", "rpy"),
-    "axis": ("xyz",),
-    "limit": ("lower", "upper", "velocity", "effort", "acceleration", "deceleration", "jerk"),
-    "mimic": ("joint", "multiplier", "offset"),
-    "mesh": ("filename", "scale"),
-}  # of the elements in which a missing attribute has a default
+SHAPES: Final = ("box", "cylinder", "capsule", "sphere", "mesh")
 FOREIGN: Final = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "group_state", "actuator"})
 
 
@@ -69,11 +68,21 @@ class UrdfMimic:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UrdfLimit:
-    """Limits as far as the file gives usable ones, in [rad] or [m]."""
+    """Limits as far as the file gives usable ones, in [rad] or [m].
+
+    Attributes:
+        lower: Lowest position.
+        upper: Highest position.
+        velocity: Largest velocity.
+        position_slip: What is wrong with the positions of the file, if they were not taken for that.
+        velocity_slip: What is wrong with its velocity, if it was not taken for that.
+    """
 
     lower: float | None = None
     upper: float | None = None
     velocity: float | None = None
+    position_slip: str = ""
+    velocity_slip: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,35 +111,60 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UrdfDocument:
-    """All links and joints of a file by name, in its order."""
+    """All links and joints of a file by name, in its order.
+
+    Attributes:
+        file: Name of the file, without folders.
+        name: Name of the robot.
+        links: Links by name.
+        joints: Joints by name.
+        remarks: What was read over, one line for each kind.
+        included: Files that a xacro file includes, each once.
+    """
 
     file: str
     name: str
     links: dict[str, UrdfLink]
     joints: dict[str, UrdfJoint]
+    remarks: tuple[str, ...] = ()
+    included: tuple[Path, ...] = ()
 
 
 Named = TypeVar("Named", UrdfLink, UrdfJoint)
 
 
-def read_document(path: Path) -> UrdfDocument:
-    """Read a URDF and check every element for itself.
+def read_document(path: Path, settings: XacroSettings | None = None) -> UrdfDocument:
+    """Read a URDF, or expand a xacro file into one, and check every element for itself.
+
+    Args:
+        path: The file; one whose name ends in ``.xacro`` is expanded.
+        settings: What a xacro file needs to be expanded.
 
     Raises:
         InputError: With file and line, for anything that is missing, double, misspelt, out of range or not supported.
     """
-    root = read_xml(path)
+    remarks = Remarks()
+    if path.suffix.lower() == XACRO_SUFFIX:
+        root, included = expand_xacro(path, settings or XacroSettings(), remarks)
+    else:
+        root, included = read_xml(path), None
     if root.tag != "robot":
         raise root.error(f"expected a URDF with the root element <robot>, got <{shown(root.tag)[1:-1]}>")
     for element in root.walk(frozenset()):
         if element.tag.startswith("xacro:"):
-            raise element.error(f"expected plain URDF, got <{element.tag}>: expand the xacro file first")
+            raise element.error(
+                f"expected plain URDF, got <{element.tag}>: let the name of the file end in {XACRO_SUFFIX}"
+            )
+    check_spelling(root.all("link"), root.all("joint"), remarks)
     links = _by_name(_link(element) for element in root.all("link"))
     joints = _by_name(_joint(element) for element in root.all("joint"))
     if not 1 <= len(links) <= MAX_LINKS:
-        raise InputError(f"{path.name}: expected 1 to {MAX_LINKS} links, got {len(links)}")
+        hint = ": is it a file of macros that others include?" if included is not None and not links else ""
+        raise InputError(f"{path.name}: expected 1 to {MAX_LINKS} links, got {len(links)}{hint}")
     _require_nothing_hidden(root, links, joints)
-    return UrdfDocument(file=path.name, name=_name(root), links=links, joints=joints)
+    return UrdfDocument(
+        file=path.name, name=_name(root), links=links, joints=joints, remarks=remarks.lines, included=included or ()
+    )
 
 
 def _by_name(things: Iterable[Named]) -> dict[str, Named]:
@@ -158,48 +192,27 @@ def _name(element: Element) -> str:
     """Name of a link, a joint or the robot."""
     name = element.text("name", element.tag)
     if not NAME.fullmatch(name):
-        what = "a name of 1 to 40 letters, digits, '_' or '-' that does not start with '-'"
+        what = "a name of 1 to 120 letters, digits, '_', '-', '.' or '/' that does not start with '-' or '.'"
         raise element.error(f"{element.tag}: expected {what}, got {shown(name)}")
     return name
-
-
-def _require_known_children(element: Element, known: tuple[str, ...], owner: str) -> None:
-    """A misspelt element would be passed over in silence; extensions with other names are left alone."""
-    for child in element.children:
-        hint = "" if child.tag in known or child.tag == SAFETY else did_you_mean(child.tag, known)
-        if hint:
-            raise child.error(f"{owner}: unknown element <{child.tag}>{hint}")
-
-
-def _require_known_attributes(element: Element, owner: str) -> None:
-    """Misspelt, an attribute would leave its default in place; extensions with other names are left alone."""
-    for child in element.children:
-        known = ATTRIBUTES.get(child.tag, ())
-        for name in child.attributes:
-            hint = "" if name in known else did_you_mean(name.lower(), known)
-            if hint:
-                raise child.error(f"{owner}: unknown attribute '{name}' in <{child.tag}>{hint}")
 
 
 def _link(element: Element) -> UrdfLink:
     """One link; a link that is drawn but has no collision body gets the drawn one."""
     name = _name(element)
     owner = f"link '{name}'"
-    _require_known_children(element, LINK_CHILDREN, owner)
     drawn = element.all("collision") or element.all("visual")
     return UrdfLink(name=name, element=element, solids=tuple(_solid(solid, owner) for solid in drawn))
 
 
 def _solid(element: Element, owner: str) -> UrdfSolid:
     """One collision or visual element."""
-    _require_known_children(element, ("origin", "geometry", "material"), owner)
-    _require_known_attributes(element, owner)
     geometry = element.one("geometry", owner)
-    if geometry is None or len(geometry.children) != 1:
-        count = 0 if geometry is None else len(geometry.children)
+    shapes = [] if geometry is None else geometry.all(*SHAPES) or geometry.children
+    if len(shapes) != 1:
+        count = len(shapes)
         raise element.error(f"{owner}: expected <{element.tag}> with a <geometry> of one shape, got {count} shapes")
-    _require_known_attributes(geometry, owner)
-    return UrdfSolid(element=element, shape=_shape(geometry.children[0], owner), X_LS=origin_of(element, owner))
+    return UrdfSolid(element=element, shape=_shape(shapes[0], owner), X_LS=origin_of(element, owner))
 
 
 def _shape(element: Element, owner: str) -> Box | Cylinder | Capsule | Sphere | UrdfMesh:
@@ -249,8 +262,6 @@ def _joint(element: Element) -> UrdfJoint:
     """One joint."""
     name = _name(element)
     owner = f"joint '{name}'"
-    _require_known_children(element, JOINT_CHILDREN, owner)
-    _require_known_attributes(element, owner)
     kind = element.text("type", owner)
     if kind in REFUSED:
         raise element.error(f"{owner}: expected one axis at most, got the type '{kind}', which is not supported")
@@ -290,22 +301,40 @@ def _axis(element: Element, owner: str) -> Array:
 
 
 def _limit(element: Element, owner: str, *, kind: str) -> UrdfLimit:
-    """Limits; a pair that leaves no room and a speed that is not positive count as not given."""
+    """Limits; what leaves no room, is not positive or is beyond all machines counts as not given."""
     limit = element.one("limit", owner)
     if limit is None or kind == "fixed":
         return UrdfLimit()
-    velocity = limit.number("velocity", owner, default=0.0)
+    velocity = _bound(limit, "velocity", owner)
+    fastest, unit = (MAX_TRAVEL_SPEED, "m/s") if kind == "prismatic" else (MAX_TURN_SPEED, "rad/s")
+    if velocity > fastest:
+        hint = "mm/s" if kind == "prismatic" else "deg/s"
+        slip = f"expected a velocity limit of at most {fastest:g} {unit}, got {velocity:g} {unit} (is it in {hint}?)"
+        speed = UrdfLimit(velocity_slip=slip)
+    else:
+        speed = UrdfLimit(velocity=velocity if velocity > 0.0 else None)
     if kind == "continuous":
-        return UrdfLimit(velocity=velocity if velocity > 0.0 else None)
-    lower, upper = (limit.number(name, owner, default=0.0) for name in ("lower", "upper"))
-    if lower > upper:
-        raise limit.error(f"{owner}: expected 'lower' below 'upper', got {lower:g} and {upper:g}")
-    has_room = lower < upper
-    return UrdfLimit(
-        lower=lower if has_room else None,
-        upper=upper if has_room else None,
-        velocity=velocity if velocity > 0.0 else None,
-    )
+        return speed
+    lower, upper = (_bound(limit, name, owner) for name in ("lower", "upper"))
+    slip = _position_slip(lower, upper, slides=kind == "prismatic")
+    if slip or lower == upper:
+        return replace(speed, position_slip=slip)
+    return replace(speed, lower=lower, upper=upper)
+
+
+def _bound(limit: Element, name: str, owner: str) -> float:
+    """One limit, which may be infinite; zero when it is absent."""
+    written = limit.attributes.get(name, "").strip().lower()
+    return float(written) if written in INFINITE else limit.number(name, owner, default=0.0)
+
+
+def _position_slip(lower: float, upper: float, *, slides: bool) -> str:
+    """What is wrong with a pair of position limits: their order, or their unit; empty for nothing."""
+    largest = max(abs(lower), abs(upper))
+    if largest > (MAX_TRAVEL if slides else MAX_RANGE):
+        hint = "20 m, got {:g} m (is the unit mm?)" if slides else "two turns, got {:g} rad (is the unit degrees?)"
+        return f"expected position limits within {hint.format(largest)}"
+    return f"expected 'lower' below 'upper', got {lower:g} and {upper:g}" if lower > upper else ""
 
 
 def _mimic(element: Element, owner: str) -> UrdfMimic | None:

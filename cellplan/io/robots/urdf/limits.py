@@ -14,10 +14,6 @@ from cellplan.io.robots.urdf.tree import in_user_unit, unit_of
 from cellplan.io.yaml.writer import flow_text
 
 BLANK: Final = "…"  # a value that the user has to state
-MAX_TURN: Final = 4.0 * np.pi  # [rad] limits beyond two turns each way are mistakes of the unit
-MAX_TRAVEL: Final = 20.0  # [m]
-MAX_TURN_SPEED: Final = 100.0  # [rad/s] the fastest wrists reach 20
-MAX_TRAVEL_SPEED: Final = 10.0  # [m/s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +79,7 @@ def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJo
     """Limits of a driven joint: the tightest of the URDF's, the cell's and those of the joints that follow it.
 
     Raises:
-        InputError: A limit is missing, is widened by the cell, leaves no range or has an unlikely size.
+        InputError: A limit is missing or of an unlikely size, is widened by the cell, or leaves no range.
     """
     own = _own(joint)
     for key, text in limit_findings(own, cell, is_revolute=joint.kind != "prismatic"):
@@ -100,11 +96,9 @@ def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJo
     if not lower < upper:
         ends = f"{in_user_unit(joint, lower)} and {in_user_unit(joint, upper)}"
         raise joint.error(f"expected a lower limit below the upper one, got {ends}")
-    found = Range(
+    return Range(
         lower=lower, upper=upper, velocity=velocity, rated_velocity=None if cell.velocity is None else own.velocity
     )
-    _require_likely(joint, found)
-    return found
 
 
 def _own(joint: UrdfJoint) -> StatedLimits:
@@ -117,8 +111,8 @@ def _lacking(joint: UrdfJoint, cell: StatedLimits) -> Lacking:
     limits, unit = tightest(_own(joint), cell), unit_of(joint).name
     ends = [] if cell.wraps else [name for name in ("lower", "upper") if getattr(limits, name) is None]
     keys = [f"{name}_{unit}" for name in ends] + ([f"velocity_{unit}_s"] if limits.velocity is None else [])
-    reasons = [_range_reason(joint)] if ends else []
-    reasons += [_stated(joint, "velocity")] if limits.velocity is None else []
+    reasons = [joint.limit.position_slip or _range_reason(joint)] if ends else []
+    reasons += [joint.limit.velocity_slip or _stated(joint, "velocity")] if limits.velocity is None else []
     return Lacking(joint=joint, keys=tuple(keys), reason=" and ".join(dict.fromkeys(reasons)))
 
 
@@ -157,15 +151,3 @@ def _within_follower(follower: UrdfJoint, lower: float, upper: float, *, velocit
     if limit.velocity is not None:
         velocity = min(velocity, limit.velocity / abs(mimic.multiplier))
     return lower, upper, velocity
-
-
-def _require_likely(joint: UrdfJoint, limits: Range) -> None:
-    """Refuse limits that look like degrees taken for radians or millimetres taken for metres."""
-    slides = joint.kind == "prismatic"
-    largest = max((abs(end) for end in (limits.lower, limits.upper) if np.isfinite(end)), default=0.0)
-    if largest > (MAX_TRAVEL if slides else MAX_TURN):
-        hint = "20 m, got {:g} m: is the unit mm?" if slides else "two turns, got {:g} rad: is the unit degrees?"
-        raise joint.error(f"expected position limits within {hint.format(largest)}")
-    if limits.velocity > (MAX_TRAVEL_SPEED if slides else MAX_TURN_SPEED):
-        hint = "10 m/s, got {:g} m/s: is the unit mm/s?" if slides else "100 rad/s, got {:g} rad/s: is it in deg/s?"
-        raise joint.error(f"expected a velocity limit of at most {hint.format(limits.velocity)}")

@@ -1,8 +1,10 @@
 """Robot from a URDF: joint axes and link bodies at the zero configuration, with nothing of the file lost."""
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Final
 
 from cellplan.errors import CellplanError, InvalidFileError
 from cellplan.geometry.transforms import Array
@@ -24,7 +26,10 @@ from cellplan.io.robots.urdf.tree import (
     links_in_order,
     zero_configuration,
 )
+from cellplan.io.robots.urdf.xacro import XacroSettings
 from cellplan.model.robot import Body, FollowerJoint, Joint, JointKind, Link, RobotModel
+
+PLAIN_NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +44,8 @@ class UrdfOptions:
         locks_others: Whether all other movable joints that do not lead to the flange are held still where
             `rest_position` says.
         lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where it was not written.
-        within: Folders that its meshes must lie in; None for all.
+        within: Folders that its meshes and the files that it includes must lie in; None for all.
+        xacro_args: Values of the arguments of a xacro file, by name.
         gripper: How far its gripper is open; None to leave its joints to ``locked``.
     """
 
@@ -50,15 +56,30 @@ class UrdfOptions:
     locks_others: bool = False
     lock_units: Mapping[str, str] = field(default_factory=dict)
     within: AllowedFolders | None = None
+    xacro_args: Mapping[str, str] = field(default_factory=dict)
     gripper: GripperState | None = None
+
+    @property
+    def xacro(self) -> XacroSettings:
+        """What a xacro file needs to be expanded."""
+        return XacroSettings(arguments=self.xacro_args, package_dirs=self.package_dirs, within=self.within)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UrdfRobot:
-    """A robot model and the mesh files it was read from, each once."""
+    """A robot model, and what it was read from.
+
+    Attributes:
+        model: The model.
+        mesh_files: Mesh files, each once.
+        included: Files that a xacro file includes, each once.
+        remarks: What was read over, one line for each kind.
+    """
 
     model: RobotModel
     mesh_files: tuple[Path, ...]
+    included: tuple[Path, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 def read_urdf(path: Path, options: UrdfOptions | None = None) -> RobotModel:
@@ -73,15 +94,13 @@ class UrdfStructure:
     Attributes:
         tree: Links and joints.
         flange: Name of the flange link.
-        gripper: Positions in [rad] or [m] of the joints that open its gripper, by name.
-        loose: Movable joints off the chain that are neither locked by name nor the gripper's, at rest.
+        loose: Movable joints off the chain that are not locked by name, at rest.
         roles: What each joint does.
         configuration: Poses of all links while every driven joint reads zero.
     """
 
     tree: UrdfTree
     flange: str
-    gripper: Mapping[str, float]
     loose: tuple[UrdfJoint, ...]
     roles: Roles
     configuration: ZeroConfiguration
@@ -101,10 +120,13 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         InputError: With file and line, for anything that cannot be taken over faithfully.
     """
     options = options or UrdfOptions()
-    tree = build_tree(read_document(path))
-    structure = urdf_structure(tree, choose_flange(tree, options.flange), options)
-    roles = structure.roles
-    _require_known_limits(tree.document, roles, options.limits)
+    tree = build_tree(read_document(path, options.xacro))
+    flange = choose_flange(tree, options.flange)
+    held = gripper_locks(tree, flange, options.gripper, options.locked)
+    structure = urdf_structure(tree, flange, replace(options, locked={**options.locked, **held}))
+    roles, document = structure.roles, tree.document
+    _require_plain_names(roles)
+    _require_known_limits(document, roles, options.limits)
     lacking = lacking_limits(roles.driven, options.limits)
     errors = [lacking_error(lacking)] if lacking else []
     if structure.loose and not options.locks_others:
@@ -113,11 +135,13 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         raise errors[0] if len(errors) == 1 else InvalidFileError(errors)
     shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
     bodies = link_bodies(tree, structure.configuration, shelf)
-    require_opposed(
-        tree, options.gripper, locks=structure.gripper, configuration=structure.configuration, bodies=bodies
-    )
+    model = urdf_model(structure, bodies, limits=options.limits, source=path.name)
+    require_opposed(tree, options.gripper, locks=held, configuration=structure.configuration, bodies=model.bodies)
     return UrdfRobot(
-        model=urdf_model(structure, bodies, limits=options.limits, source=path.name), mesh_files=tuple(shelf.files)
+        model=model,
+        mesh_files=tuple(shelf.files),
+        included=document.included,
+        remarks=(*document.remarks, *shelf.remarks.lines),
     )
 
 
@@ -128,13 +152,11 @@ def urdf_structure(tree: UrdfTree, flange: str, options: UrdfOptions) -> UrdfStr
         InputError: A lock or a mimic is unsound, or no joint is driven.
     """
     require_sound_locks(tree.document, options.locked, options.lock_units)
-    gripper = gripper_locks(tree, flange, options.gripper, options.locked)
-    named = {**options.locked, **gripper}
-    loose = loose_joints(tree, flange, named)
-    roles = assign_roles(tree, flange, {**{joint.name: rest_position(joint) for joint in loose}, **named})
-    configuration = zero_configuration(tree, roles)
+    loose = loose_joints(tree, flange, options.locked)
+    held = {**{joint.name: rest_position(joint) for joint in loose}, **options.locked}
+    roles = assign_roles(tree, flange, held)
     return UrdfStructure(
-        tree=tree, flange=flange, gripper=gripper, loose=loose, roles=roles, configuration=configuration
+        tree=tree, flange=flange, loose=loose, roles=roles, configuration=zero_configuration(tree, roles)
     )
 
 
@@ -168,6 +190,13 @@ def urdf_model(
     )
     _require_complete(document, roles, model)
     return model
+
+
+def _require_plain_names(roles: Roles) -> None:
+    """Joints that are driven head columns of tables and are keys of cells."""
+    for joint in roles.driven:
+        if not PLAIN_NAME.fullmatch(joint.name):
+            raise joint.error("is driven: expected a name of 1 to 60 letters, digits, '_', '-' or '.', got another one")
 
 
 def _require_known_limits(document: UrdfDocument, roles: Roles, limits: Mapping[str, StatedLimits]) -> None:

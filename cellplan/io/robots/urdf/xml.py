@@ -84,8 +84,16 @@ def read_xml(path: Path) -> Element:
     Raises:
         InputError: The file cannot be read, is too large, not well-formed or declares a document type.
     """
-    data = read_regular_file(path, file=path.name, limit=MAX_BYTES)
-    return _Builder(path.name).parse(data)
+    return parse_xml(read_regular_file(path, file=path.name, limit=MAX_BYTES), path.name)
+
+
+def parse_xml(data: bytes, file: str) -> Element:
+    """The same of the bytes of a file.
+
+    Raises:
+        InputError: They are not well-formed or declare a document type.
+    """
+    return _Builder(file).parse(data)
 
 
 def origin_of(element: Element, owner: str) -> Array:

@@ -22,13 +22,18 @@ MIMIC = '<mimic joint="{}"/>'
         ([*ARM, "<link/>"], "r.urdf:5: link: expected <link> with the attribute 'name'"),
         (
             [*ARM, '<link name="a,b"/>'],
-            "r.urdf:5: link: expected a name of 1 to 40 letters, digits, '_' or '-' that does not start with "
-            "'-', got 'a,b'",
+            "r.urdf:5: link: expected a name of 1 to 120 letters, digits, '_', '-', '.' or '/' that does not "
+            "start with '-' or '.', got 'a,b'",
         ),
         (
-            [*ARM, '<link name="arm/1.tip"/>'],
-            "r.urdf:5: link: expected a name of 1 to 40 letters, digits, '_' or '-' that does not start with "
-            "'-', got 'arm/1.tip'",
+            [*ARM, '<link name="../tip"/>'],
+            "r.urdf:5: link: expected a name of 1 to 120 letters, digits, '_', '-', '.' or '/' that does not "
+            "start with '-' or '.', got '../tip'",
+        ),
+        (
+            [*ARM[:2], joint("arm/a1", "base", "tip")],
+            "r.urdf:4: joint 'arm/a1': is driven: expected a name of 1 to 60 letters, digits, '_', '-' or '.', "
+            "got another one",
         ),
         ([*ARM, '<link name="x"/>'], "r.urdf: expected one root link, got 2: base, x"),
         ([*ARM, joint("b", "tip", "base")], "r.urdf:4: joint 'a1': its links form a cycle: tip, base"),
@@ -132,7 +137,8 @@ MIMIC = '<mimic joint="{}"/>'
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="2" upper="-1" velocity="3"/>')],
-            "r.urdf:4: joint 'a1': expected 'lower' below 'upper', got 2 and -1",
+            "r.urdf:4: joint 'a1': expected 'lower' below 'upper', got 2 and -1: "
+            "state `limits: {a1: {lower_deg: …, upper_deg: …}}` of the robot in the cell",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="0" velocity="3"/>')],
@@ -160,15 +166,18 @@ MIMIC = '<mimic joint="{}"/>'
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="-170" upper="170" velocity="3"/>')],
-            "r.urdf:4: joint 'a1': expected position limits within two turns, got 170 rad: is the unit degrees?",
+            "r.urdf:4: joint 'a1': expected position limits within two turns, got 170 rad (is the unit degrees?): "
+            "state `limits: {a1: {lower_deg: …, upper_deg: …}}` of the robot in the cell",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="500" velocity="3"/>', kind="prismatic")],
-            "r.urdf:4: joint 'a1': expected position limits within 20 m, got 500 m: is the unit mm?",
+            "r.urdf:4: joint 'a1': expected position limits within 20 m, got 500 m (is the unit mm?): "
+            "state `limits: {a1: {lower_mm: …, upper_mm: …}}` of the robot in the cell",
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="5" velocity="156"/>')],
-            "r.urdf:4: joint 'a1': expected a velocity limit of at most 100 rad/s, got 156 rad/s: is it in deg/s?",
+            "r.urdf:4: joint 'a1': expected a velocity limit of at most 100 rad/s, got 156 rad/s (is it in deg/s?): "
+            "state `limits: {a1: {velocity_deg_s: …}}` of the robot in the cell",
         ),
         (
             [*ARM, '<link name="f"/>', joint("g", "base", "f")],
@@ -326,7 +335,7 @@ def test_endless_turning_and_limits_exclude_each_other(tmp_path: Path) -> None:
         ),
         (
             '<robot name="x" xmlns:xacro="http://x">\n<xacro:macro/></robot>',
-            "r.urdf:2: expected plain URDF, got <xacro:macro>: expand the xacro file first",
+            "r.urdf:2: expected plain URDF, got <xacro:macro>: let the name of the file end in .xacro",
         ),
         ("<robot><link name='base'/></robot>", "r.urdf:1: robot: expected <robot> with the attribute 'name'"),
         ("<a>" * 65 + "</a>" * 65, "r.urdf:1: expected at most 64 nested elements"),

@@ -1,0 +1,32 @@
+"""How the controller of a robot counts its joints, as written in a robot file or a cell file."""
+
+from typing import Annotated, Final, Literal
+
+from pydantic import Field
+
+from cellplan.io.schema.common import Angle, Coordinate, Entry, Text
+
+LARGEST_FACTOR: Final = 1_000.0  # [-] a larger coupling is a mistake
+
+Factor = Annotated[float, Field(ge=-LARGEST_FACTOR, le=LARGEST_FACTOR)]
+
+
+class ControllerEntry(Entry):
+    """Joint positions of the controller: sign * model + zero + sum of factor * controller position of another joint."""
+
+    zero_deg: dict[str, Angle] = Field(
+        default={},
+        description="By revolute joint, what the controller shows while the model reads zero; 0 when absent.",
+    )
+    zero_mm: dict[str, Coordinate] = Field(
+        default={},
+        description="By prismatic joint, what the controller shows while the model reads zero; 0 when absent.",
+    )
+    sign: dict[str, Literal[1, -1]] = Field(
+        default={}, description="By joint, -1 where the controller counts the other way round; 1 when absent."
+    )
+    coupling: dict[str, dict[str, Factor]] = Field(
+        default={},
+        description="By joint, the factors of the controller positions of earlier joints of its kind that are added.",
+    )
+    source: Text = Field(default="not stated", description="Where this is known from.")

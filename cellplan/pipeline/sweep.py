@@ -1,0 +1,149 @@
+"""Sweep: solve a cell with every combination of some values, and keep a line for each."""
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+
+from cellplan.errors import CellplanError, InputError, NoSolutionError
+from cellplan.io.cell.changes import plain_values, read_setting
+from cellplan.io.cell.load import load_cell
+from cellplan.model.cell import Cell
+from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.overrides import require_task, with_overrides
+from cellplan.pipeline.solve import solve
+from cellplan.pipeline.write_run import versions, write_run
+from cellplan.report.page.study import study_files
+from cellplan.report.record.key_figures import key_figures
+from cellplan.report.record.study import StudyRecord, study_record
+from cellplan.study.folder import prepare_folder, run_folder, write_results
+from cellplan.study.journal import Journal
+from cellplan.study.run import run_trials
+from cellplan.study.trial import Outcome, TrialStatus
+from cellplan.study.variants import Axis, Variant, combinations
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepJob:
+    """What every variant starts from, in plain data that a worker process can be sent.
+
+    Attributes:
+        cell: The cell file.
+        allow_dirs: Further folders that the files it names may lie in.
+        settings: Values set in it for all variants, each as ``KEY=VALUE``.
+        task: Name of the only task to work on; None for all.
+        runs: Folder of the study in which the run of every variant is kept; None to keep none.
+    """
+
+    cell: Path
+    allow_dirs: tuple[Path, ...] = ()
+    settings: tuple[str, ...] = ()
+    task: str | None = None
+    runs: Path | None = None
+
+
+def sweep(
+    job: SweepJob,
+    axes: Sequence[Axis],
+    folder: Path,
+    *,
+    workers: int | Executor = 1,
+    resume: bool = False,
+    progress: Progress = silent,
+) -> StudyRecord:
+    """Solve a cell with every combination of values and write the study into a folder.
+
+    The folder holds ``study.jsonl``, a line for each variant that grows while the study runs, and at the end
+    ``study.json``, ``study.csv`` and ``study.html``. The files are the same for any number of workers.
+
+    Args:
+        job: The cell and what is set in it for all variants.
+        axes: Keys that vary and their values.
+        folder: Folder of the study; an earlier study there is replaced, or continued with ``resume``.
+        workers: Number of processes that solve, each with about the memory of ``cellplan solve``; or an executor.
+        resume: Whether variants that the folder holds already are not solved again.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The cell cannot be read, an address does not exist, or the folder cannot be used.
+        KeyboardInterrupt: It was interrupted; says how many variants are recorded.
+    """
+    base = _base_cell(job)
+    require_task(base, job.task)
+    variants = combinations(axes)
+    for axis in axes:
+        _require_a_valid_value(base, axis)
+    prepare_folder(folder, resume=resume)
+    header = {
+        "kind": "sweep",
+        "cell": base.name,
+        "settings": plain_values(dict(map(read_setting, job.settings))),
+        "task": job.task,
+        "vary": {axis.address: list(axis.values) for axis in axes},
+        "inputs": dict(base.inputs),
+        "versions": versions(),
+    }
+    with Journal(folder, header, variants, resume=resume) as journal:
+        evaluate = partial(evaluate_variant, job)
+        try:
+            trials = run_trials(variants, evaluate, journal, workers=workers, progress=progress)
+        except KeyboardInterrupt:
+            done = f"{len(journal.trials)} of {len(variants)} variants are recorded"
+            raise KeyboardInterrupt(f"interrupted: {done} in {folder}; --resume goes on from there") from None
+    record = study_record(header, [trial.record for trial in trials])
+    write_results(folder, study_files(record))
+    return record
+
+
+def evaluate_variant(job: SweepJob, variant: Variant) -> Outcome:
+    """Solve one variant; what is wrong with it becomes its reason.
+
+    Args:
+        job: The cell and what is set in it for all variants.
+        variant: Its number and values.
+    """
+    try:
+        cell = _base_cell(job).with_values(variant.values)
+        require_task(cell, job.task)
+        solution = solve(cell, task=job.task)
+    except InputError as error:
+        return Outcome(status=TrialStatus.BAD_INPUT, reason=_reason(job, error), figures={})
+    except NoSolutionError as error:
+        return Outcome(status=TrialStatus.NO_SOLUTION, reason=_reason(job, error), figures={})
+    if job.runs is not None:
+        write_run(solution, run_folder(job.runs, variant.number))
+    reports = [run.report for run in solution.runs]
+    failed = [check.message for report in reports for check in report.checks if not check.passed]
+    status = TrialStatus.FAILED if failed else TrialStatus.PASSED
+    return Outcome(status=status, reason=failed[0] if failed else "", figures=key_figures(reports))
+
+
+@lru_cache(maxsize=1)
+def _base_cell(job: SweepJob) -> Cell:
+    """The cell with what is set for all variants; read once in each process."""
+    cell = load_cell(job.cell, allow_dirs=job.allow_dirs)
+    return with_overrides(cell, job.settings)
+
+
+def _require_a_valid_value(base: Cell, axis: Axis) -> None:
+    """Refuse a key none of whose values can stand in the cell.
+
+    Raises:
+        InputError: That of the first value.
+    """
+    first: InputError | None = None
+    for value in axis.values:
+        try:
+            base.with_values({axis.address: value})
+        except InputError as error:
+            first = first or error
+        else:
+            return
+    if first is not None:
+        raise first
+
+
+def _reason(job: SweepJob, error: CellplanError) -> str:
+    """An error as one line that does not depend on where the cell file lies."""
+    return str(error).splitlines()[0].replace(str(job.cell), job.cell.name)

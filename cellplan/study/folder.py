@@ -1,0 +1,106 @@
+"""Folder of a study: the journal, the result once all trials are there, and the runs of variants that are kept."""
+
+import os
+import re
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from cellplan.errors import InputError
+from cellplan.io.run.content import LEFT_ALONE, foreign_within, is_run_folder
+from cellplan.study.journal import JOURNAL, SCHEMA
+
+RUNS: Final = "runs"
+OWN: Final = re.compile(r"\.?study\.(jsonl|json|csv|html|svg|png)(\.draft)?")
+RUN_NAME: Final = re.compile(r"\d{4,6}")
+MARK_WITHIN: Final = 200  # [bytes]
+
+
+def run_folder(folder: Path, number: int) -> Path:
+    """Run folder of a variant."""
+    return folder / RUNS / f"{number:04d}"
+
+
+def prepare_folder(folder: Path, *, resume: bool) -> None:
+    """Make the folder of a study, or empty that of an earlier one; a study that is continued keeps journal and runs.
+
+    Raises:
+        InputError: The folder holds something that no study wrote, or cannot be written.
+    """
+    try:
+        if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+            raise InputError(f"{folder}: expected a folder for the study, got something else")
+        folder.mkdir(parents=True, exist_ok=True)
+        foreign = _foreign(folder)
+        if foreign:
+            raise InputError(
+                f"{folder}: holds '{foreign}', which no study wrote; choose another folder with -o or empty this one"
+            )
+        kept = {JOURNAL, RUNS} if resume else set()
+        for entry in folder.iterdir():
+            if entry.name not in kept:
+                shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+    except OSError as error:
+        raise _cannot_write(folder, error) from error
+
+
+def write_results(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write the results of a study, each file whole or not at all.
+
+    Args:
+        folder: The folder of the study.
+        files: Content by file name.
+
+    Raises:
+        InputError: The folder cannot be written.
+    """
+    for name, content in files.items():
+        draft = folder / f".{name}.draft"
+        try:
+            with draft.open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            draft.replace(folder / name)
+        except OSError as error:
+            draft.unlink(missing_ok=True)
+            raise _cannot_write(folder / name, error) from error
+
+
+def _foreign(folder: Path) -> str | None:
+    """The first thing in a folder that no study wrote; None when there is none."""
+    entries = sorted(folder.iterdir())
+    if not entries or not _has_journal(folder):
+        return entries[0].name if entries else None
+    for entry in entries:
+        if entry.name == LEFT_ALONE or (OWN.fullmatch(entry.name) and entry.is_file() and not entry.is_symlink()):
+            continue
+        if entry.name != RUNS or not entry.is_dir() or entry.is_symlink():
+            return entry.name
+        foreign = next(filter(None, map(_foreign_run, sorted(entry.iterdir()))), None)
+        if foreign:
+            return f"{RUNS}/{foreign}"
+    return None
+
+
+def _foreign_run(entry: Path) -> str | None:
+    """The first thing in a run of a study that is not part of it."""
+    if entry.is_symlink() or not RUN_NAME.fullmatch(entry.name) or not is_run_folder(entry):
+        return entry.name
+    within = foreign_within(entry)
+    return f"{entry.name}/{within}" if within else None
+
+
+def _has_journal(folder: Path) -> bool:
+    """Whether the folder holds the journal of a study."""
+    journal = folder / JOURNAL
+    if journal.is_symlink() or not journal.is_file():
+        return False
+    with journal.open("rb") as file:
+        return f'"schema": "{SCHEMA}"'.encode() in file.read(MARK_WITHIN)
+
+
+def _cannot_write(path: Path, error: OSError) -> InputError:
+    """The error that users see."""
+    return InputError(f"{path}: cannot write the study: {(error.strerror or str(error)).lower()}")

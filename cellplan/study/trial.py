@@ -1,0 +1,71 @@
+"""Trial: one variant of a cell, what came of it, and its line in a study."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Self
+
+from cellplan.study.variants import Variant
+
+
+class TrialStatus(StrEnum):
+    """What came of a variant."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    NO_SOLUTION = "no_solution"
+    BAD_INPUT = "bad_input"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What came of a variant.
+
+    Attributes:
+        status: Its verdict.
+        reason: The first check that failed or the reason why there is no result; empty where it passed.
+        figures: Key figures by name, with their unit in the name; none where there is no motion.
+    """
+
+    status: TrialStatus
+    reason: str = ""
+    figures: Mapping[str, object]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """A variant and its outcome: one line of a study."""
+
+    variant: Variant
+    outcome: Outcome
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The trial as plain data."""
+        return {
+            "trial": self.variant.number,
+            "values": dict(self.variant.values),
+            "status": str(self.outcome.status),
+            "reason": self.outcome.reason,
+            "figures": dict(self.outcome.figures),
+        }
+
+    @property
+    def line(self) -> str:
+        """The trial as one line of JSON."""
+        return json.dumps(self.record, ensure_ascii=False, allow_nan=False)
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, Any]) -> Self:
+        """The trial of a line.
+
+        Raises:
+            KeyError: A key is missing.
+            TypeError: A value is of another kind.
+            ValueError: The status is unknown.
+        """
+        outcome = Outcome(
+            status=TrialStatus(record["status"]), reason=str(record["reason"]), figures=dict(record["figures"])
+        )
+        return cls(variant=Variant(int(record["trial"]), dict(record["values"])), outcome=outcome)
