@@ -12,7 +12,7 @@ from cellplan.io.cell.referenced_files import Sources
 from cellplan.io.cell.write import in_file_units
 from cellplan.io.input.findings import unknown_name
 from cellplan.io.robots.rules import start_keys
-from cellplan.io.robots.urdf.srdf import Srdf, configuration_of, disabled_bodies
+from cellplan.io.robots.urdf.srdf import Srdf, configuration_of, disabled_bodies, unknown_links
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import POSITION_WORDS, RobotEntry
 from cellplan.io.schema.units import Deg, Mm
@@ -27,7 +27,8 @@ def apply_srdfs(
 ) -> tuple[ValidEntries, dict[str, RobotModel]]:
     """The entries with named configurations written out, and the models with the pairs that their SRDFs disable.
 
-    What is wrong with an SRDF, or with a name, is added to the findings of the sources.
+    What is wrong with an SRDF, or with a name, is added to the findings of the sources, and what says nothing to their
+    remarks.
 
     Args:
         valid: The entries of the cell.
@@ -42,6 +43,8 @@ def apply_srdfs(
         try:
             if srdf is not None:
                 found[name] = replace(model, disabled=disabled_bodies(srdf, model))
+                remark = unknown_links(srdf, model)
+                sources.remarks += [(f"robots.{name}.srdf", remark)] if remark else []
         except InputError as error:
             sources.errors.append(error)
         if entry.srdf is None or srdf is not None:

@@ -47,6 +47,8 @@ def test_pairs_and_digest_come_with_the_cell(load: Load, tmp_path: Path) -> None
     cell = load((MODEL, ARM))
 
     assert cell.robot("holder").model.disabled == (("base", "arm", "disabled in arm.srdf as 'Never'"),)
+    remark = "arm.srdf: disabled pairs (1) name links that 'rig' does not have: ghost"
+    assert cell.remarks == (("robots.holder.srdf", remark),)
     (tmp_path / "arm.srdf").write_text(SRDF.replace('"arm" reason', '"palm" reason'), encoding="utf-8")
     assert cell.inputs["arm.srdf"] != load((MODEL, ARM)).inputs["arm.srdf"]
 

@@ -102,6 +102,16 @@ def disabled_bodies(srdf: Srdf, model: RobotModel) -> tuple[tuple[str, str, str]
     return tuple(found)
 
 
+def unknown_links(srdf: Srdf, model: RobotModel) -> str | None:
+    """Remark on disabled pairs that say nothing, as they name links that the robot does not have; None without any."""
+    links = {link.name for link in model.links}
+    pairs = [pair for pair in srdf.pairs if not set(pair.links) <= links]
+    missing = dict.fromkeys(link for pair in pairs for link in pair.links if link not in links)
+    if not pairs:
+        return None
+    return f"{srdf.file}: disabled pairs ({len(pairs)}) name links that '{model.name}' does not have: {listed(missing)}"
+
+
 def configuration_of(srdf: Srdf, name: str, model: RobotModel) -> Array | None:
     """Joint positions of a named configuration in [rad] or [m], shape (n,); None when there is none of this name.
 
