@@ -13,9 +13,9 @@ Refuse = Callable[..., list[str]]
         (
             "    base: {xyz",
             "    bsae: {xyz",
-            "c:9: robots.worker.bsae: unknown key, did you mean 'base'?; allowed: model, package_dirs, flange, "
-            "base, bodies, payload, pedestal, tool, attachments, start_deg, start, home_deg, home, weights, limits, "
-            "acceleration, controller_cycle_ms, locked",
+            "c:9: robots.worker.bsae: unknown key, did you mean 'base'?; allowed: model, package_dirs, xacro_args, "
+            "flange, base, bodies, payload, srdf, gripper, pedestal, mount, tool, attachments, start_deg, start, "
+            "home_deg, home, weights, limits, acceleration, controller, controller_cycle_ms, locked",
         ),
         (
             "xyz_mm: [2000, 0, 0]",
