@@ -11,6 +11,7 @@ from cellplan.geometry.shapes import Mesh, Solid
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.findings import listed, shown
 from cellplan.io.robots.urdf.document import UrdfLink, UrdfMesh, UrdfSolid
+from cellplan.io.robots.urdf.packages import Packages
 from cellplan.io.robots.urdf.remarks import Remarks
 from cellplan.io.robots.urdf.tree import UrdfTree, ZeroConfiguration, links_in_order
 from cellplan.io.robots.urdf.xml import Element
@@ -109,9 +110,25 @@ def find_mesh(
             "expected a mesh below the folder of the cell file, got one elsewhere; allow it with --allow-dir"
         )
     found = next((place for place in inside if _is_file(place)), None)
+    if found is None and uri.startswith(PACKAGE):
+        renamed = _in_renamed_package(uri, Packages(folder=folder, package_dirs=package_dirs, within=within))
+        if renamed is not None:
+            return renamed
     if found is None:
         raise InputError(f"no such mesh file, tried {listed(str(place) for place in inside)}{cure}")
     return found, tried[found]
+
+
+def _in_renamed_package(uri: str, packages: Packages) -> tuple[Path, str | None] | None:
+    """A mesh of a package whose folder has another name, and a remark where nothing else states the name."""
+    package, _, rest = uri.removeprefix(PACKAGE).lstrip("/").partition("/")
+    try:
+        path, stand_in = packages.file(package, rest.lstrip("/"))
+    except InputError:
+        return None
+    remark = None if stand_in is None else f"no such package, read from the folder {shown(stand_in.resolve().name)}"
+    is_inside = packages.within is None or packages.within.holds(path)
+    return (path, remark) if is_inside and _is_file(path) else None
 
 
 def _is_file(place: Path) -> bool:

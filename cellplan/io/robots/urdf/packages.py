@@ -45,8 +45,9 @@ class Packages:
         if found is not None:
             return found / rest, None
         for root in self._roots():
-            if (root / rest).is_file():
-                return root / rest, root
+            place = root / rest
+            if (self.within is None or self.within.holds(place)) and place.is_file():
+                return place, root
         where = listed(shown(each.name) for each in self.package_dirs)
         raise InputError(
             f"no package {shown(package)} in package_dirs ({where}) or above the file: "

@@ -13,7 +13,7 @@ import traceback
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any, Final
 from xml.dom import minidom
 from xml.parsers import expat
@@ -48,7 +48,7 @@ class XacroSettings:
         within: Folders that all files it reads must lie in; None for all.
     """
 
-    arguments: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    arguments: Mapping[str, str] = field(default_factory=dict)
     package_dirs: tuple[Path, ...] = ()
     within: AllowedFolders | None = None
 

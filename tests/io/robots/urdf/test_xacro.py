@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 import xacro
+from builders.urdf_texts import ARM, joint
 from builders.xacro_texts import HEAD, write_arm
 from xacro import substitution_args
 
@@ -23,8 +25,8 @@ from cellplan.model.robot import RobotModel
 
 def flange(model: RobotModel, q: Array) -> Array:
     X = np.eye(4)
-    for joint, position in zip(model.joints, q, strict=True):
-        X = X @ screw_displacement(joint, position)
+    for axis, position in zip(model.joints, q, strict=True):
+        X = X @ screw_displacement(axis, position)
     return X @ model.X_BF
 
 
@@ -104,6 +106,40 @@ def test_a_folder_of_another_name_that_has_the_file_is_taken_with_a_remark(tmp_p
     document = read_document(path, XacroSettings(package_dirs=(tmp_path / "packages" / "arm",)))
 
     assert "arm.urdf.xacro: no package 'arm_support' by name: its files were read from 'arm'" in document.remarks
+
+
+@pytest.mark.parametrize("prefix", ["$(find arm_support)", "file://$(find arm_support)", "package://arm_support"])
+@pytest.mark.parametrize("folder", ["packages/arm_support", "packages/arm"])
+def test_meshes_of_a_package_are_found_where_its_files_are(tmp_path: Path, prefix: str, folder: str) -> None:
+    mesh = tmp_path / folder / "meshes" / "box.stl"
+    mesh.parent.mkdir(parents=True)
+    trimesh.creation.box((0.1, 0.2, 0.3)).export(mesh)
+    shape = f'<geometry><mesh filename="{prefix}/meshes/box.stl"/></geometry>'
+    lines = (
+        f'<link name="base"><collision>{shape}</collision></link>',
+        '<link name="tip"/>',
+        joint("a1", "base", "tip"),
+    )
+    path = tmp_path / "r.xacro"
+    path.write_text("\n".join([HEAD, *lines, "</robot>"]), encoding="utf-8")
+
+    robot = load_urdf(path, UrdfOptions(package_dirs=(tmp_path / folder,), within=AllowedFolders(folder=tmp_path)))
+
+    assert robot.mesh_files == (mesh,)
+    renamed = "r.xacro:2: mesh 'package://arm_support/meshes/box.stl': no such package, read from the folder 'arm'"
+    assert robot.remarks == ((renamed,) if folder.endswith("arm") else ())
+
+
+def test_a_renamed_package_does_not_lead_out_of_the_allowed_folders(tmp_path: Path) -> None:
+    trimesh.creation.box((0.1, 0.2, 0.3)).export(tmp_path / "secret.stl")
+    inside = tmp_path / "cell"
+    inside.mkdir()
+    path = inside / "r.urdf"
+    mesh = '<collision><geometry><mesh filename="package://arm/../secret.stl"/></geometry></collision>'
+    path.write_text(f'<robot name="r"><link name="base">{mesh}</link>{ARM[1]}{ARM[2]}</robot>', encoding="utf-8")
+
+    with pytest.raises(InputError, match=r"no such mesh file|got one elsewhere"):
+        load_urdf(path, UrdfOptions(within=AllowedFolders(folder=inside)))
 
 
 def test_without_xacro_one_line_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
