@@ -260,7 +260,7 @@ class Cell:
         checks: Required clearance and tolerances.
         origin: The document that the cell was read from.
         inputs: SHA-256 of every file that was read, by the path as written.
-        remarks: Key of the cell file, and what was read over in the file that it names.
+        remarks: Key of the cell file, and what was not read of the file that it names.
     """
 
     name: str

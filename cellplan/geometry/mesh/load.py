@@ -15,13 +15,14 @@ from cellplan.geometry.mesh.collada_file import parse_collada
 from cellplan.geometry.mesh.healing import require_few_pieces
 from cellplan.geometry.mesh.polygons import Triangles
 from cellplan.geometry.mesh.rays import RayHits, ray_hits
-from cellplan.geometry.mesh.stl_obj import parse_mesh, require_likely_count
+from cellplan.geometry.mesh.stl_obj import parse_mesh, require_likely_count, unknown_format
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.mesh.topology import components, count_edges, make_mesh, mesh_volume, winding_numbers
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 
 __all__ = [
+    "FORMATS",
     "MESH_UNITS",
     "RayHits",
     "contains",
@@ -36,9 +37,11 @@ __all__ = [
     "require_enclosing",
     "require_solid",
     "tessellate",
+    "unknown_format",
 ]
 
 MESH_UNITS: Final[Mapping[str, float]] = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}  # [m]
+FORMATS: Final = frozenset({".stl", ".obj", ".ply", ".dae"})
 MAX_BYTES: Final = 100_000_000
 MIN_EXTENT: Final = 1e-3  # [m] smaller things in a robot cell are errors of the unit
 MAX_EXTENT: Final = 20.0  # [m] larger ones as well

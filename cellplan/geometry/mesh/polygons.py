@@ -77,14 +77,18 @@ def _is_folded(corner: Array) -> NDArray[np.bool_]:
     areas = np.cross(corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0])
     whole = areas.sum(axis=1, keepdims=True)
     square = np.sum(whole * whole, axis=2)
+    total = np.linalg.norm(areas, axis=2).sum(axis=1)
     extent = np.ptp(corner.reshape(len(corner), -1, 3), axis=1).max(axis=1)
     is_folded = np.any(np.sum(areas * whole, axis=2) < -FOLD_FRACTION * square, axis=1)
-    return np.asarray(is_folded & (np.sqrt(square[:, 0]) > THIN_FRACTION * extent**2))
+    is_folded |= np.sqrt(square[:, 0]) < FOLD_FRACTION * total  # as much of it faces one way as the other
+    return np.asarray(is_folded & (total > THIN_FRACTION * extent**2))
 
 
 def _ears(points: Array) -> NDArray[np.int64] | None:
     """Triangles of one polygon, shape (n, 3), to corner numbers of shape (n - 2, 3); None when it crosses itself."""
     flat = _in_its_plane(points)
+    if flat is None:
+        return None
     least = FOLD_FRACTION * _double_area(flat)
     left, cut = np.arange(len(points)), []
     while len(left) > 3:
@@ -108,10 +112,13 @@ def _ears(points: Array) -> NDArray[np.int64] | None:
     return np.array([*cut, left], dtype=np.int64)
 
 
-def _in_its_plane(points: Array) -> Array:
-    """Coordinates of a polygon in the plane of its mean normal, counter-clockwise, shape (n, 2)."""
+def _in_its_plane(points: Array) -> Array | None:
+    """Coordinates of a polygon in the plane of its mean normal, counter-clockwise, shape (n, 2); None without one."""
     normal = np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
-    normal /= np.linalg.norm(normal)
+    length = float(np.linalg.norm(normal))
+    if not THIN_FRACTION * float(np.ptp(points, axis=0).max()) ** 2 < length < np.inf:
+        return None
+    normal /= length
     first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
     first /= np.linalg.norm(first)
     return points @ np.stack([first, np.cross(normal, first)], axis=1)

@@ -14,11 +14,13 @@ from io import BytesIO
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.numbers import plain_word
+from cellplan.geometry.mesh.numbers import plain_word, text_numbers
 from cellplan.geometry.mesh.ply import parse_ply
-from cellplan.geometry.mesh.polygons import Polygons, Triangles, polygons_as_triangles
+from cellplan.geometry.mesh.polygons import Polygons, Triangles, cut_polygons, polygons_as_triangles
+from cellplan.geometry.transforms import Array
 
 STL_HEADER: Final = 84  # [bytes] 80 of comment and 4 of count
 STL_TRIANGLE: Final = 50  # [bytes]
@@ -36,12 +38,14 @@ NUMBER: Final = rb"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf|infinity)"
 STL_VERTEX: Final = re.compile(rb"vertex" + 3 * (rb"\s+" + NUMBER))
 MIN_TRIANGLES: Final = 4  # a tetrahedron
 MAX_TRIANGLES: Final = 500_000
+MAX_INDEX: Final = 3 * MAX_TRIANGLES
 MAX_LINE: Final = 100_000  # [characters] of an OBJ file: a longer line is no face
 OBJ_SILENT: Final = frozenset({"vt", "vn", "g", "o", "s", "l", "p", "usemtl", "mtllib"})
+OBJ_SILENT_BYTES: Final = frozenset({b"", *(word.encode() for word in OBJ_SILENT)})
 
 
 def parse_mesh(data: bytes, name: str) -> Triangles:
-    """Vertices, shape (V, 3), and triangles, shape (M, 3), of a mesh file in its own unit.
+    """Vertices, shape (V, 3), and triangles, shape (M, 3), of an STL, OBJ or PLY file in its own unit.
 
     The suffix of the name gives the format.
 
@@ -56,8 +60,13 @@ def parse_mesh(data: bytes, name: str) -> Triangles:
                 return _parse_obj(data, name)
             case "ply":
                 return parse_ply(data, name)
-            case suffix:
-                raise InputError(f"{name}: expected a mesh file .stl, .obj, .ply or .dae, got '.{suffix}'")
+            case _:
+                raise unknown_format(name)
+
+
+def unknown_format(name: str) -> InputError:
+    """Finding about a file of a format that is not read."""
+    return InputError(f"{name}: expected a mesh file .stl, .obj, .ply or .dae, got '.{name.rpartition('.')[2]}'")
 
 
 def require_likely_count(triangles: int, name: str) -> None:
@@ -151,23 +160,53 @@ def _checked_text_stl(data: bytes, name: str) -> tuple[bytes, int]:
 
 def _parse_obj(data: bytes, name: str) -> Triangles:
     """Wavefront OBJ: vertices and polygons; material files are not opened, curved surfaces and includes refused."""
-    vertices: list[Sequence[float]] = []
-    polygons: Polygons = []
     if b"\0" in data:
         raise InputError(f"{name}: expected an OBJ text file, got binary data")
+    regular = _regular_obj(data)
+    if regular is not None:
+        vertices, corners, sizes = regular
+        return vertices, cut_polygons(vertices, corners, sizes, name)
+    points: list[Sequence[float]] = []
+    polygons: Polygons = []
     for line, words in _obj_lines(data, name):
         place = f"{name}:{line}"
         if words[0] == "v":
-            vertices.append(_obj_vertex(words[1:], place))
-            require_no_more(len(vertices), 3 * MAX_TRIANGLES, "vertices", place=place)
+            points.append(_obj_vertex(words[1:], place))
+            require_no_more(len(points), 3 * MAX_TRIANGLES, "vertices", place=place)
         elif words[0] == "f":
-            polygons.append([_obj_index(word, known=len(vertices), place=place) for word in words[1:]])
+            polygons.append([_obj_index(word, known=len(points), place=place) for word in words[1:]])
             if len(words) < 4:
                 raise InputError(f"{place}: expected a face with at least three corners, got {len(words) - 1}")
             require_no_more(len(polygons), MAX_TRIANGLES, "faces", place=place)
         elif words[0] not in OBJ_SILENT:
             raise InputError(f"{place}: expected vertices and flat faces, got '{words[0]}', which is not supported")
-    return polygons_as_triangles(np.array(vertices, dtype=float).reshape(-1, 3), polygons, name)
+    return polygons_as_triangles(np.array(points, dtype=float).reshape(-1, 3), polygons, name)
+
+
+def _regular_obj(data: bytes) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]] | None:
+    """Vertices, corners of all faces and corners of each, read at once from a file without anything unusual.
+
+    None for every other file, sound or not: a vertex of more than three numbers, an index below one, a continued line,
+    a comment behind numbers, another statement, too much of anything. Such a file is read line by line.
+    """
+    lines = data.split(b"\n")
+    points, faces = ([line for line in lines if line.startswith(start)] for start in (b"v ", b"f "))
+    others = {line.strip().partition(b" ")[0] for line in lines if not line.startswith((b"v ", b"f ", b"#"))}
+    is_short = max(map(len, lines)) < MAX_LINE and len(points) <= 3 * MAX_TRIANGLES and len(faces) <= MAX_TRIANGLES
+    if not is_short or b"\\" in data or not others <= OBJ_SILENT_BYTES:
+        return None
+    words = [line.split() for line in faces]
+    heads = b" ".join(word.partition(b"/")[0] for each in words for word in each[1:])
+    sizes = np.fromiter((len(each) - 1 for each in words), dtype=np.int64, count=len(words))
+    if heads.translate(None, b"0123456789 ") or any(len(line.split()) != 4 for line in points) or np.any(sizes < 3):
+        return None
+    try:
+        vertices, corners = text_numbers(b" ".join(line[2:] for line in points)), text_numbers(heads)
+    except ValueError:
+        return None
+    if len(vertices) != 3 * len(points) or len(corners) != sizes.sum() or np.any((corners < 1) | (corners > MAX_INDEX)):
+        return None
+    return vertices.reshape(-1, 3), corners.astype(np.int64) - 1, sizes
 
 
 def _obj_lines(data: bytes, name: str) -> Iterable[tuple[int, list[str]]]:

@@ -12,7 +12,7 @@ from cellplan.io.cell.referenced_files import Sources
 from cellplan.io.cell.write import in_file_units
 from cellplan.io.input.findings import unknown_name
 from cellplan.io.robots.rules import start_keys
-from cellplan.io.robots.urdf.srdf import Srdf, disabled_bodies, posture_of
+from cellplan.io.robots.urdf.srdf import Srdf, configuration_of, disabled_bodies, unknown_links
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import POSITION_WORDS, RobotEntry
 from cellplan.io.schema.units import Deg, Mm
@@ -25,9 +25,10 @@ AUTO: Final = "auto"
 def apply_srdfs(
     valid: ValidEntries, models: Mapping[str, RobotModel], sources: Sources, document: YamlDocument
 ) -> tuple[ValidEntries, dict[str, RobotModel]]:
-    """The entries with named postures written out, and the models with the pairs that their SRDFs disable.
+    """The entries with named configurations written out, and the models with the pairs that their SRDFs disable.
 
-    What is wrong with an SRDF, or with a name, is added to the findings of the sources.
+    What is wrong with an SRDF, or with a name, is added to the findings of the sources, and what says nothing to their
+    remarks.
 
     Args:
         valid: The entries of the cell.
@@ -42,10 +43,12 @@ def apply_srdfs(
         try:
             if srdf is not None:
                 found[name] = replace(model, disabled=disabled_bodies(srdf, model))
+                remark = unknown_links(srdf, model)
+                sources.remarks += [(f"robots.{name}.srdf", remark)] if remark else []
         except InputError as error:
             sources.errors.append(error)
         if entry.srdf is None or srdf is not None:
-            robots[name] = _Postures(name, model, srdf, sources, document).written_out(entry)
+            robots[name] = _Configurations(name, model, srdf, sources, document).written_out(entry)
     whole = valid.whole
     if whole is not None:
         whole = whole.model_copy(
@@ -55,8 +58,8 @@ def apply_srdfs(
 
 
 @dataclass(frozen=True, slots=True)
-class _Postures:
-    """Named postures of one robot."""
+class _Configurations:
+    """Named configurations of one robot."""
 
     name: str
     model: RobotModel
@@ -71,7 +74,7 @@ class _Postures:
         return entry.model_copy(update={key: value for key, value in found.items() if value is not None})
 
     def _positions(self, key: str, word: str) -> dict[str, float] | None:
-        """Positions of a posture by joint, in the units of a cell file; None for ``auto`` and after a finding."""
+        """Positions of a configuration by joint, in the units of a cell file; None for ``auto`` and after a finding."""
         if word == AUTO:
             return None
         path = ("robots", self.name, key)
@@ -80,12 +83,12 @@ class _Postures:
             self.sources.findings.append(self.document.finding(path, text))
             return None
         try:
-            q = posture_of(self.srdf, word, self.model)
+            q = configuration_of(self.srdf, word, self.model)
         except InputError as error:
             self.sources.errors.append(error)
             return None
         if q is None:
-            text = unknown_name(f"a posture of {self.srdf.file}", word, self.srdf.posture_names)
+            text = unknown_name(f"a configuration of {self.srdf.file}", word, self.srdf.configuration_names)
             self.sources.findings.append(self.document.finding(path, text))
             return None
         return dict(zip(start_keys(self.model), _within_limits(self.model, q), strict=True))

@@ -41,7 +41,7 @@ class Sources:
         inputs: SHA-256 of every file that was read, by the path as written.
         findings: About the names in the cell file.
         errors: About the files themselves.
-        remarks: Key of the cell file, and what was read over in the file that it names.
+        remarks: Key of the cell file, and what was not read of the file that it names.
     """
 
     def __init__(self, document: YamlDocument, folders: AllowedFolders) -> None:

@@ -36,6 +36,6 @@ def load_bundled_table(name: str) -> RobotTable:
     if name not in names:
         hint = did_you_mean(name, names)
         raise InputError(
-            f"expected a bundled robot ({listed(names)}) or a .urdf or .yaml file, got {shown(name)}{hint}"
+            f"expected a bundled robot ({listed(names)}) or a .urdf, .xacro or .yaml file, got {shown(name)}{hint}"
         )
     return load_robot_table(FOLDER / f"{name}.yaml", file=f"bundled:{name}", folders=AllowedFolders(folder=FOLDER))

@@ -57,8 +57,10 @@ SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_
 OTHERS: Final = "others"  # key of all joints that do not lead to the flange, where they are locked together
 LOCK_WORDS: Final = "a number, or zero for the key others"
 POSTURE_WORDS: Final = "auto or a list of joint angles"
+POSITION_WORDS: Final = (
+    "auto, the name of a configuration in the SRDF, or a mapping with one key per joint (a1_deg, rail_mm)"
+)
 ARGUMENT_WORDS: Final = "a text, a number, true or false"
-POSITION_WORDS: Final = "auto, the name of a posture in the SRDF, or a mapping with one key per joint (a1_deg, rail_mm)"
 
 Configuration = Annotated[
     Annotated[Literal["auto"], Tag(f"<{POSTURE_WORDS}>")] | Annotated[tuple[Angle, ...], Tag("<list>")],
@@ -249,7 +251,7 @@ class RobotEntry(Entry):
     srdf: Text | None = Field(
         default=None,
         description="Path of an SRDF for a URDF: pairs of its links that are not checked against each other, and named "
-        "postures for start and home.",
+        "configurations for start and home.",
     )
     gripper: GripperEntry | None = Field(
         default=None, description="The gripper that a URDF brings along: how far it is open, and what may work."
@@ -273,8 +275,8 @@ class RobotEntry(Entry):
     )
     start: NamedConfiguration | None = Field(
         default=None,
-        description="Start posture, one key per joint with its unit (a1_deg, rail_mm), or the name of a posture in the "
-        "SRDF (STATE, or GROUP/STATE where several groups have one); excludes start_deg.",
+        description="Start posture, one key per joint with its unit (a1_deg, rail_mm); auto finds one; else the name "
+        "of a configuration in the SRDF (STATE, or GROUP/STATE where several groups have one). Excludes start_deg.",
     )
     home_deg: Configuration | None = Field(
         default=None,

@@ -84,7 +84,7 @@ class HeadRecord(OriginRecord):
     not_in_program: Annotated[list[str], "moves that the program does not contain"]
     rests_on: Annotated[RestsOnRecord, "assumptions on which the values rest"]
     open_surfaces: Annotated[list[OpenSurfaceRecord], "bodies whose mesh is not closed"]
-    remarks: Annotated[list[str], "what was read over in the files of robots"]
+    remarks: Annotated[list[str], "what was not read of the files of robots"]
     left_out: Annotated[list[LeftOutRecord], "pairs that were not judged in full"]
     solver: Annotated[SolverRecord, "how the motion was computed"]
     caution: Annotated[str, "limits of an offline result"]

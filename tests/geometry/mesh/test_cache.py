@@ -29,7 +29,7 @@ def assert_same(one: Mesh, other: Mesh) -> None:
     assert (one.source, one.is_closed) == (other.source, other.is_closed)
 
 
-@pytest.mark.parametrize("suffix", ["stl", "obj", "ply"])
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "dae"])
 @pytest.mark.parametrize("scale", [1.0, 0.001, (0.5, -0.5, 0.25)])
 def test_a_mesh_is_the_same_when_it_was_kept(tmp_path: Path, own_cache: Path, suffix: str, scale: object) -> None:
     path = tmp_path / f"part.{suffix}"

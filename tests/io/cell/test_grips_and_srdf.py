@@ -34,7 +34,7 @@ def files(tmp_path: Path) -> None:
     (tmp_path / "arm.srdf").write_text(SRDF, encoding="utf-8")
 
 
-def test_named_postures_are_read_to_the_last_bit_at_a_limit_too(load: Load) -> None:
+def test_named_configurations_are_read_to_the_last_bit_at_a_limit_too(load: Load) -> None:
     robot = load((MODEL, ARM)).robot("holder")
 
     assert robot.start == pytest.approx([0.1, 2.0, -1.0], abs=1e-15)
@@ -47,6 +47,8 @@ def test_pairs_and_digest_come_with_the_cell(load: Load, tmp_path: Path) -> None
     cell = load((MODEL, ARM))
 
     assert cell.robot("holder").model.disabled == (("base", "arm", "disabled in arm.srdf as 'Never'"),)
+    remark = "arm.srdf: disabled pairs (1) name links that 'rig' does not have: ghost"
+    assert cell.remarks == (("robots.holder.srdf", remark),)
     (tmp_path / "arm.srdf").write_text(SRDF.replace('"arm" reason', '"palm" reason'), encoding="utf-8")
     assert cell.inputs["arm.srdf"] != load((MODEL, ARM)).inputs["arm.srdf"]
 
@@ -63,7 +65,7 @@ def test_the_written_cell_reads_back_to_the_same(load: Load, tmp_path: Path) -> 
     assert np.array_equal(again.robot("holder").start, cell.robot("holder").start)
 
 
-def test_values_set_from_python_may_name_a_posture(load: Load) -> None:
+def test_values_set_from_python_may_name_a_configuration(load: Load) -> None:
     cell = load((MODEL, ARM)).with_values({"robots.holder.start": "folded"})
 
     assert cell.robot("holder").start == pytest.approx([0.3, 0.7, 0.0], abs=1e-15)
@@ -82,14 +84,14 @@ def test_a_gripper_is_open_as_far_as_the_cell_says(load: Load) -> None:
         (
             "start: ready",
             "start: redy",
-            "c:8: robots.holder.start: expected a posture of arm.srdf (ready, folded), got 'redy', did you mean "
+            "c:8: robots.holder.start: expected a configuration of arm.srdf (ready, folded), got 'redy', did you mean "
             "'ready'?",
         ),
         (
             "    srdf: arm.srdf\n",
             "",
-            "c:7: robots.holder.start: expected auto, the name of a posture in the SRDF, or a mapping with one key per "
-            "joint (a1_deg, rail_mm), got 'ready' without the key srdf",
+            "c:7: robots.holder.start: expected auto, the name of a configuration in the SRDF, or a mapping with one "
+            "key per joint (a1_deg, rail_mm), got 'ready' without the key srdf",
         ),
         (
             "srdf: arm.srdf",

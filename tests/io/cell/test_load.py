@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.collada_texts import collada
 
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Sphere
@@ -256,6 +257,26 @@ def test_meshes_and_toolpaths_below_the_cell_are_read_and_digested(load: Load, t
     assert isinstance(path, SampledPath)
     assert not path.is_smooth
     assert {"sub/part.obj", "path.csv"} <= set(cell.inputs)
+
+
+def test_a_part_drawn_in_collada_has_the_unit_and_the_up_axis_of_its_file(
+    load: Load, refuse: Refuse, tmp_path: Path
+) -> None:
+    (tmp_path / "part.dae").write_text(collada(asset='<unit meter="0.01"/><up_axis>Y_UP</up_axis>'), encoding="utf-8")
+    cylinder = "{cylinder: {radius_mm: 250, length_mm: 500, axis: x}}"
+
+    shape = load((cylinder, "{mesh: part.dae}")).part.shape
+
+    assert isinstance(shape, Mesh)
+    assert np.ptp(shape.vertices, axis=0) == pytest.approx([0.003, 0.001, 0.002], abs=1e-9)
+    assert shape.vertices[:, 2].min() == pytest.approx(0.0, abs=1e-12)  # y of the file is up
+    place = "c:13: part.geometry"
+    assert refuse((cylinder, "{mesh: part.dae, unit: mm}")) == [
+        f"{place}.mesh: part.dae: states a unit of 0.01 m, got unit: mm: leave out the unit"
+    ]
+    assert refuse((cylinder, "{mesh: part.stl}")) == [
+        f"{place}.unit: missing, expected the unit of the mesh: mm, m or inch"
+    ]
 
 
 def test_an_open_part_is_refused(load: Load, tmp_path: Path) -> None:

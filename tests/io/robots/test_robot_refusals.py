@@ -4,6 +4,10 @@ from collections.abc import Callable
 
 import pytest
 
+from cellplan.io.input.findings import listed
+from cellplan.io.robots.bundled import bundled_names
+from cellplan.io.schema.robot import RobotEntry
+
 Refuse = Callable[..., list[str]]
 
 
@@ -13,9 +17,8 @@ Refuse = Callable[..., list[str]]
         (
             "    base: {xyz",
             "    bsae: {xyz",
-            "c:9: robots.worker.bsae: unknown key, did you mean 'base'?; allowed: model, package_dirs, flange, "
-            "base, bodies, payload, pedestal, tool, attachments, start_deg, start, home_deg, home, weights, limits, "
-            "acceleration, controller_cycle_ms, locked",
+            "c:9: robots.worker.bsae: unknown key, did you mean 'base'?; allowed: "
+            + ", ".join(RobotEntry.model_fields),
         ),
         (
             "xyz_mm: [2000, 0, 0]",
@@ -169,8 +172,8 @@ Refuse = Callable[..., list[str]]
         (
             "model: abb_irb1600",
             "model: abb_irb160",
-            "c:8: robots.worker.model: expected a bundled robot (abb_irb1600, kuka_kr6, planar_3r, reis_rv20_16, "
-            "staubli_rx90l, staubli_rx90l_as_printed) or a .urdf or .yaml file, got 'abb_irb160', did you mean "
+            f"c:8: robots.worker.model: expected a bundled robot ({listed(bundled_names())}) or a .urdf, .xacro or "
+            ".yaml file, got 'abb_irb160', did you mean "
             "'abb_irb1600'?",
         ),
         (

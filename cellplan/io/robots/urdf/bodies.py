@@ -1,12 +1,12 @@
 """Link bodies of a URDF: mesh files looked up and read, every collision element turned into one body."""
 
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Final
 from urllib.parse import unquote
 
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.load import is_flat, read_mesh
+from cellplan.geometry.mesh.load import FORMATS, is_flat, read_mesh, unknown_format
 from cellplan.geometry.shapes import Mesh, Solid
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.findings import listed, shown
@@ -45,6 +45,9 @@ class MeshShelf:
         Raises:
             InputError: It is not found, cannot be read, or is flat.
         """
+        name = PurePosixPath(desired.uri)
+        if name.suffix and name.suffix.lower() not in FORMATS:
+            raise unknown_format(name.name)
         path, remark = find_mesh(desired.uri, self.folder, package_dirs=self.package_dirs, within=self.within)
         if remark is not None:
             self.remarks.add(remark, f"mesh {shown(desired.uri)}: {remark}", element)
@@ -88,7 +91,7 @@ def find_mesh(
     folder of the URDF and those above it, in the same two ways; ``package:///NAME/rest`` likewise, and where no
     package is named, ``rest`` below the same folders. Other names are relative to the URDF. Absolute paths and
     ``file://`` count below the URDF's folder, a package folder or a folder of ``within``; a name that only begins with
-    a slash is looked up without it. Nothing outside the folders ``within`` is accessed.
+    a slash is looked up below the first two. Nothing outside the folders ``within`` is accessed.
 
     Raises:
         InputError: There is no such file; the message names every place that was tried.
@@ -162,7 +165,7 @@ def _plain_places(
     allowed = [folder, *package_dirs, *(() if within is None else (within.folder, *within.allowed))]
     if any(path.resolve().is_relative_to(root.resolve()) for root in allowed):
         return {path: "is an absolute path, which other machines will not have"}
-    below = [root / path.relative_to(path.anchor) for root in _roots(folder, package_dirs)]
+    below = [root / path.relative_to(path.anchor) for root in (*package_dirs, folder)]
     if not any(_is_file(place) for place in below if within is None or within.holds(place)):
         raise InputError("expected an absolute path below the URDF's folder or one of `package_dirs`")
     return dict.fromkeys(below, "begins with a slash, looked up below the folders of the URDF and of packages")

@@ -74,15 +74,15 @@ class UrdfLimit:
         lower: Lowest position.
         upper: Highest position.
         velocity: Largest velocity.
-        position_slip: What is wrong with the positions of the file, if they were not taken for that.
-        velocity_slip: What is wrong with its velocity, if it was not taken for that.
+        position_fault: What is wrong with the positions of the file, if they were not taken for that.
+        velocity_fault: What is wrong with its velocity, if it was not taken for that.
     """
 
     lower: float | None = None
     upper: float | None = None
     velocity: float | None = None
-    position_slip: str = ""
-    velocity_slip: str = ""
+    position_fault: str = ""
+    velocity_fault: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,7 +118,7 @@ class UrdfDocument:
         name: Name of the robot.
         links: Links by name.
         joints: Joints by name.
-        remarks: What was read over, one line for each kind.
+        remarks: What was not read, one line for each kind.
         included: Files that a xacro file includes, each once.
     """
 
@@ -309,16 +309,16 @@ def _limit(element: Element, owner: str, *, kind: str) -> UrdfLimit:
     fastest, unit = (MAX_TRAVEL_SPEED, "m/s") if kind == "prismatic" else (MAX_TURN_SPEED, "rad/s")
     if velocity > fastest:
         hint = "mm/s" if kind == "prismatic" else "deg/s"
-        slip = f"expected a velocity limit of at most {fastest:g} {unit}, got {velocity:g} {unit} (is it in {hint}?)"
-        speed = UrdfLimit(velocity_slip=slip)
+        fault = f"expected a velocity limit of at most {fastest:g} {unit}, got {velocity:g} {unit} (is it in {hint}?)"
+        speed = UrdfLimit(velocity_fault=fault)
     else:
         speed = UrdfLimit(velocity=velocity if velocity > 0.0 else None)
     if kind == "continuous":
         return speed
     lower, upper = (_bound(limit, name, owner) for name in ("lower", "upper"))
-    slip = _position_slip(lower, upper, slides=kind == "prismatic")
-    if slip or lower == upper:
-        return replace(speed, position_slip=slip)
+    fault = _position_fault(lower, upper, slides=kind == "prismatic")
+    if fault or lower == upper:
+        return replace(speed, position_fault=fault)
     return replace(speed, lower=lower, upper=upper)
 
 
@@ -328,7 +328,7 @@ def _bound(limit: Element, name: str, owner: str) -> float:
     return float(written) if written in INFINITE else limit.number(name, owner, default=0.0)
 
 
-def _position_slip(lower: float, upper: float, *, slides: bool) -> str:
+def _position_fault(lower: float, upper: float, *, slides: bool) -> str:
     """What is wrong with a pair of position limits: their order, or their unit; empty for nothing."""
     largest = max(abs(lower), abs(upper))
     if largest > (MAX_TRAVEL if slides else MAX_RANGE):

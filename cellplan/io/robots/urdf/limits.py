@@ -111,8 +111,8 @@ def _lacking(joint: UrdfJoint, cell: StatedLimits) -> Lacking:
     limits, unit = tightest(_own(joint), cell), unit_of(joint).name
     ends = [] if cell.wraps else [name for name in ("lower", "upper") if getattr(limits, name) is None]
     keys = [f"{name}_{unit}" for name in ends] + ([f"velocity_{unit}_s"] if limits.velocity is None else [])
-    reasons = [joint.limit.position_slip or _range_reason(joint)] if ends else []
-    reasons += [joint.limit.velocity_slip or _stated(joint, "velocity")] if limits.velocity is None else []
+    reasons = [joint.limit.position_fault or _range_reason(joint)] if ends else []
+    reasons += [joint.limit.velocity_fault or _stated(joint, "velocity")] if limits.velocity is None else []
     return Lacking(joint=joint, keys=tuple(keys), reason=" and ".join(dict.fromkeys(reasons)))
 
 

@@ -73,7 +73,7 @@ class UrdfRobot:
         model: The model.
         mesh_files: Mesh files, each once.
         included: Files that a xacro file includes, each once.
-        remarks: What was read over, one line for each kind.
+        remarks: What was not read, one line for each kind.
     """
 
     model: RobotModel

@@ -1,4 +1,4 @@
-"""Remarks about a robot file: what was read over, one line for each kind, with a count when there are many."""
+"""Remarks about a robot file: what was not read, one line for each kind, with a count when there are many."""
 
 from collections import Counter
 

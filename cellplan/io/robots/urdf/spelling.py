@@ -11,7 +11,7 @@ from cellplan.io.input.findings import did_you_mean
 from cellplan.io.robots.urdf.remarks import Remarks
 from cellplan.io.robots.urdf.xml import Element
 
-LONGEST_SLIP: Final = 2  # characters by which a misspelt name is longer or shorter
+MOST_EXTRA: Final = 2  # characters by which a misspelt name is longer or shorter
 CHILDREN: Final = {
     "link": ("inertial", "visual", "collision"),
     "joint": (
@@ -80,7 +80,7 @@ def _check_children(element: Element, needed: Iterable[str], owner: str, *, rema
         if child.tag in CHILDREN[element.tag]:
             continue
         bodies = ["collision"] if child.all("geometry") else []  # one of several would be lost
-        hint = _slip_of(child.tag, missing + bodies)
+        hint = _misspelt(child.tag, missing + bodies)
         if hint:
             raise child.error(f"{owner}: unknown element <{child.tag}>{hint}")
         text = f"{owner}: element <{child.tag}> is not known and was not read"
@@ -98,13 +98,13 @@ def _check_attributes(element: Element, owner: str, *, kind: str = "", remarks: 
     for name in element.attributes:
         if name in known:
             continue
-        hint = _slip_of(name, missing)
+        hint = _misspelt(name, missing)
         if hint:
             raise element.error(f"{owner}: unknown attribute '{name}' in <{element.tag}>{hint}")
         text = f"{owner}: attribute '{name}' of <{element.tag}> is not known and was not read"
         remarks.add(f"<{element.tag}> {name}", text, element)
 
 
-def _slip_of(name: str, missing: Iterable[str]) -> str:
+def _misspelt(name: str, missing: Iterable[str]) -> str:
     """Which missing name was probably meant; empty for none."""
-    return did_you_mean(name.lower(), [each for each in missing if abs(len(name) - len(each)) <= LONGEST_SLIP])
+    return did_you_mean(name.lower(), [each for each in missing if abs(len(name) - len(each)) <= MOST_EXTRA])

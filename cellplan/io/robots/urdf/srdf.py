@@ -1,4 +1,4 @@
-"""SRDF of a robot: pairs of its links that need not be checked against each other, and named postures."""
+"""SRDF of a robot: pairs of its links that need not be checked against each other, and named configurations."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class DisabledPair:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NamedPosture:
+class NamedConfiguration:
     """A state of a group: its joints by name, as elements of the file."""
 
     name: str
@@ -38,25 +38,27 @@ class Srdf:
     Attributes:
         file: Name in messages.
         pairs: Pairs of links that are disabled.
-        postures: Named postures.
+        configurations: Named configurations.
     """
 
     file: str
     pairs: tuple[DisabledPair, ...]
-    postures: tuple[NamedPosture, ...]
+    configurations: tuple[NamedConfiguration, ...]
 
     @property
-    def posture_names(self) -> tuple[str, ...]:
-        """Names by which postures can be called: ``STATE``, and ``GROUP/STATE`` where several groups have it."""
-        names = [posture.name for posture in self.postures]
+    def configuration_names(self) -> tuple[str, ...]:
+        """Names by which configurations can be called: ``STATE``, and ``GROUP/STATE`` where several groups have it."""
+        names = [configuration.name for configuration in self.configurations]
         return tuple(
-            posture.name if names.count(posture.name) == 1 else f"{posture.group}/{posture.name}"
-            for posture in self.postures
+            configuration.name
+            if names.count(configuration.name) == 1
+            else f"{configuration.group}/{configuration.name}"
+            for configuration in self.configurations
         )
 
 
 def read_srdf(path: Path) -> Srdf:
-    """Read the disabled pairs and the named postures of an SRDF; groups, end effectors and the like are not used.
+    """Read the disabled pairs and the named configurations of an SRDF; groups, end effectors and the like are not used.
 
     Raises:
         InputError: With file and line: it is no plain SRDF, or an entry that is used is incomplete.
@@ -74,7 +76,7 @@ def read_srdf(path: Path) -> Srdf:
         )
         for pair in root.all("disable_collisions")
     )
-    return Srdf(file=path.name, pairs=pairs, postures=tuple(map(_posture, root.all("group_state"))))
+    return Srdf(file=path.name, pairs=pairs, configurations=tuple(map(_configuration, root.all("group_state"))))
 
 
 def disabled_bodies(srdf: Srdf, model: RobotModel) -> tuple[tuple[str, str, str], ...]:
@@ -100,15 +102,25 @@ def disabled_bodies(srdf: Srdf, model: RobotModel) -> tuple[tuple[str, str, str]
     return tuple(found)
 
 
-def posture_of(srdf: Srdf, name: str, model: RobotModel) -> Array | None:
-    """Joint positions of a named posture in [rad] or [m], shape (n,); None when there is none of this name.
+def unknown_links(srdf: Srdf, model: RobotModel) -> str | None:
+    """Remark on disabled pairs that say nothing, as they name links that the robot does not have; None without any."""
+    links = {link.name for link in model.links}
+    pairs = [pair for pair in srdf.pairs if not set(pair.links) <= links]
+    missing = dict.fromkeys(link for pair in pairs for link in pair.links if link not in links)
+    if not pairs:
+        return None
+    return f"{srdf.file}: disabled pairs ({len(pairs)}) name links that '{model.name}' does not have: {listed(missing)}"
+
+
+def configuration_of(srdf: Srdf, name: str, model: RobotModel) -> Array | None:
+    """Joint positions of a named configuration in [rad] or [m], shape (n,); None when there is none of this name.
 
     Where several groups have a state of the name, those that lack joints of the chain to the flange are passed over.
 
     Raises:
         InputError: Joints are missing, several groups differ, or a value is no number or outside the joint's limits.
     """
-    named = [each for each in srdf.postures if name in (each.name, f"{each.group}/{each.name}")]
+    named = [each for each in srdf.configurations if name in (each.name, f"{each.group}/{each.name}")]
     if not named:
         return None
     complete = [each for each in named if set(model.joint_names) <= set(each.joints)]
@@ -119,12 +131,12 @@ def posture_of(srdf: Srdf, name: str, model: RobotModel) -> Array | None:
     found = [_positions(each, model) for each in complete]
     if any(not np.array_equal(q, found[0]) for q in found):
         names = listed(f"{each.group}/{each.name}" for each in complete)
-        raise complete[1].element.error(f"group_state '{name}': expected one posture of this name, got {names}")
+        raise complete[1].element.error(f"group_state '{name}': expected one configuration of this name, got {names}")
     return found[0]
 
 
-def _posture(state: Element) -> NamedPosture:
-    """A named posture."""
+def _configuration(state: Element) -> NamedConfiguration:
+    """A named configuration."""
     name = state.text("name", "group_state")
     joints: dict[str, Element] = {}
     for joint in state.all("joint"):
@@ -132,14 +144,14 @@ def _posture(state: Element) -> NamedPosture:
         if key in joints:
             raise joint.error(f"group_state '{name}': expected each joint once, got '{key}' twice")
         joints[key] = joint
-    return NamedPosture(name=name, group=state.attributes.get("group", ""), element=state, joints=joints)
+    return NamedConfiguration(name=name, group=state.attributes.get("group", ""), element=state, joints=joints)
 
 
-def _positions(posture: NamedPosture, model: RobotModel) -> Array:
+def _positions(configuration: NamedConfiguration, model: RobotModel) -> Array:
     """Values of the joints of the chain, within their limits."""
     values = np.empty(len(model.joints))
     for index, joint in enumerate(model.joints):
-        element, owner = posture.joints[joint.name], f"group_state '{posture.name}': joint '{joint.name}'"
+        element, owner = configuration.joints[joint.name], f"group_state '{configuration.name}': joint '{joint.name}'"
         values[index] = element.number("value", owner)
         if not joint.lower <= values[index] <= joint.upper:
             unit = "rad" if joint.is_revolute else "m"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders.urdf_texts import FINGERS, FOLLOWS, HAND_ARM, finger, refusal, write_urdf
+from builders.urdf_texts import FINGERS, FOLLOWS, HAND_ARM, LIMIT, boxed, finger, joint, refusal, write_urdf
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.robots.urdf.gripper import GripperState
@@ -137,3 +137,14 @@ def test_a_joint_is_held_by_one_key(tmp_path: Path) -> None:
     said = refusal(write_urdf(tmp_path, *HAND_ARM, *FINGERS), options)
 
     assert said == "arm.urdf:10: joint 'left': is held by `gripper` and by `locked`: remove it from one of them"
+
+
+def test_the_other_joints_off_the_chain_are_locked_beside_the_gripper(tmp_path: Path) -> None:
+    head = joint("pan", "base", "head", LIMIT) + boxed("head", "0.1 0.1 0.1", "0 0 0.3")
+    path = write_urdf(tmp_path, *HAND_ARM, *FINGERS, head)
+
+    model = read_urdf(path, UrdfOptions(locks_others=True, gripper=GripperState(opening=0.03)))
+
+    assert gap(model) == pytest.approx(0.03, abs=1e-12)
+    assert model.joint_names == ("lift", "turn", "roll")
+    assert refusal(path, gripping(opening=0.03)).startswith("arm.urdf:12: joint 'pan': moves, but is not between")

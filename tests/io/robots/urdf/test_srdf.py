@@ -1,4 +1,4 @@
-"""SRDFs: disabled pairs become pairs of link bodies, named postures become joint positions, the rest is refused."""
+"""SRDFs: disabled pairs become pairs of link bodies, named configurations joint positions, the rest is refused."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +10,7 @@ from builders.urdf_texts import FINGERS, HAND_ARM, LIMIT, boxed, joint, write_ur
 from cellplan.errors import InputError
 from cellplan.io.robots.urdf.gripper import GripperState
 from cellplan.io.robots.urdf.load import UrdfOptions, read_urdf
-from cellplan.io.robots.urdf.srdf import Srdf, disabled_bodies, posture_of, read_srdf
+from cellplan.io.robots.urdf.srdf import Srdf, configuration_of, disabled_bodies, read_srdf
 from cellplan.model.robot import RobotModel
 
 READY = (
@@ -59,12 +59,12 @@ def test_the_srdf_of_another_robot_is_refused(tmp_path: Path, model: RobotModel)
         disabled_bodies(srdf(tmp_path, off("hip", "knee")), model)
 
 
-def test_a_posture_has_the_joints_of_the_chain_in_their_order(tmp_path: Path, model: RobotModel) -> None:
+def test_a_configuration_has_the_joints_of_the_chain_in_their_order(tmp_path: Path, model: RobotModel) -> None:
     file = srdf(tmp_path, READY)
 
-    assert np.array_equal(posture_of(file, "ready", model), [0.25, -0.5, 2.0])
-    assert np.array_equal(posture_of(file, "arm/ready", model), [0.25, -0.5, 2.0])
-    assert posture_of(file, "readi", model) is None
+    assert np.array_equal(configuration_of(file, "ready", model), [0.25, -0.5, 2.0])
+    assert np.array_equal(configuration_of(file, "arm/ready", model), [0.25, -0.5, 2.0])
+    assert configuration_of(file, "readi", model) is None
 
 
 def test_states_of_other_groups_do_not_count(tmp_path: Path, model: RobotModel) -> None:
@@ -72,8 +72,8 @@ def test_states_of_other_groups_do_not_count(tmp_path: Path, model: RobotModel) 
 
     file = srdf(tmp_path, hand, READY)
 
-    assert np.array_equal(posture_of(file, "ready", model), [0.25, -0.5, 2.0])
-    assert file.posture_names == ("hand/ready", "arm/ready")
+    assert np.array_equal(configuration_of(file, "ready", model), [0.25, -0.5, 2.0])
+    assert file.configuration_names == ("hand/ready", "arm/ready")
 
 
 @pytest.mark.parametrize(
@@ -100,32 +100,32 @@ def test_states_of_other_groups_do_not_count(tmp_path: Path, model: RobotModel) 
         (' name="ready"', "", ":2: group_state: expected <group_state> with the attribute 'name'"),
     ],
 )
-def test_a_posture_that_cannot_be_taken_is_refused(
+def test_a_configuration_that_cannot_be_taken_is_refused(
     tmp_path: Path, model: RobotModel, old: str, new: str, text: str
 ) -> None:
     assert READY.count(old) == 1
     with pytest.raises(InputError) as caught:
-        posture_of(srdf(tmp_path, READY.replace(old, new)), "ready", model)
+        configuration_of(srdf(tmp_path, READY.replace(old, new)), "ready", model)
 
     assert str(caught.value) == f"arm.srdf{text}"
 
 
-def test_two_postures_of_one_name_need_their_groups(tmp_path: Path, model: RobotModel) -> None:
+def test_two_configurations_of_one_name_need_their_groups(tmp_path: Path, model: RobotModel) -> None:
     file = srdf(tmp_path, READY, READY.replace('"arm"', '"all"').replace("-0.5", "0.5"))
 
     with pytest.raises(InputError) as caught:
-        posture_of(file, "ready", model)
+        configuration_of(file, "ready", model)
 
-    text = ":3: group_state 'ready': expected one posture of this name, got arm/ready, all/ready"
+    text = ":3: group_state 'ready': expected one configuration of this name, got arm/ready, all/ready"
     assert str(caught.value) == f"arm.srdf{text}"
-    assert np.array_equal(posture_of(file, "all/ready", model), [0.25, 0.5, 2.0])
+    assert np.array_equal(configuration_of(file, "all/ready", model), [0.25, 0.5, 2.0])
 
 
 def test_limits_of_the_cell_count(tmp_path: Path, model: RobotModel) -> None:
     joints = (replace(model.joints[0], upper=0.2), *model.joints[1:])
 
     with pytest.raises(InputError, match=r"from -1 to 0\.2 m, its limits here, got 0\.25$"):
-        posture_of(srdf(tmp_path, READY), "ready", replace(model, joints=joints))
+        configuration_of(srdf(tmp_path, READY), "ready", replace(model, joints=joints))
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Names that the reader does not know are remarks; what looks like a slip can be put right by the cell."""
+"""Names that the reader does not know are remarks; what looks like a mistake can be put right by the cell."""
 
 from pathlib import Path
 
@@ -99,7 +99,7 @@ def test_a_name_that_resembles_a_missing_one_is_refused(tmp_path: Path, lines: t
 
 
 @pytest.mark.parametrize(
-    ("limit", "stated", "slip", "key"),
+    ("limit", "stated", "fault", "key"),
     [
         ('lower="-1" upper="1" velocity="1000"', {"velocity": 2.0}, "a velocity limit", "velocity_deg_s: …"),
         ('lower="-1" upper="1" velocity="inf"', {"velocity": 2.0}, "a velocity limit", "velocity_deg_s: …"),
@@ -109,15 +109,15 @@ def test_a_name_that_resembles_a_missing_one_is_refused(tmp_path: Path, lines: t
         ('lower="2" upper="-2" velocity="3"', {"lower": -2.0, "upper": 2.0}, "'lower' below 'upper'", "lower_deg: …"),
     ],
 )
-def test_a_slip_names_a_cure_and_the_cure_works(
-    tmp_path: Path, limit: str, stated: dict[str, float], slip: str, key: str
+def test_a_fault_names_a_cure_and_the_cure_works(
+    tmp_path: Path, limit: str, stated: dict[str, float], fault: str, key: str
 ) -> None:
     lines = arm(f"<limit {limit}/>")
     message = refused(tmp_path, *lines)
 
     robot = loaded(tmp_path, *lines, options=UrdfOptions(limits={"a1": StatedLimits(**stated)}))
 
-    assert message.startswith(f"r.urdf:4: joint 'a1': expected {slip}")
+    assert message.startswith(f"r.urdf:4: joint 'a1': expected {fault}")
     assert key in message
     assert message.endswith("}}`")
     assert {name: getattr(robot.model.joints[0], name) for name in stated} == stated
@@ -131,16 +131,16 @@ def test_zero_and_minus_zero_leave_no_room_until_the_cell_states_limits(tmp_path
     assert loaded(tmp_path, *lines, options=options).model.joints[0].lower == -1.0
 
 
-def test_slips_of_joints_that_are_not_driven_do_not_matter(tmp_path: Path) -> None:
-    slip = '<limit lower="-1e16" upper="1e16" velocity="1000" effort="inf"/>'
+def test_faults_of_joints_that_are_not_driven_do_not_matter(tmp_path: Path) -> None:
+    fault = '<limit lower="-1e16" upper="1e16" velocity="1000" effort="inf"/>'
     lines = (
         *ARM,
         '<link name="tool0"/>',
         joint("m", "tip", "tool0", "", kind="fixed"),
         '<link name="f"/>',
-        joint("locked", "tip", "f", slip),
+        joint("locked", "tip", "f", fault),
         '<link name="g"/>',
-        joint("twin", "tip", "g", f'<mimic joint="a1"/>{slip}'),
+        joint("twin", "tip", "g", f'<mimic joint="a1"/>{fault}'),
     )
     model = loaded(tmp_path, *lines, options=UrdfOptions(locked={"locked": 0.5})).model
 
@@ -164,4 +164,4 @@ def test_infinite_limits_are_read_as_such_and_not_as_numbers(tmp_path: Path) -> 
     limit = read_document(path).joints["a1"].limit
 
     assert (limit.lower, limit.upper) == (None, None)
-    assert f"{np.inf:g} rad" in limit.position_slip
+    assert f"{np.inf:g} rad" in limit.position_fault
