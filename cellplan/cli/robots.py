@@ -19,7 +19,7 @@ SCHEMA = "cellplan.robots/1"
 Model = Annotated[
     str | None,
     typer.Argument(
-        metavar="[MODEL]", help="URDF, xacro file, joint-axis table or bundled robot to describe.", show_default=False
+        metavar="MODEL", help="URDF, xacro file, joint-axis table or bundled robot to describe.", show_default=False
     ),
 ]
 PackageDirs = Annotated[
@@ -52,10 +52,10 @@ def robots(
     xacro_arg: XacroArgs = None,
     as_json: AsJson = False,
 ) -> None:
-    """List the bundled robots with reach, limits and source, or describe one robot.
+    """List the bundled robots, or describe what the file of one says.
 
-    Of one robot: the possible flanges, joints with limits, what is missing, bodies and their size, and the lines to
-    write into a cell.
+    The list has reach, limits and source. Of one robot: the possible flanges, joints with limits, what is missing,
+    bodies and their size, and the lines to write into a cell.
     """
     with json_failure(SCHEMA, desired=as_json):
         if model is None and (flange or package_dir or xacro_arg):

@@ -10,6 +10,7 @@ import pytest
 from builders.xacro_texts import write_arm
 
 from cellplan.cli.main import run
+from cellplan.io.yaml.writer import flow_text
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +95,19 @@ def lift(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 def test_a_file_is_described_with_the_lines_for_a_cell(lift: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["robots", lift]) == 0
     assert capsys.readouterr().out == TEXT
+
+
+def test_a_table_is_described_as_a_bundled_robot_is(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["robots", str(cells / "robots" / "turntable.yaml")]) == 0
+
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "turntable"
+    assert lines[3].startswith("  flange at [0, 0, ")
+    assert lines[-3:] == [
+        "robots:",
+        "  turntable:",
+        f"    model: {flow_text(str(cells / 'robots' / 'turntable.yaml'))}",
+    ]
 
 
 def test_a_machine_gets_the_same_about_a_file(lift: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -38,11 +38,9 @@ def _blanks(record: dict[str, Any]) -> str:
 
 def _flange_lines(record: dict[str, Any]) -> Iterator[str]:
     """Base, flange and the other links that may be the flange."""
-    if not record["flange"]:
-        return
     xyz, rpy = (", ".join(f"{value:.4g}" for value in record["flange_at"][key]) for key in ("xyz_mm", "rpy_deg"))
     at = f"[{xyz}] mm, turned [{rpy}] deg, with all joints at zero"
-    yield f"  base {record['base']}, flange {record['flange']} at {at}"
+    yield f"  base {record['base']}, flange {record['flange']} at {at}" if record["flange"] else f"  flange at {at}"
     rows = [
         (
             each["link"],
