@@ -170,3 +170,23 @@ def test_a_xacro_file_is_described_with_its_arguments_and_what_was_not_read(
 def test_an_argument_without_a_value_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["robots", "arm.urdf.xacro", "--xacro-arg", "prefix"]) == 2
     assert "--xacro-arg: expected NAME=VALUE, got 'prefix'" in capsys.readouterr().err
+
+
+def test_a_machine_gets_the_zero_that_positions_count_from(listed: dict[str, Any]) -> None:
+    zeros = {robot["name"]: robot["zero"] for robot in listed["robots"]}
+
+    assert zeros["kuka_kr6"]["is_stated"]
+    assert zeros["kuka_kr6"]["controller"] == {
+        "A2": "-model",
+        "B2": "model - 90 deg",
+        "C2": "model + 90 deg",
+        "D2": "-model",
+        "F2": "-model",
+    }
+    assert zeros["abb_irb1600"]["line"] == "joint positions count from the model's zero, which is the controller's"
+    assert zeros["reis_rv20_16"] == {
+        "line": "joint positions count from the model's zero, taken as the controller's; not confirmed",
+        "is_stated": False,
+        "controller": {},
+        "source": "not stated",
+    }
