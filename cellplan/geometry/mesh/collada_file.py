@@ -48,7 +48,8 @@ def parse_collada(data: bytes, name: str, *, is_upright: bool) -> tuple[Triangle
         side = float(np.linalg.det(X[:3, :3]))
         if side == 0.0:
             raise InputError(f"{name}: expected nodes that keep a volume, got one that is scaled to nothing")
-        vertices = meter * (points @ X[:3, :3].T + X[:3, 3]) @ turn.T
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused by name later
+            vertices = meter * (points @ X[:3, :3].T + X[:3, 3]) @ turn.T
         faces = cut_polygons(vertices, flat, sizes, name)
         count, offset = count + len(faces), offset + len(vertices)
         if count > MAX_TRIANGLES or offset > 3 * MAX_TRIANGLES:

@@ -18,6 +18,11 @@ from cellplan.geometry.mesh.numbers import text_numbers
 NAMESPACE: Final = "http://www.collada.org/2005/11/COLLADASchema"
 FACES: Final = {"triangles": 3, "tristrips": None, "trifans": None, "polygons": None, "polylist": None}
 TRANSFORMS: Final = {"matrix": 16, "translate": 3, "rotate": 4, "scale": 3}  # and how many numbers each has
+TARGETS: Final = {
+    "geometry": "library_geometries/geometry[mesh]",
+    "node": ".//node[@id]",
+    "visual_scene": "library_visual_scenes/visual_scene[@id]",
+}  # what an element instance_… may refer to
 UNSUPPORTED: Final = frozenset({"ph", "skew", "lookat", "instance_controller"})  # shapes that would be lost or wrong
 TEXTS: Final = frozenset({"up_axis", "float_array", "p", "vcount", *TRANSFORMS})
 MESHES: Final = {"geometry", "mesh", "source", "technique_common", "accessor", "param", "vertices", "input", *FACES}
@@ -90,6 +95,7 @@ def read_collada(data: bytes, file: str) -> Located:
         seen.add(name)
         for mesh in _all(geometry, "mesh"):
             _reduce_mesh(mesh)
+    _check_references(root)
     root.set("xmlns", NAMESPACE)
     return root
 
@@ -117,6 +123,16 @@ def _located(element: ET.Element) -> Located:
     if not isinstance(element, Located):
         raise TypeError("an element without a line")
     return element
+
+
+def _check_references(root: Located) -> None:
+    """Whatever is instanced stands in this file."""
+    for tag, path in TARGETS.items():
+        known = {f"#{target.get('id')}" for target in root.iterfind(path)}
+        for link in _all(root, f".//instance_{tag}"):
+            if link.get("url", "") not in known:
+                text = printable(link.get("url", ""))
+                raise link.error(f"expected the url of a <{tag}> of this file, got '{text}'")
 
 
 def _check_transform(element: Located) -> None:

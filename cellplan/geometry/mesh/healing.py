@@ -20,7 +20,8 @@ def require_few_pieces(faces: Indices, *, source: str) -> None:
     Raises:
         InputError: There are more than 5000 connected pieces.
     """
-    pieces = len(np.unique(shells(faces, int(faces.max(initial=-1)) + 1)[faces[:, 0]]))
+    label = shells(faces, count := int(faces.max(initial=-1)) + 1)
+    pieces = int(np.count_nonzero(np.bincount(label[faces[:, 0]], minlength=count)))
     if pieces > MAX_PIECES:
         raise InputError(
             f"{source}: expected a surface of at most {MAX_PIECES} connected components, got {pieces}: "
@@ -75,6 +76,8 @@ def turn_outward(vertices: Array, faces: Indices, *, source: str) -> Indices:
         faces = faces[:, ::-1]
     names, label = np.unique(shells(faces, len(vertices))[faces[:, 0]], return_inverse=True)
     inward = np.flatnonzero(np.bincount(label, weights=face_volumes(vertices, faces)) < 0.0)
+    if not inward.size:
+        return faces
     low, high = _boxes(vertices, faces, label, count=len(names))
     turned = faces.copy()
     for shell in inward:

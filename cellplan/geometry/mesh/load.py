@@ -113,7 +113,9 @@ def _checked_mesh(loose: Triangles, name: str, *, scale: Array) -> Mesh:
         raise InputError(f"{name}: expected scale factors that are finite and not zero, got {factors.tolist()}")
     with np.errstate(over="ignore"):
         vertices = vertices * factors
-    _require_likely_size(vertices[np.unique(faces)], name)
+    is_used = np.zeros(len(vertices), dtype=bool)
+    is_used[faces] = True
+    _require_likely_size(vertices[is_used], name)
     outward = faces if np.prod(np.sign(factors)) > 0.0 else faces[:, ::-1]
     mesh = make_mesh(vertices, outward, source=name)
     require_few_pieces(mesh.faces, source=name)

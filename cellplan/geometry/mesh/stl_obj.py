@@ -109,13 +109,13 @@ def _parse_stl(data: bytes, name: str) -> Triangles:
 def _read_stl(data: bytes, name: str, *, triangles: int) -> Triangles:
     """Have trimesh read an STL file that is known to hold so many triangles."""
     require_likely_count(triangles, name)
-    import trimesh
+    from trimesh.exchange.stl import load_stl
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what it would warn of is counted below
-            mesh = trimesh.load_mesh(BytesIO(data), file_type="stl", process=False)
-        vertices, faces = np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+            mesh = load_stl(BytesIO(data))
+        vertices, faces = np.array(mesh["vertices"], dtype=np.float64), np.array(mesh["faces"], dtype=np.int64)
     except Exception as error:  # noqa: BLE001 - whatever the library stumbles over, the file is at fault
         reason = " ".join(str(error).split())[:100] or type(error).__name__
         raise InputError(f"{name}: expected an STL file that can be read, got a damaged one: {reason}") from None

@@ -42,12 +42,13 @@ def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
     Raises:
         InputError: More than half of the triangles have no area; a closed surface is in thousands of pieces.
     """
-    welded, corners = _weld(vertices, faces)
+    welded, corners, edges = _weld(vertices, faces)
     whole = corners[_has_three_corners(corners)]
-    if count_edges(whole).crowded:
+    if edges.crowded:
         whole = without_repeats(whole)
-    whole = oriented_alike(whole)
-    is_closed = encloses(whole)
+    if not edges.is_closed:
+        whole = oriented_alike(whole)
+    is_closed = len(whole) > 0 if edges.is_closed else encloses(whole)
     kept = whole[_has_area(welded, whole)]
     flat = len(faces) - int(np.sum(_has_three_corners(corners))) + len(whole) - len(kept)
     _account_for(flat, total=len(faces), source=source)
@@ -65,19 +66,25 @@ def mesh_volume(mesh: Mesh) -> float:
     return _volume(mesh.vertices, mesh.faces)
 
 
-def _weld(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
-    """Merge equal vertices; where that leaves open edges, those that differ by rounding to single precision."""
+def _weld(vertices: Array, faces: Indices) -> tuple[Array, Indices, EdgeCount]:
+    """Merge equal vertices; where that leaves open edges, those that differ by rounding to single precision.
+
+    Returns:
+        The vertices, the corners of all triangles, and the edges of those that still have three.
+    """
     points, corners = _merge(vertices + 0.0, faces, key=vertices + 0.0)  # + 0.0 makes -0 and 0 equal
-    if not count_edges(corners[_has_three_corners(corners)]).open:
-        return points, corners
+    edges = count_edges(corners[_has_three_corners(corners)])
+    if not edges.open:
+        return points, corners, edges
     grid = WELD_FRACTION * float(np.ptp(points, axis=0).max())
     for shift in GRID_SHIFTS:  # two vertices that one grid separates lie in one cell of another
         near, joined = _merge(points, corners, key=np.round(points / grid + shift))
         if len(near) == len(points):
             break  # no two vertices are that near: the file is not one that rounds
-        if not count_edges(joined[_has_three_corners(joined)]).open:
-            return near, joined
-    return points, corners
+        closed = count_edges(joined[_has_three_corners(joined)])
+        if not closed.open:
+            return near, joined, closed
+    return points, corners, edges
 
 
 def _merge(vertices: Array, faces: Indices, *, key: Array) -> tuple[Array, Indices]:

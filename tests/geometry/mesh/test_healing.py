@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cellplan.errors import InputError
+from cellplan.geometry.mesh.counts import ray_winding
 from cellplan.geometry.mesh.healing import MAX_PIECES, require_few_pieces
 from cellplan.geometry.mesh.load import require_enclosing, require_solid
 from cellplan.geometry.mesh.tessellation import tessellate
@@ -106,3 +108,17 @@ def test_a_heap_of_loose_triangles_is_refused() -> None:
     require_few_pieces(np.arange(3 * MAX_PIECES).reshape(-1, 3), source="heap.stl")
     with pytest.raises(InputError, match=f"expected a surface of at most 5000 connected components, got {count}"):
         require_few_pieces(np.arange(3 * count).reshape(-1, 3), source="heap.stl")
+
+
+def test_crossings_of_a_ray_agree_with_the_solid_angle_also_through_edges_and_vertices() -> None:
+    rng = np.random.default_rng(2)
+    ring = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=8)
+    for other in (trimesh.creation.icosphere(subdivisions=1), ring, trimesh.creation.box()):
+        triangles = np.asarray(other.triangles)
+        points = rng.uniform(-1.5, 1.5, (100, 3))
+        points[:40, 1:] = np.asarray(other.vertices)[rng.integers(len(other.vertices), size=40), 1:]
+        points[40:60, 1:] = triangles[rng.integers(len(triangles), size=20), :2].mean(axis=1)[:, 1:]
+        points[:60, 0] *= 3.0 / np.abs(points[:60, 0])  # these lie outside: their rays graze vertices and edges
+        np.testing.assert_array_equal(ray_winding(triangles, points), np.rint(winding_numbers(triangles, points)))
+        turned = triangles[:, ::-1]
+        np.testing.assert_array_equal(ray_winding(turned, points), np.rint(winding_numbers(turned, points)))
