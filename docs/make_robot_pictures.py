@@ -33,6 +33,7 @@ LOWEST, WIDEST = 1.6, 14.0  # [inch] of a row of views with its titles, and acro
 WORKING_POSTURES = {
     "reis_rv20_16": (0, -93, 108, 0, -15, 0),
     "kuka_kr6": (20, -12, 17, 30, 85, 0),
+    "kuka_kr6_maker_zero": (-20, -102, 107, -30, 85, 0),
     "abb_irb1600": (20, -12, 14, 30, 45, 0),
     "staubli_rx90l": (15, -20, 110, 30, 60, 0),
     "staubli_rx90l_as_printed": (15, -20, 110, 0, 60, 0),

@@ -51,11 +51,13 @@ def _record(result: CellCheck) -> dict[str, Any]:
     """The result in printed units."""
     from cellplan.report.record.clearance import left_out_record
     from cellplan.report.record.common import check_record, number
+    from cellplan.report.record.missing_tools import missing_tools
     from cellplan.report.record.open_surfaces import open_surfaces_record
     from cellplan.report.record.tasks import direction_record
     from cellplan.report.text.notes import open_surface_notes
 
     open_surfaces = open_surfaces_record(result.cell)
+    remarks = [*open_surface_notes(open_surfaces), *missing_tools(result.cell)]
     return {
         "cell": result.cell.name,
         "status": "passed" if result.passed else "failed",
@@ -66,7 +68,7 @@ def _record(result: CellCheck) -> dict[str, Any]:
         "direction": {task.name: direction_record(task) for task in result.cell.tasks},
         "checks": [check_record(each) for each in result.checks],
         "open_surfaces": open_surfaces,
-        "remarks": [f"{result.cell.origin.at(key)}: {line}" for key, line in open_surface_notes(open_surfaces)],
+        "remarks": [f"{result.cell.origin.at(key)}: {line}" for key, line in remarks],
         "left_out": left_out_record(result.left_out),
     }
 

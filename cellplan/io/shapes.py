@@ -40,6 +40,16 @@ def pose_from_entry(entry: PoseEntry | None) -> Array:
     return pose(in_si(entry.xyz_mm), in_si(entry.rpy_deg))
 
 
+def direction(written: str | tuple[float, float, float]) -> Array:
+    """Unit vector of a word such as ``+x`` or of a vector of any length."""
+    if isinstance(written, str):
+        vector = np.zeros(3)
+        vector["xyz".index(written[-1])] = -1.0 if written.startswith("-") else 1.0
+        return vector
+    unit: Array = np.array(written) / np.linalg.norm(written)
+    return unit
+
+
 def centred_solid(
     entry: PartShapeEntry | ToolBodyEntry | ObstacleEntry | AttachmentEntry, read_mesh: MeshReader
 ) -> tuple[Solid, Array]:

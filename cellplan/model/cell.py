@@ -13,7 +13,7 @@ from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
 from cellplan.model.joint_limits import JointLimits
-from cellplan.model.mounting import Pedestal
+from cellplan.model.mounting import Mount
 from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
@@ -65,7 +65,7 @@ class Robot:
         acceleration: Accelerations that its joints are checked against.
         controller_cycle: Cycle of its controller in [s], over which jerk is computed.
         attachments: Solids mounted on its links, their poses ``X_BS`` in B while all joints read zero.
-        pedestal: Pedestal below the base; None for a base on the floor or on an obstacle.
+        pedestal: What the base stands on, hangs from or is fixed to; None for a base on the floor or on an obstacle.
     """
 
     name: str
@@ -78,7 +78,7 @@ class Robot:
     acceleration: AccelerationRule = USUAL_ACCELERATION
     controller_cycle: float = USUAL_CYCLE
     attachments: tuple[Body, ...] = ()
-    pedestal: Pedestal | None = None
+    pedestal: Mount | None = None
 
     def __repr__(self) -> str:
         """One line without arrays."""

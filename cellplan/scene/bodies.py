@@ -31,8 +31,8 @@ class SceneBody:
     """One solid of the cell.
 
     Attributes:
-        name: ``<robot>/<body>``, ``<robot>/tool``, ``<robot>/pedestal`` or ``<robot>/<attachment>``, ``part`` or the
-            name of a thing in the surroundings.
+        name: ``<robot>/<body>``, ``<robot>/tool``, ``<robot>/pedestal``, ``<robot>/mount`` or ``<robot>/<attachment>``,
+            ``part`` or the name of a thing in the surroundings.
         kind: What it belongs to.
         shape: The solid, in its own frame S.
         robot: The robot that moves it; None when it is fixed in the world.
@@ -143,9 +143,9 @@ def _mounted_bodies(robot: Robot) -> list[SceneBody]:
         for body in robot.attachments
     ]
     below = None if robot.pedestal is None else robot.pedestal.solid(robot.X_WB)
-    if below is not None:
+    if robot.pedestal is not None and below is not None:
         shape, X_BS = below
-        name = f"{robot.name}/pedestal"
+        name = f"{robot.name}/{robot.pedestal.name}"
         bodies.append(SceneBody(name=name, kind=Kind.PEDESTAL, shape=shape, robot=robot.name, link=BASE, X_BS=X_BS))
     return bodies
 

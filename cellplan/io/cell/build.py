@@ -6,9 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from cellplan.geometry.transforms import Array
 from cellplan.io.cell.build_accelerations import acceleration_rule, controller_cycle
-from cellplan.io.cell.build_mounting import build_attachments, build_pedestal, floor_height_mm
+from cellplan.io.cell.build_mounting import build_attachments, build_mount, rail_bodies, with_floor_height
 from cellplan.io.cell.rules import needs_surface
 from cellplan.io.robots.build_controller import build_controller
 from cellplan.io.robots.rules import home_configuration, start_posture
@@ -26,7 +25,7 @@ from cellplan.io.schema.task import (
     TrapezoidEntry,
 )
 from cellplan.io.schema.units import Mm, in_si, si_or_none
-from cellplan.io.shapes import MeshReader, centred_solid, obstacle_shape, pose_from_entry, tool_solid
+from cellplan.io.shapes import MeshReader, centred_solid, direction, obstacle_shape, pose_from_entry, tool_solid
 from cellplan.model.cell import (
     CheckSettings,
     Exclusion,
@@ -78,7 +77,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
     controller = model.controller or build_controller(entry.controller, model.joints)
     return Robot(
         name=name,
-        model=replace(model, controller=controller),
+        model=replace(model, controller=controller, bodies=(*rail_bodies(entry, read_mesh), *model.bodies)),
         X_WB=pose_from_entry(entry.base),
         tool=_tool(entry.tool, read_mesh),
         start=start,
@@ -87,7 +86,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         acceleration=acceleration_rule(entry, document.acceleration, joints=len(model.joints)),
         controller_cycle=controller_cycle(entry, document),
         attachments=build_attachments(entry.attachments, model, read_mesh),
-        pedestal=build_pedestal(entry, document.environment),
+        pedestal=build_mount(entry, document.environment),
     )
 
 
@@ -201,16 +200,6 @@ def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
     return f"-{normal}", "+y" if is_default and normal == "x" else entry.tool_x
 
 
-def direction(written: Direction) -> Array:
-    """Unit vector of a word such as ``+x`` or of a vector of any length."""
-    if isinstance(written, str):
-        vector = np.zeros(3)
-        vector["xyz".index(written[-1])] = -1.0 if written.startswith("-") else 1.0
-        return vector
-    unit: Array = np.array(written) / np.linalg.norm(written)
-    return unit
-
-
 def _tolerance(entry: ToleranceEntry) -> Tolerance:
     """Allowed tool errors in [m] and [rad]."""
     return Tolerance(
@@ -246,8 +235,7 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
             entry["path"].setdefault("offset_mm", 0.0)
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}
     for name, robot in document.robots.items():
-        if robot.pedestal is not None:
-            values["robots"][name]["pedestal"]["floor_z_mm"] = floor_height_mm(robot, document.environment)
+        values["robots"][name] = with_floor_height(values["robots"][name], robot, document.environment)
     for grasp in values["part"]["held_by"][:1]:
         del grasp["axes"]  # the first holder has no choice
     return values

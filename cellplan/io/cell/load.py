@@ -18,7 +18,7 @@ from cellplan.io.cell.build import (
     resolved_document,
 )
 from cellplan.io.cell.build_accelerations import acceleration_findings
-from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings
+from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings, on_mount, rail_entries
 from cellplan.io.cell.build_solver import build_solver
 from cellplan.io.cell.changes import changed, plain_values
 from cellplan.io.cell.referenced_files import Sources
@@ -131,7 +131,10 @@ def _models(valid: ValidEntries, document: YamlDocument, sources: Sources) -> di
         written = document.root["robots"][name]
         if name not in found and isinstance(written, dict) and isinstance(written.get("model"), str):
             sources.look_for_model(name, written["model"])
-    return {name: with_statements(valid.robots[name], model) for name, model in found.items() if model is not None}
+    models = {name: model for name, model in found.items() if model is not None}
+    return {
+        name: on_mount(valid.robots[name], with_statements(valid.robots[name], model)) for name, model in models.items()
+    }
 
 
 def _targets(valid: ValidEntries, sources: Sources) -> Targets:
@@ -190,6 +193,7 @@ def _read_meshes(valid: ValidEntries, sources: Sources) -> None:
         place: KeyPath = ("robots", name, "tool")
         shapes += [((*place, "bodies", index), body) for index, body in enumerate(robot.tool.bodies)]
         shapes += [(("robots", name, "attachments", index), it) for index, it in enumerate(robot.attachments)]
+        shapes += [(("robots", name, "mount", "rail", key, index), it) for key, index, it in rail_entries(robot)]
         shapes += [((*place, "geometry"), robot.tool.geometry)] if robot.tool.geometry is not None else []
     part = valid.part.geometry if valid.part is not None else None
     if part is not None and part.mesh is not None and part.unit is not None:

@@ -3,13 +3,15 @@
 from collections.abc import Iterable
 from typing import Annotated, Any, ClassVar, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, StringConstraints, Tag
 from pydantic_core import PydanticCustomError
 
 from cellplan.io.schema.units import Deg, Mm, Within
 
 NAME_PATTERN: Final = "^[A-Za-z0-9_][A-Za-z0-9_-]{0,39}$"
 NAME_WORDS: Final = "a name of 1 to 40 letters, digits, '_' or '-' that does not start with '-'"
+
+DIRECTION_WORDS: Final = "+x, -x, +y, -y, +z, -z or a direction [x, y, z]"
 
 FARTHEST_MM: Final = 100_000.0  # nothing in a cell is farther away than 100 m
 THINNEST_MM: Final = 0.001  # nothing solid is thinner than a micrometre
@@ -98,6 +100,12 @@ def by_kind(words: str, **kinds: type | tuple[type, ...]) -> Discriminator:
         return None
 
     return Discriminator(tag, custom_error_type="choice", custom_error_message=words)
+
+
+Direction = Annotated[
+    Annotated[SignedAxis, Tag(f"<{DIRECTION_WORDS}>")] | Annotated[Vector, Tag("<list>")],
+    by_kind(DIRECTION_WORDS, list=tuple),
+]
 
 
 class Entry(BaseModel):

@@ -1,4 +1,4 @@
-"""Pedestals of robots and attachments of their links as written in a cell file."""
+"""What robots stand on or hang from, and attachments of their links, as written in a cell file."""
 
 from typing import ClassVar, Self
 
@@ -14,6 +14,7 @@ from cellplan.io.schema.shapes import (
     MeshUnit,
     OneShape,
     SphereEntry,
+    ToolBodyEntry,
 )
 
 PEDESTAL_SHAPES = ("cylinder", "box")
@@ -31,24 +32,49 @@ class PedestalBoxEntry(Entry):
     size_mm: tuple[Size, Size] = Field(description="Edge lengths along the x and y of the base.")
 
 
-class PedestalEntry(Entry):
-    """What a robot stands on, from the floor to the origin of its base: exactly one of cylinder and box."""
+class ColumnEntry(Entry):
+    """A column between a robot's base and what carries it: exactly one of cylinder and box."""
 
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PEDESTAL_SHAPES))
 
-    cylinder: PedestalColumnEntry | None = Field(default=None, description="Upright column below the base.")
-    box: PedestalBoxEntry | None = Field(default=None, description="Upright box below the base, turned as the base is.")
-    floor_z_mm: Coordinate | None = Field(
-        default=None,
-        description="Height of the floor that it stands on; when absent the highest plane of the environment that is "
-        "not above the base.",
-    )
+    cylinder: PedestalColumnEntry | None = Field(default=None, description="Round column through the base's origin.")
+    box: PedestalBoxEntry | None = Field(default=None, description="Box round the base's origin, turned as it is.")
 
     @model_validator(mode="after")
     def _is_one_shape(self) -> Self:
         """Exactly one shape."""
         require_one(self, PEDESTAL_SHAPES)
         return self
+
+
+class PedestalEntry(ColumnEntry):
+    """What a robot stands on, upright from the floor to the origin of its base; a tilted base cuts off its top."""
+
+    floor_z_mm: Coordinate | None = Field(
+        default=None,
+        description="Height of the floor that it stands on; when absent the highest plane of the environment that is "
+        "not above the base.",
+    )
+
+
+class HangingEntry(ColumnEntry):
+    """What a robot hangs from upside down, upright from the origin of its base to the ceiling."""
+
+    ceiling_z_mm: Coordinate = Field(description="Height of the ceiling.")
+
+
+class WallEntry(ColumnEntry):
+    """What a robot is fixed to sideways, along the -z axis of its base."""
+
+    length_mm: Size = Field(description="Length from the base to the wall.")
+
+
+class RailBodyEntry(ToolBodyEntry):
+    """A solid of a rail: exactly one shape."""
+
+    at: PoseEntry = Field(
+        default=PoseEntry(), description="Pose of the solid in the base frame while the rail reads zero."
+    )
 
 
 class AttachmentEntry(OneShape):

@@ -1,13 +1,27 @@
 """Robots of a cell: model, place, tool, start posture, weights and limits."""
 
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import Field, Tag, model_validator
+from pydantic import ConfigDict, Field, Tag, model_validator
 
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
-from cellplan.io.schema.common import Angle, Coordinate, Coordinates, Entry, PoseEntry, Size, Text, by_kind, rule
+from cellplan.io.schema.common import (
+    Angle,
+    Coordinate,
+    Coordinates,
+    Direction,
+    Entry,
+    Name,
+    PoseEntry,
+    Size,
+    Text,
+    by_kind,
+    one_of_keys,
+    require_one,
+    rule,
+)
 from cellplan.io.schema.controller import ControllerEntry
-from cellplan.io.schema.mounting import AttachmentEntry, PedestalEntry
+from cellplan.io.schema.mounting import AttachmentEntry, HangingEntry, PedestalEntry, RailBodyEntry, WallEntry
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
 from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Within
 
@@ -19,6 +33,8 @@ WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses
 HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
 ROUGHEST_MM: Final = 1_000.0  # bodies that are farther off stand for nothing
 AXIS_LIMIT: Final = 64  # joints of one robot
+SOLID_LIMIT: Final = 50  # solids of a track or a carriage
+MOUNTS: Final = ("pedestal", "tilted", "hanging", "wall", "rail")
 
 JointAngle = Annotated[Deg, Within(ge=-LARGEST_JOINT_DEG, le=LARGEST_JOINT_DEG)]
 TurningSpeed = Annotated[DegPerS, Within(gt=0.0, le=FASTEST_DEG_S)]
@@ -140,6 +156,51 @@ class PayloadEntry(Entry):
     source: Text = Field(default="not stated", description="Where the figures come from.")
 
 
+class RailEntry(Entry):
+    """A rail that carries the robot: a prismatic joint before its first one."""
+
+    name: Name = Field(default="rail", description="Name of the joint, in tables, start postures and reports.")
+    axis: Direction = Field(description="Direction of the rail in the base frame: one of +x, -x, … or a vector.")
+    lower_mm: Coordinate = Field(description="Lowest position.")
+    upper_mm: Coordinate = Field(description="Highest position.")
+    velocity_mm_s: SlidingSpeed = Field(description="Largest speed.")
+    acceleration_mm_s2: SlidingAcceleration | None = Field(default=None, description="Largest acceleration, if known.")
+    jerk_mm_s3: SlidingJerk | None = Field(default=None, description="Largest jerk, if known.")
+    track: tuple[RailBodyEntry, ...] = Field(
+        default=(), max_length=SOLID_LIMIT, description="Solids that stand still: ROBOT/track, ROBOT/track_2, …."
+    )
+    carriage: tuple[RailBodyEntry, ...] = Field(
+        default=(), max_length=SOLID_LIMIT, description="Solids that ride along: ROBOT/carriage, ROBOT/carriage_2, …."
+    )
+
+    @model_validator(mode="after")
+    def _has_a_range(self) -> Self:
+        """Lower below upper."""
+        if not self.lower_mm < self.upper_mm:
+            raise rule(f"expected a number above lower_mm = {self.lower_mm:g}, got {self.upper_mm:g}", "upper_mm")
+        return self
+
+
+class MountEntry(Entry):
+    """How a robot is mounted: exactly one of the keys."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*MOUNTS))
+
+    pedestal: PedestalEntry | None = Field(default=None, description="Upright on a pedestal, as with the key pedestal.")
+    tilted: PedestalEntry | None = Field(
+        default=None, description="Tilted on an upright column that is cut off along the plane of the base."
+    )
+    hanging: HangingEntry | None = Field(default=None, description="Upside down below a ceiling.")
+    wall: WallEntry | None = Field(default=None, description="On a bracket behind its base, at a wall or elsewhere.")
+    rail: RailEntry | None = Field(default=None, description="On a carriage that moves along a rail.")
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        """Exactly one way."""
+        require_one(self, MOUNTS)
+        return self
+
+
 class RobotEntry(Entry):
     """A robot placed in the cell."""
 
@@ -165,6 +226,9 @@ class RobotEntry(Entry):
     pedestal: PedestalEntry | None = Field(
         default=None,
         description="Column or box from the floor to the base; it moves with the base and is judged like any body.",
+    )
+    mount: MountEntry | None = Field(
+        default=None, description="How the base is mounted, with the bodies that this takes; excludes pedestal."
     )
     tool: ToolEntry = Field(
         default=ToolEntry(), description="What the robot carries; without it the flange is the tool tip."
@@ -213,11 +277,13 @@ class RobotEntry(Entry):
 
     @model_validator(mode="after")
     def _starts_once(self) -> Self:
-        """Start posture and home are given at most once each; locked joints name their unit."""
+        """Start posture, home and mount are given at most once each; locked joints name their unit."""
         if self.start_deg is not None and self.start is not None:
             raise rule("expected either start_deg or start, got both", "start")
         if self.home_deg is not None and self.home is not None:
             raise rule("expected either home_deg or home, got both", "home")
+        if self.pedestal is not None and self.mount is not None:
+            raise rule("expected either pedestal or mount, got both", "mount")
         joints: set[str] = set()
         for key in self.locked:
             joint, _, unit = key.rpartition("_")

@@ -6,11 +6,12 @@ from pydantic import ConfigDict, Field, Tag, model_validator
 
 from cellplan.io.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
 from cellplan.io.schema.common import (
+    DIRECTION_WORDS,
     Angle,
     Coordinate,
+    Direction,
     Entry,
     Name,
-    SignedAxis,
     Size,
     Text,
     Vector,
@@ -31,7 +32,6 @@ MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
 Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
 
-DIRECTION_WORDS: Final = "+x, -x, +y, -y, +z, -z or a direction [x, y, z]"
 TOOL_AXIS_WORDS: Final = f"normal, {DIRECTION_WORDS}"
 LAW_WORDS: Final = "constant, trapezoid, quintic or {trapezoid: {ramp: 0.25}}"
 CORNER_WORDS: Final = "stop or {blend_mm: 2}"
@@ -97,10 +97,6 @@ class CsvEntry(Entry):
 CsvChoice = Annotated[
     Annotated[Text, Tag(f"<{CSV_WORDS}>")] | Annotated[CsvEntry, Tag("<mapping>")],
     by_kind(CSV_WORDS, mapping=dict),
-]
-Direction = Annotated[
-    Annotated[SignedAxis, Tag(f"<{DIRECTION_WORDS}>")] | Annotated[Vector, Tag("<list>")],
-    by_kind(DIRECTION_WORDS, list=tuple),
 ]
 ToolAxis = Annotated[
     Annotated[Literal["normal", "+x", "-x", "+y", "-y", "+z", "-z"], Tag(f"<{TOOL_AXIS_WORDS}>")]

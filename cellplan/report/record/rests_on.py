@@ -8,6 +8,7 @@ from cellplan.model.payload import LoadUse
 from cellplan.model.units import MM
 from cellplan.report.record.common import Number, number
 from cellplan.report.record.controller import ZeroRecord, zero_record
+from cellplan.report.record.missing_tools import missing_tools
 from cellplan.report.record.payload import LoadRecord, loads_record, unjudged_loads
 
 
@@ -36,7 +37,7 @@ def rests_on_record(cell: Cell, loads: Sequence[LoadUse]) -> RestsOnRecord:
         "body_accuracy": "add" if cell.checks.adds_accuracy else "report",
         "payload": loads_record(loads),
         "zero": {robot.name: zero_record(robot.model) for robot in cell.robots},
-        "lines": [*unstated_bodies(cell), *unjudged_loads(loads)],
+        "lines": [*(text for _, text in missing_tools(cell)), *unstated_bodies(cell), *unjudged_loads(loads)],
     }
 
 

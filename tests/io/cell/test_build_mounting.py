@@ -67,8 +67,8 @@ def test_the_written_cell_states_the_floor_of_a_pedestal_and_reads_back(load: Ca
         ),
         (
             "    base: {xyz_mm: [2000, 0, 900], rpy_deg: [180, 0, 0]}\n    pedestal: {cylinder: {radius_mm: 230}}",
-            "c:10: robots.worker.pedestal: expected a base that stands upright, got one that leans by 180 deg: draw "
-            "what it hangs on or stands on in the environment",
+            "c:10: robots.worker.pedestal: expected a base that stands upright, got one that leans by 180 deg: use "
+            "mount: {tilted: …}, {wall: …} or {hanging: …}",
         ),
         (
             f"{BASE_LINE}\n    attachments: [{{link: C4, sphere: {{radius_mm: 50}}}}]",

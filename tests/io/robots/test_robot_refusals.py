@@ -14,8 +14,8 @@ Refuse = Callable[..., list[str]]
             "    base: {xyz",
             "    bsae: {xyz",
             "c:9: robots.worker.bsae: unknown key, did you mean 'base'?; allowed: model, package_dirs, flange, "
-            "base, bodies, payload, pedestal, tool, attachments, start_deg, start, home_deg, home, weights, limits, "
-            "acceleration, controller_cycle_ms, locked",
+            "base, bodies, payload, pedestal, mount, tool, attachments, start_deg, start, home_deg, home, weights, limits, "
+            "acceleration, controller, controller_cycle_ms, locked",
         ),
         (
             "xyz_mm: [2000, 0, 0]",
@@ -149,9 +149,8 @@ Refuse = Callable[..., list[str]]
         (
             "model: abb_irb1600",
             "model: abb_irb160",
-            "c:8: robots.worker.model: expected a bundled robot (abb_irb1600, kuka_kr6, planar_3r, reis_rv20_16, "
-            "staubli_rx90l, staubli_rx90l_as_printed) or a .urdf or .yaml file, got 'abb_irb160', did you mean "
-            "'abb_irb1600'?",
+            "c:8: robots.worker.model: expected a bundled robot (`cellplan robots` lists them) or a .urdf or .yaml "
+            "file, got 'abb_irb160', did you mean 'abb_irb1600'?",
         ),
         (
             "model: abb_irb1600",
