@@ -50,7 +50,8 @@ def _lines(record: dict[str, Any]) -> list[str]:
 
     lines = [record["name"], f"  reach {record['reach_mm']:g} mm from the first axis; {record['source']}"]
     if (published := record["published_reach"]) is not None:
-        lines.append(f"  published reach {published['mm']:g} mm, to: {published['to']} ({published['source']})")
+        to = "" if published["to"] is None else f" to {published['to']}"
+        lines.append(f"  published reach {published['mm']:g} mm{to} ({published['source']})")
     for joint in record["joints"]:
         limits, speed = limits_text(joint)
         lines.append(f"  {joint['name']:<10} {limits:<22} {speed}")

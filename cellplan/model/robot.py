@@ -150,12 +150,12 @@ class PublishedReach:
 
     Attributes:
         distance: Largest distance from the first axis in [m].
-        to: The word flange, or the joint to whose point it is measured.
+        to: The word flange, or the joint to whose point it is measured; None when it is not published.
         source: Where the figure comes from.
     """
 
     distance: float
-    to: str
+    to: str | None
     source: str
 
 

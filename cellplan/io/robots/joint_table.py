@@ -94,8 +94,8 @@ def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Findin
     yield from payload_findings(("payload",), table.payload, turning, document)
     turns = {name: joint.type == "revolute" for name, joint in table.joints.items()}
     yield from controller_findings(("controller",), table.controller, turns, document)
-    if table.reach is not None and table.reach.to not in (*table.joints, "flange", "not stated"):
-        text = unknown_name("flange or a joint", table.reach.to, ("flange", *table.joints))
+    if table.reach is not None and table.reach.to not in (None, "flange", *table.joints):
+        text = unknown_name("flange or a joint", str(table.reach.to), ("flange", *table.joints))
         yield document.finding(("reach", "to"), text)
     named = [(index, body.name) for index, body in enumerate(table.solids) if body.name is not None]
     for order, (index, name) in enumerate(named):

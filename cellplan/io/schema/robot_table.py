@@ -167,8 +167,9 @@ class ReachEntry(Entry):
     """The maker's figure of the reach, from the first axis."""
 
     distance_mm: Size = Field(description="Largest distance from the first axis.")
-    to: Text = Field(
-        default="not stated", description="The word flange, or the joint to whose point the maker measures."
+    to: Text | None = Field(
+        default=None,
+        description="The word flange, or the joint to whose point the maker measures; absent when it is not published.",
     )
     source: Text = Field(default="not stated", description="Where the figure comes from.")
 
