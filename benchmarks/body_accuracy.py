@@ -30,7 +30,7 @@ from cellplan.model.robot import BASE, Body, RobotModel
 SPREAD: Final = 20_000  # [-] points on the surface of one mesh
 DIRECTIONS: Final = 500  # [-] in which the hull of a mesh is taken
 SEED: Final = 7
-SEGMENTS: Final = 72  # [-] sides round a cylinder
+SEGMENTS: Final = 48  # [-] sides round a cylinder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

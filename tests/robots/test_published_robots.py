@@ -1,6 +1,7 @@
 """Robots after their makers' published figures: kinematics by second opinions, reach, bodies against real meshes."""
 
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -11,7 +12,7 @@ import trimesh
 from body_accuracy import compare, distance_to, mesh_points, skin_points
 
 from cellplan.geometry.transforms import Array, inverse, pose, pose_from, rotation_about, transform_points
-from cellplan.io.robots.bundled import load_bundled
+from cellplan.io.robots import bundled
 from cellplan.io.robots.joint_table import read_robot_table
 from cellplan.io.robots.urdf.load import read_urdf
 from cellplan.kinematics.reach import arm_reach
@@ -119,6 +120,9 @@ PUBLISHED = {
 }
 
 
+load_bundled = cache(bundled.load_bundled)
+
+
 def chain(model: RobotModel) -> ScrewChain:
     tool, weights = Tool(X_FT=np.eye(4), bodies=()), np.ones(len(model.joints))
     return ScrewChain(Robot(name=model.name, model=model, X_WB=np.eye(4), tool=tool, start=None, weights=weights))
@@ -211,6 +215,7 @@ def distance_to_link(model: RobotModel, link: int, points_B: Array) -> Array:
     return nearest
 
 
+@cache
 def skin(model: RobotModel, link: int) -> Array:
     return np.concatenate([skin_points(body, 500) for body in model.bodies if body.link == link])
 
@@ -261,7 +266,13 @@ def test_the_reference_page_shows_the_figures_of_the_table(name: str, repository
     assert (repository / "docs" / "images" / f"robot_{name}.png").stat().st_size < 60_000
 
 
-@pytest.mark.parametrize("name", URDFS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("kuka_kr16_2", "motopos_d500"),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("abb_irb1600_8_145", "staubli_rx160")),
+    ],
+)
 def test_bodies_hold_the_real_robot_as_well_as_they_say(name: str, shared_robots: Path) -> None:
     model = load_bundled(name)
     meshes = mesh_points(shared_robots / URDFS[name] / f"{URDFS[name]}.urdf", model, is_visual=True, count=3000)
