@@ -59,6 +59,7 @@ def header_edit(rng, copy):
             ("# verdict: passed\n", ""),
             ("# cell: small-pair", "# cell: large-pair"),
             ("# mode: simultaneous", "# mode: pairwise"),
+            ("the model's zero", "the maker's zero"),
             ("table v1", "table v2"),
             ("_deg", "_mm"),
             ("run first at reduced speed", "run at full speed"),

@@ -44,3 +44,23 @@ def test_a_machine_gets_the_figures_of_the_data_sheet(listed: dict[str, Any]) ->
 def test_a_robot_named_for_its_reach_has_it(listed: dict[str, Any]) -> None:
     reis = next(robot for robot in listed["robots"] if robot["name"] == "reis_rv20_16")
     assert reis["reach_mm"] == 1600.0  # RV20-16: 20 kg, 1.6 m
+
+
+def test_a_machine_gets_the_zero_that_positions_count_from(listed: dict[str, Any]) -> None:
+    zeros = {robot["name"]: robot["zero"] for robot in listed["robots"]}
+
+    assert zeros["kuka_kr6"]["is_stated"]
+    assert zeros["kuka_kr6"]["controller"] == {
+        "A2": "-model",
+        "B2": "model - 90 deg",
+        "C2": "model + 90 deg",
+        "D2": "-model",
+        "F2": "-model",
+    }
+    assert zeros["abb_irb1600"]["line"] == "joint positions count from the model's zero, which is the controller's"
+    assert zeros["reis_rv20_16"] == {
+        "line": "joint positions count from the model's zero, taken as the controller's; not confirmed",
+        "is_stated": False,
+        "controller": {},
+        "source": "not stated",
+    }

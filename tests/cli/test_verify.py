@@ -48,7 +48,7 @@ def test_an_edited_table_ends_with_two_and_names_the_line(copy: Copy, capsys: py
     assert (status, out) == (2, "")
     table = copy.table("left")
     assert err.splitlines()[0].startswith(f"{table}: changed since the run was written (")
-    assert err.splitlines()[1:] == [f"{table}:15: A_deg: expected a plain decimal number such as -12.5, got 'nan'"]
+    assert err.splitlines()[1:] == [f"{table}:16: A_deg: expected a plain decimal number such as -12.5, got 'nan'"]
 
 
 def test_a_check_that_fails_ends_with_one(copy: Copy, capsys: pytest.CaptureFixture[str]) -> None:

@@ -181,7 +181,7 @@ FORGERIES: dict[str, tuple[Callable[[Path], None], str]] = {
     ),
     "no gap in a table": (
         without_line("left.csv", "# not part of"),
-        "tables/left.csv:213: expected the line '# not part of the program: first to second'",
+        "tables/left.csv:214: expected the line '# not part of the program: first to second'",
     ),
     "gaps one row later": (moved_by_a_step, "expected the line '# not part of the program: first to second'"),
     "a gap of another name": (
