@@ -1,5 +1,6 @@
-"""Draw the bundled robots: ``python docs/make_robot_pictures.py`` writes one picture each to ``docs/images``."""
+"""Draw the bundled robots, one picture each in ``docs/images``: ``python docs/make_robot_pictures.py [NAME ...]``."""
 
+import sys
 from pathlib import Path
 
 import matplotlib as mpl
@@ -8,6 +9,7 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
+from PIL import Image
 
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.transforms import Array, transform_points
@@ -19,13 +21,15 @@ from cellplan.model.robot import RobotModel
 IMAGES = Path(__file__).resolve().parent / "images"
 SEGMENTS = 36
 RESOLUTION = 70  # [dots per inch]
-LINK_COLOURS = ("#4d4d4d", "#c8642b", "#2f6fab", "#d6a03b", "#4c8f5b", "#8a5aa5", "#c03a4b")
+COLOURS = 128  # of a picture, to keep the file small
+LINK_COLOURS = ("#4d4d4d", "#c8642b", "#2f6fab", "#d6a03b", "#4c8f5b", "#8a5aa5", "#c03a4b", "#7f7f7f")
 LIGHT = np.array([0.35, -0.6, 0.72])  # direction to the lamp, in the frame of each view
 AMBIENT = 0.45
 MARGIN = 60.0  # [mm] white round the robot
 HEIGHT = 4.2  # [inch] of one view
+LOWEST, WIDEST = 1.6, 14.0  # [inch] of a row of views with its titles, and across all views of a row
 
-# Working configuration of each robot in [deg], the arm bent as it stands in a cell.
+# Working configuration of each robot in [deg] or [mm], the arm bent as it stands in a cell.
 WORKING_POSTURES = {
     "reis_rv20_16": (0, -93, 108, 0, -15, 0),
     "kuka_kr6": (20, -12, 17, 30, 85, 0),
@@ -34,6 +38,16 @@ WORKING_POSTURES = {
     "staubli_rx90l": (15, -20, 110, 30, 60, 0),
     "staubli_rx90l_as_printed": (15, -20, 110, 0, 60, 0),
     "planar_3r": (30, 60, -40),
+    "kuka_kr16_2": (-20, -80, 95, 30, 60, 0),
+    "abb_irb1600_8_145": (20, 15, 10, 30, 50, 0),
+    "staubli_rx160": (15, 20, 100, 30, 50, 0),
+    "kuka_lbr_iiwa_14_r820": (20, 30, 20, -80, -20, 70, 0),
+    "kuka_lbr_iiwa_7_r800": (20, 30, 20, -80, -20, 70, 0),
+    "franka_panda": (20, -10, 10, -125, 0, 125, 45),
+    "ur5e": (20, -60, 80, -110, -90, 0),
+    "ur10e": (20, -60, 80, -110, -90, 0),
+    "motopos_d500": (40, 20),
+    "rail_kl100_2": (600,),
 }
 # Axes of B drawn to the right and upwards, and the one that points out of the sheet.
 VIEWS = {
@@ -46,12 +60,13 @@ mpl.use("agg")
 mpl.rcParams.update({"font.family": "DejaVu Sans", "font.size": 9})
 
 
-def triangles_of(model: RobotModel, configuration_deg: tuple[float, ...]) -> tuple[Array, list[int]]:
+def triangles_of(model: RobotModel, configuration: tuple[float, ...]) -> tuple[Array, list[int]]:
     """Triangles of all bodies in B, shape (M, 3, 3) in [mm], and the link of each; the base is 0."""
     n = len(model.joints)
     tool = Tool(X_FT=np.eye(4), bodies=())
     placed = Robot(name=model.name, model=model, X_WB=np.eye(4), tool=tool, start=None, weights=np.ones(n))
-    D = ScrewChain(placed).link_displacements(np.radians([configuration_deg]))[0]
+    q = [value / joint.display_unit.scale for joint, value in zip(model.joints, configuration, strict=True)]
+    D = ScrewChain(placed).link_displacements(np.array([q]))[0]
     triangles, links = [], []
     for body in model.bodies:
         mesh = tessellate(body.shape, SEGMENTS)
@@ -101,7 +116,8 @@ def draw_robot(model: RobotModel) -> None:
     boxes = [limits_of([triangles for triangles, _ in bodies.values()], view) for view in VIEWS.values()]
     widths = [float(box[1, 0] - box[0, 0]) for box in boxes]
     height = max(float(box[1, 1] - box[0, 1]) for box in boxes)  # one for all: every view has the same scale
-    size = (HEIGHT * sum(widths) / height + 2.0, 2.0 * HEIGHT)
+    view_height = min(HEIGHT, WIDEST * height / sum(widths))
+    size = (view_height * sum(widths) / height + 2.0, 2.0 * max(view_height, LOWEST))
     figure, sheet = plt.subplots(2, 3, figsize=size, width_ratios=widths, layout="constrained", dpi=RESOLUTION)
     for row, (configuration, (triangles, links)) in zip(sheet, bodies.items(), strict=True):
         for axes, (name, view), box in zip(row, VIEWS.items(), boxes, strict=True):
@@ -113,16 +129,18 @@ def draw_robot(model: RobotModel) -> None:
             axes.set(xlabel=f"{right} [mm]", ylabel=f"{up} [mm]")
             axes.grid(visible=True, color="#dddddd", linewidth=0.5)
             axes.set_axisbelow(True)
-    figure.savefig(IMAGES / f"robot_{model.name}.png", metadata={"Software": None})
+    path = IMAGES / f"robot_{model.name}.png"
+    figure.savefig(path, metadata={"Software": None})
     plt.close(figure)
+    Image.open(path).convert("RGB").quantize(COLOURS).save(path, optimize=True)
 
 
-def main() -> None:
-    """Draw all bundled robots."""
+def main(names: list[str]) -> None:
+    """Draw the bundled robots of these names, all of them for none."""
     IMAGES.mkdir(exist_ok=True)
-    for name in WORKING_POSTURES:
+    for name in names or WORKING_POSTURES:
         draw_robot(load_bundled(name))
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

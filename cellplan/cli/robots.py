@@ -107,6 +107,9 @@ def _record(name: str, model: RobotModel) -> dict[str, Any]:
         "name": name,
         "source": model.source,
         "reach_mm": round(1e3 * arm_reach(model), 1),
+        "published_reach": None
+        if model.reach is None
+        else {"mm": round(1e3 * model.reach.distance, 1), "to": model.reach.to, "source": model.reach.source},
         "bodies": len(model.bodies),
         "zero": zero_record(model),
         "joints": [joint_record(joint) for joint in model.joints],
@@ -118,6 +121,9 @@ def _lines(record: dict[str, Any]) -> list[str]:
     from cellplan.report.record.joint_limits import limits_text
 
     lines = [record["name"], f"  reach {record['reach_mm']:g} mm from the first axis; {record['source']}"]
+    if (published := record["published_reach"]) is not None:
+        to = "" if published["to"] is None else f" to {published['to']}"
+        lines.append(f"  published reach {published['mm']:g} mm{to} ({published['source']})")
     for joint in record["joints"]:
         limits, speed = limits_text(joint)
         lines.append(f"  {joint['name']:<10} {limits:<22} {speed}")

@@ -41,18 +41,19 @@ def arm_reach(model: RobotModel) -> float:
     lower = np.where(np.isfinite(model.lower), model.lower, -0.5 * UNLIMITED_RANGE)
     upper = np.where(np.isfinite(model.upper), model.upper, 0.5 * UNLIMITED_RANGE)
     starts = np.random.default_rng(0).uniform(lower, upper, size=(START_COUNT, len(lower)))
-    return max(_climb(distances, q, lower, upper) for q in starts)
+    return _climb(distances, starts, lower, upper)
 
 
-def _climb(distances: Callable[[Array], Array], q: Array, lower: Array, upper: Array) -> float:
-    """Distance at the best configuration found from ``q``, in [m]."""
-    best = q.copy()
+def _climb(distances: Callable[[Array], Array], starts: Array, lower: Array, upper: Array) -> float:
+    """Distance at the best configuration found from any of ``starts``, shape (S, n), in [m]."""
+    best, rows = starts.copy(), np.arange(len(starts))
     width = upper - lower
     for _ in range(SWEEP_COUNT):
-        for joint in range(len(best)):
-            tried = np.repeat(best[None], GRID_COUNT, axis=0)
+        for joint in range(best.shape[1]):
+            tried = np.repeat(best[:, None], GRID_COUNT, axis=1)
             offsets = np.linspace(-width[joint], width[joint], GRID_COUNT)
-            tried[:, joint] = np.clip(best[joint] + offsets, lower[joint], upper[joint])
-            best = tried[int(np.argmax(distances(tried)))]
+            tried[:, :, joint] = np.clip(tried[:, :, joint] + offsets, lower[joint], upper[joint])
+            found = distances(tried.reshape(-1, tried.shape[2])).reshape(len(rows), GRID_COUNT)
+            best = tried[rows, np.argmax(found, axis=1)]
         width = 0.5 * width
-    return float(distances(best[None])[0])
+    return float(distances(best).max())

@@ -146,6 +146,21 @@ class BodyAccuracy:
     source: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PublishedReach:
+    """Reach as the maker publishes it.
+
+    Attributes:
+        distance: Largest distance from the first axis in [m].
+        to: The word flange, or the joint to whose point it is measured; None when it is not published.
+        source: Where the figure comes from.
+    """
+
+    distance: float
+    to: str | None
+    source: str
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Link:
     """A link by name, so that things can be mounted on it.
@@ -174,6 +189,7 @@ class RobotModel:
         body_accuracy: How good the link bodies are that do not say it themselves; None when it is not stated.
         payload: What it may carry; None when it is not stated.
         controller: How its controller counts the joints; None when it is not stated.
+        reach: Reach as the maker publishes it; None when it is not stated.
         flange_link: Index of the joint that carries the flange.
         X_BF: Flange (mechanical interface) in B at the reference configuration, z out of the flange.
         bodies: Link bodies.
@@ -192,6 +208,7 @@ class RobotModel:
     payload: Payload | None = None
     disabled: tuple[tuple[str, str, str], ...] = ()
     controller: ControllerZero | None = None
+    reach: PublishedReach | None = None
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""

@@ -5,7 +5,7 @@ from typing import Final
 
 from cellplan.errors import InputError
 from cellplan.io.input.allowed_folders import AllowedFolders
-from cellplan.io.input.findings import did_you_mean, listed, shown
+from cellplan.io.input.findings import did_you_mean, shown
 from cellplan.io.robots.joint_table import RobotTable, load_robot_table
 from cellplan.model.robot import RobotModel
 
@@ -36,6 +36,7 @@ def load_bundled_table(name: str) -> RobotTable:
     if name not in names:
         hint = did_you_mean(name, names)
         raise InputError(
-            f"expected a bundled robot ({listed(names)}) or a .urdf, .xacro or .yaml file, got {shown(name)}{hint}"
+            "expected a bundled robot (`cellplan robots` lists them) or a .urdf, .xacro or .yaml file, got "
+            f"{shown(name)}{hint}"
         )
     return load_robot_table(FOLDER / f"{name}.yaml", file=f"bundled:{name}", folders=AllowedFolders(folder=FOLDER))

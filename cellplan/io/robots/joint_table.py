@@ -22,11 +22,11 @@ from cellplan.io.robots.limits import RATES
 from cellplan.io.schema import RobotTableDocument
 from cellplan.io.schema.messages import validate
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS
-from cellplan.io.schema.robot_table import BodiesEntry, JointEntry
+from cellplan.io.schema.robot_table import BodiesEntry, JointEntry, ReachEntry
 from cellplan.io.schema.units import in_si, si_or_none
 from cellplan.io.shapes import link_solid, pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
-from cellplan.model.robot import BASE, Body, BodyAccuracy, Joint, JointKind, Link, RobotModel
+from cellplan.model.robot import BASE, Body, BodyAccuracy, Joint, JointKind, Link, PublishedReach, RobotModel
 
 FOOT: Final = "base"  # word for the link that does not move
 TOOL_NAME: Final = re.compile(r"tool(_[0-9]+)?")  # these names belong to the bodies of the tool
@@ -93,6 +93,9 @@ def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Findin
     yield from payload_findings(("payload",), table.payload, turning, document)
     turns = {name: joint.type == "revolute" for name, joint in table.joints.items()}
     yield from controller_findings(("controller",), table.controller, turns, document)
+    if table.reach is not None and table.reach.to not in (None, "flange", *table.joints):
+        text = unknown_name("flange or a joint", str(table.reach.to), ("flange", *table.joints))
+        yield document.finding(("reach", "to"), text)
     named = [(index, body.name) for index, body in enumerate(table.solids) if body.name is not None]
     for order, (index, name) in enumerate(named):
         if name in {other for _, other in named[:order]}:
@@ -171,6 +174,7 @@ def _model(table: RobotTableDocument, bodies: tuple[Body, ...]) -> RobotModel:
         body_accuracy=_body_accuracy(table),
         payload=build_payload(table.payload),
         controller=build_controller(table.controller, joints),
+        reach=_reach(table.reach),
         links=tuple(
             Link(name=name, index=index - 1, X_BL=np.eye(4)) for index, name in enumerate((FOOT, *table.joints))
         ),
@@ -183,6 +187,13 @@ def _body_accuracy(table: RobotTableDocument) -> BodyAccuracy | None:
     if not isinstance(bodies, BodiesEntry) or bodies.accuracy_mm is None:
         return None
     return BodyAccuracy(distance=bodies.accuracy_mm.si, source=bodies.source)
+
+
+def _reach(entry: ReachEntry | None) -> PublishedReach | None:
+    """Reach as published, if the table says so."""
+    if entry is None:
+        return None
+    return PublishedReach(distance=entry.distance_mm.si, to=entry.to, source=entry.source)
 
 
 def _joint(name: str, entry: JointEntry, parent: int) -> Joint:

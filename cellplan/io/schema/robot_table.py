@@ -169,6 +169,17 @@ BodiesChoice = Annotated[
 ]
 
 
+class ReachEntry(Entry):
+    """The maker's figure of the reach, from the first axis."""
+
+    distance_mm: Size = Field(description="Largest distance from the first axis.")
+    to: Text | None = Field(
+        default=None,
+        description="The word flange, or the joint to whose point the maker measures; absent when it is not published.",
+    )
+    source: Text = Field(default="not stated", description="Where the figure comes from.")
+
+
 class RobotTableDocument(Entry):
     """A whole robot file."""
 
@@ -188,6 +199,7 @@ class RobotTableDocument(Entry):
     payload: PayloadEntry | None = Field(
         default=None, description="What the robot may carry; the report says so when absent."
     )
+    reach: ReachEntry | None = Field(default=None, description="Reach as the maker publishes it, if known.")
     controller: ControllerEntry | None = Field(
         default=None,
         description="How its controller counts the joints; when absent the zero of the model is taken as the "

@@ -4,8 +4,6 @@ from collections.abc import Callable
 
 import pytest
 
-from cellplan.io.input.findings import listed
-from cellplan.io.robots.bundled import bundled_names
 from cellplan.io.schema.robot import RobotEntry
 
 Refuse = Callable[..., list[str]]
@@ -172,9 +170,8 @@ Refuse = Callable[..., list[str]]
         (
             "model: abb_irb1600",
             "model: abb_irb160",
-            f"c:8: robots.worker.model: expected a bundled robot ({listed(bundled_names())}) or a .urdf, .xacro or "
-            ".yaml file, got 'abb_irb160', did you mean "
-            "'abb_irb1600'?",
+            "c:8: robots.worker.model: expected a bundled robot (`cellplan robots` lists them) or a .urdf, .xacro or .yaml "
+            "file, got 'abb_irb160', did you mean 'abb_irb1600'?",
         ),
         (
             "model: abb_irb1600",
