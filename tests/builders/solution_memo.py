@@ -138,7 +138,9 @@ def _entry(cell: Cell, task: str | None, folder: Path) -> _Entry:
     entry = _Entry(folder, [])
     text = io.BytesIO()
     environment = sorted((key, value) for key, value in os.environ.items() if key.startswith("CELLPLAN"))
-    _KeyWriter(text, entry.origins).dump((cell, task, environment))
+    writer = _KeyWriter(text, entry.origins)
+    writer.fast = True  # by values alone, whichever of its parts are one object
+    writer.dump((cell, task, environment))
     entry.path = folder / hashlib.sha256(text.getvalue()).hexdigest()
     return entry
 
