@@ -4,6 +4,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,15 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["CELLPLAN_CACHE"] = str(Path(os.environ[SESSION]) / "cache")
     picture_memo.install(Path(os.environ[SESSION]) / "pictures")
     settings.load_profile("quick" if config.option.markexpr == "not slow" else "full")
+
+
+@contextmanager
+def shared_solutions() -> Iterator[None]:
+    """Cells that were solved before in the session are not solved again within the ``with`` statement."""
+    from builders import solution_memo
+
+    with solution_memo.kept(Path(os.environ[SESSION]) / "solutions"):
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -47,6 +57,13 @@ def shared_robots() -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def kept_solutions() -> Iterator[None]:
+    """The tests of a module share solved cells with all other modules that say so."""
+    with shared_solutions():
+        yield
+
+
 @pytest.fixture
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Folder of a cache that only this test uses, empty at first."""
@@ -64,5 +81,6 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from builders.stored_cells import solve_into, write_cell
 
     folder = tmp_path_factory.mktemp("sound")
-    solve_into(write_cell(folder / "cell"), folder / "run")
+    with shared_solutions():
+        solve_into(write_cell(folder / "cell"), folder / "run")
     return folder

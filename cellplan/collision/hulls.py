@@ -21,6 +21,7 @@ MAX_CORNERS: Final = 2000  # the work of every distance grows with their number
 FEW_CORNER_COUNT: Final = 250  # coal keeps at most 255 neighbours of a corner: so few corners cannot have more
 MAX_GROWTH: Final = 1.1  # [-] by which a hull of some of the points may be blown up to hold the others
 PAIR_CHUNK: Final = 4_000_000  # [-] products of points and planes worked on at once: about 30 MB
+PROOF_CHUNK: Final = 200_000  # [-] likewise where only the largest counts: what a processor keeps at hand
 GOLDEN_ANGLE: Final = np.pi * (3.0 - np.sqrt(5.0))  # [rad]
 
 
@@ -119,7 +120,7 @@ def _blown_up(hull: Mesh, points: Array) -> Mesh | None:
 def _sticking_out(hull: Mesh, points: Array) -> float:
     """How far in [m] the farthest point lies outside of a face: the proof of the hull, however it was found."""
     normals, offsets = _planes(hull)
-    step = max(1, PAIR_CHUNK // len(normals))
+    step = max(1, PROOF_CHUNK // len(normals))
     return max(float((points[k : k + step] @ normals.T - offsets).max()) for k in range(0, len(points), step))
 
 

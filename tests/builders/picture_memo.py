@@ -1,6 +1,7 @@
 """Pictures that a test session has painted before are not painted again: the bytes follow from the sheet alone."""
 
 import hashlib
+import io
 import os
 import pickle
 from collections.abc import Iterator, Mapping
@@ -38,7 +39,7 @@ def _kept(sheets: Mapping[str, Any]) -> dict[str, bytes]:
         return _paint(sheets)
     files: dict[str, bytes] = {}
     for name, sheet in sheets.items():
-        entry = folder / hashlib.sha256(pickle.dumps(sheet)).hexdigest()
+        entry = folder / _digest(sheet)
         if not entry.exists():
             draft = entry.with_suffix(f".{os.getpid()}")
             draft.write_bytes(pickle.dumps(_paint({"": sheet})))
@@ -46,3 +47,12 @@ def _kept(sheets: Mapping[str, Any]) -> dict[str, bytes]:
         painted: dict[str, bytes] = pickle.loads(entry.read_bytes())  # noqa: S301 - written by this session
         files |= {f"{name}{ending}": content for ending, content in painted.items()}
     return files
+
+
+def _digest(sheet: Any) -> str:
+    """Digest of a sheet by its values alone, whichever of its strings are one object."""
+    text = io.BytesIO()
+    pickler = pickle.Pickler(text)
+    pickler.fast = True
+    pickler.dump(sheet)
+    return hashlib.sha256(text.getvalue()).hexdigest()

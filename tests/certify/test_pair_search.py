@@ -9,7 +9,7 @@ from builders.scene_builders import fixed_part, make_cell, placed, slide_model, 
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.pair_search import SolidSearch
-from cellplan.certify.pair_state import PairState
+from cellplan.certify.pair_state import MAX_CUTS, PairState
 from cellplan.collision.distance import APART_TOL, measure
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Sphere
@@ -52,8 +52,11 @@ def turned(model: RobotModel, X: Array) -> RobotModel:
     return replace(model, bodies=tuple(replace(body, X_BS=X @ body.X_BS) for body in model.bodies))
 
 
-def search(scene: Scene, q: Array, pair: tuple[int, int], cutoff: float = APART_TOL) -> SolidSearch:
-    found = SolidSearch(scene.engine, pair, StraightMotion.of_cell(scene, LeverArms(scene, q), q), state=PairState())
+def search(
+    scene: Scene, q: Array, pair: tuple[int, int], cutoff: float = APART_TOL, max_cuts: int = MAX_CUTS
+) -> SolidSearch:
+    motion = StraightMotion.of_cell(scene, LeverArms(scene, q), q)
+    found = SolidSearch(scene.engine, pair, motion, state=PairState(max_cuts=max_cuts))
     found.run(cutoff)
     return found
 
@@ -128,6 +131,7 @@ def test_a_pair_without_end_of_open_steps_is_given_up_and_not_called_free() -> N
     scene = Scene.from_cell(make_cell(low, things=(high,)))
     index = {body.name: place for place, body in enumerate(scene.bodies)}
 
-    found = search(scene, np.linspace(0.0, 0.1, 60)[:, None], (index["low/block"], index["high"])).state
+    q = np.linspace(0.0, 0.1, 60)[:, None]
+    found = search(scene, q, (index["low/block"], index["high"]), max_cuts=100).state
 
     assert found.unproved or found.touches

@@ -15,6 +15,8 @@ import pytest
 from cellplan.cli.main import run
 from cellplan.pipeline.gate.equal_text import first_difference
 
+pytestmark = pytest.mark.usefixtures("kept_solutions")
+
 GOLDEN = Path(__file__).parent / "golden"
 COMMANDS = ("check", "explain", "export", "rehearse", "robots", "schema", "solve", "sweep", "verify")
 ERRORS = """\

@@ -7,6 +7,8 @@ import pytest
 
 from cellplan.cli.main import run
 
+pytestmark = pytest.mark.usefixtures("kept_solutions")
+
 FIXED = """\
 cellplan_errors: 1
 robots:

@@ -9,6 +9,8 @@ import pytest
 from cellplan.cli import progress
 from cellplan.cli.main import run
 
+pytestmark = pytest.mark.usefixtures("kept_solutions")
+
 
 @pytest.fixture
 def coarse_cell(cells: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:

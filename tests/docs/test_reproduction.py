@@ -13,6 +13,8 @@ import pytest
 
 from cellplan import load_cell, solve
 
+pytestmark = pytest.mark.usefixtures("kept_solutions")
+
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAPERS = ROOT / "cells" / "papers"
 RECORD = ROOT / "docs" / "reproduction" / "measured.json"

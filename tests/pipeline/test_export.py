@@ -13,6 +13,8 @@ from cellplan.io.input.files import digest
 from cellplan.pipeline import export
 from cellplan.pipeline.overrides import with_overrides
 
+pytestmark = pytest.mark.usefixtures("kept_solutions")
+
 
 @pytest.fixture
 def copy(sound: Path, tmp_path: Path) -> Path:

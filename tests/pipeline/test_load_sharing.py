@@ -19,6 +19,8 @@ from cellplan.report.record.structure import structure_record
 from cellplan.report.text.run import summary_lines
 from cellplan.report.text.structure import structure_lines
 
+pytestmark = pytest.mark.usefixtures("kept_solutions")
+
 ALLOWED_MM, ALLOWED_DEG = 0.003, 0.001
 
 

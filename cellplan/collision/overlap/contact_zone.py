@@ -1,5 +1,6 @@
 """The surface of a tool outside the zone round its tip in which it may touch the part."""
 
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -28,15 +29,21 @@ def outside_zone(shape: Solid, centre: Array, radius: float) -> tuple[Mesh | Non
     Returns:
         The surface outside, None when there is none; and whether some of it was inside.
     """
-    mesh = _surface(shape)
+    return _outside_zone(shape, (float(centre[0]), float(centre[1]), float(centre[2])), radius)
+
+
+@lru_cache(maxsize=64)
+def _outside_zone(shape: Solid, centre: tuple[float, float, float], radius: float) -> tuple[Mesh | None, bool]:
+    """What ``outside_zone`` returns; a cell is made computable more than once, with the same tools."""
+    mesh, middle = _surface(shape), np.array(centre)
     open_ = mesh.vertices[mesh.faces]
     kept, is_cut = [], False
     while len(open_):
-        inside = np.linalg.norm(open_ - centre, axis=2).max(axis=1) <= radius
+        inside = np.linalg.norm(open_ - middle, axis=2).max(axis=1) <= radius
         is_cut |= bool(np.any(inside))
         open_ = open_[~inside]
         longest = np.linalg.norm(open_ - np.roll(open_, -1, axis=1), axis=2).max(axis=1, initial=0.0)
-        across = (_distance_bound(open_, centre, longest) < radius) & (longest > FINEST_FRACTION * radius)
+        across = (_distance_bound(open_, middle, longest) < radius) & (longest > FINEST_FRACTION * radius)
         kept.append(open_[~across])
         open_ = halved(open_[across])
     triangles = np.concatenate(kept) if kept else np.empty((0, 3, 3))

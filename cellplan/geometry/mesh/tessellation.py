@@ -1,5 +1,7 @@
 """Primitive shapes turned into meshes that hold the shape: never smaller than the truth."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from cellplan.geometry.mesh.topology import make_mesh
@@ -19,6 +21,12 @@ def tessellate(shape: Solid, segments: int = 48) -> Mesh:
     """
     if segments < 4:
         raise ValueError(f"a round body needs at least 4 segments, got {segments}")
+    return shape if isinstance(shape, Mesh) else _tessellated(shape, segments)
+
+
+@lru_cache(maxsize=512)
+def _tessellated(shape: Box | Cylinder | Capsule | Sphere, segments: int) -> Mesh:
+    """The mesh round a primitive shape; a cell has many equal ones, and is made computable more than once."""
     match shape:
         case Box(size):
             vertices, faces = _box(np.asarray(size))
@@ -29,9 +37,10 @@ def tessellate(shape: Solid, segments: int = 48) -> Mesh:
             vertices, faces = _rounded(radius, length, segments=segments)
         case Sphere(radius):
             vertices, faces = _rounded(radius, 0.0, segments=segments)
-        case Mesh():
-            return shape
-    return make_mesh(vertices, faces, source=type(shape).__name__.lower())
+    mesh = make_mesh(vertices, faces, source=type(shape).__name__.lower())
+    mesh.vertices.setflags(write=False)
+    mesh.faces.setflags(write=False)
+    return mesh
 
 
 def halved(triangles: Array) -> Array:

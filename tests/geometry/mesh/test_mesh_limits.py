@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from cellplan.errors import InputError
+from cellplan.geometry.mesh import stl_obj
 from cellplan.geometry.mesh.load import read_mesh
 
 PLY = "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
@@ -14,14 +15,14 @@ FACES = "element face {}\nproperty list uchar int vertex_indices\nend_header\n"
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("m.obj", "v 0 0 0\n" * 1_500_001, "m.obj:1500001: expected at most 1500000 vertices, got more"),
-        ("m.obj", "v 0 0 0\n" * 3 + "f 1 2 3\n" * 500_001, "m.obj:500004: expected at most 500000 faces, got more"),
+        ("m.obj", "v 0 0 0\n" * 15_001, "m.obj:15001: expected at most 15000 vertices, got more"),
+        ("m.obj", "v 0 0 0\n" * 3 + "f 1 2 3\n" * 5_001, "m.obj:5004: expected at most 5000 faces, got more"),
         ("m.obj", "f" + " 1" * 60_000, "m.obj:1: expected at most 100000 characters in a line, got more"),
         ("m.obj", "f" + " 1 2\\\n" * 60_000, "m.obj:50000: expected at most 100000 words in a line, got more"),
         (
             "m.stl",
-            "solid\n" + "vertex 0 0 0\n" * 1_500_001,
-            "m.stl:1500002: expected at most 1500000 'vertex' lines, got more",
+            "solid\n" + "vertex 0 0 0\n" * 15_001,
+            "m.stl:15002: expected at most 15000 'vertex' lines, got more",
         ),
         (
             "m.ply",
@@ -32,7 +33,12 @@ FACES = "element face {}\nproperty list uchar int vertex_indices\nend_header\n"
     ],
     ids=["vertices", "faces", "long line", "joined lines", "stl", "ply vertices", "ply faces"],
 )
-def test_too_much_is_refused_where_it_begins_to_be(tmp_path: Path, name: str, text: str, message: str) -> None:
+def test_too_much_is_refused_where_it_begins_to_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, text: str, message: str
+) -> None:
+    """Triangles are counted up to a hundredth of what is allowed: the files are that much smaller."""
+    assert stl_obj.MAX_TRIANGLES == 500_000
+    monkeypatch.setattr(stl_obj, "MAX_TRIANGLES", 5_000)
     (tmp_path / name).write_text(text, encoding="utf-8")
 
     with pytest.raises(InputError) as caught:

@@ -1,5 +1,6 @@
 """The file format: its JSON Schema, and any spoiled cell refused with a line and nothing but our own errors."""
 
+import copy
 import math
 import tempfile
 from pathlib import Path
@@ -27,9 +28,12 @@ def plain(value: Any) -> Any:
     return [plain(item) for item in value] if isinstance(value, tuple) else value
 
 
+FOUR_ROBOTS = plain(parse_yaml((ROOT / "cells" / "four_robots.yaml").read_bytes(), file="cell").root)
+
+
 def four_robots() -> dict[str, Any]:
-    data = (ROOT / "cells" / "four_robots.yaml").read_bytes()
-    return plain(parse_yaml(data, file="cell").root)
+    """A copy to be spoiled."""
+    return copy.deepcopy(FOUR_ROBOTS)
 
 
 def places(value: Any, path: Place = ()) -> list[Place]:
@@ -40,7 +44,7 @@ def places(value: Any, path: Place = ()) -> list[Place]:
     return found
 
 
-PLACES = places(four_robots())
+PLACES = places(FOUR_ROBOTS)
 
 
 def owner(document: Any, place: Place) -> Any:
@@ -107,15 +111,13 @@ def test_a_value_of_another_kind_is_fine_or_named_with_its_line(place: Place, wr
     assert all(1 <= line <= len(text.splitlines()) for line in lines_of(findings))
     assert all("Input should" not in found and "<" not in found for found in findings)
     kind_differs = isinstance(wrong, bool | list | dict) and wrong not in ([], {})
-    if kind_differs and not isinstance(owner(four_robots(), place)[place[-1]], type(wrong)):
+    if kind_differs and not isinstance(owner(FOUR_ROBOTS, place)[place[-1]], type(wrong)):
         line = parse_yaml(text.encode(), file="cell").line(place)
         assert any(found.startswith(f":{line}: {key_text(place)}") for found in findings)
 
 
 @given(
-    place=st.sampled_from(
-        [place for place in PLACES if isinstance(owner(four_robots(), place)[place[-1]], int | float)]
-    ),
+    place=st.sampled_from([place for place in PLACES if isinstance(owner(FOUR_ROBOTS, place)[place[-1]], int | float)]),
     word=st.sampled_from([".nan", ".inf", "-.inf", "1e400", "010", "1:30", "0x10", "1_0", "no", "2020-01-01", "~"]),
 )
 def test_words_that_are_no_number_are_refused_where_they_stand(place: Place, word: str) -> None:

@@ -21,6 +21,8 @@ from cellplan.model.solver import Integrator
 from cellplan.model.verified_run import ACCESS_TOKEN, VerifiedRun
 from cellplan.pipeline.overrides import with_overrides
 
+pytestmark = pytest.mark.usefixtures("kept_solutions")
+
 PACKAGE = Path(__file__).resolve().parents[3] / "cellplan"
 
 

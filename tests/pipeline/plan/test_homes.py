@@ -23,6 +23,8 @@ from cellplan.pipeline.plan.run import PlannedRun
 from cellplan.planning.modes import plan_phases
 from cellplan.scene.scene import Scene
 
+pytestmark = pytest.mark.usefixtures("kept_solutions")
+
 BLOCK = Box((0.1, 0.1, 0.1))
 ROOM = 0.055  # [m] the demanded clearance, and what a home keeps beyond it where it can
 

@@ -16,6 +16,8 @@ from cellplan.model.solver import Integrator
 from cellplan.model.task import Tolerance
 from cellplan.pipeline.overrides import with_overrides
 
+pytestmark = pytest.mark.usefixtures("kept_solutions")
+
 TOLERANCE = Tolerance(position=1e-4, orientation=np.deg2rad(0.01))
 SMALL = CellErrors(
     robots={

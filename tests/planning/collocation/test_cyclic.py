@@ -110,9 +110,9 @@ def test_coming_and_leaving_are_no_part_of_the_cycle() -> None:
 
 
 def test_a_start_beside_the_path_spoils_the_first_cycle_only() -> None:
-    case = cyclic(triangles(CELLS["mixed"]), 4)
+    case = cyclic(triangles(CELLS["mixed"]), 3)
     path = closed(replace(case, start=case.start + 1e-5))
-    found = drift(path, [0.0, 1.0, 2.0, 3.0, 4.0])
+    found = drift(path, [0.0, 1.0, 2.0, 3.0])
     assert 1e-6 < found[0] < 1e-3
     assert found[1:].max() <= PERIODIC
 

@@ -46,7 +46,7 @@ def names(cell: Cell) -> tuple[str, ...]:
 
 def four_robots() -> tuple[Cell, np.ndarray]:
     cell = load_cell(FOLDER / "four_robots.yaml")
-    cell = replace(cell, motion=replace(cell.motion, step=0.01), solver=replace(cell.solver, gain=50.0))
+    cell = replace(cell, motion=replace(cell.motion, step=0.02), solver=replace(cell.solver, gain=25.0))
     return cell, np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
 
 

@@ -17,6 +17,8 @@ from cellplan.report.record.run import run_record
 from cellplan.report.record.schema import report_schema
 from cellplan.report.record.summary import summary_record
 
+pytestmark = pytest.mark.usefixtures("kept_solutions")
+
 
 @pytest.fixture(scope="module")
 def validator() -> Draft202012Validator:
