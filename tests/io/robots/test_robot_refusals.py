@@ -170,8 +170,8 @@ Refuse = Callable[..., list[str]]
         (
             "model: abb_irb1600",
             "model: abb_irb160",
-            "c:8: robots.worker.model: expected a bundled robot (`cellplan robots` lists them) or a .urdf, .xacro or .yaml "
-            "file, got 'abb_irb160', did you mean 'abb_irb1600'?",
+            "c:8: robots.worker.model: expected a bundled robot (`cellplan robots` lists them) or a .urdf, .xacro or "
+            ".yaml file, got 'abb_irb160', did you mean 'abb_irb1600'?",
         ),
         (
             "model: abb_irb1600",
