@@ -16,10 +16,10 @@ import re
 import subprocess
 import sys
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -27,6 +27,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
+import xacro
+from xacro import substitution_args
 
 from cellplan.cli.main import run
 from cellplan.geometry.transforms import Array, inverse, rotation_vector
@@ -42,6 +44,10 @@ MAX_SECONDS: Final = 10.0  # of processor time to read a robot
 TOLERANCE: Final = 1e-9  # [m] and [rad] between two readings of the same kinematics
 FILLED: Final[Mapping[str, float]] = {"lower": -90.0, "upper": 90.0, "velocity": 60.0}  # in place of blanks
 NO_LIMIT: Final = 1e3  # [rad] or [m] limits beyond it are no limits
+XACRO_FOLDER: Final = Path("rtbdata/xacro")
+ARM: Final = re.compile(
+    r"(abb|kuka|puma)[^_]*_.*/(?!.*_macro)(irb|kr(?!210)|lbr|puma)[^/]*$"
+)  # kr210 has a fault of its own
 SHARE: Final = Path("cmeel.prefix/share")
 FOLDER: Final = Path(os.environ.get("CELLPLAN_COLLECTIONS", Path.home() / ".cache/cellplan-collections"))
 HEAD: Final = """\
@@ -125,12 +131,13 @@ def urdf_files(place: Path) -> list[Path]:
     return [file for file in files if re.search(r'type="(revolute|continuous|prismatic)"', file.read_text())]
 
 
-def try_robot(file: Path, package_dirs: Sequence[Path]) -> Trial:
+def try_robot(file: Path, package_dirs: Sequence[Path], urdf: Callable[[], str]) -> Trial:
     """Describe a robot, paste the printed lines into a cell and read it.
 
     Args:
         file: URDF or xacro file.
         package_dirs: Folders in which its packages are looked up.
+        urdf: Gives the text of its URDF, read by other means, for the comparison.
     """
     begin = _seconds()
     with TemporaryDirectory() as folder:
@@ -147,7 +154,7 @@ def try_robot(file: Path, package_dirs: Sequence[Path]) -> Trial:
             return Trial(name=file.name, reason=_reason(errors), seconds=_seconds() - begin, error=np.nan)
         seconds = _seconds() - begin
         robot = next(each for each in load_cell(cell_file, allow_dirs=(*package_dirs, file.parent)).robots)
-        error = disagreement(robot, description["flange"], file.read_text())
+        error = disagreement(robot, description["flange"], urdf())
         return Trial(name=file.name, reason="", seconds=seconds, error=error)
 
 
@@ -236,10 +243,40 @@ def _seconds() -> float:
     return used.user + used.system + used.children_user + used.children_system
 
 
+def xacro_files(place: Path) -> list[Path]:
+    """Xacro files of whole industrial arms in the second collection, by name."""
+    return sorted(file for file in (place / XACRO_FOLDER).rglob("*.xacro") if ARM.search(file.as_posix()))
+
+
+def package_folders(place: Path) -> list[Path]:
+    """Folders in which the packages of the second collection are looked up."""
+    root = place / XACRO_FOLDER
+    return [root, root / "kuka_description", *sorted(path for path in root.iterdir() if path.is_dir())]
+
+
+def expanded(file: Path, folders: Sequence[Path]) -> str:
+    """The URDF that the package xacro makes of a file by itself; packages are looked up in some folders.
+
+    Args:
+        file: The xacro file.
+        folders: These folders; a package that none of them holds is taken to be the one above the file.
+    """
+
+    def find(package: str) -> str:
+        return str(next((each / package for each in folders if (each / package).is_dir()), file.parent.parent))
+
+    usual, substitution_args._eval_find = substitution_args._eval_find, find
+    try:
+        with redirect_stderr(io.StringIO()):
+            return str(xacro.process_file(str(file)).toprettyxml())
+    finally:
+        substitution_args._eval_find = usual
+
+
 def table(trials: Iterable[Trial]) -> Iterator[str]:
     """A line for each robot, and a count."""
     every = list(trials)
-    width = max(len(trial.name) for trial in every)
+    width = max((len(trial.name) for trial in every), default=0)
     for trial in every:
         read = f"{trial.error:.1e}" if trial.is_read else f"refused: {trial.reason}"
         yield f"{trial.name:<{width}}  {trial.seconds:5.1f} s  {read}"
@@ -254,8 +291,12 @@ def main() -> None:
     given = parser.parse_args()
     place = fetch(*URDFS, given.folder)
     share = place / SHARE
-    urdfs = [try_robot(file, [share]) for file in urdf_files(place) if given.only in str(file)]
-    print("\n".join(table(urdfs)))
+    trials = [try_robot(file, [share], file.read_text) for file in urdf_files(place) if given.only in str(file)]
+    print("\n".join(table(trials)))
+    place = fetch(*XACROS, given.folder)
+    folders = package_folders(place)
+    files = [file for file in xacro_files(place) if given.only in str(file)]
+    print("\n".join(table([try_robot(file, folders, partial(expanded, file, folders)) for file in files])))
 
 
 if __name__ == "__main__":
