@@ -35,7 +35,8 @@ def parse_collada(data: bytes, name: str, *, is_upright: bool) -> tuple[Triangle
         name: Name of the file for messages.
         is_upright: Whether the axis that the file calls up becomes z. The links of URDFs are drawn in the frames of
             their links, whatever axis is called up: neither RViz nor pinocchio turns them, and files that are called
-            Y_UP agree with the STL drawing of the same link only as they are.
+            Y_UP agree with the STL drawing of the same link only as they are. The unit is always applied, as by RViz;
+            pinocchio leaves it out and takes an arm drawn in inches for one of 40 times its size.
 
     Raises:
         InputError: With line or name of the element that is damaged or not supported, or when nothing is drawn.
