@@ -128,7 +128,7 @@ def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Seque
         robot = str(bodies[links[0]].robot)
         where = cell.origin.at(_key(cell, body, robot))
         what, question = _words(body)
-        beyond = "its own" if body.kind is Kind.ATTACHMENT else "its flange"
+        beyond = {Kind.ATTACHMENT: "its own", Kind.PEDESTAL: "its foot"}.get(body.kind, "its flange")
         raise InputError(
             f"{where}: expected {what} clear of the links of '{robot}' beyond {beyond}, got one that touches {named} "
             f"in every configuration: {question} If contact is permitted, name the pairs under checks.exclude"
@@ -146,6 +146,8 @@ def _key(cell: Cell, body: SceneBody, robot: str) -> str:
         if tool.get("geometry") is None:
             return f"robots.{robot}.tool.bodies[{number}]"
         return f"robots.{robot}.tool.bodies[{number - 1}]" if number else f"robots.{robot}.tool.geometry"
+    if body.kind is Kind.PEDESTAL:
+        return f"robots.{robot}.{body.name.rpartition('/')[2]}"
     number = [f"{robot}/{attachment.name}" for attachment in cell.robot(robot).attachments].index(body.name)
     return f"robots.{robot}.attachments[{number}]"
 
@@ -164,4 +166,6 @@ def _words(body: SceneBody) -> tuple[str, str]:
         return "a part", "is the grasp the right way round?"
     if body.kind is Kind.TOOL:
         return "a body of the tool", "is it in front of the flange, along its z axis?"
+    if body.kind is Kind.PEDESTAL:
+        return "what it is mounted on", "is it too wide, or does the robot reach below its base?"
     return "an attachment", "is it on the right link, and placed in the frame that 'at' is given in?"

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import pose
+from cellplan.io.robots.bundled import load_bundled
 from cellplan.model.cell import Cell, Robot
-from cellplan.model.mounting import Pedestal
+from cellplan.model.mounting import Hanger, Pedestal
 from cellplan.model.robot import BASE
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -130,3 +131,19 @@ def test_a_free_attachment_leaves_the_scene_as_it_was() -> None:
     scene = Scene.from_cell(make_cell(arm(attachments=(free,)), things=(post,)))
 
     assert scene.touching(np.array([0.0, 0.0, 0.0, 0.0, 0.5, 0.0])) is None
+
+
+def test_a_mount_that_touches_a_moving_link_in_every_configuration_is_refused_with_its_key() -> None:
+    """The first link of this arm turns in the plane of the base, where the column ends."""
+    hung = pose((0.0, 0.0, 1.9), (np.pi, 0.0, 0.0))
+    for base, mount, key in (
+        (hung, Hanger(radius=0.09, ceiling=2.5), "robots.a.mount"),
+        (RAISED, COLUMN, "robots.a.pedestal"),
+    ):
+        robot = placed("a", load_bundled("planar_3r"), base=base, tool=stick())
+
+        with pytest.raises(InputError) as caught:
+            Scene.from_cell(make_cell(replace(robot, pedestal=mount)))
+
+        assert str(caught.value).startswith(f"<cell>: {key}: expected what it is mounted on clear of the links of 'a'")
+        assert "touches a/A in every configuration" in str(caught.value)

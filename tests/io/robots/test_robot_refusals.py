@@ -14,8 +14,8 @@ Refuse = Callable[..., list[str]]
             "    base: {xyz",
             "    bsae: {xyz",
             "c:9: robots.worker.bsae: unknown key, did you mean 'base'?; allowed: model, package_dirs, flange, "
-            "base, bodies, payload, pedestal, mount, tool, attachments, start_deg, start, home_deg, home, weights, limits, "
-            "acceleration, controller, controller_cycle_ms, locked",
+            "base, bodies, payload, pedestal, mount, tool, attachments, start_deg, start, home_deg, home, weights, "
+            "limits, acceleration, controller, controller_cycle_ms, locked",
         ),
         (
             "xyz_mm: [2000, 0, 0]",
