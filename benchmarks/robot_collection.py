@@ -1,4 +1,4 @@
-"""Robots that nobody here wrote: ``python benchmarks/robot_collection.py``.
+"""Robots from other hands: ``python benchmarks/robot_collection.py``.
 
 Every URDF of example-robot-data 6.0 is described by ``cellplan robots``; the lines that this prints are pasted into a
 cell of its own, blanks filled with numbers, and ``cellplan check`` reads that cell. The kinematics of each robot that
@@ -283,20 +283,36 @@ def table(trials: Iterable[Trial]) -> Iterator[str]:
     yield f"{sum(trial.is_read for trial in every)} of {len(every)} read"
 
 
+def try_collection(name: str, folder: Path, only: str = "") -> list[Trial]:
+    """Try all robots of a collection.
+
+    Args:
+        name: ``urdf`` or ``xacro``.
+        folder: Where packages are kept.
+        only: Only files whose path has this text.
+
+    Raises:
+        NoIndexError: It is not there and cannot be downloaded.
+    """
+    if name == "urdf":
+        place = fetch(*URDFS, folder)
+        return [try_robot(file, [place / SHARE], file.read_text) for file in urdf_files(place) if only in str(file)]
+    place = fetch(*XACROS, folder)
+    folders, files = package_folders(place), [file for file in xacro_files(place) if only in str(file)]
+    return [try_robot(file, folders, partial(expanded, file, folders)) for file in files]
+
+
 def main() -> None:
     """Try both collections and print a line for each robot."""
     parser = argparse.ArgumentParser(description="Read the robots of two public collections.")
     parser.add_argument("--folder", type=Path, default=FOLDER, help="where downloaded packages are kept")
     parser.add_argument("--only", default="", help="only files whose path has this text")
     given = parser.parse_args()
-    place = fetch(*URDFS, given.folder)
-    share = place / SHARE
-    trials = [try_robot(file, [share], file.read_text) for file in urdf_files(place) if given.only in str(file)]
-    print("\n".join(table(trials)))
-    place = fetch(*XACROS, given.folder)
-    folders = package_folders(place)
-    files = [file for file in xacro_files(place) if given.only in str(file)]
-    print("\n".join(table([try_robot(file, folders, partial(expanded, file, folders)) for file in files])))
+    try:
+        for name in ("urdf", "xacro"):
+            print("\n".join(table(try_collection(name, given.folder, given.only))))
+    except NoIndexError as error:
+        print(f"skipped: {error}", file=sys.stderr)
 
 
 if __name__ == "__main__":

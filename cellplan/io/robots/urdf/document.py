@@ -156,6 +156,7 @@ def read_document(path: Path, settings: XacroSettings | None = None) -> UrdfDocu
                 f"expected plain URDF, got <{element.tag}>: let the name of the file end in {XACRO_SUFFIX}"
             )
     check_spelling(root.all("link"), root.all("joint"), remarks)
+    _leave_out_nameless_meshes(root.all("link"), remarks)
     links = _by_name(_link(element) for element in root.all("link"))
     joints = _by_name(_joint(element) for element in root.all("joint"))
     if not 1 <= len(links) <= MAX_LINKS:
@@ -165,6 +166,17 @@ def read_document(path: Path, settings: XacroSettings | None = None) -> UrdfDocu
     return UrdfDocument(
         file=path.name, name=_name(root), links=links, joints=joints, remarks=remarks.lines, included=included or ()
     )
+
+
+def _leave_out_nameless_meshes(links: Iterable[Element], remarks: Remarks) -> None:
+    """Drop collision and visual elements whose mesh has an empty file name, with a remark: they have no shape."""
+    for link in links:
+        for element in link.all("collision", "visual"):
+            meshes = [mesh for geometry in element.all("geometry") for mesh in geometry.all("mesh")]
+            if any(not mesh.attributes.get("filename", "-").strip() for mesh in meshes):
+                link.children.remove(element)
+                text = f"link '{link.attributes.get('name', '')}': <{element.tag}> names no mesh file: it has no body"
+                remarks.add(f"no file of a {element.tag}", text, element)
 
 
 def _by_name(things: Iterable[Named]) -> dict[str, Named]:

@@ -165,3 +165,13 @@ def test_infinite_limits_are_read_as_such_and_not_as_numbers(tmp_path: Path) -> 
 
     assert (limit.lower, limit.upper) == (None, None)
     assert f"{np.inf:g} rad" in limit.position_fault
+
+
+def test_a_mesh_without_a_file_name_is_a_remark_and_the_drawing_stands_for_the_link(tmp_path: Path) -> None:
+    nameless = '<geometry><mesh filename=" "/></geometry>'
+    link = f'<link name="base"><visual>{BOX}</visual><collision>{nameless}</collision></link>'
+
+    robot = loaded(tmp_path, link, *arm(LIMIT)[1:])
+
+    assert robot.remarks == ("r.urdf:2: link 'base': <collision> names no mesh file: it has no body",)
+    assert [type(body.shape).__name__ for body in robot.model.bodies if body.link == -1] == ["Box"]
