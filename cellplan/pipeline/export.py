@@ -21,6 +21,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report import CAUTION
 from cellplan.model.verified_run import VerifiedMotion, VerifiedRun
 from cellplan.pipeline.write_run import versions
+from cellplan.report.record.controller import zero_text
 from cellplan.scene.scene import Scene
 
 SCHEMA: Final = "cellplan.export/1"
@@ -143,6 +144,7 @@ def _record(run: VerifiedRun, files: Mapping[str, str], *, form: str, decimals: 
         "decimals": decimals,
         "run": run.digest,
         "versions": versions(),
+        "zero": {robot.name: zero_text(robot.model) for robot in run.cell.robots},
         "files": {name: digest(text.encode()) for name, text in files.items()},
         "caution": CAUTION,
     }

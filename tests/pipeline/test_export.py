@@ -29,6 +29,8 @@ def test_the_record_names_every_file_and_the_run(copy: Path) -> None:
 
     record = json.loads((copy / "programs" / "export.json").read_text())
     assert record["run"] == digest((copy / "run" / "manifest.json").read_bytes())
+    unknown = "joint positions count from the model's zero, taken as the controller's; not confirmed"
+    assert record["zero"] == dict.fromkeys(("left", "right", "idle"), unknown)
     assert record["files"] == {name: digest((copy / "programs" / name).read_bytes()) for name in files}
 
 
