@@ -16,7 +16,7 @@ from cellplan.cli.main import run
 from cellplan.pipeline.gate.equal_text import first_difference
 
 GOLDEN = Path(__file__).parent / "golden"
-COMMANDS = ("check", "explain", "export", "rehearse", "robots", "schema", "solve", "verify")
+COMMANDS = ("check", "explain", "export", "fastest", "rehearse", "robots", "schema", "solve", "verify")
 ERRORS = """\
 cellplan_errors: 1
 seed: 3

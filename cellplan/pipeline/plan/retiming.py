@@ -123,8 +123,21 @@ class RowLimits:
         """
         times = np.round(np.arange(len(q)) * self.step, TIME_DECIMALS)
         velocity, acceleration, jerk = (float(shares.max()) for shares in self.shares(times, q))
-        feed = max((_feed_share(path, sigma, times) for path in self.paths), default=0.0)
+        feed = max(self.feeds(sigma, times).values(), default=0.0)
         return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, self._part_share(times, q) ** 0.5)
+
+    def feeds(self, sigma: Array, times: Array) -> dict[str, float]:
+        """Largest speed of each tool along its path between rows, as a share of its feed, by task with a feed.
+
+        Args:
+            sigma: Nominal times of the rows in [s], shape (N,).
+            times: Their times in [s], shape (N,).
+        """
+        return {
+            path.task.name: float((np.diff(path.targets(sigma)[2]) / np.diff(times)).max() / path.task.feed)
+            for path in self.paths
+            if path.task.feed is not None
+        }
 
     def feed_share(self, sigma: Array) -> Array:
         """Share of the feeds that is taken up at the speed of the nominal time, shape (N,)."""
@@ -169,10 +182,3 @@ def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath) -> Array:
         f"{scene.cell.origin.at('motion.timing')}: expected a cycle of at least {least:.6g} s, in which all joints "
         f"keep their limits along this path, got {motion.cycle:g}; make it longer, or write fastest"
     )
-
-
-def _feed_share(path: ClockedPath, sigma: Array, times: Array) -> float:
-    """Largest speed of a tool along its path between rows, as a share of its feed; 0 without one."""
-    if path.task.feed is None:
-        return 0.0
-    return float((np.diff(path.targets(sigma)[2]) / np.diff(times)).max() / path.task.feed)
