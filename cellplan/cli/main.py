@@ -13,6 +13,7 @@ from cellplan.cli.check import check
 from cellplan.cli.errors import OutputError, report_failure
 from cellplan.cli.explain import explain
 from cellplan.cli.export import export
+from cellplan.cli.fastest import fastest
 from cellplan.cli.output import say
 from cellplan.cli.rehearse import rehearse
 from cellplan.cli.robots import robots
@@ -57,6 +58,7 @@ app.command()(solve)
 app.command()(verify)
 app.command()(export)
 app.command()(sweep)
+app.command()(fastest)
 app.command()(rehearse)
 app.command()(robots)
 app.command()(schema)

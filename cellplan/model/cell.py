@@ -193,6 +193,14 @@ class LockedJoint:
     since: float
 
 
+class Timing(StrEnum):
+    """When the joints are where on their path."""
+
+    AS_WRITTEN = "as_written"
+    FASTEST = "fastest"
+    CYCLE = "cycle"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionSettings:
     """Mode and clock.
@@ -203,6 +211,10 @@ class MotionSettings:
         step: Time between two samples in [s].
         cyclic: Whether all joints are to end where they started.
         locked: Joints that fail during the motion.
+        timing: Whether the time laws say when the joints are where, or the limits of the joints.
+        cycle: Time in [s] that each phase of a program takes; None unless the timing demands one.
+        build_up: Time in [s] in which a joint without a stated limit of jerk is taken to build up its acceleration
+            where a program is retimed; None for no limit.
     """
 
     mode: Mode
@@ -210,6 +222,9 @@ class MotionSettings:
     step: float
     cyclic: bool = False
     locked: tuple[LockedJoint, ...] = ()
+    timing: Timing = Timing.AS_WRITTEN
+    cycle: float | None = None
+    build_up: float | None = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.clock import Clock
 from cellplan.model.clocked_path import ClockedPath, distinct
+from cellplan.model.joint_path import JointPath
 from cellplan.model.phase import Phase
 from cellplan.model.plan import Plan, rows_of
 from cellplan.model.solver import Integrator
@@ -50,12 +52,14 @@ class Schedule:
         tasks: The tasks that are worked on, at the samples.
         paths: The same tasks at any time; empty where they are known at the samples only.
         extra_breaks: Further times in [s] that count as jumps: ends of panels where errors were too large, shape (K,).
+        clock: Nominal times of the samples, which are the times of the paths; None where these are the times.
     """
 
     times: Array
     tasks: tuple[TaskSchedule, ...]
     paths: tuple[ClockedPath, ...] = ()
     extra_breaks: Array = field(default_factory=lambda: np.zeros(0))
+    clock: Clock | None = None
 
     @property
     def step(self) -> float:
@@ -78,13 +82,19 @@ class Schedule:
         return self._within_clock([path.jumps for path in self.paths])
 
     def poses(self, times: Array) -> tuple[Array, ...]:
-        """Reference poses X_PT of all tasks at times in [s], shape (M,), shape (M, 4, 4) each."""
-        return tuple(path.poses(times) for path in self.paths)
+        """Reference poses X_PT of all tasks at times in [s], shape (M,), shape (M, 4, 4) each.
+
+        Between two samples the nominal time is linear in time.
+        """
+        nominal = times if self.clock is None else self.clock.at(times)
+        return tuple(path.poses(nominal) for path in self.paths)
 
     def _within_clock(self, found: Sequence[Array]) -> Array:
         """Times of all paths within the clock, and its ends."""
         end = float(self.times[-1])
-        every = np.concatenate([self.extra_breaks, *found])
+        nominal = np.concatenate([np.zeros(0), *found])
+        times = nominal if self.clock is None else self.clock.reached_at(nominal)
+        every = np.concatenate([self.extra_breaks, times])
         inner = distinct(every[(every > TIME_TOLERANCE) & (every < end - TIME_TOLERANCE)])
         return np.concatenate([[0.0], inner, [end]])
 
@@ -162,6 +172,7 @@ class Motion:
         slack: Norm of the twist residual that each step accepts (mixed units: m/s and rad/s), shape (N - 1,); None when
             it was not measured.
         resolution: Nodes and effort of the accurate mode; None when not recorded.
+        path: The motion between the rows too, over the nominal time; None where only the rows are known.
     """
 
     times: Array
@@ -171,6 +182,7 @@ class Motion:
     iterations: Array | None = None
     slack: Array | None = None
     resolution: Resolution | None = None
+    path: JointPath | None = None
 
     def __post_init__(self) -> None:
         """Check that nothing is missing or not finite."""

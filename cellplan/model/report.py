@@ -77,6 +77,7 @@ class TaskAccuracy:
         position_error: Position error in P in [m], shape (N, 3); unconstrained components are zero.
         orientation_error: Rotation vector of ``R_PT,desired R_PT^T`` in P in [rad], shape (N, 3); likewise.
         path_length: Length of the path on the surface in [m].
+        start_s: Instant at which the path begins.
         end_s: Instant at which the path is done.
         between: Errors between the rows; None where they were not evaluated.
     """
@@ -86,6 +87,7 @@ class TaskAccuracy:
     position_error: Array
     orientation_error: Array
     path_length: float
+    start_s: float
     end_s: float
     between: BetweenRows | None = None
 

@@ -18,6 +18,7 @@ from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.plan.headers import table_headers
 from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_homes
 from cellplan.pipeline.plan.program import ProgramClock, refuse_clock_name
+from cellplan.pipeline.plan.retiming import retimed
 from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.run import PlannedRun, plan_run
 from cellplan.pipeline.plan.start import chosen_start
@@ -43,8 +44,8 @@ def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -
         InputError: The cell cannot be worked with: a path misses the part, a given start is off its task.
         NoSolutionError: No start posture or no home was found, or a tool lost its path.
     """
-    scene, solution = _solve_motion(cell, task=task, progress=progress)
-    return _with_clearance(solution, scene, progress=progress)
+    scene, solution = solve_motion(cell, task=task, progress=progress)
+    return certified(solution, scene, progress=progress)
 
 
 def solve_with_plots(
@@ -58,14 +59,14 @@ def solve_with_plots(
         task: Name of the only task to work on; the other operators stay at their homes.
         progress: Called with the stage and the fraction done.
     """
-    scene, solution = _solve_motion(cell, task=task, progress=progress)
+    scene, solution = solve_motion(cell, task=task, progress=progress)
     for run in solution.runs:
         plots.begin(run.report, cell=solution.cell)
-    return _with_clearance(solution, scene, progress=progress)
+    return certified(solution, scene, progress=progress)
 
 
-def _solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[Scene, Solution]:
-    """All phases, verified but for their clearance, and the scene of the solved cell."""
+def solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[Scene, Solution]:
+    """All phases, verified but for their clearance, and the scene of the solved cell; see ``solve``."""
     refuse_clock_name(cell)
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
@@ -83,7 +84,7 @@ def _solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[
     return scene, Solution(cell=solved, motion=motion, runs=runs, remark=choice.warning)
 
 
-def _with_clearance(solution: Solution, scene: Scene, *, progress: Progress) -> Solution:
+def certified(solution: Solution, scene: Scene, *, progress: Progress) -> Solution:
     """The solution with the clearance of every phase checked and the verdict in the headers of its tables."""
     reports = [with_clearance(run.report, scene, run.schedule, progress=progress) for run in solution.runs]
     program = with_verdict(solution.cell, solution.program, solution.plan.program, reports)
@@ -96,8 +97,9 @@ def _runs(
 ) -> tuple[Motion, tuple[Run, ...]]:
     """The motion of the program, and its phases verified on the rows that would be written, but for their clearance."""
     cell = scene.cell
-    motions = [replace(run.motion, q=standing(cell, run.phase, run.motion.q)) for run in planned]
+    nominal = [replace(run.motion, q=standing(cell, run.phase, run.motion.q)) for run in planned]
     clock = ProgramClock.of(cell, plan, [run.schedule for run in planned])
+    clock, motions = retimed(scene, clock, nominal, progress=progress)
     motion = clock.motion([each.q for each in motions])
     program = render_program(cell, motion)
     tasks = [task.name for task in cell.tasks if task.name in clock.plan.process]
@@ -105,16 +107,16 @@ def _runs(
     program = replace(program, clock=text)
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
     runs = []
-    for place, (run, own) in enumerate(zip(planned, motions, strict=True)):
-        rows = clock.cut(tables, place)
-        report = verify_motion(scene, run.schedule, rows, moving=run.phase.moving, progress=progress)
+    for place, (schedule, own) in enumerate(zip(clock.schedules, motions, strict=True)):
+        phase, rows = clock.plan.program[place], clock.cut(tables, place)
+        report = verify_motion(scene, schedule, rows, moving=phase.moving, progress=progress)
         runs.append(
             Run(
-                phase=clock.plan.program[place],
-                schedule=run.schedule,
+                phase=phase,
+                schedule=schedule,
                 motion=own,
                 program=program,
-                report=replace(report, phases=clock.plan.phases),
+                report=replace(report, phases=clock.timed_phases),
             )
         )
     return motion, tuple(runs)

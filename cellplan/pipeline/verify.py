@@ -9,18 +9,23 @@ from cellplan.cache import nothing_kept
 from cellplan.checks.verify import verify as verify_tables
 from cellplan.errors import InputError
 from cellplan.io.input.findings import listed
+from cellplan.io.run.clock_table import parse_clock
 from cellplan.io.run.joint_tables import parse_table
-from cellplan.model.cell import Cell
+from cellplan.io.run.stored import CLOCK
+from cellplan.model.cell import Cell, Timing
 from cellplan.model.motion import JointTable
 from cellplan.model.plan import Plan
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
+from cellplan.pipeline.plan.nominal_times import with_nominal_times
 from cellplan.pipeline.plan.program import ProgramClock, moved_while_holding
 from cellplan.planning.modes import plan_phases
 from cellplan.scene.scene import Scene
 
 
-def verify(cell: Cell, tables: Mapping[str, str], *, task: str | None = None, progress: Progress = silent) -> Report:
+def verify(
+    cell: Cell, tables: Mapping[str, str], *, task: str | None = None, clock: str = "", progress: Progress = silent
+) -> Report:
     """Recompute tool errors, joint limits and clearance from the text of joint tables.
 
     Args:
@@ -28,6 +33,8 @@ def verify(cell: Cell, tables: Mapping[str, str], *, task: str | None = None, pr
         tables: Text of one joint table per robot, by robot name.
         task: Name of the only task that was worked on, or of the phase to verify where the program has one per task;
             the report counts time from the start of that phase.
+        clock: Text of the clock of the program, ``tables/clock.csv``: for its nominal times where the cell has another
+            ``motion.timing`` than ``as_written``.
         progress: Called with the stage and the fraction done.
 
     Raises:
@@ -37,10 +44,17 @@ def verify(cell: Cell, tables: Mapping[str, str], *, task: str | None = None, pr
     parsed = [parse_table(text, f"tables/{name}.csv") for name, text in tables.items()]
     plan = plan_phases(cell) if any(table.gaps for table in parsed) else plan_phases(cell, only=task)
     place = _place(plan, task)
-    clock = ProgramClock.from_cell(cell, plan)
-    _refuse_other_rows(clock, parsed)
-    phase, schedule = clock.plan.program[place], clock.schedules[place]
-    own = clock.cut(parsed, place)
+    program = ProgramClock.from_cell(cell, plan)
+    if cell.motion.timing is not Timing.AS_WRITTEN:
+        file = f"tables/{CLOCK}.csv"
+        if not clock:
+            raise InputError(
+                f"clock: expected the text of {file}, as motion.timing is {cell.motion.timing}, got nothing"
+            )
+        program = with_nominal_times(program, parse_clock(clock, file), cell, file=file)
+    _refuse_other_rows(program, parsed)
+    phase, schedule = program.plan.program[place], program.schedules[place]
+    own = program.cut(parsed, place)
     for table in own:
         if table.robot in phase.roles and moved_while_holding(phase, table.robot, table.q) is not None:
             raise InputError(
@@ -48,7 +62,7 @@ def verify(cell: Cell, tables: Mapping[str, str], *, task: str | None = None, pr
             )
     with nothing_kept():  # a proof rests on the cell itself
         report = verify_tables(Scene.from_cell(cell), schedule, own, moving=phase.moving, progress=progress)
-    return replace(report, phases=clock.plan.phases)
+    return replace(report, phases=program.timed_phases)
 
 
 def _place(plan: Plan, task: str | None) -> int:

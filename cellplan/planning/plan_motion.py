@@ -65,7 +65,8 @@ def _sampled(
         stepped = integrate(steps, q[-1], first=reached, last=last, progress=progress)
         q = np.concatenate([q, stepped.q[reached + 1 :]])
     euler_from = float(times[reached]) if reached < last else None
-    return Motion(times=times, q=q, resolution=_resolution(run, path, euler_from=euler_from, lost=lost))
+    whole = path.joints if euler_from is None else None
+    return Motion(times=times, q=q, path=whole, resolution=_resolution(run, path, euler_from=euler_from, lost=lost))
 
 
 def _resolution(

@@ -41,7 +41,12 @@ def plan_within_accuracy(task: MotionTask, *, progress: Progress = silent) -> Mo
         if not len(rough):
             break
         schedule = replace(schedule, extra_breaks=distinct(np.concatenate([schedule.extra_breaks, rough])))
-    return replace(motion, q=order.as_listed(motion.q))
+    path = motion.path and replace(
+        motion.path,
+        start=order.as_listed(motion.path.start),
+        nodes=[order.as_listed(nodes.T).T for nodes in motion.path.nodes],
+    )
+    return replace(motion, q=order.as_listed(motion.q), path=path)
 
 
 def _with_errors(motion: Motion, task: MotionTask) -> tuple[Motion, Array]:

@@ -165,6 +165,7 @@ def _accuracy(index: int, task: str, robot: str) -> TaskAccuracy:
         position_error=1.4e-6 * envelope * wave,
         orientation_error=6e-6 * envelope * wave[:, ::-1],
         path_length=0.63 + 0.1 * index,
+        start_s=0.0,
         end_s=4.0,
     )
 

@@ -51,7 +51,7 @@ def motion_accelerations(
     return MotionAccelerations(
         joints=tuple(use for uses in joints for use in uses),
         tools={name: _point(times, poses[:, None, :3, 3], window=cycles[name])[0] for name, poses in X_WT.items()},
-        part=_part(cell, times, X_WP, window=cycles[cell.positioners[0]]) if cell.positioners else None,
+        part=part_acceleration(cell, times, X_WP, window=cycles[cell.positioners[0]]) if cell.positioners else None,
         process=process_speeds(schedule, X_WT, X_WP),
         not_judged=tuple(_not_judged(cell)),
     )
@@ -118,8 +118,15 @@ def _judged(cell: Cell, times: Array) -> Flags:
     return judged
 
 
-def _part(cell: Cell, times: Array, X_WP: Array, *, window: float) -> PartAcceleration:
-    """The centre of the part's bounding box, and the corner of it that is accelerated most."""
+def part_acceleration(cell: Cell, times: Array, X_WP: Array, *, window: float) -> PartAcceleration:
+    """The centre of the part's bounding box, and the corner of it that is accelerated most.
+
+    Args:
+        cell: The cell.
+        times: Times of the rows in [s], shape (N,).
+        X_WP: The part in the world, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed place.
+        window: Time in [s] over which jerk is taken.
+    """
     middle, half = bounding_box(cell.part.shape)
     points_S = middle + half * np.array([(0, 0, 0), *product((-1, 1), repeat=3)])
     points_P = points_S @ cell.part.X_PS[:3, :3].T + cell.part.X_PS[:3, 3]

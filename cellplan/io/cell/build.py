@@ -13,7 +13,7 @@ from cellplan.io.cell.rules import needs_surface
 from cellplan.io.robots.build_controller import build_controller
 from cellplan.io.robots.rules import home_configuration, start_posture
 from cellplan.io.schema import CellDocument
-from cellplan.io.schema.cell import ChecksEntry, MotionEntry
+from cellplan.io.schema.cell import ChecksEntry, CycleEntry, MotionEntry
 from cellplan.io.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
 from cellplan.io.schema.robot import ToolEntry
 from cellplan.io.schema.shapes import ObstacleEntry
@@ -37,6 +37,7 @@ from cellplan.model.cell import (
     Obstacle,
     Part,
     Robot,
+    Timing,
     Tool,
 )
 from cellplan.model.origin import Origin
@@ -304,13 +305,17 @@ def _time_law(law: str | TrapezoidEntry) -> TimeLaw:
 
 
 def build_motion(entry: MotionEntry) -> MotionSettings:
-    """Mode, clock, and joints that fail."""
+    """Mode, clock, timing, and joints that fail."""
+    cycle = entry.timing.cycle_s if isinstance(entry.timing, CycleEntry) else None
     return MotionSettings(
         mode=Mode(entry.mode),
         duration=entry.duration_s,
         step=entry.step_s,
         cyclic=entry.cyclic,
         locked=tuple(LockedJoint(robot=it.robot, joint=it.joint, since=it.from_s) for it in entry.locked_joints),
+        timing=Timing(entry.timing) if isinstance(entry.timing, str) else Timing.CYCLE,
+        cycle=cycle,
+        build_up=None if isinstance(entry.jerk_build_up_s, str) else entry.jerk_build_up_s,
     )
 
 

@@ -26,6 +26,7 @@ def rule_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Findi
     yield from feedback_findings(valid, document)
     yield from accurate_findings(valid, document)
     yield from _layout(valid, document)
+    yield from _timing(valid, document)
 
 
 def _clashing_names(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
@@ -159,3 +160,16 @@ def _layout(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
             yield document.key_finding(path, unknown_name("a robot of this cell", robot, valid.names["robots"]))
         elif (what == "base") == (value is True):
             yield document.finding(path, "expected ranges for a base and true for a start posture")
+
+
+def _timing(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
+    """What happens at a time of its own has none in a program that is retimed."""
+    if valid.motion is None or valid.motion.timing == "as_written":
+        return
+    text = "expected 0 in a program that is retimed (motion.timing), got {:g}; remove it, or write timing: as_written"
+    for index, lock in enumerate(valid.motion.locked_joints):
+        if lock.from_s > 0.0:
+            yield document.finding(("motion", "locked_joints", index, "from_s"), text.format(lock.from_s))
+    for name, task in valid.tasks.items():
+        if task.settle_s > 0.0:
+            yield document.finding(("tasks", name, "settle_s"), text.format(task.settle_s))

@@ -119,6 +119,29 @@ class LockedJointEntry(Entry):
     )
 
 
+class CycleEntry(Entry):
+    """A cycle time that a program is to take."""
+
+    cycle_s: Seconds = Field(
+        description="Time that the program takes, or each phase of it in the mode pairwise; a multiple of step_s."
+    )
+
+
+WHOLE_STEPS: Final = 1e-6  # [-] of a step: rounding of a quotient
+TIMING_WORDS: Final = "as_written, fastest or {cycle_s: …}"
+TimingChoice = Annotated[
+    Annotated[Literal["as_written", "fastest"], Tag(f"<{TIMING_WORDS}>")] | Annotated[CycleEntry, Tag("<mapping>")],
+    by_kind(TIMING_WORDS, mapping=dict),
+]
+
+BUILD_UP_WORDS: Final = "a number of seconds or unlimited"
+BuildUpChoice = Annotated[
+    Annotated[Literal["unlimited"], Tag(f"<{BUILD_UP_WORDS}>")]
+    | Annotated[Annotated[float, Field(ge=0.001, le=10.0)], Tag("<number>")],
+    by_kind(BUILD_UP_WORDS, number=(int, float)),
+]
+
+
 class MotionEntry(Entry):
     """Who moves, and the common clock."""
 
@@ -132,6 +155,17 @@ class MotionEntry(Entry):
         "own (duration_s, feed_mm_s or a file with times) and the clock ends with the last one.",
     )
     step_s: Seconds = Field(default=0.001, description="Time between two samples.")
+    timing: TimingChoice = Field(
+        default="as_written",
+        description="When the joints are where: as the durations, feeds and time laws say; as fast as all joints can "
+        "go along the path that these give, all robots together, so that tools keep their paths on the part; or in a "
+        "given time, slower than that everywhere alike. Feeds are then upper limits.",
+    )
+    jerk_build_up_s: BuildUpChoice = Field(
+        default=0.05,
+        description="Time in which a joint without a stated limit of jerk is taken to build up its full acceleration "
+        "in a retimed program; unlimited takes none.",
+    )
     controller_cycle_ms: CycleTime = Field(
         default=Ms(4.0), description="Cycle of the controllers, over which jerk is taken."
     )
@@ -144,7 +178,10 @@ class MotionEntry(Entry):
 
     @model_validator(mode="after")
     def _has_a_sensible_clock(self) -> Self:
-        """At least one step, and a bounded number of samples."""
+        """At least one step, a bounded number of samples, and a cycle of whole steps."""
+        cycle = self.timing.cycle_s if isinstance(self.timing, CycleEntry) else self.step_s
+        if abs(cycle / self.step_s - round(cycle / self.step_s)) > WHOLE_STEPS:
+            raise rule(f"expected a multiple of step_s = {self.step_s:g}, got {cycle:g}", "timing.cycle_s")
         if self.duration_s is None:
             return self
         if self.step_s > self.duration_s:

@@ -63,8 +63,8 @@ def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], prog
     _refuse_failed(stored)
     source = load_stored_cell(stored, cell=cell, allow_dirs=allow_dirs)
     plan = _plan(source.cell, stored)
-    clock = ProgramClock.from_cell(source.cell, plan)
-    rows = read_rows(stored, source.cell, clock)
+    rows = read_rows(stored, source.cell, ProgramClock.from_cell(source.cell, plan))
+    clock = rows.clock
     scene = Scene.from_cell(source.cell)
     motions = tuple(_verified(scene, rows, place, progress=progress) for place in range(len(clock.schedules)))
     _refuse_failing(stored, motions)
@@ -126,7 +126,7 @@ def _verified(scene: Scene, rows: StoredRows, place: int, *, progress: Progress)
     phase, schedule = clock.plan.program[place], clock.schedules[place]
     tables = rows.of_phase(place)
     report = verify(scene, schedule, list(tables.values()), moving=phase.moving, progress=progress)
-    report = replace(report, phases=clock.plan.phases)
+    report = replace(report, phases=clock.timed_phases)
     return VerifiedMotion(name=phase.task, moving=phase.moving, schedule=schedule, tables=tables, report=report)
 
 

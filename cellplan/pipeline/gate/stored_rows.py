@@ -17,6 +17,7 @@ from cellplan.model.motion import ClockTable, JointTable, Motion
 from cellplan.model.phase import NOT_IN_PROGRAM, Phase
 from cellplan.model.plan import rows_of
 from cellplan.pipeline.plan.headers import left_out_of_program
+from cellplan.pipeline.plan.nominal_times import with_nominal_times
 from cellplan.pipeline.plan.program import ProgramClock, moved_while_holding
 
 START_TOL: Final = 1e-9  # [rad] or [m] tables and cells have twelve decimals of a degree, millimetre or metre
@@ -29,7 +30,8 @@ class StoredRows:
 
     Attributes:
         stored: The run.
-        clock: The plan on its clock, and the desired tool poses, all from the cell.
+        clock: The plan on its clock, and the desired tool poses: all from the cell but for the nominal times of the
+            rows of a retimed program.
         tables: The joint tables with all rows of the program, by robot.
         motion: The same as one motion.
     """
@@ -51,7 +53,7 @@ class StoredRows:
             InputError: With file and line.
         """
         for phase in self.clock.plan.program:
-            first = rows_of(phase, self.clock.times).start
+            first = rows_of(phase, self.clock.sigma).start
             for robot in cell.robots:
                 off = np.abs(self.tables[robot.name].q[first] - robot.start)
                 if robot.name not in phase.idle and not np.all(off <= START_TOL):
@@ -66,7 +68,7 @@ class StoredRows:
             InputError: With file and line.
         """
         for phase in self.clock.plan.program:
-            rows = rows_of(phase, self.clock.times)
+            rows = rows_of(phase, self.clock.sigma)
             for robot in cell.robots:
                 moved = moved_while_holding(phase, robot.name, self.tables[robot.name].q[rows])
                 if moved is not None:
@@ -87,7 +89,7 @@ def read_rows(stored: StoredRun, cell: Cell, clock: ProgramClock) -> StoredRows:
     Args:
         stored: The run.
         cell: Its cell.
-        clock: The plan on its clock, as the cell demands it.
+        clock: The plan on its clock, as the time laws of the cell have it.
 
     Raises:
         InputError: With file and line, when something is not as the plan of the cell demands.
@@ -97,6 +99,7 @@ def read_rows(stored: StoredRun, cell: Cell, clock: ProgramClock) -> StoredRows:
     tables = _joint_tables(stored, cell, clock.plan.program, program)
     file = stored.file("", f"tables/{CLOCK}.csv")
     written = parse_clock(stored.clock, file)
+    clock = with_nominal_times(clock, written, cell, file=file)
     for name, table in tables.items():
         _refuse_other_times(stored, name, table, clock)
     for finding in _clock_findings(written, clock, cell=cell, program=program):

@@ -18,7 +18,7 @@ from cellplan.model.phase import Hold, Phase
 from cellplan.model.plan import Plan, rows_of
 from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.schedule import TIME_DECIMALS, schedule_tasks
+from cellplan.planning.timing.schedule import TIME_DECIMALS, retimed_schedule, schedule_tasks
 
 STILL_TOL: Final = 1e-9  # [rad] or [m] tables have twelve decimals of a degree or a millimetre
 
@@ -33,11 +33,13 @@ class ProgramClock:
     Attributes:
         plan: The plan, its phases on the nominal time of the whole program.
         times: Times of all rows in [s], shape (N,).
+        sigma: Nominal time of each row in [s], shape (N,).
         schedules: Desired tool poses of each phase of the program, on the phase's own time, which starts at 0.
     """
 
     plan: Plan
     times: Array
+    sigma: Array
     schedules: tuple[Schedule, ...]
 
     @classmethod
@@ -54,7 +56,7 @@ class ProgramClock:
         first = np.cumsum([0, *counts])
         ends = [(float(times[a]), float(times[b - 1])) for a, b in pairwise(first)]
         placed = [replace(phase, begin=b, end=e) for phase, (b, e) in zip(plan.program, ends, strict=True)]
-        return cls(plan=_placed(plan, placed, schedules), times=times, schedules=tuple(schedules))
+        return cls(plan=_placed(plan, placed, schedules), times=times, sigma=times, schedules=tuple(schedules))
 
     @classmethod
     def from_cell(cls, cell: Cell, plan: Plan) -> Self:
@@ -65,14 +67,39 @@ class ProgramClock:
             schedules.append(schedule_tasks(cell, toolpaths))
         return cls.of(cell, plan, schedules)
 
+    def retimed(self, sigma: Array) -> Self:
+        """The same program with other nominal times in its rows, a step of the clock apart as before.
+
+        Args:
+            sigma: Nominal times of all rows in [s], shape (N,), increasing; the first and the last row of each phase
+                have those at which it begins and ends.
+        """
+        step = self.schedules[0].step
+        schedules = []
+        for phase, schedule in zip(self.plan.program, self.schedules, strict=True):
+            nominal = sigma[rows_of(phase, sigma)] - phase.begin
+            times = np.round(np.arange(len(nominal)) * step, TIME_DECIMALS)
+            schedules.append(retimed_schedule(schedule, Clock(times=times, sigma=nominal)))
+        times = np.round(np.arange(len(sigma)) * step, TIME_DECIMALS)
+        return replace(self, times=times, sigma=sigma, schedules=tuple(schedules))
+
     @property
     def gaps(self) -> dict[int, str]:
         """Names of interruptions of the program, by the first row after each."""
-        return self.plan.gaps(self.times)
+        return self.plan.gaps(self.sigma)
+
+    @property
+    def timed_phases(self) -> tuple[Phase, ...]:
+        """All phases of the plan with the times of their first and last rows in [s]."""
+        if self.sigma is self.times:
+            return self.plan.phases
+        ends = np.array([[phase.begin, phase.end] for phase in self.plan.phases])
+        at = Clock(times=self.times, sigma=self.sigma).reached_at(ends).tolist()
+        return tuple(replace(p, begin=b, end=e) for p, (b, e) in zip(self.plan.phases, at, strict=True))
 
     def motion(self, q: Sequence[Array]) -> Motion:
         """The motion of the program from that of its phases, shape (n, nq) each."""
-        clock = Clock.as_written(self.times)
+        clock = Clock(times=self.times, sigma=self.sigma)
         return Motion(times=clock.times, sigma=clock.sigma, q=np.concatenate(q), plan=self.plan)
 
     def table(self, tasks: Sequence[str]) -> ClockTable:
@@ -84,15 +111,14 @@ class ProgramClock:
         names = [""] * len(self.times)
         lengths = {task: np.zeros(len(self.times)) for task in tasks}
         for phase, schedule in zip(self.plan.program, self.schedules, strict=True):
-            rows = rows_of(phase, self.times)
+            rows = rows_of(phase, self.sigma)
             names[rows] = [phase.name] * (rows.stop - rows.start)
             for scheduled in schedule.tasks:
                 lengths[scheduled.task.name][rows] = scheduled.travelled
                 lengths[scheduled.task.name][rows.stop :] = scheduled.travelled[-1]
-        process = {task: _within(self.times, self.plan.process[task]) for task in tasks}
-        sigma = self.times
+        process = {task: _within(self.sigma, self.plan.process[task]) for task in tasks}
         return ClockTable(
-            times=self.times, sigma=sigma, phases=tuple(names), lengths=lengths, process=process, gaps=self.gaps
+            times=self.times, sigma=self.sigma, phases=tuple(names), lengths=lengths, process=process, gaps=self.gaps
         )
 
     def cut(self, tables: Sequence[JointTable], place: int) -> list[JointTable]:
@@ -102,7 +128,7 @@ class ProgramClock:
             tables: One table per robot, with all rows of the program and its times.
             place: Number of the phase among those of the program.
         """
-        rows = rows_of(self.plan.program[place], self.times)
+        rows = rows_of(self.plan.program[place], self.sigma)
         times = self.schedules[place].times
         return [replace(table, times=times, q=table.q[rows], gaps={}) for table in tables]
 

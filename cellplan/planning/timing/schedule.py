@@ -1,6 +1,7 @@
 """Schedule: all toolpaths on one common clock."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -10,6 +11,7 @@ from cellplan.geometry.curves.arc_length import quickly
 from cellplan.geometry.transforms import Array, rotation_vector
 from cellplan.model.approach_retract import stand_off
 from cellplan.model.cell import Cell
+from cellplan.model.clock import Clock
 from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.task import TIME_TOLERANCE, Task
@@ -38,6 +40,35 @@ def schedule_paths(cell: Cell, paths: Sequence[ClockedPath]) -> Schedule:
     """
     times = clock_times(cell, paths)
     return Schedule(times=times, tasks=tuple(_on_clock(times, path) for path in paths), paths=tuple(paths))
+
+
+def retimed_schedule(schedule: Schedule, clock: Clock) -> Schedule:
+    """The same tasks on another clock: its nominal times are the times of the paths.
+
+    Args:
+        schedule: The tasks and their paths.
+        clock: Times of the new samples and their nominal times, which increase.
+    """
+    if clock.is_as_written:
+        return schedule
+    rate = np.gradient(clock.sigma, clock.times)[:, None]
+    tasks = []
+    for path in schedule.paths:
+        nominal = _on_clock(clock.sigma, path)
+        own = [path.task.start, nominal.end, *nominal.cycle_ends, *nominal.stops]
+        start, end, *rest = clock.reached_at(np.array(own)).tolist()
+        cycles = len(nominal.cycle_ends)
+        tasks.append(
+            replace(
+                nominal,
+                task=replace(path.task, start=start),
+                V_PT_P=rate * nominal.V_PT_P,
+                end=end,
+                cycle_ends=tuple(rest[:cycles]),
+                stops=tuple(rest[cycles:]),
+            )
+        )
+    return Schedule(times=clock.times, tasks=tuple(tasks), paths=schedule.paths, clock=clock)
 
 
 def clock_times(cell: Cell, paths: Sequence[ClockedPath]) -> Array:

@@ -2,16 +2,19 @@
 
 from typing import Final
 
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, Timing
 
 STEP_TOL: Final = 1e-9  # [-] relative rounding error of the number of steps
 GIVEN: Final = "motion.duration_s"
 NEXT_STEP: Final = "step after motion.duration_s"
 TASKS: Final = "tasks"
+TIMING: Final = "motion.timing"
 
 
 def clock_from(cell: Cell) -> str:
-    """The stated duration, the step after it if it is no whole number of steps, or the last task."""
+    """The timing, the stated duration, the step after it if it is no whole number of steps, or the last task."""
+    if cell.motion.timing is not Timing.AS_WRITTEN:
+        return TIMING
     duration = cell.motion.duration
     if duration is None:
         return TASKS

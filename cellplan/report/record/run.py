@@ -70,7 +70,7 @@ class HeadRecord(OriginRecord):
     clock_from: Annotated[
         str,
         "what determines the duration: `motion.duration_s`; `step after motion.duration_s` if that is not a "
-        "multiple of the step; `tasks` if the cell states no duration",
+        "multiple of the step; `tasks` if the cell states no duration; `motion.timing` if the program is retimed",
     ]
     phases: Annotated[list[PhaseRecord], "phases of the whole program"]
     tasks: Annotated[dict[str, TaskRecord], "by task"]

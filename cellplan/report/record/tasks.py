@@ -133,7 +133,7 @@ def _task_record(accuracy: TaskAccuracy, report: Report, cell: Cell, *, depth: T
         "axes": [AXES[index] for index in task.axes],
         "path_length_mm": number(MM * accuracy.path_length),
         "cycles": task.repeat,
-        "start_s": number(task.start),
+        "start_s": number(accuracy.start_s),
         "end_s": number(accuracy.end_s),
         **direction_record(task),
         **between_record(accuracy.between),

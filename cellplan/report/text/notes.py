@@ -4,13 +4,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from cellplan.model.left_out import left_out_lines
-from cellplan.report.record.clock import NEXT_STEP, TASKS
+from cellplan.report.record.clock import NEXT_STEP, TASKS, TIMING
 from cellplan.report.record.common import Number, Record
 
 MAX_NAMES: Final = 3  # links of a robot that a line names; further ones are counted
 CLOCK_NOTES: Final = {
     TASKS: "no motion.duration_s: the clock ends with the last task",
     NEXT_STEP: "motion.duration_s is not a multiple of motion.step_s: the clock ends with the step after it",
+    TIMING: "motion.timing: joints and feeds determine how long the program takes",
 }
 
 

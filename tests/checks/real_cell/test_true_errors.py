@@ -28,6 +28,7 @@ def accuracy(position=0.0, at=0):
         position_error=errors,
         orientation_error=np.zeros((N, 3)),
         path_length=1.0,
+        start_s=0.0,
         end_s=1.0,
     )
 

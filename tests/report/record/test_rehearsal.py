@@ -49,6 +49,7 @@ def accuracy(size):
         position_error=errors,
         orientation_error=np.zeros((N, 3)),
         path_length=1.0,
+        start_s=0.0,
         end_s=0.4,
     )
 

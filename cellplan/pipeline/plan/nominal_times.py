@@ -1,0 +1,61 @@
+"""Nominal times of a retimed program: all that is taken from a run beside its times and joint positions."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.io.run.clock_table import ClockText
+from cellplan.model.cell import Cell, Timing
+from cellplan.model.phase import Phase
+from cellplan.pipeline.plan.program import ProgramClock
+
+
+def with_nominal_times(clock: ProgramClock, written: ClockText, cell: Cell, *, file: str) -> ProgramClock:
+    """A program on the clock of a run; the desired poses at its nominal times still come from the cell.
+
+    Args:
+        clock: The program as the time laws of the cell have it; it stays where the cell demands it as written.
+        written: The clock of the run.
+        cell: Its cell.
+        file: File of that clock.
+
+    Raises:
+        InputError: With file and line, when the nominal times do not rise from the beginning of each phase to its end,
+            or a phase lasts for another time than the demanded one.
+    """
+    if cell.motion.timing is Timing.AS_WRITTEN:
+        return clock
+    _refuse_other(written, cell, clock.plan.program, file=file)
+    return clock.retimed(written.table.sigma)
+
+
+def _refuse_other(written: ClockText, cell: Cell, phases: Sequence[Phase], *, file: str) -> None:
+    """Refuse nominal times of a retimed program that do not rise from the beginning of each phase to its end."""
+    sigma, row = written.table.sigma, 0
+    for phase in phases:
+        last = row + int(np.searchsorted(sigma[row:], phase.end, side="right")) - 1
+        for place, demanded in ((min(row, len(sigma) - 1), phase.begin), (max(last, 0), phase.end)):
+            if sigma[place] != demanded:
+                raise InputError(
+                    f"{file}:{written.line(place)}: sigma_s: expected {demanded!r}, at which the phase '{phase.name}' "
+                    f"{'begins' if demanded == phase.begin else 'ends'}, got {float(sigma[place])!r}"
+                )
+        still = np.flatnonzero(np.diff(sigma[row : last + 1]) <= 0.0)
+        if len(still):
+            place = row + int(still[0]) + 1
+            got = float(sigma[place])
+            raise InputError(
+                f"{file}:{written.line(place)}: sigma_s: expected more than in the row before, got {got!r}"
+            )
+        steps = None if cell.motion.cycle is None else round(cell.motion.cycle / cell.motion.step)
+        if steps not in (None, last - row):
+            raise InputError(
+                f"{file}:{written.line(last)}: expected a phase of {cell.motion.cycle:g} s (motion.timing), got "
+                f"{(last - row) * cell.motion.step:g} s"
+            )
+        row = last + 1
+    if row < len(sigma):
+        raise InputError(
+            f"{file}:{written.line(row)}: expected no row after the end of the last phase, got another one"
+        )

@@ -1,0 +1,184 @@
+"""Retiming of a program: each phase as fast as its joints and feeds allow, or in a demanded time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cellplan.checks.joints.acceleration_limits import acceleration_limit, part_acceleration
+from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
+from cellplan.checks.joints.limits import joint_uses
+from cellplan.checks.tools.tracking import part_poses
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell, Timing
+from cellplan.model.clocked_path import ClockedPath
+from cellplan.model.joint_path import JointPath
+from cellplan.model.motion import Motion, Schedule
+from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.plan.program import ProgramClock
+from cellplan.planning.timing.retime import JointBounds, Retimer
+from cellplan.planning.timing.schedule import TIME_DECIMALS
+from cellplan.scene.scene import Scene
+
+
+def retimed(
+    scene: Scene, clock: ProgramClock, motions: Sequence[Motion], *, progress: Progress = silent
+) -> tuple[ProgramClock, list[Motion]]:
+    """A program and the motions of its phases on the clock that the cell's timing asks for.
+
+    Args:
+        scene: The scene of the solved cell.
+        clock: The program as its time laws have it.
+        motions: Motion of each of its phases, likewise.
+        progress: Called with the stage and the fraction done.
+
+    Returns:
+        The same objects where the program runs as it is written.
+
+    Raises:
+        InputError: The joints cannot go as fast as the demanded cycle asks for.
+    """
+    cell = scene.cell
+    if cell.motion.timing is Timing.AS_WRITTEN:
+        return clock, list(motions)
+    paths, nominal = [], []
+    for place, (phase, motion) in enumerate(zip(clock.plan.program, motions, strict=True)):
+        progress("retiming", place / len(motions))
+        paths.append(joint_path(motion))
+        sigma = np.round(phase.begin + _nominal_times(scene, clock.schedules[place], paths[-1]), TIME_DECIMALS)
+        sigma[0], sigma[-1] = phase.begin, phase.end
+        nominal.append(sigma)
+    clock = clock.retimed(np.concatenate(nominal))
+    made: list[Motion] = []
+    for phase, path, motion, sigma in zip(clock.plan.program, paths, motions, nominal, strict=True):
+        own = sigma - phase.begin
+        times = clock.schedules[len(made)].times
+        made.append(replace(motion, times=times, sigma=own, q=path.at(own), iterations=None, slack=None))
+    return clock, made
+
+
+def joint_path(motion: Motion) -> JointPath:
+    """The joints over the nominal time, also between the rows; those that stand still in the rows do so everywhere."""
+    if motion.path is None:
+        return JointPath.through(motion.times, motion.q)
+    stands = np.all(motion.q == motion.q[0], axis=0)
+    nodes = [np.where(stands[:, None], motion.q[0][:, None], each) for each in motion.path.nodes]
+    return replace(motion.path, start=motion.q[0], nodes=nodes)
+
+
+def joint_bounds(cell: Cell) -> JointBounds:
+    """Limits of all joints of a cell: stated ones, else those that the cell assumes."""
+    velocity, acceleration, jerk = [], [], []
+    for robot in cell.robots:
+        for index, joint in enumerate(robot.model.joints):
+            limit = acceleration_limit(robot, index)[0]
+            velocity.append(joint.velocity)
+            acceleration.append(np.inf if limit is None else limit)
+            if joint.jerk is None or robot.acceleration.is_unlimited:
+                jerk.append(acceleration[-1] / cell.motion.build_up if cell.motion.build_up else np.inf)
+            else:
+                jerk.append(joint.jerk)
+    return JointBounds(velocity=np.array(velocity), acceleration=np.array(acceleration), jerk=np.array(jerk))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RowLimits:
+    """The limits of a cell in rows of one phase, as the checks compute them.
+
+    Attributes:
+        scene: The scene of the cell.
+        paths: Paths of the tasks that are worked on.
+        bounds: Limits of all joints.
+        step: Time between two rows in [s].
+    """
+
+    scene: Scene
+    paths: tuple[ClockedPath, ...]
+    bounds: JointBounds
+    step: float
+
+    def shares(self, times: Array, q: Array) -> tuple[Array, Array, Array]:
+        """Largest velocity, acceleration and jerk of each joint, in shares of the limits, shape (nq,) each."""
+        cell, found = self.scene.cell, []
+        for robot in cell.robots:
+            own, cycle = q[:, cell.columns(robot.name)], robot.controller_cycle
+            signed = point_accelerations(times, own)[..., None]
+            found.append(
+                (
+                    [use.peak_velocity for use in joint_uses(robot, times, own)],
+                    joint_accelerations(times, own, cycle=cycle).values.max(axis=0),
+                    jerks(times, signed, window=cycle).max(axis=0),
+                )
+            )
+        velocity, acceleration, jerk = (np.concatenate(each) for each in zip(*found, strict=True))
+        return velocity / self.bounds.velocity, acceleration / self.bounds.acceleration, jerk / self.bounds.jerk
+
+    def slower(self, sigma: Array, q: Array) -> float:
+        """By which factor rows have to be slower for every limit to hold in them.
+
+        Args:
+            sigma: Nominal times of the rows in [s], shape (N,).
+            q: Stacked joint positions in [rad] or [m], shape (N, nq).
+        """
+        times = np.round(np.arange(len(q)) * self.step, TIME_DECIMALS)
+        velocity, acceleration, jerk = (float(shares.max()) for shares in self.shares(times, q))
+        feed = max(self.feeds(sigma, times).values(), default=0.0)
+        return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, self._part_share(times, q) ** 0.5)
+
+    def feeds(self, sigma: Array, times: Array) -> dict[str, float]:
+        """Largest speed of each tool along its path between rows, as a share of its feed, by task with a feed.
+
+        Args:
+            sigma: Nominal times of the rows in [s], shape (N,).
+            times: Their times in [s], shape (N,).
+        """
+        return {
+            path.task.name: float((np.diff(path.targets(sigma)[2]) / np.diff(times)).max() / path.task.feed)
+            for path in self.paths
+            if path.task.feed is not None
+        }
+
+    def feed_share(self, sigma: Array) -> Array:
+        """Share of the feeds that is taken up at the speed of the nominal time, shape (N,)."""
+        share = np.zeros(len(sigma))
+        for path in self.paths:
+            if path.task.feed is not None:
+                twists = path.targets(sigma)[1]
+                is_moving = (sigma >= path.start) & (sigma <= path.end)
+                share = np.maximum(share, is_moving * np.linalg.norm(twists[:, :3], axis=1) / path.task.feed)
+        return share
+
+    def _part_share(self, times: Array, q: Array) -> float:
+        """Acceleration of the part as a share of what is allowed."""
+        cell, limit = self.scene.cell, self.scene.cell.checks.part_acceleration
+        if limit is None or not cell.positioners:
+            return 0.0
+        by_robot = {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots}
+        X_WP = part_poses(cell, self.scene.chains, by_robot)
+        cycle = cell.robot(cell.positioners[0]).controller_cycle
+        return part_acceleration(cell, times, X_WP, window=cycle).corner.peak / limit
+
+
+def row_limits(scene: Scene, schedule: Schedule) -> RowLimits:
+    """The limits in the rows of one phase; its schedule names the tasks."""
+    return RowLimits(scene, schedule.paths, joint_bounds(scene.cell), scene.cell.motion.step)
+
+
+def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath) -> Array:
+    """Nominal times of the rows of one phase in [s], shape (N,)."""
+    limits, motion = row_limits(scene, schedule), scene.cell.motion
+    retimer = Retimer(bounds=limits.bounds, step=motion.step, feed_share=limits.feed_share, slower=limits.slower)
+    fastest = retimer.fastest(path)
+    if motion.cycle is None:
+        return fastest.sigma
+    steps = round(motion.cycle / motion.step)
+    if fastest.steps <= steps:
+        sigma = fastest.lasting(steps).sigma
+        if limits.slower(sigma, path.at(sigma)) <= 1.0:
+            return sigma
+    least = max(fastest.steps, steps + (fastest.steps <= steps)) * motion.step
+    raise InputError(
+        f"{scene.cell.origin.at('motion.timing')}: expected a cycle of at least {least:.6g} s, in which all joints "
+        f"keep their limits along this path, got {motion.cycle:g}; make it longer, or write fastest"
+    )

@@ -1,0 +1,152 @@
+"""Retiming: the nominal time of a joint path as a function of the time, as fast as the limits of all joints allow.
+
+The joints keep their path, all of them together, so the tools keep their paths on one another; only speeds change.
+Without a limit of jerk the speed is the largest one from rest to rest (``speed_profile``). With one, its mean over a
+window that all joints share is taken, so that accelerations change evenly over the window; this is not the fastest
+motion with that jerk. The motion is then made slower as a whole until every limit holds in the rows of the tables.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.joint_path import JointPath
+from cellplan.planning.timing.path_length import Stretch, stretches
+from cellplan.planning.timing.retimed_path import AsWritten, RestToRest, RetimedPath, Rows
+from cellplan.planning.timing.speed_profile import SpeedProfile, fastest_profile
+
+POINTS_PER_ROW: Final = 5  # [-] lengths for every row of the tables at first; at least doubled once
+FEWEST_POINTS: Final = 400  # [-] lengths of a stretch
+MOST_POINTS: Final = 20_000  # [-] likewise: some seconds of computing
+SETTLED: Final = 0.01  # [-] change of the duration when the lengths are doubled: a smaller one is accepted
+WINDOWS: Final = (1.0, 1.4, 2.0, 2.4)  # [-] windows tried, in times that the jerk takes to the full acceleration
+BEND_SHARES: Final = (0.8, 0.6, 0.4)  # [-] tried with them: what the bends of the path may take up of the jerk limits
+RESERVE: Final = 0.95  # [-] share of the acceleration limits with a limit of jerk: the means take up the rest
+MOST_STRETCHINGS: Final = 40  # [-] until every limit holds
+MARGIN: Final = 1e-7  # [-] by which a motion is made slower than the limits ask for
+
+Slower = Callable[
+    [Array, Array], float
+]  # nominal times and joints in the rows -> factor of time that the limits ask for
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointBounds:
+    """Limits of all joints in [rad] or [m] and seconds, shape (nq,) each; infinite for none."""
+
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+    @property
+    def build_up(self) -> float:
+        """Time in [s] in which every limited joint can build up its full acceleration; 0 without a limit of jerk."""
+        limited = np.isfinite(self.jerk) & np.isfinite(self.acceleration)
+        return float((self.acceleration[limited] / self.jerk[limited]).max(initial=0.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Retimer:
+    """What a joint path is retimed by.
+
+    Attributes:
+        bounds: Limits of all joints.
+        step: Time between two rows in [s].
+        feed_share: Share of the tools' speed limits that is taken up at the speed of the nominal time, at nominal times
+            in [s], shape (N,) to shape (N,).
+        slower: By which factor the rows have to be slower for every limit to hold in them; at most 1 where all hold.
+    """
+
+    bounds: JointBounds
+    step: float
+    feed_share: Callable[[Array], Array]
+    slower: Slower
+
+    def fastest(self, path: JointPath) -> RetimedPath:
+        """The fastest motion found along a path.
+
+        Args:
+            path: The joints over the nominal time.
+        """
+        made = [self._settled(piece) for piece in stretches(path, self.bounds.velocity)]
+        found = RetimedPath(
+            motions=tuple(motion for _, motion in made), counts=tuple(count for count, _ in made), end=path.end
+        )
+        for _ in range(MOST_STRETCHINGS):
+            sigma = found.sigma
+            factor = self.slower(sigma, path.at(sigma))
+            if factor <= 1.0:
+                return found
+            found = replace(found, counts=tuple(_longer(count, factor) for count in found.counts))
+        return found
+
+    def _settled(self, piece: Stretch) -> tuple[int, Rows]:
+        """The motion of one stretch with its steps, from so many lengths that twice as many change it little."""
+        written = AsWritten(piece)
+        sigma = piece.sigma[0] + self.step * np.arange(float(piece.sigma[-1] - piece.sigma[0]) // self.step + 1.0)
+        slow = self._steps(piece, written, self.step * len(sigma) * self.slower(sigma, piece.path.at(sigma)))
+        rough = self._profile(piece, FEWEST_POINTS).duration
+        points = int(np.clip(POINTS_PER_ROW * rough / self.step, FEWEST_POINTS, MOST_POINTS // 4))
+        count, motion = self._best(piece, points)
+        while points < MOST_POINTS // 2:
+            points, before = 2 * points, count
+            count, motion = self._best(piece, points)
+            if abs(count - before) <= max(1.0, SETTLED * before):
+                break
+        return (slow, written) if slow < count else (count, motion)
+
+    def _best(self, piece: Stretch, points: int) -> tuple[int, Rows]:
+        """The shortest motion of one stretch among the windows and shares that are tried, and its steps."""
+        build_up = self.bounds.build_up
+        if build_up:
+            profiles = [self._profile(piece, points, share) for share in BEND_SHARES]
+            tried = [RestToRest(piece, each, window * build_up) for each in profiles for window in WINDOWS]
+        else:
+            tried = [RestToRest(piece, self._profile(piece, points), 0.0)]
+        counts = [self._steps(piece, motion, motion.duration) for motion in tried]
+        best = counts.index(min(counts))
+        return counts[best], tried[best]
+
+    def _profile(self, piece: Stretch, points: int, bend_share: float | None = None) -> SpeedProfile:
+        """Fastest motion along one stretch; lengths lie closer to each other near the rests.
+
+        At a constant speed v of the path a joint has the jerk v^3 times its third derivative by the length: with a
+        share for the bends of the path, v is bounded so that this takes up no more of any limit.
+        """
+        lengths = 0.5 * piece.length * (1.0 - np.cos(np.pi * np.arange(points + 1) / points))
+        sigma = piece.at(lengths)
+        share = self.feed_share(sigma)
+        rates = np.interp(sigma, piece.sigma, piece.rates)
+        highest = np.where(share > 0.0, rates / np.where(share > 0.0, share, 1.0), np.inf)
+        highest[[0, -1]] = np.inf
+        directions = piece.directions(sigma)
+        if bend_share is not None:
+            third = np.gradient(np.gradient(directions, lengths, axis=0), lengths, axis=0)
+            with np.errstate(divide="ignore"):
+                highest = np.minimum(highest, np.cbrt((bend_share * self.bounds.jerk / np.abs(third)).min(axis=1)))
+        return fastest_profile(
+            lengths,
+            directions,
+            velocity=self.bounds.velocity,
+            acceleration=(1.0 if bend_share is None else RESERVE) * self.bounds.acceleration,
+            highest=highest,
+        )
+
+    def _steps(self, piece: Stretch, motion: Rows, duration: float) -> int:
+        """Steps that a motion of one stretch takes, made slower as a whole until every limit holds in its rows."""
+        count = max(2, int(np.ceil(duration / self.step * (1.0 - MARGIN))))
+        for _ in range(MOST_STRETCHINGS):
+            sigma = motion.rows(count)
+            factor = self.slower(sigma, piece.path.at(sigma))
+            if factor <= 1.0:
+                break
+            count = _longer(count, factor)
+        return count
+
+
+def _longer(count: int, factor: float) -> int:
+    """Steps of a motion that is slower by a factor: more than before."""
+    return max(count + 1, int(np.ceil(count * factor * (1.0 - MARGIN))))

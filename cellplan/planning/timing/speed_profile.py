@@ -1,0 +1,164 @@
+r"""Fastest speed along a path: the largest that velocities and accelerations of all joints allow.
+
+With the length p of the path, the squared speed :math:`x = \dot p^2` and :math:`u = \ddot p`, a joint has the
+acceleration :math:`q' u + q'' x`; over an interval in which u is constant, x is linear in p. Backwards from rest: the
+largest x from which some u keeps all limits at both ends of the interval and reaches what can be brought to rest
+behind it. Forwards from rest: the largest u that stays below. At every x the limits leave u between the highest of many
+lower lines and the lowest of many upper ones; the distance of the two is concave in x, so Newton's method from the
+right finds the largest x at which it is not negative in a few steps, exactly.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.transforms import Array
+
+LEAST: Final = 1e-12  # [-] share of the acceleration limit by which the speeding up of the path counts
+MOST_STEPS: Final = 60  # [-] of Newton's method: as many lines are crossed at most
+ROUNDING: Final = 1e-13  # [-] of a bound on the acceleration
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SpeedProfile:
+    """Motion along a path, with constant acceleration of the path between neighbouring lengths.
+
+    Attributes:
+        lengths: Lengths of path, increasing from 0, shape (N,).
+        speeds: Speed of the path there, shape (N,), 0 at both ends.
+        times: Times in [s] at which they are passed, shape (N,), from 0.
+    """
+
+    lengths: Array
+    speeds: Array
+    times: Array
+
+    @property
+    def duration(self) -> float:
+        """Time from rest to rest in [s]."""
+        return float(self.times[-1])
+
+    def at(self, times: Array, window: float = 0.0) -> Array:
+        """Lengths at times in [s], shape (M,); with a window, means of the speed over that time.
+
+        Args:
+            times: From 0 to the duration and the window.
+            window: In [s] over which the speed is averaged: the motion takes so much longer, and what jumped before
+                changes evenly over the window.
+        """
+        if window > 0.0:
+            return (self._area(times) - self._area(times - window)) / window
+        k, elapsed = self._place(times)
+        within: Array = self.lengths[k] + elapsed * (self.speeds[k] + 0.5 * elapsed * self._accelerations[k])
+        return within
+
+    @property
+    def _accelerations(self) -> Array:
+        """Acceleration of the path between its lengths, shape (N - 1,)."""
+        return np.diff(self.speeds) / np.diff(self.times)
+
+    def _place(self, times: Array) -> tuple[NDArray[np.intp], Array]:
+        """Interval of each time, and the time since its beginning."""
+        inside = np.clip(times, 0.0, self.duration)
+        k = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.times) - 2)
+        return k, inside - self.times[k]
+
+    def _area(self, times: Array) -> Array:
+        """Integral of the length over time from the start on; before it the length is 0, after the end the whole."""
+        step, u = np.diff(self.times), self._accelerations
+        whole = step * (self.lengths[:-1] + step * (0.5 * self.speeds[:-1] + step * u / 6.0))
+        begin = np.append(0.0, np.cumsum(whole))
+        k, elapsed = self._place(times)
+        part = elapsed * (self.lengths[k] + elapsed * (0.5 * self.speeds[k] + elapsed * u[k] / 6.0))
+        after: Array = np.maximum(times - self.duration, 0.0) * self.lengths[-1]
+        return begin[k] + part + after
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Lines:
+    """Bounds on u, by interval: ``-top - slope x <= u <= top - slope x``, shape (N - 1, L) each."""
+
+    top: Array
+    slope: Array
+
+
+def fastest_profile(
+    lengths: Array, directions: Array, *, velocity: Array, acceleration: Array, highest: Array
+) -> SpeedProfile:
+    """The fastest motion along a path from rest to rest.
+
+    Args:
+        lengths: Lengths of path, increasing from 0, shape (N,).
+        directions: Derivatives of the joints by the length, shape (N, nq).
+        velocity: Largest speeds of the joints, positive, shape (nq,).
+        acceleration: Largest accelerations of the joints, positive; infinite for a joint without limit, shape (nq,).
+        highest: Largest speeds of the path itself, shape (N,); infinite where there is no such limit.
+    """
+    with np.errstate(divide="ignore"):
+        allowed = np.minimum(highest, (velocity / np.abs(directions)).min(axis=1)) ** 2
+    limited = np.isfinite(acceleration)
+    step = np.diff(lengths)
+    if limited.any():
+        along = directions[:, limited] / acceleration[limited]
+        lines = _lines(along, np.gradient(along, lengths, axis=0), step)
+        squared = _forward(lines, step, _backward(lines, step, allowed))
+    else:
+        squared = allowed.copy()
+        squared[[0, -1]] = 0.0
+    speeds = np.sqrt(squared)
+    times = np.append(0.0, np.cumsum(2.0 * step / (speeds[:-1] + speeds[1:])))
+    return SpeedProfile(lengths=lengths, speeds=speeds, times=times)
+
+
+def _lines(along: Array, bent: Array, step: Array) -> _Lines:
+    """Limits at both ends of every interval; at the later end the squared speed is ``x + 2 step u``.
+
+    Args:
+        along: Derivatives of the joints by the length, in shares of their acceleration limits, shape (N, m).
+        bent: Their derivatives by the length, shape (N, m).
+        step: Widths of the intervals, shape (N - 1,).
+    """
+    factor_u = np.concatenate([along[:-1], along[1:] + 2.0 * step[:, None] * bent[1:]], axis=1)
+    factor_x = np.concatenate([bent[:-1], bent[1:]], axis=1)
+    size = np.maximum(np.abs(factor_u), LEAST)
+    return _Lines(top=1.0 / size, slope=np.where(factor_u < 0.0, -factor_x, factor_x) / size)
+
+
+def _backward(lines: _Lines, step: Array, allowed: Array) -> Array:
+    """Largest squared speeds from which the path can be brought to rest at its end, shape (N,)."""
+    reach = np.empty_like(allowed)
+    reach[-1] = 0.0
+    for i in range(len(step) - 1, -1, -1):
+        top, slope, per_u = lines.top[i], lines.slope[i], 0.5 / step[i]
+        target = reach[i + 1]
+        x = min(allowed[i], target)  # a first step from the left never ends left of the largest
+        for number in range(MOST_STEPS):
+            bend = slope * x
+            up, low = int((top - bend).argmin()), int((top + bend).argmin())
+            ceiling, ceiling_slope = top[up] - bend[up], -slope[up]
+            floor, floor_slope = -top[low] - bend[low], -slope[low]
+            if (target - x) * per_u < ceiling:
+                ceiling, ceiling_slope = (target - x) * per_u, -per_u
+            if -x * per_u > floor:
+                floor, floor_slope = -x * per_u, -per_u
+            gap, fall = ceiling - floor, ceiling_slope - floor_slope
+            is_kept = gap >= -ROUNDING * (abs(ceiling) + abs(floor))
+            if is_kept and (number > 0 or x >= allowed[i]):
+                break
+            x = max(0.0, min(allowed[i], x - gap / fall)) if fall < 0.0 else allowed[i]
+        reach[i] = x
+    reach[0] = 0.0
+    return reach
+
+
+def _forward(lines: _Lines, step: Array, reach: Array) -> Array:
+    """Largest squared speeds that are reached from rest and stay within those that can be brought to rest."""
+    squared = np.zeros_like(reach)
+    for i in range(len(step)):
+        x = squared[i]
+        u = min(float((lines.top[i] - lines.slope[i] * x).min()), float((reach[i + 1] - x) / (2.0 * step[i])))
+        squared[i + 1] = max(0.0, x + 2.0 * step[i] * u)
+    squared[-1] = 0.0
+    return squared
