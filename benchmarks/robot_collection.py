@@ -103,7 +103,7 @@ def fetch(requirement: str, size: str, folder: Path) -> Path:
 
     Args:
         requirement: Name and version of the package.
-        size: What it takes, which is told before anything is downloaded.
+        size: What it takes, which is printed before anything is downloaded.
         folder: Where packages are kept.
 
     Raises:

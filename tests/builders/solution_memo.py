@@ -93,7 +93,7 @@ def _install() -> None:
         if not found.name.endswith("__main__"):
             importlib.import_module(found.name)
     module = importlib.import_module("cellplan.pipeline.solve")
-    module._solve_motion, module._with_clearance = _motion(module._solve_motion), _clearance(module._with_clearance)
+    module.solve_motion, module.certified = _motion(module.solve_motion), _clearance(module.certified)
     _state.names = _package_names()
 
 
