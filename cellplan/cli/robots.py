@@ -102,14 +102,13 @@ def _record(name: str, model: RobotModel) -> dict[str, Any]:
     from cellplan.kinematics.reach import arm_reach
     from cellplan.report.record.controller import zero_record
     from cellplan.report.record.joint_limits import joint_record
+    from cellplan.report.record.robot_description import published_reach
 
     return {
         "name": name,
         "source": model.source,
         "reach_mm": round(1e3 * arm_reach(model), 1),
-        "published_reach": None
-        if model.reach is None
-        else {"mm": round(1e3 * model.reach.distance, 1), "to": model.reach.to, "source": model.reach.source},
+        "published_reach": published_reach(model),
         "bodies": len(model.bodies),
         "zero": zero_record(model),
         "joints": [joint_record(joint) for joint in model.joints],

@@ -83,7 +83,7 @@ def rows(recipe: str) -> dict[str, list[str]]:
 
 
 def file_of(place: str) -> Path:
-    return ROOT / place if place.startswith(("docs/", "tests/")) else PACKAGE / place
+    return ROOT / place if place.startswith(("benchmarks/", "docs/", "tests/")) else PACKAGE / place
 
 
 def test_every_kind_of_addition_has_a_recipe() -> None:

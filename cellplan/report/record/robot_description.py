@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from cellplan.geometry.transforms import rpy_from_rotation
+from cellplan.model.robot import RobotModel
 from cellplan.model.robot_description import DescribedJoint, DescribedMimic, RobotDescription
 from cellplan.model.units import DEG, MM, joint_unit
 from cellplan.report.record.controller import zero_record
@@ -21,6 +22,7 @@ def description_record(described: RobotDescription, reach: float | None) -> dict
         "name": described.name,
         "source": described.source,
         "reach_mm": None if reach is None else round(MM * reach, 1),
+        "published_reach": None if model is None else published_reach(model),
         "bodies": sum(len(link.shapes) for link in described.links),
         "zero": None if model is None else zero_record(model),
         "joints": [_joint(joint) for joint in described.joints],
@@ -47,6 +49,13 @@ def description_record(described: RobotDescription, reach: float | None) -> dict
         "cell_lines": described.cell_lines,
         "remarks": list(described.remarks),
     }
+
+
+def published_reach(model: RobotModel) -> dict[str, Any] | None:
+    """The reach as it is published; None where it is not."""
+    if model.reach is None:
+        return None
+    return {"mm": round(MM * model.reach.distance, 1), "to": model.reach.to, "source": model.reach.source}
 
 
 def _joint(joint: DescribedJoint) -> dict[str, Any]:
