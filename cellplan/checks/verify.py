@@ -22,7 +22,7 @@ from cellplan.checks.tools.between_checks import (
 )
 from cellplan.checks.tools.closure import check_closure, closure_accuracy
 from cellplan.checks.tools.conditioning import conditioning
-from cellplan.checks.tools.speeds import robot_speed
+from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
 from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
@@ -81,7 +81,8 @@ def verify_motion(
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
     uses, joint_checks = _joints(cell, schedule.times, q)
     accelerations = motion_accelerations(cell, scene.chains, schedule, q=q, X_WP=X_WP)
-    checks += [*joint_checks, *check_accelerations(cell, accelerations)]
+    speeds = _speeds(scene, schedule.times, q)
+    checks += [*joint_checks, *check_accelerations(cell, accelerations), *check_tool_speeds(cell, speeds)]
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
     checks += [*check_idle(cell, schedule, q), *check_payload(loads)]
@@ -95,7 +96,7 @@ def verify_motion(
         clearance=UNKNOWN,
         conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving),
         motion_share=_motion_share(uses),
-        speeds=_speeds(scene, schedule.times, q),
+        speeds=speeds,
         times=schedule.times,
         q=q,
         repeatability=drift,

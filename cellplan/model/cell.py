@@ -248,6 +248,7 @@ class CheckSettings:
         closure_orientation: Largest angle in [rad] between the two.
         standing_depth: By how much in [m] bodies that never move may overlap where one stands on the other.
         part_acceleration: Largest allowed acceleration of the part in [m/s^2]; None: it is only reported.
+        tool_speed: Largest allowed speed of any tool tip in the world in [m/s]; None: it is only reported.
     """
 
     clearance: float
@@ -257,6 +258,7 @@ class CheckSettings:
     closure_orientation: float = 1e-3 * math.pi / 180.0
     standing_depth: float = 0.005
     part_acceleration: float | None = None
+    tool_speed: float | None = None
     adds_accuracy: bool = False
 
 

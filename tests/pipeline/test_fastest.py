@@ -1,6 +1,7 @@
 """Shortest cycles, by their definition: the limits hold, and a step less would break one."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,3 +85,26 @@ def test_everything_that_takes_time_is_scaled(cell: Cell) -> None:
 def test_times_that_do_not_follow_the_clock_are_refused(cell: Cell) -> None:
     with pytest.raises(InputError, match=r"tasks\.first\.settle_s: expected 0 where the shortest cycle is sought"):
         fastest(cell.with_values({"tasks.first.settle_s": 0.1}))
+
+
+def test_the_tools_keep_their_speed_in_the_world(cell: Cell) -> None:
+    """The circle of 628 mm takes at least 2.09 s at 300 mm/s."""
+    values = {"motion.timing": "fastest", "checks.tool_speed_mm_s": 300}
+    report = solve(cell.with_values(values)).runs[0].report
+
+    (check,) = (check for check in report.checks if check.name == "tool_speed")
+    assert report.passed
+    assert (check.subject, check.limit, check.unit) == ("left", 300.0, "mm/s")
+    assert 297.0 <= check.value <= 300.0
+    assert 0.2 * np.pi / 0.3 < report.times[-1] < 1.1 * 0.2 * np.pi / 0.3
+
+
+def test_a_tool_that_is_too_fast_in_the_world_fails_by_what_it_exceeds(cell: Cell) -> None:
+    """As written, its quintic law has 1.875 times the mean speed."""
+    strict = replace(cell, checks=replace(cell.checks, tool_speed=0.5))
+    report = solve(strict).runs[0].report
+
+    (check,) = (check for check in report.checks if not check.passed)
+    assert check.name == "tool_speed"
+    assert check.value == pytest.approx(1e3 * 1.875 * 0.2 * np.pi / 2.0, rel=1e-3)
+    assert check.message.endswith("mm/s in the world at 1.010 s, allowed 500 mm/s")

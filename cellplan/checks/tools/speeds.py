@@ -8,9 +8,10 @@ from cellplan.checks.tools.tracking import relative_to_task_frame
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.acceleration import STEADY_FRACTION, ProcessSpeed
-from cellplan.model.cell import Robot
+from cellplan.model.cell import Cell, Robot
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.report import REDUCED_SPEED, RobotSpeed
+from cellplan.model.report import REDUCED_SPEED, Check, RobotSpeed
+from cellplan.model.units import MM
 
 
 def robot_speed(robot: Robot, chain: ScrewChain, times: Array, q: Array) -> RobotSpeed:
@@ -34,6 +35,34 @@ def robot_speed(robot: Robot, chain: ScrewChain, times: Array, q: Array) -> Robo
         axis=robot.model.joint_names[int(joint)],
         axis_peak_at_s=float(times[instant + 1]),
     )
+
+
+def check_tool_speeds(cell: Cell, speeds: Mapping[str, RobotSpeed]) -> list[Check]:
+    """The largest speed of each tool tip in the world, where the cell allows no more.
+
+    Args:
+        cell: The cell.
+        speeds: Speeds by robot.
+    """
+    limit = cell.checks.tool_speed
+    if limit is None:
+        return []
+    return [
+        Check(
+            name="tool_speed",
+            subject=name,
+            passed=speed.tool_peak <= limit,
+            value=MM * speed.tool_peak,
+            limit=MM * limit,
+            unit="mm/s",
+            at_s=speed.tool_peak_at_s,
+            message=(
+                f"tool of {name} has a peak speed of {MM * speed.tool_peak:.4g} mm/s in the world at "
+                f"{speed.tool_peak_at_s:.3f} s, allowed {MM * limit:g} mm/s"
+            ),
+        )
+        for name, speed in speeds.items()
+    ]
 
 
 def process_speeds(schedule: Schedule, X_WT: Mapping[str, Array], X_WP: Array) -> dict[str, ProcessSpeed]:

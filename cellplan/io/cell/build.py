@@ -330,4 +330,5 @@ def build_checks(entry: ChecksEntry) -> CheckSettings:
         closure_orientation=entry.closure_deg.si,
         standing_depth=entry.standing_depth_mm.si,
         part_acceleration=entry.part_acceleration_m_s2,
+        tool_speed=si_or_none(entry.tool_speed_mm_s),
     )

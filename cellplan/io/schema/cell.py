@@ -18,7 +18,7 @@ from cellplan.io.schema.common import (
     require_each_once,
     rule,
 )
-from cellplan.io.schema.robot import Mass, RobotEntry
+from cellplan.io.schema.robot import Mass, RobotEntry, SlidingSpeed
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.schema.task import (
@@ -242,6 +242,10 @@ class ChecksEntry(Entry):
         default=None,
         description="Largest allowed acceleration in the world of any corner of the bounding box of a part that is "
         "held; it is only reported when absent.",
+    )
+    tool_speed_mm_s: SlidingSpeed | None = Field(
+        default=None,
+        description="Largest allowed speed of any tool tip in the world; it is only reported when absent.",
     )
     exclude: tuple[ExclusionEntry, ...] = Field(default=(), description="Pairs left out of the collision check.")
 

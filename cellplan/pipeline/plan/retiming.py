@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from cellplan.pipeline.plan.program import ProgramClock
 from cellplan.planning.timing.retime import JointBounds, Retimer
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.scene.scene import Scene
+
+NOMINAL_STEP: Final = 1e-4  # [s] of nominal time over which the speed of a tool is taken
 
 
 def retimed(
@@ -91,12 +94,14 @@ class RowLimits:
         paths: Paths of the tasks that are worked on.
         bounds: Limits of all joints.
         step: Time between two rows in [s].
+        path: The joints over the nominal time; needed for the speed of the tools in the world only.
     """
 
     scene: Scene
     paths: tuple[ClockedPath, ...]
     bounds: JointBounds
     step: float
+    path: JointPath | None = None
 
     def shares(self, times: Array, q: Array) -> tuple[Array, Array, Array]:
         """Largest velocity, acceleration and jerk of each joint, in shares of the limits, shape (nq,) each."""
@@ -124,7 +129,8 @@ class RowLimits:
         times = np.round(np.arange(len(q)) * self.step, TIME_DECIMALS)
         velocity, acceleration, jerk = (float(shares.max()) for shares in self.shares(times, q))
         feed = max(self.feeds(sigma, times).values(), default=0.0)
-        return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, self._part_share(times, q) ** 0.5)
+        tools = float(self._tool_moves(q[:-1], q[1:]).max()) / self.step
+        return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, tools, self._part_share(times, q) ** 0.5)
 
     def feeds(self, sigma: Array, times: Array) -> dict[str, float]:
         """Largest speed of each tool along its path between rows, as a share of its feed, by task with a feed.
@@ -140,14 +146,27 @@ class RowLimits:
         }
 
     def feed_share(self, sigma: Array) -> Array:
-        """Share of the feeds that is taken up at the speed of the nominal time, shape (N,)."""
+        """Share of the speed limits of the tools that is taken up at the speed of the nominal time, shape (N,)."""
         share = np.zeros(len(sigma))
         for path in self.paths:
             if path.task.feed is not None:
                 twists = path.targets(sigma)[1]
                 is_moving = (sigma >= path.start) & (sigma <= path.end)
                 share = np.maximum(share, is_moving * np.linalg.norm(twists[:, :3], axis=1) / path.task.feed)
+        if self.path is not None:
+            q, move = self.path.at(sigma), 0.5 * NOMINAL_STEP * self.path.at(sigma, 1)
+            share = np.maximum(share, self._tool_moves(q - move, q + move) / NOMINAL_STEP)
         return share
+
+    def _tool_moves(self, before: Array, after: Array) -> Array:
+        """Longest moves of a tool tip in the world, divided by the speed that is allowed, in [s], shape (N,)."""
+        cell, limit = self.scene.cell, self.scene.cell.checks.tool_speed
+        longest = np.zeros(len(before))
+        for robot in cell.robots if limit is not None else ():
+            columns, chain = cell.columns(robot.name), self.scene.chains[robot.name]
+            at = [chain.tool_poses(q[:, columns])[:, :3, 3] for q in (before, after)]
+            longest = np.maximum(longest, np.linalg.norm(at[1] - at[0], axis=1) / limit)
+        return longest
 
     def _part_share(self, times: Array, q: Array) -> float:
         """Acceleration of the part as a share of what is allowed."""
@@ -167,7 +186,7 @@ def row_limits(scene: Scene, schedule: Schedule) -> RowLimits:
 
 def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath) -> Array:
     """Nominal times of the rows of one phase in [s], shape (N,)."""
-    limits, motion = row_limits(scene, schedule), scene.cell.motion
+    limits, motion = replace(row_limits(scene, schedule), path=path), scene.cell.motion
     retimer = Retimer(bounds=limits.bounds, step=motion.step, feed_share=limits.feed_share, slower=limits.slower)
     fastest = retimer.fastest(path)
     if motion.cycle is None:

@@ -86,8 +86,9 @@ class Retimer:
     def _settled(self, piece: Stretch) -> tuple[int, Rows]:
         """The motion of one stretch with its steps, from so many lengths that twice as many change it little."""
         written = AsWritten(piece)
-        sigma = piece.sigma[0] + self.step * np.arange(float(piece.sigma[-1] - piece.sigma[0]) // self.step + 1.0)
-        slow = self._steps(piece, written, self.step * len(sigma) * self.slower(sigma, piece.path.at(sigma)))
+        count = max(2, round(float(piece.sigma[-1] - piece.sigma[0]) / self.step))
+        sigma = written.rows(count)
+        slow = self._steps(piece, written, count * self.step * self.slower(sigma, piece.path.at(sigma)))
         rough = self._profile(piece, FEWEST_POINTS).duration
         points = int(np.clip(POINTS_PER_ROW * rough / self.step, FEWEST_POINTS, MOST_POINTS // 4))
         count, motion = self._best(piece, points)

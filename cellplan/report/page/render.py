@@ -29,6 +29,7 @@ CHECKS: Final = {
     "joint_acceleration_assumed": "joint accelerations within assumed limits",
     "joint_jerk": "joint jerk within its limits",
     "part_acceleration": "acceleration of the part within its limit",
+    "tool_speed": "speed of the tools within its limit",
     "locked_joint": "failed joints at rest",
     "position_error": "tool position on the part within tolerance",
     "orientation_error": "tool orientation on the part within tolerance",

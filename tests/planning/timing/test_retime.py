@@ -118,6 +118,15 @@ def test_while_no_joint_moves_no_time_passes() -> None:
     assert retimed(rests, bounds_of(1.0, 1.0), step=0.01).sigma.tolist() == [0.0, 1.0]
 
 
+def test_a_stretch_shorter_than_a_row_is_gone_through_too() -> None:
+    """A corner 4 ms before the end, and rows 10 ms apart."""
+    breaks = np.array([0.0, 2.996, 3.0])
+    nodes = [np.array([[0.0, 0.7], [0.0, 0.0]]), np.array([[0.7, 0.7], [0.0, 1e-3]])]
+    found = retimed(JointPath(np.zeros(2), breaks, nodes), bounds_of(1.0, 2.0, joints=2), step=0.01)
+    assert len(found.motions) == 2
+    assert found.counts[1] == pytest.approx(2.0 * (1e-3 / 2.0) ** 0.5 / 0.01, abs=1.0)
+
+
 def test_a_slower_motion_takes_exactly_the_steps_that_it_is_given() -> None:
     corner = path_of(lambda u: np.stack([np.minimum(u, 0.5), np.maximum(u, 0.5)], axis=1), law=straight)
     found = retimed(corner, bounds_of(1.0, 2.0, joints=2), step=0.01)
