@@ -157,7 +157,7 @@ def _angle(leaders: Sequence[UrdfJoint], angle: float) -> float:
         raise leaders[1].error("is named under gripper.joints: expected one joint for angle_deg: lock the other one")
     if joint.kind == "prismatic":
         raise joint.error("slides: expected gripper.opening_mm, got angle_deg")
-    lower, upper = _limits(joint)
+    lower, upper = joint.limit.ends
     if not lower - RANGE_TOL <= angle <= upper + RANGE_TOL:
         allowed = f"{in_user_unit(joint, lower)} to {in_user_unit(joint, upper)}"
         raise joint.error(f"expected gripper.angle_deg within {allowed}, got {in_user_unit(joint, angle)}")
@@ -169,7 +169,7 @@ def _fingers(document: UrdfDocument, leader: UrdfJoint) -> list[Finger]:
     followers = _followers(document, leader)
     for joint in (leader, *(joint for joint, _ in followers)):
         if joint.kind != "prismatic":
-            lower, upper = _limits(leader)
+            lower, upper = leader.limit.ends
             cure = "state the position of the leading joint under `locked`"
             if leader.kind != "prismatic":
                 cure = f"state angle_deg from {np.degrees(lower):.6g} to {np.degrees(upper):.6g}"
@@ -184,20 +184,14 @@ def _followers(document: UrdfDocument, leader: UrdfJoint) -> list[tuple[UrdfJoin
     return [(joint, mimic) for joint, mimic in mimics if mimic and mimic.leader == leader.name]
 
 
-def _limits(joint: UrdfJoint) -> tuple[float, float]:
-    """Lowest and highest position in [rad] or [m]."""
-    lower, upper = joint.limit.lower, joint.limit.upper
-    return -np.inf if lower is None else lower, np.inf if upper is None else upper
-
-
 def _sign(joint: UrdfJoint) -> float:
     """-1 for a finger that opens towards negative positions: one whose range ends at zero or below."""
-    return -1.0 if _limits(joint)[1] <= 0.0 else 1.0
+    return -1.0 if joint.limit.ends[1] <= 0.0 else 1.0
 
 
 def _closed_end(joint: UrdfJoint) -> float:
     """The end of a finger's range at which it is closed, in [m]: the lowest position, or zero where it ends there."""
-    lower, upper = _limits(joint)
+    lower, upper = joint.limit.ends
     if not np.isfinite(upper - lower):
         raise joint.error("has no limits, so it has no closed end: state its position under `locked`")
     return lower if _sign(joint) > 0.0 else upper
@@ -205,10 +199,10 @@ def _closed_end(joint: UrdfJoint) -> float:
 
 def _range(document: UrdfDocument, leader: UrdfJoint) -> float:
     """Travel in [m] of a joint that leads from its closed end, as far as those that follow it reach, too."""
-    closed, (lower, upper) = _closed_end(leader), _limits(leader)
+    closed, (lower, upper) = _closed_end(leader), leader.limit.ends
     travel = upper - lower
     for joint, mimic in _followers(document, leader):
-        lower, upper = _limits(joint)
+        lower, upper = joint.limit.ends
         start = mimic.multiplier * closed + mimic.offset
         if not lower - RANGE_TOL <= start <= upper + RANGE_TOL:
             within = f"{in_user_unit(joint, lower)} to {in_user_unit(joint, upper)}"
