@@ -79,6 +79,13 @@ def closed_depth(cell: Cell, body: SceneBody, grasp: Grasp) -> float:
     return overlap_depth(engine, (0, 1), poses, sample=0)
 
 
+def closed_gap(cell: Cell, body: SceneBody, grasp: Grasp) -> float:
+    """How far in [m] a body of a holder that is not in the part is from it, where its tool stands as the grasp says."""
+    solid = prepare(body.name, body.shape)  # type: ignore[arg-type] # no half-space
+    engine, poses = _gripped(cell, body, grasp, solid)
+    return 0.0 if engine.touch(0, 1, poses, sample=0) else engine.surface_distance(0, 1, poses, sample=0)
+
+
 def _require_free(cell: Cell, body: SceneBody, grasp: Grasp, outside: CollisionBody) -> None:
     """Refuse a grasp by which what lies outside the zone touches the part."""
     engine, poses = _gripped(cell, body, grasp, outside)

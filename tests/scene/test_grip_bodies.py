@@ -126,6 +126,15 @@ def test_fingers_are_no_deeper_in_the_part_than_the_grasp_says(deep: float, pass
     assert checks[0].value == pytest.approx(1e3 * deep, abs=0.011)
 
 
+@pytest.mark.parametrize(("apart", "ending"), [(0.0009, "allowed 2 mm"), (0.0085, "is the gripper open too far?")])
+def test_fingers_that_do_not_reach_the_part_say_how_far_it_is(apart: float, ending: str) -> None:
+    checks = check_mounting(Scene.from_cell(gripping(deep=-apart)), np.zeros((1, 6)))
+
+    assert [check.passed for check in checks] == [True, True]
+    assert all(check.message.endswith(ending) for check in checks)
+    assert all(("8.5 mm away from it" in check.message) is (apart == 0.0085) for check in checks)
+
+
 def test_what_a_further_holder_does_not_grip_with_keeps_the_clearance_too() -> None:
     cell = gripping()
     cell = replace(cell, checks=replace(cell.checks, contact_zone=0.04))

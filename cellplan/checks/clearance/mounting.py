@@ -10,6 +10,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.report import Check
 from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, is_ground
+from cellplan.scene.grips import closed_gap
 from cellplan.scene.mounting import Mount
 from cellplan.scene.scene import Scene
 
@@ -20,6 +21,7 @@ CURES: Final = {
     Mount.STANDING: "is it placed correctly? Place one on top of the other, or name the pair under checks.exclude",
 }
 DISPLAY_TOL: Final = 1e-3  # [-] of 0.01 mm: a depth of 3 mm that is worked out as 3.000000001 is shown as 3
+FARTHEST_GRIP: Final = 1e-3  # [m] from the part of a body that grips it: what is farther away holds nothing
 PIT_CURE: Final = "is there a pit? Place the base on the floor, or name the pair under checks.exclude"
 
 
@@ -53,7 +55,7 @@ def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
     at_s = None if times is None or not pair.moves else float(times[found.row])
     instant = "" if at_s is None else f" at {at_s:.3f} s"
     share = f" ({limit - MM * pair.accuracy:g} mm beyond the accuracy of its body)" if pair.accuracy else ""
-    message = f"{inner} is {_shown(depth)} mm deep in {outer}{instant}, allowed {limit:g} mm{share}"
+    message = f"{inner} is {_shown(depth)} mm deep in {outer}{instant}, allowed {limit:g} mm{share}{_gap(scene, found)}"
     passed, cure = _passed(found), PIT_CURE if is_ground(scene.bodies[pair.second]) else CURES[pair.mount]
     return Check(
         name=str(pair.mount),
@@ -65,6 +67,17 @@ def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
         at_s=at_s,
         message=message if passed else f"{message}: {cure}",
     )
+
+
+def _gap(scene: Scene, found: FoundDepth) -> str:
+    """How far a body that the cell names as gripping is from the part, where it does not reach it."""
+    if found.pair.mount is not Mount.GRIP or found.depth > 0.0:
+        return ""
+    name, _ = _named(scene, found)
+    body = next(each for each in scene.bodies if each.name == name)
+    grasp = next((each for each in scene.cell.part.held_by if name in (each.bodies or ())), None)
+    gap = 0.0 if grasp is None else closed_gap(scene.cell, body, grasp)
+    return f", but {MM * gap:.4g} mm away from it: is the gripper open too far?" if gap > FARTHEST_GRIP else ""
 
 
 def _all_standing(scene: Scene, standing: Sequence[FoundDepth], times: Array | None) -> list[Check]:

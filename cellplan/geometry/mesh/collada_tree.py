@@ -132,7 +132,8 @@ def _check_references(root: Located) -> None:
         for link in _all(root, f".//instance_{tag}"):
             if link.get("url", "") not in known:
                 text = printable(link.get("url", ""))
-                raise link.error(f"expected the url of a <{tag}> of this file, got '{text}'")
+                what = f"<{tag}> with a <mesh>" if tag == "geometry" else f"<{tag}>"
+                raise link.error(f"expected the url of a {what} of this file, got '{text}'")
 
 
 def _check_transform(element: Located) -> None:
@@ -142,6 +143,8 @@ def _check_transform(element: Located) -> None:
         raise element.error(f"expected {TRANSFORMS[element.tag]} numbers, got {len(values)}")
     if element.tag == "matrix" and not np.array_equal(values[12:], (0.0, 0.0, 0.0, 1.0)):
         raise element.error(f"expected 0 0 0 1 as the last row, got {' '.join(f'{value:g}' for value in values[12:])}")
+    if element.tag == "scale" and not np.all(values):
+        raise element.error("expected a scale that keeps a volume, got one of zero")
 
 
 def _reduce_mesh(mesh: Located) -> None:

@@ -70,10 +70,12 @@ class _Configurations:
     def written_out(self, entry: RobotEntry) -> RobotEntry:
         """The entry with positions in place of names; a name that means none stays, after a finding."""
         written = {"start": entry.start, "home": entry.home}
-        found = {key: self._positions(key, word) for key, word in written.items() if isinstance(word, str)}
+        rail = entry.mount.rail if entry.mount is not None else None
+        added = () if rail is None else (rail.name,)
+        found = {key: self._positions(key, word, added) for key, word in written.items() if isinstance(word, str)}
         return entry.model_copy(update={key: value for key, value in found.items() if value is not None})
 
-    def _positions(self, key: str, word: str) -> dict[str, float] | None:
+    def _positions(self, key: str, word: str, added: tuple[str, ...]) -> dict[str, float] | None:
         """Positions of a configuration by joint, in the units of a cell file; None for ``auto`` and after a finding."""
         if word == AUTO:
             return None
@@ -83,7 +85,7 @@ class _Configurations:
             self.sources.findings.append(self.document.finding(path, text))
             return None
         try:
-            q = configuration_of(self.srdf, word, self.model)
+            q = configuration_of(self.srdf, word, self.model, added=added)
         except InputError as error:
             self.sources.errors.append(error)
             return None

@@ -276,7 +276,8 @@ class RobotEntry(Entry):
     start: NamedConfiguration | None = Field(
         default=None,
         description="Start posture, one key per joint with its unit (a1_deg, rail_mm); auto finds one; else the name "
-        "of a configuration in the SRDF (STATE, or GROUP/STATE where several groups have one). Excludes start_deg.",
+        "of a configuration in the SRDF (STATE, or GROUP/STATE where several groups have one), with the rail of the "
+        "cell at zero or at its nearest limit. Excludes start_deg.",
     )
     home_deg: Configuration | None = Field(
         default=None,

@@ -166,3 +166,13 @@ def test_a_link_with_an_open_mesh_does_not_work_as_a_tool(load: Load, refuse: Re
         "c:6: robots.holder.gripper.bodies[0]: expected closed meshes, got open edges of 'left_finger': its depth in "
         "the part cannot be judged"
     ]
+
+
+def test_a_configuration_of_an_srdf_leaves_the_rail_of_the_cell_at_zero_or_the_nearest_limit(load: Load) -> None:
+    rail = "    mount: {{rail: {{axis: +y, lower_mm: {}, upper_mm: 900, velocity_mm_s: 500}}}}\n"
+
+    for lower, position in ((-100, 0.0), (200, 0.2)):
+        robot = load((MODEL, ARM + rail.format(lower))).robot("holder")
+        assert robot.model.joint_names == ("rail", "lift", "turn", "roll")
+        assert robot.start == pytest.approx([position, 0.1, 2.0, -1.0], abs=1e-15)
+        assert robot.home == pytest.approx([position, 0.3, 0.7, 0.0], abs=1e-15)

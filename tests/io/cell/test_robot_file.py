@@ -186,3 +186,21 @@ def test_options_of_urdfs_are_refused_for_other_robots() -> None:
     with pytest.raises(InputError) as caught:
         describe_robot("kuka_kr6", flange="tool0")
     assert str(caught.value) == "kuka_kr6: expected --flange, --package-dir and --xacro-arg with a URDF only"
+
+
+def test_files_that_lie_elsewhere_come_with_the_folder_to_be_allowed(
+    described: Callable[..., RobotDescription], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert not any("elsewhere" in remark for remark in described().remarks)
+
+    (tmp_path / "urdf").mkdir()
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "cells").mkdir()
+    (tmp_path / "rod.stl").rename(tmp_path / "meshes" / "rod.stl")
+    moved = (tmp_path / "arm.urdf").read_text(encoding="utf-8").replace("rod.stl", "../meshes/rod.stl")
+    (tmp_path / "urdf" / "arm.urdf").write_text(moved, encoding="utf-8")
+    monkeypatch.chdir(tmp_path / "cells")
+
+    made = describe_robot("../urdf/arm.urdf")
+
+    assert made.remarks[-1] == f"lies elsewhere: a cell in this folder reads it with --allow-dir {tmp_path.resolve()}"

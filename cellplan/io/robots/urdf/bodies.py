@@ -11,14 +11,13 @@ from cellplan.geometry.shapes import Mesh, Solid
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.findings import listed, shown
 from cellplan.io.robots.urdf.document import UrdfLink, UrdfMesh, UrdfSolid
-from cellplan.io.robots.urdf.packages import Packages
+from cellplan.io.robots.urdf.packages import LEVELS_UP, Packages
 from cellplan.io.robots.urdf.remarks import Remarks
 from cellplan.io.robots.urdf.tree import UrdfTree, ZeroConfiguration, links_in_order
 from cellplan.io.robots.urdf.xml import Element
 from cellplan.model.robot import Body
 
 PACKAGE: Final = "package://"
-LEVELS_UP: Final = 8  # folders above the URDF's that are searched for its package
 
 
 @dataclass(slots=True)

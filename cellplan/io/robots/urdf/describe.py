@@ -1,5 +1,6 @@
 """What a URDF says before a cell adds anything: possible flanges, joints, what is missing, bodies and their size."""
 
+import os
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -67,7 +68,7 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
         links=tuple(_links(structure, bodies)),
         cell_lines=_cell_lines(structure, lacking, written=written, options=options),
         model=model,
-        remarks=(*tree.document.remarks, *shelf.remarks.lines),
+        remarks=(*tree.document.remarks, *shelf.remarks.lines, *_elsewhere(path, tree, shelf)),
     )
 
 
@@ -91,6 +92,15 @@ def size_along(bodies: tuple[Body, ...], X_BL: Array) -> Array:
 def cell_lines(name: str, entry: Mapping[str, object]) -> str:
     """A robot as it stands in a cell, one key to a line."""
     return f"robots:\n  {flow_text(name)}:\n{indent(yaml_text(entry), '    ')}"
+
+
+def _elsewhere(path: Path, tree: UrdfTree, shelf: MeshShelf) -> Iterator[str]:
+    """What a cell in the current folder needs to read files that lie elsewhere."""
+    folders = [*shelf.package_dirs, *(file.parent for file in (path, *tree.document.included, *shelf.files))]
+    outside = [folder.resolve() for folder in folders if not folder.resolve().is_relative_to(Path.cwd())]
+    for drive in dict.fromkeys(folder.anchor for folder in outside):
+        shared = os.path.commonpath([folder for folder in outside if folder.anchor == drive])
+        yield f"lies elsewhere: a cell in this folder reads it with --allow-dir {shared}"
 
 
 def _choices(tree: UrdfTree) -> Iterator[FlangeChoice]:

@@ -84,6 +84,11 @@ class UrdfLimit:
     position_fault: str = ""
     velocity_fault: str = ""
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest position; infinite where the file gives none."""
+        return -np.inf if self.lower is None else self.lower, np.inf if self.upper is None else self.upper
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UrdfJoint:

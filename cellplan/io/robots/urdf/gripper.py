@@ -10,7 +10,7 @@ from cellplan.errors import InputError
 from cellplan.geometry.shapes import support_point
 from cellplan.geometry.transforms import Array
 from cellplan.io.input.findings import did_you_mean, listed
-from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint
+from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, UrdfMimic
 from cellplan.io.robots.urdf.tree import UrdfTree, ZeroConfiguration, in_user_unit, known_joint
 from cellplan.model.robot import Body
 from cellplan.model.units import MM
@@ -63,7 +63,7 @@ def gripper_locks(tree: UrdfTree, flange: str, state: GripperState | None, locke
     if not 1 <= len(fingers) <= 2:
         cure = "state the position of each joint under `locked`"
         raise leaders[0].error(f"opens a gripper of {len(fingers)} fingers: expected one or two for opening_mm: {cure}")
-    widest = min(_range(leader) for leader in leaders) * sum(abs(finger.ratio) for finger in fingers)
+    widest = min(_range(tree.document, leader) for leader in leaders) * sum(abs(finger.ratio) for finger in fingers)
     opening = state.opening or 0.0
     if opening > widest + RANGE_TOL:
         allowed = f"expected gripper.opening_mm from 0 to {MM * widest:.6g}"
@@ -110,17 +110,16 @@ def require_opposed(
 def _leaders(tree: UrdfTree, flange: str, state: GripperState, locked: Collection[str]) -> list[UrdfJoint]:
     """The joints that a gripper is opened by."""
     document, driven = tree.document, _driven_to(tree, flange, locked)
-    beyond = [
+    movable = [
         joint
         for joint in tree.joints
-        if not (joint.is_fixed or joint.mimic or joint in driven or joint.name in locked)
-        and _driven_to(tree, joint.parent, locked) == driven
+        if not (joint.is_fixed or joint.mimic or joint in driven) and _driven_to(tree, joint.parent, locked) == driven
     ]
+    beyond = [joint for joint in movable if joint.name not in locked]
+    held = [joint.name for joint in movable if joint.name in locked and joint not in tree.path_to(flange)]
     if not state.joints:
         if len(beyond) != 1:
-            names = listed(joint.name for joint in beyond)
-            text = f"expected the joints that open it, as those beyond the flange '{flange}' that move are: {names}"
-            raise InputError(f"{document.file}: gripper.joints: {text}")
+            raise InputError(f"{document.file}: gripper{_unclear(beyond, flange, held)}")
         return beyond
     for name in state.joints:
         joint = known_joint(document, name, "gripper.joints")
@@ -135,6 +134,17 @@ def _leaders(tree: UrdfTree, flange: str, state: GripperState, locked: Collectio
     return [document.joints[name] for name in state.joints]
 
 
+def _unclear(beyond: Sequence[UrdfJoint], flange: str, held: Sequence[str]) -> str:
+    """Why the joints that open a gripper have to be named, or why there are none."""
+    if beyond:
+        names = listed(joint.name for joint in beyond)
+        return (
+            f".joints: expected the joints that open it, as those beyond the flange '{flange}' that move are: {names}"
+        )
+    text = f": expected a joint beyond the flange '{flange}' that moves, got none"
+    return f"{text} but {listed(held)}, held by `locked`: remove from there what opens the gripper" if held else text
+
+
 def _driven_to(tree: UrdfTree, link: str, locked: Collection[str]) -> list[UrdfJoint]:
     """Joints from the base to a link that may move."""
     return [joint for joint in tree.path_to(link) if not joint.is_fixed and joint.name not in locked]
@@ -147,7 +157,7 @@ def _angle(leaders: Sequence[UrdfJoint], angle: float) -> float:
         raise leaders[1].error("is named under gripper.joints: expected one joint for angle_deg: lock the other one")
     if joint.kind == "prismatic":
         raise joint.error("slides: expected gripper.opening_mm, got angle_deg")
-    lower, upper = _limits(joint)
+    lower, upper = joint.limit.ends
     if not lower - RANGE_TOL <= angle <= upper + RANGE_TOL:
         allowed = f"{in_user_unit(joint, lower)} to {in_user_unit(joint, upper)}"
         raise joint.error(f"expected gripper.angle_deg within {allowed}, got {in_user_unit(joint, angle)}")
@@ -156,42 +166,54 @@ def _angle(leaders: Sequence[UrdfJoint], angle: float) -> float:
 
 def _fingers(document: UrdfDocument, leader: UrdfJoint) -> list[Finger]:
     """The sliding joints that a leading one moves, itself first."""
-    followers = [joint for joint in document.joints.values() if joint.mimic and joint.mimic.leader == leader.name]
-    for joint in (leader, *followers):
+    followers = _followers(document, leader)
+    for joint in (leader, *(joint for joint, _ in followers)):
         if joint.kind != "prismatic":
-            lower, upper = _limits(leader)
+            lower, upper = leader.limit.ends
             cure = "state the position of the leading joint under `locked`"
             if leader.kind != "prismatic":
                 cure = f"state angle_deg from {np.degrees(lower):.6g} to {np.degrees(upper):.6g}"
             raise joint.error(f"turns, so the opening of the gripper is not proportional to its position: {cure}")
     sign = _sign(leader)
-    return [Finger(leader, sign), *(Finger(joint, sign * joint.mimic.multiplier) for joint in followers if joint.mimic)]
+    return [Finger(leader, sign), *(Finger(joint, sign * mimic.multiplier) for joint, mimic in followers)]
 
 
-def _limits(joint: UrdfJoint) -> tuple[float, float]:
-    """Lowest and highest position in [rad] or [m]."""
-    lower, upper = joint.limit.lower, joint.limit.upper
-    return -np.inf if lower is None else lower, np.inf if upper is None else upper
+def _followers(document: UrdfDocument, leader: UrdfJoint) -> list[tuple[UrdfJoint, UrdfMimic]]:
+    """The joints that follow another one, and how."""
+    mimics = [(joint, joint.mimic) for joint in document.joints.values()]
+    return [(joint, mimic) for joint, mimic in mimics if mimic and mimic.leader == leader.name]
 
 
 def _sign(joint: UrdfJoint) -> float:
     """-1 for a finger that opens towards negative positions: one whose range ends at zero or below."""
-    return -1.0 if _limits(joint)[1] <= 0.0 else 1.0
+    return -1.0 if joint.limit.ends[1] <= 0.0 else 1.0
 
 
 def _closed_end(joint: UrdfJoint) -> float:
     """The end of a finger's range at which it is closed, in [m]: the lowest position, or zero where it ends there."""
-    lower, upper = _limits(joint)
+    lower, upper = joint.limit.ends
     if not np.isfinite(upper - lower):
         raise joint.error("has no limits, so it has no closed end: state its position under `locked`")
     return lower if _sign(joint) > 0.0 else upper
 
 
-def _range(joint: UrdfJoint) -> float:
-    """Travel of a finger in [m]."""
-    _closed_end(joint)
-    lower, upper = _limits(joint)
-    return upper - lower
+def _range(document: UrdfDocument, leader: UrdfJoint) -> float:
+    """Travel in [m] of a joint that leads from its closed end, as far as those that follow it reach, too."""
+    closed, (lower, upper) = _closed_end(leader), leader.limit.ends
+    travel = upper - lower
+    for joint, mimic in _followers(document, leader):
+        lower, upper = joint.limit.ends
+        start = mimic.multiplier * closed + mimic.offset
+        if not lower - RANGE_TOL <= start <= upper + RANGE_TOL:
+            within = f"{in_user_unit(joint, lower)} to {in_user_unit(joint, upper)}"
+            raise joint.error(
+                f"follows '{leader.name}' to {in_user_unit(joint, start)} where the gripper is closed, beyond its own "
+                f"limits of {within}: state the position of '{leader.name}' under `locked`"
+            )
+        rate = _sign(leader) * mimic.multiplier
+        if rate != 0.0:
+            travel = min(travel, max(0.0, ((upper if rate > 0.0 else lower) - start) / rate))
+    return travel
 
 
 def _direction(finger: Finger, configuration: ZeroConfiguration) -> Array:

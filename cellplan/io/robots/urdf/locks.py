@@ -24,7 +24,7 @@ def unlocked_joints(tree: UrdfTree, flange: str, locked: Mapping[str, float]) ->
 
 def rest_position(joint: UrdfJoint) -> float:
     """Zero, or the position within the limits of the file that is nearest to it, in [rad] or [m]."""
-    lower, upper = _ends(joint)
+    lower, upper = joint.limit.ends
     return min(max(0.0, lower), upper)
 
 
@@ -82,7 +82,7 @@ def require_sound_locks(document: UrdfDocument, locked: Mapping[str, float], uni
             raise joint.error(f"is locked by the cell, but it follows '{joint.mimic.leader}': lock that one")
         if units.get(name, unit_of(joint).name) != unit_of(joint).name:
             raise joint.error(f"is {joint.kind}: expected to be locked in {unit_of(joint).name}, got {units[name]}")
-        lower, upper = _ends(joint)
+        lower, upper = joint.limit.ends
         if not (np.isfinite(position) and lower - LIMIT_TOL <= position <= upper + LIMIT_TOL):
             allowed = f"{in_user_unit(joint, lower)} to {in_user_unit(joint, upper)}"
             raise joint.error(f"expected to be locked within {allowed}, got {in_user_unit(joint, position)}")
@@ -93,12 +93,6 @@ def _number(joint: UrdfJoint, position: float | None) -> float:
     is_revolute = joint.kind != "prismatic"
     if position is not None:
         return file_number(position, is_revolute=is_revolute)
-    rest, (lower, upper) = rest_position(joint), _ends(joint)
+    rest, (lower, upper) = rest_position(joint), joint.limit.ends
     within = max(lower, rest - LIMIT_TOL), min(upper, rest + LIMIT_TOL)
     return file_number(rest, is_revolute=is_revolute, within=within)
-
-
-def _ends(joint: UrdfJoint) -> tuple[float, float]:
-    """Limits of the file; infinite where it has none."""
-    lower, upper = joint.limit.lower, joint.limit.upper
-    return -np.inf if lower is None else lower, np.inf if upper is None else upper

@@ -1,6 +1,6 @@
 """SRDF of a robot: pairs of its links that need not be checked against each other, and named configurations."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -112,10 +112,16 @@ def unknown_links(srdf: Srdf, model: RobotModel) -> str | None:
     return f"{srdf.file}: disabled pairs ({len(pairs)}) name links that '{model.name}' does not have: {listed(missing)}"
 
 
-def configuration_of(srdf: Srdf, name: str, model: RobotModel) -> Array | None:
+def configuration_of(srdf: Srdf, name: str, model: RobotModel, *, added: Collection[str] = ()) -> Array | None:
     """Joint positions of a named configuration in [rad] or [m], shape (n,); None when there is none of this name.
 
     Where several groups have a state of the name, those that lack joints of the chain to the flange are passed over.
+
+    Args:
+        srdf: The file.
+        name: ``STATE`` or ``GROUP/STATE``.
+        model: The robot.
+        added: Joints that are not the file's, such as a rail below the robot: at zero, or at the nearest limit.
 
     Raises:
         InputError: Joints are missing, several groups differ, or a value is no number or outside the joint's limits.
@@ -123,12 +129,13 @@ def configuration_of(srdf: Srdf, name: str, model: RobotModel) -> Array | None:
     named = [each for each in srdf.configurations if name in (each.name, f"{each.group}/{each.name}")]
     if not named:
         return None
-    complete = [each for each in named if set(model.joint_names) <= set(each.joints)]
+    own = [joint for joint in model.joint_names if joint not in added]
+    complete = [each for each in named if set(own) <= set(each.joints)]
     if not complete:
-        missing = [joint for joint in model.joint_names if joint not in named[0].joints]
+        missing = [joint for joint in own if joint not in named[0].joints]
         text = f"expected a value of every joint between base and flange, missing: {listed(missing)}"
         raise named[0].element.error(f"group_state '{name}': {text}")
-    found = [_positions(each, model) for each in complete]
+    found = [_positions(each, model, added) for each in complete]
     if any(not np.array_equal(q, found[0]) for q in found):
         names = listed(f"{each.group}/{each.name}" for each in complete)
         raise complete[1].element.error(f"group_state '{name}': expected one configuration of this name, got {names}")
@@ -147,10 +154,12 @@ def _configuration(state: Element) -> NamedConfiguration:
     return NamedConfiguration(name=name, group=state.attributes.get("group", ""), element=state, joints=joints)
 
 
-def _positions(configuration: NamedConfiguration, model: RobotModel) -> Array:
+def _positions(configuration: NamedConfiguration, model: RobotModel, added: Collection[str]) -> Array:
     """Values of the joints of the chain, within their limits."""
-    values = np.empty(len(model.joints))
+    values: Array = np.clip(np.zeros(len(model.joints)), model.lower, model.upper)
     for index, joint in enumerate(model.joints):
+        if joint.name in added:
+            continue
         element, owner = configuration.joints[joint.name], f"group_state '{configuration.name}': joint '{joint.name}'"
         values[index] = element.number("value", owner)
         if not joint.lower <= values[index] <= joint.upper:

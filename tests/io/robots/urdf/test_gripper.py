@@ -113,7 +113,7 @@ BEYOND = "gripper.joints: expected the joints that open it, as those beyond the 
             "expected one of left",
         ),
         ((LEFT, finger("right", sign=-1)), {"opening": 0.01}, f": {BEYOND}: left, right"),
-        ((), {"opening": 0.01}, f": {BEYOND}: none"),
+        ((), {"opening": 0.01}, ": gripper: expected a joint beyond the flange 'flange' that moves, got none"),
         (
             (LEFT, finger("right", sign=1, more=FOLLOWS.format(ratio=1))),
             {"opening": 0.01},
@@ -132,11 +132,32 @@ def test_what_is_no_opening_is_refused_in_one_line(tmp_path: Path, fingers, stat
 
 
 def test_a_joint_is_held_by_one_key(tmp_path: Path) -> None:
-    options = UrdfOptions(locked={"left": 0.01}, gripper=GripperState(joints=("left",), opening=0.02))
+    path = write_urdf(tmp_path, *HAND_ARM, *FINGERS)
+    named, unnamed = (
+        UrdfOptions(locked={"left": 0.01, "turn": 0.0}, gripper=GripperState(joints=joints, opening=0.02))
+        for joints in (("left",), ())
+    )
 
-    said = refusal(write_urdf(tmp_path, *HAND_ARM, *FINGERS), options)
+    said = refusal(path, named)
 
     assert said == "arm.urdf:10: joint 'left': is held by `gripper` and by `locked`: remove it from one of them"
+    assert refusal(path, unnamed) == (
+        "arm.urdf: gripper: expected a joint beyond the flange 'flange' that moves, got none but left, held by "
+        "`locked`: remove from there what opens the gripper"
+    )
+
+
+def test_a_finger_that_follows_bounds_the_opening_by_its_own_limits(tmp_path: Path) -> None:
+    short = finger("right", sign=-1, high=0.01, more=FOLLOWS.format(ratio=0.5))
+    late = finger("right", sign=-1, low=0.01, more=FOLLOWS.format(ratio=1))
+
+    path = write_urdf(tmp_path, *HAND_ARM, LEFT, short)
+    assert gap(read_urdf(path, gripping(opening=0.03))) == pytest.approx(0.03, abs=1e-12)
+    assert "from 0 to 30, the travel of 'left' and 'right', got 31" in refusal(path, gripping(opening=0.031))
+    assert refusal(write_urdf(tmp_path, *HAND_ARM, LEFT, late), gripping(opening=0.03)) == (
+        "arm.urdf:11: joint 'right': follows 'left' to 0 mm where the gripper is closed, beyond its own limits of "
+        "10 mm to 40 mm: state the position of 'left' under `locked`"
+    )
 
 
 def test_the_other_joints_off_the_chain_are_locked_beside_the_gripper(tmp_path: Path) -> None:
