@@ -184,10 +184,11 @@ class Sources:
         place, folders = self._file(entry.model, path), self._package_dirs(name, entry)
         if place is None or folders is None:
             return None
+        rail = entry.mount.rail.name if entry.mount is not None and entry.mount.rail is not None else None
         options = UrdfOptions(
             flange=entry.flange,
             package_dirs=folders,
-            limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items()},
+            limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items() if joint != rail},
             locked={joint: at.si for joint, at in entry.locked_joints.items()},
             lock_units={joint: "deg" if isinstance(at, Deg) else "mm" for joint, at in entry.locked_joints.items()},
             locks_others=entry.locks_others,

@@ -1,10 +1,10 @@
 """How the controller of a robot counts its joints, as written in a robot file or a cell file."""
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from cellplan.io.schema.common import Angle, Coordinate, Entry, Text
+from cellplan.io.schema.common import Angle, Coordinate, Entry, Text, rule
 
 LARGEST_FACTOR: Final = 1_000.0  # [-] a larger coupling is a mistake
 
@@ -30,3 +30,10 @@ class ControllerEntry(Entry):
         description="By joint, the factors of the controller positions of earlier joints of its kind that are added.",
     )
     source: Text = Field(default="not stated", description="Where this is known from.")
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Self:
+        """An empty entry would confirm a counting that was never stated."""
+        if not self.model_fields_set:
+            raise rule("expected zero_deg, zero_mm, sign or coupling, or the source that says there are none, got none")
+        return self

@@ -176,3 +176,12 @@ def test_a_configuration_of_an_srdf_leaves_the_rail_of_the_cell_at_zero_or_the_n
         assert robot.model.joint_names == ("rail", "lift", "turn", "roll")
         assert robot.start == pytest.approx([position, 0.1, 2.0, -1.0], abs=1e-15)
         assert robot.home == pytest.approx([position, 0.3, 0.7, 0.0], abs=1e-15)
+
+
+def test_limits_of_a_rail_below_a_urdf_are_refused_with_the_key_that_has_them(refuse: Refuse) -> None:
+    rail = "    mount: {rail: {axis: +y, lower_mm: -100, upper_mm: 900, velocity_mm_s: 500}}\n"
+
+    assert refuse((MODEL, ARM + rail + "    limits: {rail: {upper_mm: 100}}\n")) == [
+        "c:11: robots.holder.limits.rail: unexpected key, the limits of 'rail' are those of mount.rail: "
+        "change them there"
+    ]

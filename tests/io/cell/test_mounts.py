@@ -245,6 +245,12 @@ def test_a_cell_may_state_the_counting_of_a_controller_that_a_file_does_not(load
         ),
         (
             "staubli_rx90l",
+            "{}",
+            "c:9: robots.worker.controller: expected zero_deg, zero_mm, sign or coupling, or the source that says "
+            "there are none, got none",
+        ),
+        (
+            "staubli_rx90l",
             "{coupling: {B4: {C4: 1}}}",
             "c:9: robots.worker.controller.coupling.B4.C4: expected an earlier joint than 'B4' of its kind (A4), "
             "got 'C4'",

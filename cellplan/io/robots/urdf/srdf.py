@@ -66,6 +66,9 @@ def read_srdf(path: Path) -> Srdf:
     root = read_xml(path)
     if root.tag != "robot":
         raise root.error(f"expected an SRDF, whose root element is <robot>, got <{root.tag}>")
+    link = next((child for child in root.children if child.tag == "link"), None)
+    if link is not None:
+        raise link.error("expected an SRDF, got a URDF, with <link>")
     macro = next((child for child in root.children if child.tag.startswith("xacro:")), None)
     if macro is not None:
         raise macro.error(f"expected a plain SRDF, got <{macro.tag}>: expand it first")

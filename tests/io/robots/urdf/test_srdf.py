@@ -141,6 +141,7 @@ def test_limits_of_the_cell_count(tmp_path: Path, model: RobotModel) -> None:
             '<!DOCTYPE r [<!ENTITY a "b">]><robot/>',
             "arm.srdf:1: expected plain XML, got a document type or an entity declaration",
         ),
+        ('<robot>\n<link name="a"/></robot>', "arm.srdf:2: expected an SRDF, got a URDF, with <link>"),
         ("<robot>", "arm.srdf:1: expected well-formed XML, got: no element found"),
     ],
 )
