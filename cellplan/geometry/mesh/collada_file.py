@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.collada_tree import Located, printable, read_collada
+from cellplan.geometry.mesh.collada_tree import Located, read_collada
 from cellplan.geometry.mesh.numbers import plain_word
 from cellplan.geometry.mesh.polygons import Triangles, cut_polygons
+from cellplan.geometry.mesh.strict_xml import printable
 from cellplan.geometry.transforms import Array
 
 UPRIGHT: Final = {

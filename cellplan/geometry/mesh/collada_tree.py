@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.numbers import text_numbers
+from cellplan.geometry.mesh.strict_xml import parse_strictly, printable
 
 NAMESPACE: Final = "http://www.collada.org/2005/11/COLLADASchema"
 FACES: Final = {"triangles": 3, "tristrips": None, "trifans": None, "polygons": None, "polylist": None}
@@ -98,11 +99,6 @@ def read_collada(data: bytes, file: str) -> Located:
     _check_references(root)
     root.set("xmlns", NAMESPACE)
     return root
-
-
-def printable(text: str, length: int = 40) -> str:
-    """Text of a foreign file that is safe to print."""
-    return text[:length].encode("ascii", errors="backslashreplace").decode().translate(dict.fromkeys(range(32), " "))
 
 
 def _all(element: ET.Element, path: str) -> Sequence[Located]:
@@ -239,18 +235,10 @@ class _Reader:
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
         self._parser.CharacterDataHandler = self._text
-        self._parser.StartDoctypeDeclHandler = self._refuse_doctype
-        self._parser.EntityDeclHandler = self._refuse_doctype
 
     def parse(self, data: bytes) -> Located:
         """Root element of the bytes."""
-        try:
-            self._parser.Parse(data, True)
-        except expat.ExpatError as error:
-            reason = expat.ErrorString(error.code)
-            raise InputError(f"{self._file}:{error.lineno}: expected well-formed XML, got: {reason}") from None
-        except (LookupError, ValueError) as error:
-            raise InputError(f"{self._file}: expected XML in a known encoding: {printable(str(error))}") from None
+        parse_strictly(self._parser, data, self._file)
         if self._root is None:
             raise InputError(f"{self._file}: expected an XML file with a root element")
         return self._root
@@ -287,8 +275,3 @@ class _Reader:
         """Text of the innermost element."""
         if not self._skipped and self._open and self._open[-1].tag in TEXTS:
             self._texts.append(text)
-
-    def _refuse_doctype(self, *_declared: object) -> None:
-        """Document types and entities can blow up a file or read others."""
-        line = self._parser.CurrentLineNumber
-        raise InputError(f"{self._file}:{line}: expected plain XML, got a document type or an entity declaration")

@@ -10,6 +10,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.numbers import plain_word
+from cellplan.geometry.mesh.strict_xml import parse_strictly
 from cellplan.geometry.transforms import Array, pose
 from cellplan.io.input.files import read_regular_file
 from cellplan.io.input.findings import shown
@@ -125,18 +126,10 @@ class _Builder:
         self._parser = expat.ParserCreate()
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
-        self._parser.StartDoctypeDeclHandler = self._refuse_doctype
-        self._parser.EntityDeclHandler = self._refuse_doctype
 
     def parse(self, data: bytes) -> Element:
         """Root element of the bytes."""
-        try:
-            self._parser.Parse(data, True)
-        except expat.ExpatError as error:
-            reason = expat.ErrorString(error.code)
-            raise InputError(f"{self._file}:{error.lineno}: expected well-formed XML, got: {reason}") from None
-        except (LookupError, ValueError) as error:
-            raise InputError(f"{self._file}: expected XML in a known encoding: {error}") from None
+        parse_strictly(self._parser, data, self._file)
         if self._root is None:
             raise InputError(f"{self._file}: expected an XML file with a root element")
         return self._root
@@ -155,8 +148,3 @@ class _Builder:
     def _end(self, _tag: str) -> None:
         """An element closes."""
         self._open.pop()
-
-    def _refuse_doctype(self, *_declared: object) -> None:
-        """Document types and entities can blow up a file or read others."""
-        line = self._parser.CurrentLineNumber
-        raise InputError(f"{self._file}:{line}: expected plain XML, got a document type or an entity declaration")
