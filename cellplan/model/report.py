@@ -359,6 +359,7 @@ class Report:
         loads: Load of each robot.
         phases: All phases of the program on its nominal time, those that are not part of it among them; the times of
             this report count from the begin of the phase that it is for.
+        idle: Names of the robots that stand at their homes all the time.
     """
 
     cell: str
@@ -380,6 +381,7 @@ class Report:
     accelerations: MotionAccelerations = UNKNOWN_ACCELERATIONS
     loads: tuple[LoadUse, ...] = ()
     phases: tuple[Phase, ...] = ()
+    idle: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:

@@ -142,7 +142,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
         "motion_share": motion_share_record(report, cell),
         "speeds": {robot: speed_record(speed) for robot, speed in report.speeds.items()},
         "checks": [check_record(check) for check in report.checks],
-        **idle_record(cell, report.tasks),
+        **idle_record(cell, report),
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "rests_on": rests_on_record(cell, report.loads),

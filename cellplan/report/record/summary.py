@@ -63,11 +63,13 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
     Tasks, joints, clearance and accelerations are the worst of all runs; everything else is in the report of each run.
 
     Args:
-        reports: Report by the name of the run, which is its task and its folder.
+        reports: Report by the name of the run, which is its phase and its folder.
         cell: The cell.
         provenance: Origin of the result.
     """
     runs = list(reports.values())
+    tasks = {task.name for task in cell.tasks}
+    own = [report for report in runs if tasks.issuperset(report.tasks)]  # straight moves of holders have a report each
     accelerations = merge_accelerations(report.accelerations for report in runs)
     return {
         "schema": SCHEMA,
@@ -78,7 +80,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "clock_from": clock_from(cell),
         "phases": phases_record(runs[0].phases),
         "runs": {name: _run_entry(name, report, cell) for name, report in reports.items()},
-        "tasks": {name: record for report in runs for name, record in tasks_record(report, cell).items()},
+        "tasks": {name: record for report in own for name, record in tasks_record(report, cell).items()},
         "open_surfaces": open_surfaces_record(cell),
         "remarks": [text for _, text in cell.remarks],
         "closure": worst_closures_record(runs, cell),
@@ -102,6 +104,8 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
 def _run_entry(name: str, report: Report, cell: Cell) -> RunEntry:
     """What the summary holds of one run."""
     entry: RunEntry = {"status": status(report), "folder": name, "cycle_time_s": number(report.cycle_time)}
+    if not {task.name for task in cell.tasks}.issuperset(report.tasks):
+        return entry
     for task in tasks_record(report, cell).values():
         entry["robot"] = task["robot"]
         entry["max_position_error_mm"] = task["max_position_error_mm"]
