@@ -34,6 +34,12 @@ class Run:
     rungs: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def transfers(self) -> dict[str, str]:
+        """How its transfer moves were found, in words, by the name of the phase; empty without any."""
+        words = ", ".join(f"{robot} {rung}" for robot, rung in self.rungs.items())
+        return {self.phase.name: words} if words else {}
+
+    @property
     def name(self) -> str | None:
         """Name of the phase among several; None for the only one of a program."""
         return self.phase.label

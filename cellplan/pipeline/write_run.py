@@ -66,7 +66,8 @@ def write_run(
             record = _write_report(target, run, provenance, background)
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
-            record = summary_record(reports, cell=cell, provenance=provenance)
+            transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
+            record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers)
             target.write_text("report.json", as_json(record))
             target.write_text("report.html", overview_page(record, cell=cell))
         target.write_text("cell.yaml", render_cell(cell))
@@ -93,7 +94,7 @@ def _write_report(target: RunFolder, run: Run, provenance: Provenance, plots: Ba
     cell = run.scene.cell
     place = "" if run.name is None else f"{run.name}/"
     begun = plots.pictures(run.report, cell=cell)
-    record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion)
+    record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion, transfers=run.transfers)
     target.write_text(f"{place}report.json", as_json(record))
     target.write_text(f"{place}series.json", series_json(run.report, run.motion))
     pictures = begun()

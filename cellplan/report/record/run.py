@@ -1,5 +1,6 @@
 """``report.json``: the record of a run in printed units (deg, mm, s), built from typed records."""
 
+from collections.abc import Mapping
 from typing import Annotated, Final
 
 from cellplan.model.cell import Cell
@@ -109,7 +110,14 @@ class RunRecord(HeadRecord):
     idle: Annotated[list[str], "idle robots of this run; their tables keep them at their homes"]
 
 
-def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> RunRecord:
+def run_record(
+    report: Report,
+    *,
+    cell: Cell,
+    provenance: Provenance,
+    motion: Motion | None = None,
+    transfers: Mapping[str, str] | None = None,
+) -> RunRecord:
     """The record of one run.
 
     Args:
@@ -117,6 +125,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
         cell: Its cell.
         provenance: Origin of the result.
         motion: The planned motion, for the effort of its steps; None if it is not available.
+        transfers: How the transfer moves of its phase were found, by the name of the phase.
     """
     clearance = report.clearance
     return {
@@ -152,6 +161,6 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
         "remarks": [text for _, text in cell.remarks],
         "left_out": left_out_record(clearance.left_out),
         "closure": closures_record(report, cell),
-        "solver": solver_record(cell.solver, motion),
+        "solver": solver_record(cell.solver, motion, transfers),
         "accelerations": accelerations_record(report.accelerations),
     }
