@@ -98,7 +98,7 @@ def verify_motion(
         accuracy=accuracy,
         joints=tuple(uses),
         clearance=UNKNOWN,
-        conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving),
+        conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving) if at_work else None,
         motion_share=_motion_share(uses),
         speeds=speeds,
         times=schedule.times,

@@ -346,7 +346,7 @@ class Report:
         accuracy: Tool errors, one entry per task.
         joints: One entry per joint of every robot.
         clearance: Distances.
-        conditioning: Distance of the motion from singularities.
+        conditioning: Distance of the motion from singularities; None where no robot works on a task.
         motion_share: Share of all joint travel per robot, 0..1, and the busiest joint of each, as (share, joint).
         speeds: Speeds of each robot in the world.
         times: The common clock in [s], shape (N,).
@@ -369,7 +369,7 @@ class Report:
     accuracy: tuple[TaskAccuracy, ...]
     joints: tuple[JointUse, ...]
     clearance: ClearanceReport
-    conditioning: Conditioning
+    conditioning: Conditioning | None
     motion_share: Mapping[str, tuple[float, str]]
     speeds: Mapping[str, RobotSpeed]
     times: Array

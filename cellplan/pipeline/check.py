@@ -16,6 +16,7 @@ from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.solve import with_start
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.sequence.approach_starts import with_approach_starts
 from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import first_blocks, program_stages
 from cellplan.planning.start.given import examine_given_starts
@@ -89,6 +90,9 @@ def _check_together(scene: Scene, progress: Progress) -> CellCheck:
     """The checks of tasks that are worked on together, or one after the other from the same start."""
     cell = scene.cell
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
+    if cell.program is not None:
+        cell = with_approach_starts(cell, scene.chains, toolpaths)
+        scene = replace(scene, cell=cell)
     paths = clock_paths(cell, toolpaths.values())
     examine_given_starts(cell, toolpaths)
     choice = chosen_start(scene, paths, progress=progress)

@@ -21,6 +21,7 @@ from cellplan.pipeline.plan.run import PlannedRun, plan_run
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.planning.modes import standing
 from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.sequence.approach_starts import with_approach_starts
 from cellplan.planning.sequence.part_moves import PartMove
 from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import Stage, program_stages
@@ -118,6 +119,8 @@ class _Worked:
         scene = replace(self._scenes.of_stage(stage), cell=own)
         toolpaths = {task.name: build_toolpath(task, own.part) for task in own.tasks}
         paths = clock_paths(own, toolpaths.values())
+        own = with_rounded_starts(with_approach_starts(own, scene.chains, toolpaths), own)
+        scene = replace(scene, cell=own)
         examine_given_starts(own, toolpaths)
         choice = chosen_start(scene, paths, progress=self._progress)
         started = _with_starts(own, choice.start)
@@ -154,6 +157,15 @@ class _Worked:
             robots.append(replace(robot, start=started.robot(robot.name).start) if is_new else robot)
         tasks = [_with_posture(task, started) if task.name in at_work.values() else task for task in self.cell.tasks]
         self.cell = replace(self.cell, robots=tuple(robots), tasks=tuple(tasks))
+
+
+def with_rounded_starts(cell: Cell, given: Cell) -> Cell:
+    """The cell with starts that differ from the given ones rounded to what is written of them."""
+    robots = []
+    for robot in cell.robots:
+        is_same = robot.start is given.robot(robot.name).start
+        robots.append(robot if is_same else replace(robot, start=rounded(robot, np.asarray(robot.start))))
+    return replace(cell, robots=tuple(robots))
 
 
 def _with_posture(task: Task, started: Cell) -> Task:

@@ -103,7 +103,7 @@ class RunRecord(HeadRecord):
     exclusions: Annotated[list[ExclusionRecord], "pairs with reduced requirements"]
     closest_pairs: Annotated[list[ClosestPair], "the ten closest pairs, nearest first"]
     clearance_proof: Annotated[ProofRecord, "evidence for the distances between the samples"]
-    singularity: Annotated[SingularityRecord, "distance to singularities"]
+    singularity: Annotated[SingularityRecord | None, "distance to singularities; null where no task is worked on"]
     motion_share: Annotated[dict[str, MotionShareRecord], "by robot"]
     speeds: Annotated[dict[str, SpeedRecord], "by robot"]
     checks: Annotated[list[CheckRecord], "every verified statement"]
