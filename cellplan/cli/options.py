@@ -26,7 +26,9 @@ AllowDirs = Annotated[
 ]
 Mode = Annotated[
     str | None,
-    typer.Option("--mode", metavar="MODE", help="Which robots move: simultaneous, pairwise or part_at_rest."),
+    typer.Option(
+        "--mode", metavar="MODE", help="Which robots move: simultaneous, pairwise, part_at_rest or semi_coordinated."
+    ),
 ]
 Method = Annotated[
     str | None,

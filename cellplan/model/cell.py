@@ -15,17 +15,19 @@ from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, Acceler
 from cellplan.model.joint_limits import JointLimits
 from cellplan.model.mounting import Mount
 from cellplan.model.origin import Origin
+from cellplan.model.program import ProgramSettings
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Frame, Task
 
 
 class Mode(StrEnum):
-    """Which robots move: MODO 1, 2, 3 of Ribeiro 2010, chapter 5."""
+    """Which robots move: MODO 1, 2, 3 of Ribeiro 2010, chapter 5; in the last one the part moves between the tasks."""
 
     SIMULTANEOUS = "simultaneous"
     PAIRWISE = "pairwise"
     PART_AT_REST = "part_at_rest"
+    SEMI_COORDINATED = "semi_coordinated"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,6 +69,7 @@ class Robot:
         attachments: Solids mounted on its links, their poses ``X_BS`` in B while all joints read zero.
         pedestal: What the base stands on, hangs from or is fixed to; None for a base on the floor or on an obstacle.
         gripper: Names of link bodies of its model that make up a gripper, which may work on the part as a tool does.
+        order: Names of its tasks and of marks in their order; empty for that of the cell's tasks.
     """
 
     name: str
@@ -81,6 +84,7 @@ class Robot:
     attachments: tuple[Body, ...] = ()
     pedestal: Mount | None = None
     gripper: tuple[str, ...] = ()
+    order: tuple[str, ...] = ()
 
     @property
     def bodies_at_work(self) -> tuple[Body, ...]:
@@ -278,6 +282,7 @@ class Cell:
         origin: The document that the cell was read from.
         inputs: SHA-256 of every file that was read, by the path as written.
         remarks: Key of the cell file, and what was not read of the file that it names.
+        program: What is done from home to home; None for tasks that begin and end where they are worked on.
     """
 
     name: str
@@ -291,6 +296,7 @@ class Cell:
     origin: Origin
     inputs: Mapping[str, str]
     remarks: tuple[tuple[str, str], ...] = ()
+    program: ProgramSettings | None = None
 
     def with_values(self, values: Mapping[str, object]) -> "Cell":
         """The cell of the same document with other values, validated like those of the file.

@@ -222,6 +222,10 @@ class Task:
         relative_to: Frame that path and axes are given in. In the world, the first holder's task says where the part
             is carried; P then reads W in everything that is said of the task.
         tool_depth: Largest depth in [m] that the tool may have in the part, along its axis.
+        after: Names of the tasks of any robots that must be done before it begins.
+        start_posture: Configuration of its robot at its start in [rad] or [m], shape (n,); None for a task that is the
+            first of its robot, or of which it is to be searched.
+        holder_posture: Configuration of the first holder at its start, likewise; None for that holder's start posture.
         origin: File and lines that the task was read from; empty for a task made in Python.
     """
 
@@ -247,6 +251,9 @@ class Task:
     retract: StraightMove | None = None
     relative_to: Frame = Frame.PART
     tool_depth: float = 1e-3
+    after: tuple[str, ...] = ()
+    start_posture: Array | None = None
+    holder_posture: Array | None = None
     origin: Origin = field(default_factory=Origin, compare=False, repr=False)
 
     def where(self, key: str = "", *, shared: str = "") -> str:

@@ -36,6 +36,11 @@ def plan_phases(cell: Cell, *, only: str | None = None) -> Plan:
             return Plan(phases=(_phase(cell, ALL_TASKS, chosen, is_carried=False),))
         case Mode.PAIRWISE:
             return Plan(phases=_with_transfers([_phase(cell, task.name, [task]) for task in chosen]))
+        case Mode.SEMI_COORDINATED:
+            raise InputError(
+                f"{cell.origin.at('motion.mode')}: expected simultaneous, pairwise or part_at_rest without program, "
+                "got 'semi_coordinated': add program: {} for a program from home to home"
+            )
 
 
 def standing(cell: Cell, phase: Phase, q: Array) -> Array:
@@ -66,7 +71,7 @@ def _phase(cell: Cell, name: str, tasks: Sequence[Task], *, is_carried: bool = T
         if (other := roles.get(task.robot)) is not None:
             raise InputError(
                 f"{task.where('robot')}: expected a robot without another task in the phase '{name}', got "
-                f"'{task.robot}' ({other})"
+                f"'{task.robot}' ({other}): add program: {{}} for a sequence of tasks"
             )
         roles[task.robot] = Work(task.name)
     for holder in cell.positioners:

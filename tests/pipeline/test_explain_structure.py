@@ -66,7 +66,7 @@ def test_two_tasks_of_one_operator_are_refused_in_one_phase_and_have_a_matrix_ea
 
     assert str(caught.value) == (
         "<cell>: tasks.again.robot: expected a robot without another task in the phase 'all tasks', got 'op0' "
-        f"(work: {cell.tasks[0].name})"
+        f"(work: {cell.tasks[0].name}): add program: {{}} for a sequence of tasks"
     )
     assert [(sum(matrix.rows), matrix.rank, matrix.redundancy) for matrix in matrices] == [(6, 6, 6), (6, 6, 6)]
 

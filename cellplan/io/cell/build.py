@@ -6,12 +6,14 @@ from typing import Any, Final
 
 import numpy as np
 
+from cellplan.geometry.transforms import Array
 from cellplan.io.cell.build_accelerations import acceleration_rule, controller_cycle
 from cellplan.io.cell.build_grips import grip_bodies, gripper_bodies
 from cellplan.io.cell.build_mounting import build_attachments, build_mount, rail_bodies, with_floor_height
+from cellplan.io.cell.build_program import build_order, written_program
 from cellplan.io.cell.rules import needs_surface
 from cellplan.io.robots.build_controller import build_controller
-from cellplan.io.robots.rules import home_configuration, start_posture
+from cellplan.io.robots.rules import Given, configuration_in_si, home_configuration, start_posture
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.cell import ChecksEntry, CycleEntry, MotionEntry
 from cellplan.io.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
@@ -90,6 +92,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         attachments=build_attachments(entry.attachments, model, read_mesh),
         pedestal=build_mount(entry, document.environment),
         gripper=gripper_bodies(entry, model),
+        order=build_order(name, document),
     )
 
 
@@ -141,7 +144,9 @@ def build_obstacle(name: str, entry: ObstacleEntry, read_mesh: MeshReader) -> Ob
     return Obstacle(name=name, shape=shape, X_WS=X_WS)
 
 
-def build_task(name: str, document: CellDocument, read_targets: TargetReader, origin: Origin) -> Task:
+def build_task(
+    name: str, document: CellDocument, models: Mapping[str, RobotModel], read_targets: TargetReader, origin: Origin
+) -> Task:
     """The task of one operator; settings that it does not state are those of the motion."""
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
@@ -171,8 +176,16 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader, or
         retract=_straight_move(entry.retract_mm, entry.retract_s),
         relative_to=Frame(entry.relative_to),
         tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm).si,
+        after=entry.preceding,
+        start_posture=_posture(entry.given_start, models, entry.robot),
+        holder_posture=_posture(entry.given_holder, models, *(it.robot for it in document.part.held_by[:1])),
         origin=origin,
     )
+
+
+def _posture(given: Given, models: Mapping[str, RobotModel], *robots: str) -> Array | None:
+    """A configuration of the first of some robots in [rad] or [m]; None when it is not given."""
+    return None if given is None else configuration_in_si(models[robots[0]], given)
 
 
 def _straight_move(distance: Mm, duration: float) -> StraightMove | None:
@@ -222,7 +235,7 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         document: The file.
         timed: Names of the tasks whose path brings its own clock.
     """
-    values = document.model_dump(exclude_none=True)
+    values = document.model_dump(exclude_none=True) | written_program(document)
     motion = values["motion"]
     for name, task in document.tasks.items():
         entry = values["tasks"][name]

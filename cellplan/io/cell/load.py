@@ -20,9 +20,11 @@ from cellplan.io.cell.build import (
 from cellplan.io.cell.build_accelerations import acceleration_findings
 from cellplan.io.cell.build_grips import grip_findings, tool_names
 from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings, on_mount, rail_entries
+from cellplan.io.cell.build_program import build_program
 from cellplan.io.cell.build_solver import build_solver
 from cellplan.io.cell.build_srdf import apply_srdfs
 from cellplan.io.cell.changes import changed, plain_values
+from cellplan.io.cell.program_rules import posture_findings, program_findings, with_stand_offs
 from cellplan.io.cell.referenced_files import Sources
 from cellplan.io.cell.rules import rule_findings
 from cellplan.io.cell.solver_rules import solver_findings
@@ -42,7 +44,16 @@ from cellplan.model.robot import RobotModel
 from cellplan.model.task import TimedPath
 
 PART_EXTENT_MM: Final = (1.0, 20_000.0)  # smaller or larger parts are a wrong unit
-PARTS: Final = ("robots", "part", "tasks", "obstacles", "motion", "solver", "checks")  # of a cell, from its document
+PARTS: Final = (
+    "robots",
+    "part",
+    "tasks",
+    "obstacles",
+    "motion",
+    "solver",
+    "checks",
+    "program",
+)  # of a cell, from its document
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,6 +115,8 @@ def _read(source: CellFile) -> Cell:
     findings += document.findings
     if valid.is_too_large:
         raise_findings(file, findings)
+    findings += program_findings(valid, document)
+    valid = with_stand_offs(valid)
     findings += rule_findings(valid, document)
     allowed = (*source.allow_dirs, *user_folders(source.folder))
     sources = Sources(document, AllowedFolders(folder=source.folder, allowed=allowed))
@@ -112,6 +125,7 @@ def _read(source: CellFile) -> Cell:
     for name, model in models.items():
         findings += robot_findings(name, valid.robots[name], model, document)
         findings += mounting_findings(name, model, valid, document)
+    findings += posture_findings(valid, models, document)
     findings += grip_findings(valid, models, document)
     findings += acceleration_findings(valid, models, document)
     findings += _unknown_bodies(valid, models, document)
@@ -233,7 +247,7 @@ def _cell(
         name=whole.name,
         robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
         part=build_part(whole, models, mesh),
-        tasks=tuple(build_task(name, whole, targets.__getitem__, origin) for name in whole.tasks),
+        tasks=tuple(build_task(name, whole, models, targets.__getitem__, origin) for name in whole.tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),
         motion=build_motion(whole.motion),
         solver=build_solver(whole.solver, whole.motion.step_s, models),
@@ -241,6 +255,7 @@ def _cell(
         origin=origin,
         inputs=dict(sorted(sources.inputs.items())),
         remarks=tuple(sources.remarks),
+        program=build_program(whole.program),
     )
     parts = {key: getattr(cell, key) for key in PARTS}
     return replace(cell, origin=replace(cell.origin, source=replace(source, parts=parts)))

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from cellplan.io.cell.as_listed import holders_as_written, operators_as_written
 from cellplan.io.cell.solver_rules import accurate_findings, feedback_findings
 from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, unknown_name
 from cellplan.io.schema.partial import ValidEntries
@@ -12,6 +13,7 @@ from cellplan.io.yaml.reader import YamlDocument
 TIME_ROOM: Final = 1e-9  # [-] of the duration: rounding of start_s + duration_s
 ORIENTATION_AXES: Final = frozenset({"rx", "ry", "rz"})
 MEANS_ELSE: Final = {"part": "the workpiece", "world": "the frame that everything stands in"}
+AT_REST: Final = frozenset({"part_at_rest", "semi_coordinated"})  # modes in which tasks are done on a part at rest
 ANGLE_RANGES: Final = ("base", "start_deg", "start")
 
 
@@ -49,7 +51,7 @@ def _clashing_names(valid: ValidEntries, document: YamlDocument) -> Iterator[Fin
 def _holders(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """The part is held by robots of the cell, each once."""
     seen: set[str] = set()
-    for path, robot in _holders_as_written(document):
+    for path, robot in holders_as_written(document):
         yield from _known_robot(robot, valid, document, path)
         if robot in seen:
             yield document.finding(path, f"expected a robot that does not hold the part already, got '{robot}' twice")
@@ -57,10 +59,10 @@ def _holders(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
 
 
 def _operators(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
-    """Each task has a robot of its own: one that does not hold the part, or the one that carries it."""
-    holders = [robot for _, robot in _holders_as_written(document)]
+    """A task is done by a robot that does not hold the part, or carries it; without a program each by another one."""
+    holders = [robot for _, robot in holders_as_written(document)]
     busy: dict[str, str] = {}
-    for name, path, robot in _operators_as_written(document):
+    for name, path, robot in operators_as_written(document):
         yield from _known_robot(robot, valid, document, path)
         if robot in holders:
             is_in_world = document.root["tasks"][name].get("relative_to") == "world"
@@ -68,8 +70,11 @@ def _operators(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]
             if text:
                 yield document.finding(path, text)
         other = busy.setdefault(robot, name)
-        if other != name:
-            text = f"expected a robot without another task, got '{robot}', which does '{other}'"
+        if other != name and "program" not in document.root:
+            text = (
+                f"expected a robot without another task, got '{robot}', which does '{other}': add program: {{}} for a "
+                "sequence of tasks"
+            )
             yield document.finding(path, text)
 
 
@@ -79,28 +84,10 @@ def _wrong_holder(robot: str, holders: Sequence[str], valid: ValidEntries, *, is
         return f"expected a robot that does not hold the part, got the positioner '{robot}'"
     if robot != holders[0]:
         return f"expected the first holder '{holders[0]}', which carries the part frame, got '{robot}'"
-    if valid.motion is not None and valid.motion.mode == "part_at_rest":
-        return f"expected a robot that does not hold the part in the mode part_at_rest, got the positioner '{robot}'"
+    if valid.motion is not None and valid.motion.mode in AT_REST:
+        mode = valid.motion.mode
+        return f"expected a robot that does not hold the part in the mode {mode}, got the positioner '{robot}'"
     return None
-
-
-def _holders_as_written(document: YamlDocument) -> Iterator[tuple[KeyPath, str]]:
-    """Robots that hold the part, also of a part that is wrong in other ways."""
-    part = document.root.get("part")
-    grasps = part.get("held_by") if isinstance(part, dict) else None
-    for index, grasp in enumerate(grasps if isinstance(grasps, tuple) else ()):
-        robot = grasp.get("robot") if isinstance(grasp, dict) else None
-        if isinstance(robot, str):
-            yield ("part", "held_by", index, "robot"), robot
-
-
-def _operators_as_written(document: YamlDocument) -> Iterator[tuple[str, KeyPath, str]]:
-    """Robots of the tasks, also of tasks that are wrong in other ways."""
-    tasks = document.root.get("tasks")
-    for name, task in tasks.items() if isinstance(tasks, dict) else ():
-        robot = task.get("robot") if isinstance(task, dict) else None
-        if isinstance(robot, str):
-            yield name, ("tasks", name, "robot"), robot
 
 
 def _known_robot(robot: str, valid: ValidEntries, document: YamlDocument, path: KeyPath) -> Iterator[Finding]:

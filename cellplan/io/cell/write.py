@@ -10,18 +10,22 @@ from cellplan.io.cell.build_accelerations import written_rule
 from cellplan.io.robots.rules import configuration_in_si, start_keys
 from cellplan.io.schema.cell import MotionEntry
 from cellplan.io.schema.robot import RobotEntry
+from cellplan.io.schema.task import TaskEntry
 from cellplan.io.schema.units import Deg, Mm, file_number, in_si
 from cellplan.io.yaml.writer import yaml_text
 from cellplan.model.cell import Cell, CheckSettings, Part, Robot
 from cellplan.model.robot import RobotModel
+from cellplan.model.sequence import sequence_of
 from cellplan.model.solver import Integrator, SolverSettings
 from cellplan.model.task import SampledPath, Task, TimedPath
 from cellplan.model.units import MM
 
-CONFIGURATIONS: Final = frozenset({"start", "start_deg", "home", "home_deg"})
+CONFIGURATIONS: Final = frozenset({"start", "start_deg", "home", "home_deg", "holder", "holder_deg"})
 
 
-def render_cell(cell: Cell, starts: Mapping[str, Array] | None = None) -> str:
+def render_cell(
+    cell: Cell, starts: Mapping[str, Array] | None = None, *, task_starts: Mapping[str, Array] | None = None
+) -> str:
     """The cell as a cell file that loads to the same cell again.
 
     Files are named as in the original, so the text loads only from a folder from which these names lead to them. Mode,
@@ -30,23 +34,29 @@ def render_cell(cell: Cell, starts: Mapping[str, Array] | None = None) -> str:
     Args:
         cell: The cell, as ``load_cell`` gave it or changed since.
         starts: Start postures that were found, by robot, in [rad] or [m]; those written in the cell stay.
+        task_starts: Those of later tasks of a robot, by task, likewise.
 
     Raises:
         ValueError: The cell was not read from a file.
     """
-    return yaml_text(written_document(cell, starts))
+    return yaml_text(written_document(cell, starts, task_starts=task_starts))
 
 
-def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> dict[str, Any]:
+def written_document(
+    cell: Cell, starts: Mapping[str, Array] | None = None, *, task_starts: Mapping[str, Array] | None = None
+) -> dict[str, Any]:
     """The cell as plain values in the units of a cell file, every default filled in; see ``render_cell``."""
     if not cell.origin.document:
         raise ValueError("a cell that was not read from a file has no words to write")
     document: dict[str, Any] = dict(cell.origin.document)
-    found = starts or {}
+    found, found_later = starts or {}, task_starts or {}
     robots, tasks = document["robots"], document["tasks"]
     document["robots"] = {robot.name: _robot(robots[robot.name], robot, found.get(robot.name)) for robot in cell.robots}
     document["part"] = _part(document["part"], cell.part)
     document["tasks"] = {task.name: _task(tasks[task.name], task) for task in cell.tasks}
+    if cell.program is not None:
+        in_program = {task.name: _postures(cell, task, found_later.get(task.name)) for task in cell.tasks}
+        document["tasks"] = {name: _with_postures(entry, in_program[name]) for name, entry in document["tasks"].items()}
     document["motion"] = _motion(document["motion"], cell)
     document["solver"] = _solver(document["solver"], cell.solver)
     document["checks"] = _checks(document["checks"], cell.checks)
@@ -72,6 +82,8 @@ def _robot(entry: Mapping[str, Any], robot: Robot, found: Array | None) -> dict[
     written["base"] = _pose(entry["base"], robot.X_WB)
     written |= _configuration("start", robot.model, robot.start if robot.start is not None else found)
     written |= _configuration("home", robot.model, robot.home)
+    if robot.order:
+        written["order"] = list(robot.order)
     written["weights"] = [float(weight) for weight in robot.weights]
     written["acceleration"] = written_rule(robot)
     written["controller_cycle_ms"] = file_number(robot.controller_cycle, is_revolute=False)
@@ -106,6 +118,23 @@ def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
     if isinstance(task.path, SampledPath | TimedPath):
         settings = {"file": task.path.source, "smooth": task.path.is_smooth, "closed": task.path.is_closed}
         written["path"] = {**entry["path"], "csv": settings}
+    return written
+
+
+def _with_postures(entry: Mapping[str, Any], postures: Mapping[str, Any]) -> dict[str, Any]:
+    """A task of a program with its postures in place of those of the file."""
+    written = {key: value for key, value in entry.items() if key not in CONFIGURATIONS} | dict(postures)
+    return {key: written[key] for key in TaskEntry.model_fields if key in written}
+
+
+def _postures(cell: Cell, task: Task, found: Array | None) -> dict[str, Any]:
+    """Start posture of a task that is not the first of its robot, and the posture of the first holder if given."""
+    robot, names = cell.robot(task.robot), [other.name for other in cell.tasks]
+    first = next((name for name in sequence_of(cell, task.robot) if name in names), task.name)
+    start = task.start_posture if task.start_posture is not None else found
+    written = {} if first == task.name else _configuration("start", robot.model, start)
+    if task.holder_posture is not None and cell.carrier is not None:
+        written |= _configuration("holder", cell.robots[cell.carrier].model, task.holder_posture)
     return written
 
 

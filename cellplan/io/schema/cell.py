@@ -18,6 +18,7 @@ from cellplan.io.schema.common import (
     require_each_once,
     rule,
 )
+from cellplan.io.schema.program import ProgramEntry
 from cellplan.io.schema.robot import Mass, RobotEntry, SlidingSpeed
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
 from cellplan.io.schema.solver import SolverEntry
@@ -145,9 +146,10 @@ BuildUpChoice = Annotated[
 class MotionEntry(Entry):
     """Who moves, and the common clock."""
 
-    mode: Literal["simultaneous", "pairwise", "part_at_rest"] = Field(
+    mode: Literal["simultaneous", "pairwise", "part_at_rest", "semi_coordinated"] = Field(
         default="simultaneous",
-        description="Who moves: all robots; the positioner and one operator at a time; the operators only.",
+        description="Who moves: all robots; the positioner and one operator at a time; the operators only; the "
+        "positioner and the operators in turn (only with program).",
     )
     duration_s: Seconds | None = Field(
         default=None,
@@ -313,6 +315,11 @@ class CellDocument(Entry):
         default={}, max_length=OBSTACLE_LIMIT, description="Fixed obstacles in the cell by name."
     )
     motion: MotionEntry = Field(description="Who moves, and the common clock.")
+    program: ProgramEntry | None = Field(
+        default=None,
+        description="A program from home to home, with any number of tasks for each robot; {} for all its defaults. "
+        "When absent the program begins and ends with the tasks, of which a robot has at most one.",
+    )
     acceleration: AccelerationChoice | None = Field(
         default=None,
         description="Accelerations that the joints of all robots are judged against, where a robot says nothing of its "

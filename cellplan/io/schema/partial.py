@@ -17,6 +17,7 @@ from cellplan.io.schema.cell import (
     PartEntry,
 )
 from cellplan.io.schema.messages import AnyEntry, valid_entry, validate
+from cellplan.io.schema.program import ProgramEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.solver import SolverEntry
@@ -38,6 +39,7 @@ class ValidEntries:
         solver: The solver's settings, if valid.
         checks: The checks, if valid.
         layout: The layout, if given and valid.
+        program: The program from home to home, if given and valid.
         acceleration: The cell's rule for accelerations, if the whole file is valid.
         names: All names in each section, of valid and invalid entries.
     """
@@ -51,6 +53,7 @@ class ValidEntries:
     solver: SolverEntry | None
     checks: ChecksEntry | None
     layout: LayoutEntry | None
+    program: ProgramEntry | None
     acceleration: AccelerationChoice | None
     names: Mapping[str, tuple[str, ...]]
 
@@ -73,6 +76,7 @@ def read_valid_entries(document: YamlDocument) -> tuple[ValidEntries, list[Findi
         solver=_single(SolverEntry, document, "solver"),
         checks=_single(ChecksEntry, document, "checks"),
         layout=_single(LayoutEntry, document, "layout"),
+        program=_single(ProgramEntry, document, "program"),
         acceleration=None if whole is None else whole.acceleration,
         names={key: tuple(_section(document, key)) for key in ("robots", "tasks", "environment")},
     )
@@ -94,5 +98,5 @@ def _named(model: type[AnyEntry], document: YamlDocument, key: str) -> dict[str,
 def _single(model: type[AnyEntry], document: YamlDocument, key: str) -> AnyEntry | None:
     """A section that is one entry; its defaults when it is absent and may be."""
     if key not in document.root:
-        return None if key in {"part", "motion", "layout"} else model()
+        return None if key in {"part", "motion", "layout", "program"} else model()
     return valid_entry(model, document, (key,))

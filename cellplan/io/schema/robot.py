@@ -34,6 +34,7 @@ WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses
 HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
 ROUGHEST_MM: Final = 1_000.0  # bodies that are farther off stand for nothing
 AXIS_LIMIT: Final = 64  # joints of one robot
+ORDER_LIMIT: Final = 400  # tasks and marks of one robot
 SOLID_LIMIT: Final = 50  # solids of a track or a carriage
 MOUNTS: Final = ("pedestal", "tilted", "hanging", "wall", "rail")
 
@@ -287,6 +288,12 @@ class RobotEntry(Entry):
     home: NamedConfiguration | None = Field(
         default=None,
         description="The same with one key per joint with its unit (a1_deg, rail_mm), or by name; excludes home_deg.",
+    )
+    order: tuple[Name, ...] | None = Field(
+        default=None,
+        max_length=ORDER_LIMIT,
+        description="Its tasks, and the marks of the program at which it waits, in their order; the order of the file, "
+        "without marks, when absent. Only with program.",
     )
     weights: tuple[Weight, ...] | None = Field(
         default=None,

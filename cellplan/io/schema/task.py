@@ -21,7 +21,7 @@ from cellplan.io.schema.common import (
     require_one,
     rule,
 )
-from cellplan.io.schema.robot import SlidingSpeed
+from cellplan.io.schema.robot import Configuration, JointPosition, SlidingSpeed
 from cellplan.io.schema.units import Deg, Mm, Within
 
 PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
@@ -36,6 +36,8 @@ Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
 TOOL_AXIS_WORDS: Final = f"normal, {DIRECTION_WORDS}"
 LAW_WORDS: Final = "constant, trapezoid, quintic or {trapezoid: {ramp: 0.25}}"
 CORNER_WORDS: Final = "stop or {blend_mm: 2}"
+AFTER_WORDS: Final = "the name of a task or a list of names"
+POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
 CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
 
 
@@ -194,6 +196,14 @@ class ToleranceEntry(Entry):
     )
 
 
+AfterChoice = Annotated[
+    Annotated[Name, Tag(f"<{AFTER_WORDS}>")] | Annotated[tuple[Name, ...], Tag("<list>")],
+    by_kind(AFTER_WORDS, list=tuple),
+]
+PositionChoice = Annotated[
+    Annotated[Literal["auto"], Tag(f"<{POSITION_WORDS}>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
+    by_kind(POSITION_WORDS, mapping=dict),
+]
 ToolDepth = Annotated[Mm, Within(ge=0.0, le=DEEPEST_CUT_MM)]
 StandOff = Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
@@ -202,11 +212,33 @@ TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
 class TaskEntry(Entry):
     """One operator's work on the part."""
 
-    robot: Name = Field(description="Robot that does the task; a robot has at most one.")
+    robot: Name = Field(description="Robot that does the task; without program a robot has at most one.")
     relative_to: Literal["part", "world"] = Field(
         default="part",
         description="Frame that path, tool axis and axes are given in. With world, a robot that holds the part (the "
         "first under held_by) carries it along the path; any other moves its tool through the cell.",
+    )
+    after: AfterChoice | None = Field(
+        default=None,
+        description="Tasks, of any robots, that must be done before this one begins; only with program.",
+    )
+    start_deg: Configuration | None = Field(
+        default=None,
+        description="Start posture of its robot for this task, one angle per joint; auto, the default, finds one. Only "
+        "with program, and only for later tasks of a robot: the start posture of the robot is that of its first one.",
+    )
+    start: PositionChoice | None = Field(
+        default=None, description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes start_deg."
+    )
+    holder_deg: tuple[Angle, ...] | None = Field(
+        default=None,
+        description="Posture of the first holder at which this task begins, and at which it is done in the modes "
+        "part_at_rest and semi_coordinated; the holder's start posture when absent. Only with program.",
+    )
+    holder: dict[str, JointPosition] | None = Field(
+        default=None,
+        min_length=1,
+        description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes holder_deg.",
     )
     path: PathEntry = Field(description="Path of the tool tip on the part.")
     tool_axis: ToolAxis | None = Field(
@@ -248,11 +280,14 @@ class TaskEntry(Entry):
     )
     approach_mm: StandOff = Field(
         default=Mm(0.0),
-        description="Distance from which the tool approaches the start of its path, along its own axis.",
+        description="Distance from which the tool approaches the start of its path, along its own axis. With program "
+        "the default is 30 for a task on the part.",
     )
     approach_s: Seconds = Field(default=0.5, description="Time for the approach, which ends when the path starts.")
     retract_mm: StandOff = Field(
-        default=Mm(0.0), description="Distance to which the tool retracts from the end of its path, along its own axis."
+        default=Mm(0.0),
+        description="Distance to which the tool retracts from the end of its path, along its own axis. With program "
+        "the default is 30 for a task on the part.",
     )
     retract_s: Seconds = Field(default=0.5, description="Time for the retraction.")
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
@@ -280,13 +315,33 @@ class TaskEntry(Entry):
             raise rule("unexpected key, a path in the world is not projected onto the part", "path.project")
         if self.relative_to == "world" and self.tool_depth_mm is not None:
             raise rule("unexpected key, a tool in the world does not work on the part", "tool_depth_mm")
-        for name, words in (("axes", self.axes), ("free", self.free)):
+        if self.start_deg is not None and self.start is not None:
+            raise rule("expected either start_deg or start, got both", "start")
+        if self.holder_deg is not None and self.holder is not None:
+            raise rule("expected either holder_deg or holder, got both", "holder")
+        for name, words in (("axes", self.axes), ("free", self.free), ("after", self.preceding)):
             require_each_once(words, name)
         if self.start_s is not None and self.start_s < self.approaching_s:
             raise rule(f"expected at least approach_s = {self.approach_s:g}, got {self.start_s:g}", "start_s")
         if self.settle_s and self.approach_mm:
             raise rule("expected no time to settle, as the tool comes to its path by an approach", "settle_s")
         return self
+
+    @property
+    def preceding(self) -> tuple[str, ...]:
+        """Names of the tasks that come before it."""
+        return (self.after,) if isinstance(self.after, str) else self.after or ()
+
+    @property
+    def given_start(self) -> tuple[float, ...] | dict[str, float] | None:
+        """Start posture that was written down; None when it is to be found."""
+        given = self.start_deg if self.start_deg is not None else self.start
+        return None if given is None or isinstance(given, str) else given
+
+    @property
+    def given_holder(self) -> tuple[float, ...] | dict[str, float] | None:
+        """Posture of the first holder that was written down; None for that holder's start posture."""
+        return self.holder_deg if self.holder_deg is not None else self.holder
 
     @property
     def approaching_s(self) -> float:

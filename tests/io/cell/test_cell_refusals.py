@@ -135,8 +135,8 @@ Refuse = Callable[..., list[str]]
         (
             "duration_s: 4",
             "duration_s: 4, mode: simultanous",
-            "c:21: motion.mode: expected simultaneous, pairwise or part_at_rest, got 'simultanous', did you mean "
-            "'simultaneous'?",
+            "c:21: motion.mode: expected simultaneous, pairwise, part_at_rest or semi_coordinated, got 'simultanous', "
+            "did you mean 'simultaneous'?",
         ),
         (
             "environment:",
@@ -222,7 +222,7 @@ Refuse = Callable[..., list[str]]
             "environment:",
             "enviroment: {}\nenvironment:",
             "c:22: enviroment: unknown key, did you mean 'environment'?; allowed: cellplan, name, robots, part, "
-            "tasks, environment, motion, acceleration, solver, checks, layout",
+            "tasks, environment, motion, program, acceleration, solver, checks, layout",
         ),
     ],
 )

@@ -14,7 +14,7 @@ Refuse = Callable[..., list[str]]
         (
             "    robot: worker\n",
             "",
-            "c:17: tasks.ring.robot: missing, expected robot that does the task; a robot has at most one",
+            "c:17: tasks.ring.robot: missing, expected robot that does the task; without program a robot has at most one",
         ),
         (
             "tool_axis: normal",
@@ -68,7 +68,8 @@ Refuse = Callable[..., list[str]]
         (
             "motion: {",
             "  second: {robot: worker, path: {circle: {radius_mm: 50, plane: xy}, project: +z}}\nmotion: {",
-            "c:21: tasks.second.robot: expected a robot without another task, got 'worker', which does 'ring'",
+            "c:21: tasks.second.robot: expected a robot without another task, got 'worker', which does 'ring': add "
+            "program: {} for a sequence of tasks",
         ),
         (
             "motion: {",
