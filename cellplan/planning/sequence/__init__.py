@@ -1,0 +1,1 @@
+"""Sequences of tasks: which are worked on together, and in which order."""
