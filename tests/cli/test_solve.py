@@ -105,7 +105,8 @@ def test_rejected_tables_are_kept_on_request(
         (
             "--mode",
             "pair",
-            "CELL with motion.mode = pair: motion.mode: expected simultaneous, pairwise, part_at_rest or semi_coordinated",
+            "CELL with motion.mode = pair: motion.mode: expected simultaneous, pairwise, part_at_rest or "
+            "semi_coordinated",
         ),
         ("--task", "circel", "error: --task: expected one of circle, rhombus, rectangle, got 'circel'"),
         ("--method", "magic", "CELL with solver.method = magic: solver.method: expected weighted_pseudo_inverse, "),

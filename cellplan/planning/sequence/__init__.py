@@ -1,1 +1,1 @@
-"""Sequences: the stages of a program from home to home."""
+"""Sequences of tasks: which are worked on together, and in which order."""
