@@ -6,22 +6,28 @@ limits of all joints and then certified as it stands in the rows: nothing is ret
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import islice
 from typing import Final
 
 import numpy as np
 
 from cellplan.certify.certify import certify
 from cellplan.geometry.transforms import Array
-from cellplan.model.joint_path import JointPath
 from cellplan.model.progress import Progress, silent
 from cellplan.model.rung import Rung
 from cellplan.planning.timing.retime import Retimer
 from cellplan.planning.timing.schedule import TIME_DECIMALS
-from cellplan.planning.transfer.query import TransferQuery
+from cellplan.planning.transfer.blended_lines import joint_path
+from cellplan.planning.transfer.in_turn import InTurn, RobotMove
+from cellplan.planning.transfer.query import STAGE, TransferQuery
 from cellplan.planning.transfer.straight_time import straight_rows
 from cellplan.scene.scene import Scene
 
-STAGE: Final = "planning transfer moves"
+RESERVES: Final = (
+    0.002,
+    0.006,
+)  # [m] kept beyond the demand while planning: the larger one where the certificate refuses what was found
+MOST_RETIMED: Final = 3  # orders that are retimed and certified
 STRAIGHT_ROWS: Final = 33  # rows of a straight move that is certified before it is retimed
 
 
@@ -64,6 +70,8 @@ def plan_transfer(
         return PlannedTransfer(times=np.array([0.0, retimer.step]), q=np.array([start, goal]), rungs={})
     progress(STAGE, 0.0)
     found = _straight(query, retimer)
+    for reserve in RESERVES:
+        found = found or _in_turn(query, retimer, reserve, progress)
     if found is None:
         raise query.not_found()
     return found
@@ -78,11 +86,31 @@ def _straight(query: TransferQuery, retimer: Retimer) -> PlannedTransfer | None:
     return in_rows(query, q, retimer, dict.fromkeys(query.movers, Rung.STRAIGHT))
 
 
-def retimed(
-    query: TransferQuery, path: JointPath, retimer: Retimer, rungs: Mapping[str, Rung]
-) -> PlannedTransfer | None:
-    """A path at the limits of all joints, in rows; None where those are not certified to keep what is demanded."""
-    return in_rows(query, path.at(retimer.fastest(path).sigma), retimer, rungs)
+def _in_turn(query: TransferQuery, retimer: Retimer, reserve: float, progress: Progress) -> PlannedTransfer | None:
+    """One robot after the other; None where no order is found or certified."""
+    search = InTurn(query, reserve=reserve, progress=progress)
+    for moves in islice(search.moves(), MOST_RETIMED):
+        rows, q = [query.start[None]], query.start
+        for move in moves:
+            rows.append(_rows_of(move, q, retimer)[1:])
+            q = rows[-1][-1]
+        rungs = {move.robot: Rung.IN_TURN for move in moves}
+        found = in_rows(query, np.concatenate(rows), retimer, rungs)
+        if found is not None:
+            return found
+    return None
+
+
+def _rows_of(move: RobotMove, q: Array, retimer: Retimer) -> Array:
+    """Rows of the move of one robot from a stacked configuration, shape (N, nq); the last one is exact."""
+    goal = q.copy()
+    goal[move.line.columns] = move.line.q[-1]
+    if move.is_straight:
+        return straight_rows(q, goal, retimer)
+    path = joint_path(q, [move.line])
+    rows = path.at(retimer.fastest(path).sigma)
+    rows[-1] = goal
+    return rows
 
 
 def in_rows(query: TransferQuery, q: Array, retimer: Retimer, rungs: Mapping[str, Rung]) -> PlannedTransfer | None:

@@ -1,6 +1,8 @@
 """Transfer query: from which configuration to which, who moves, and why there is no way."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -9,7 +11,11 @@ from cellplan.errors import TransferNotFoundError
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import ClearanceClass
 from cellplan.model.units import MM
+from cellplan.planning.transfer.trees import JointBox
 from cellplan.scene.scene import Scene
+
+STAGE: Final = "planning transfer moves"
+ENDLESS: Final = np.pi  # [rad] by which a joint without limits may go beyond its start and its goal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -21,7 +27,6 @@ class TransferQuery:
         start: Stacked joint positions in [rad] or [m], shape (nq,).
         goal: Likewise.
         movers: Names of the robots that move, in the order of the cell.
-        velocity: Largest speed of every joint in [rad/s] or [m/s], shape (nq,).
         seed: Seed of what is drawn.
     """
 
@@ -29,7 +34,6 @@ class TransferQuery:
     start: Array
     goal: Array
     movers: tuple[str, ...]
-    velocity: Array
     seed: int
 
     @classmethod
@@ -38,12 +42,31 @@ class TransferQuery:
         cell = scene.cell
         differs = start != goal
         movers = tuple(robot.name for robot in cell.robots if np.any(differs[cell.columns(robot.name)]))
-        velocity = np.concatenate([robot.model.velocity for robot in cell.robots])
-        return cls(scene=scene, start=start, goal=goal, movers=movers, velocity=velocity, seed=seed)
+        return cls(scene=scene, start=start, goal=goal, movers=movers, seed=seed)
 
-    def seconds_between(self, first: Array, second: Array) -> float:
-        """Time in [s] that the slowest joint needs from one stacked configuration to another at top speed."""
-        return float((np.abs(second - first) / self.velocity).max())
+    def ends_of(self, robot: str) -> tuple[Array, Array]:
+        """Start and goal of one robot in [rad] or [m], shape (n,) each."""
+        columns = self.scene.cell.columns(robot)
+        return self.start[columns], self.goal[columns]
+
+    def standing(self, moved: Collection[str]) -> Array:
+        """Stacked joint positions when some robots stand at their goals and the others at their starts, shape (nq,)."""
+        q = self.start.copy()
+        for name in moved:
+            columns = self.scene.cell.columns(name)
+            q[columns] = self.goal[columns]
+        return q
+
+    def box(self, robot: str) -> JointBox:
+        """Configurations that a robot may be in."""
+        model, ends = self.scene.cell.robot(robot).model, np.array(self.ends_of(robot))
+        lower = np.where(np.isfinite(model.lower), model.lower, ends.min(axis=0) - ENDLESS)
+        upper = np.where(np.isfinite(model.upper), model.upper, ends.max(axis=0) + ENDLESS)
+        return JointBox(
+            lower=np.minimum(lower, ends.min(axis=0)),
+            upper=np.maximum(upper, ends.max(axis=0)),
+            velocity=model.velocity,
+        )
 
     def require_free_ends(self) -> None:
         """Refuse a start or a goal that keeps less distance than is demanded.
