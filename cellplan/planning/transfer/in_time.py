@@ -120,7 +120,7 @@ class InTime:
         columns = self._query.scene.cell.columns(check.robot)
         at, via, share = times[way.ticks[first : last + 1]], way.q[first : last + 1], 1.0
         for _ in range(HALVINGS):
-                        line = BlendedLine.through(columns, at, via, shares=share)
+            line = BlendedLine.through(columns, at, via, shares=share)
             is_within = line.begin >= 0.0 and line.end <= times[-1]
             if is_within and check.are_free(line.at(times), np.arange(len(times))):
                 return line
