@@ -77,7 +77,7 @@ def _limits(
         if not joint.lower <= position <= joint.upper:
             unit, scale = joint.display_unit
             low, high, got = (f"{scale * value:.6g}" for value in (joint.lower, joint.upper, position))
-            yield document.finding(path, f"expected '{joint.name}' from {low} to {high} {unit}, got {got}")
+            yield document.finding(path, f"expected '{joint.name}' within its limits {low} .. {high} {unit}, got {got}")
 
 
 def _without_program(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
@@ -112,7 +112,7 @@ def _marks(marks: list[tuple[KeyPath, str]], valid: ValidEntries, document: Yaml
     seen: set[str] = set()
     orders = [robot.order or () for robot in valid.robots.values()]
     for path, name in marks:
-        if name in document.root.get("tasks", {}):
+        if name in valid.names["tasks"]:
             yield document.finding(path, f"expected a name that no task has, got '{name}', a task: rename the mark")
         elif name in seen:
             yield document.finding(path, f"expected each mark once, got '{name}' twice")
@@ -143,7 +143,7 @@ def _orders(marks: list[tuple[KeyPath, str]], valid: ValidEntries, document: Yam
 
 def _preceding(marks: list[tuple[KeyPath, str]], valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """What a task comes after is another task of the cell."""
-    names, known = [name for _, name in marks], list(document.root.get("tasks", {}))
+    names, known = [name for _, name in marks], valid.names["tasks"]
     for name, task in valid.tasks.items():
         for index, other in enumerate(task.preceding):
             place: KeyPath = (
