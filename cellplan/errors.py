@@ -100,6 +100,10 @@ class HomeNotFoundError(NoSolutionError):
     """No collision-free configuration was found for an idle robot during its runs."""
 
 
+class TransferNotFoundError(NoSolutionError):
+    """A transfer move begins or ends too close to something, or no free way was found for it."""
+
+
 class DivergedError(NoSolutionError):
     """The integration deviated so far from the task that it was stopped."""
 

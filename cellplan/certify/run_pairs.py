@@ -1,11 +1,11 @@
 """The scene of one run: the rule of a pair depends on which robots work, and some searches need a few pairs only."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 from cellplan.model.idle import idle_robots
 from cellplan.model.robot import BASE
-from cellplan.scene.bodies import Kind
+from cellplan.scene.bodies import Kind, SceneBody
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 
@@ -33,6 +33,21 @@ def scene_of_run(scene: Scene, tasks: Collection[str]) -> Scene:
 def scene_of_rows(scene: Scene, rows: Sequence[int]) -> Scene:
     """The scene in which only some pairs are watched, in the order given."""
     return replace(scene, pairs=tuple(scene.pairs[row] for row in rows))
+
+
+def scene_with_contact(scene: Scene, is_allowed: Callable[[SceneBody, SceneBody], bool], reason: str) -> Scene:
+    """The scene while some pairs may touch, as a part and what grips it or what it is put on; they are listed as such.
+
+    Args:
+        scene: The scene.
+        is_allowed: Whether two bodies may touch.
+        reason: Why they may.
+    """
+    ends = [(scene.bodies[pair.first], scene.bodies[pair.second]) for pair in scene.pairs]
+    may_touch = [is_allowed(*both) or is_allowed(*both[::-1]) for both in ends]
+    excluded = tuple((a.name, b.name, reason) for (a, b), allowed in zip(ends, may_touch, strict=True) if allowed)
+    kept = [row for row, allowed in enumerate(may_touch) if not allowed]
+    return replace(scene_of_rows(scene, kept), exclusions=(*scene.exclusions, *excluded))
 
 
 def rows_moved_by(scene: Scene, robot: str) -> list[int]:

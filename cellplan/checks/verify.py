@@ -27,6 +27,7 @@ from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accu
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
+from cellplan.model.idle import idle_robots
 from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check, ClosureAccuracy, JointUse, Report, RobotSpeed, TaskAccuracy
@@ -73,6 +74,8 @@ def verify_motion(
     """
     cell = scene.cell
     q = _positions(cell, schedule, tables)
+    at_work = [scheduled.task.name for scheduled in schedule.tasks]
+    idle = [name for name in idle_robots(cell, at_work) if name not in moving]
     progress("checking tool errors and joints", 0.0)
     X_WP = part_poses(cell, scene.chains, q)
     accuracy, closures = _errors(scene, schedule, q, X_WP)
@@ -85,16 +88,17 @@ def verify_motion(
     checks += [*joint_checks, *check_accelerations(cell, accelerations), *check_tool_speeds(cell, speeds)]
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
-    checks += [*check_idle(cell, schedule, q), *check_payload(loads)]
+    checks += [*check_idle(cell, idle, schedule.times, q), *check_payload(loads)]
     return Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
-        tasks=tuple(scheduled.task.name for scheduled in schedule.tasks),
+        tasks=tuple(at_work),
+        idle=tuple(idle),
         checks=tuple(checks),
         accuracy=accuracy,
         joints=tuple(uses),
         clearance=UNKNOWN,
-        conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving),
+        conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving) if at_work else None,
         motion_share=_motion_share(uses),
         speeds=speeds,
         times=schedule.times,

@@ -19,8 +19,11 @@ def idle_robots(cell: Cell, tasks: Collection[str]) -> tuple[str, ...]:
 def not_in_program(cell: Cell, tasks: Collection[str]) -> str:
     """One line on moves that a run omits: those of robots whose task is not part of the run, to and from home.
 
-    Empty when there are none; a robot without work in the whole cell never leaves its home.
+    Empty when there are none; a robot without work in the whole cell never leaves its home, and a program from home to
+    home has all moves.
     """
+    if cell.program is not None:
+        return ""
     workers = {task.robot for task in cell.tasks}
     idle = [name for name in idle_robots(cell, tasks) if name in workers]
     if not idle:

@@ -58,7 +58,8 @@ class Phase:
     """A stretch of the nominal time of a program; a new phase begins whenever a role changes.
 
     Attributes:
-        name: Name of its only task, ``ALL_TASKS`` when all tasks are worked on together, or what lies between two.
+        name: Name of its only task, ``ALL_TASKS`` when it is the only one, ``work-2`` or ``transfer-2`` in a program
+            from home to home, or what lies between two.
         roles: Role of every robot, by its name: those at work first, in the order of the tasks.
         begin: Nominal time in [s] at which it begins; 0, as ``end``, while the plan is not on a clock.
         end: Nominal time in [s] at which it ends.
@@ -77,8 +78,8 @@ class Phase:
             raise ValueError(f"phase '{self.name}': ends at {self.end} s before it begins at {self.begin} s")
 
     @property
-    def task(self) -> str | None:
-        """Name of the only task of a phase of its own; None when all tasks are worked on together."""
+    def label(self) -> str | None:
+        """Name by which reports and folders tell it from the others; None for the only phase of a program."""
         return None if self.name == ALL_TASKS else self.name
 
     @property

@@ -50,7 +50,7 @@ class Plan:
             KeyError: There is no such phase.
         """
         for phase in self.program:
-            if phase.task == task:
+            if phase.label == task:
                 return phase
         raise KeyError(task)
 

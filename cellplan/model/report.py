@@ -346,7 +346,7 @@ class Report:
         accuracy: Tool errors, one entry per task.
         joints: One entry per joint of every robot.
         clearance: Distances.
-        conditioning: Distance of the motion from singularities.
+        conditioning: Distance of the motion from singularities; None where no robot works on a task.
         motion_share: Share of all joint travel per robot, 0..1, and the busiest joint of each, as (share, joint).
         speeds: Speeds of each robot in the world.
         times: The common clock in [s], shape (N,).
@@ -359,6 +359,7 @@ class Report:
         loads: Load of each robot.
         phases: All phases of the program on its nominal time, those that are not part of it among them; the times of
             this report count from the begin of the phase that it is for.
+        idle: Names of the robots that stand at their homes all the time.
     """
 
     cell: str
@@ -368,7 +369,7 @@ class Report:
     accuracy: tuple[TaskAccuracy, ...]
     joints: tuple[JointUse, ...]
     clearance: ClearanceReport
-    conditioning: Conditioning
+    conditioning: Conditioning | None
     motion_share: Mapping[str, tuple[float, str]]
     speeds: Mapping[str, RobotSpeed]
     times: Array
@@ -380,6 +381,7 @@ class Report:
     accelerations: MotionAccelerations = UNKNOWN_ACCELERATIONS
     loads: tuple[LoadUse, ...] = ()
     phases: tuple[Phase, ...] = ()
+    idle: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:

@@ -17,7 +17,8 @@ class VerifiedMotion:
     """One phase of a verified run, on its own time, which starts at 0.
 
     Attributes:
-        name: Name of the only task of a phase of its own; None when all tasks are worked on together.
+        name: Name of the phase among several; None for the only one of a program.
+        cell: The cell as it is in this phase.
         moving: Names of the robots that may move.
         schedule: Desired tool poses.
         tables: Joint positions of each robot, read back from its table, by robot name.
@@ -25,6 +26,7 @@ class VerifiedMotion:
     """
 
     name: str | None
+    cell: Cell
     moving: tuple[str, ...]
     schedule: Schedule
     tables: Mapping[str, JointTable]

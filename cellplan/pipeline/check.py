@@ -1,7 +1,7 @@
 """Check a cell without solving it: files, robots, paths, reach and collisions at the start."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
@@ -16,6 +16,9 @@ from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.solve import with_start
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.sequence.approach_starts import with_approach_starts
+from cellplan.planning.sequence.scenes import StageScenes
+from cellplan.planning.sequence.stages import first_blocks, program_stages
 from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.start.present_pairs import present_pairs
 from cellplan.planning.timing.schedule import clock_paths
@@ -55,8 +58,41 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
         InputError: A path misses the part, or a given start is out of limits or off its task.
         NoSolutionError: No start posture was found.
     """
-    scene = Scene.from_cell(cell)
+    if cell.program is not None:
+        return _check_program(cell, progress)
+    return _check_together(Scene.from_cell(cell), progress)
+
+
+def _check_program(cell: Cell, progress: Progress) -> CellCheck:
+    """The checks of each block of tasks of a program from home to home, at its begin."""
+    scenes, blocks = StageScenes.of(cell), [stage for stage in program_stages(cell) if stage.cell.tasks]
+    made = {
+        stage.phase.name: _check_together(scenes.of_stage(stage), progress) for stage in blocks if stage.move is None
+    }
+    checks = [replace(each, message=f"{name}: {each.message}") for name, one in made.items() for each in one.checks]
+    words = [f"{name}: {one.choice}" for name, one in made.items() if one.choice is not None]
+    first = first_blocks(cell)
+    robots = []
+    for robot in cell.robots:
+        own = next((one.cell for one in made.values() if first.get(robot.name) in one.path_lengths), None)
+        robots.append(robot if own is None or robot.start is not None else replace(robot, start=own.robot(robot.name).start))
+    return CellCheck(
+        cell=replace(cell, robots=tuple(robots)),
+        found=tuple(dict.fromkeys(name for one in made.values() for name in one.found)),
+        choice="; ".join(words) or None,
+        path_lengths={name: length for one in made.values() for name, length in one.path_lengths.items()},
+        checks=tuple(checks),
+        left_out=scenes.held.left_out,
+    )
+
+
+def _check_together(scene: Scene, progress: Progress) -> CellCheck:
+    """The checks of tasks that are worked on together, or one after the other from the same start."""
+    cell = scene.cell
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
+    if cell.program is not None:
+        cell = with_approach_starts(cell, scene.chains, toolpaths)
+        scene = replace(scene, cell=cell)
     paths = clock_paths(cell, toolpaths.values())
     examine_given_starts(cell, toolpaths)
     choice = chosen_start(scene, paths, progress=progress)

@@ -1,12 +1,14 @@
 """Solution: what solving a cell gives: a program of one or several phases, each of them verified."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Program, Schedule
 from cellplan.model.phase import Phase
 from cellplan.model.plan import Plan
 from cellplan.model.report import Report
+from cellplan.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -15,22 +17,32 @@ class Run:
 
     Attributes:
         phase: The phase on the clock of the program.
+        scene: The scene that it is judged in, with the cell as it is in this phase.
         schedule: Desired tool poses.
         motion: Joint positions of all robots, as they were planned.
         program: The program as text, in which this phase has its rows.
         report: Result of the checks on these rows.
+        rungs: How the transfer move of each robot was found, by robot; empty without transfer moves.
     """
 
     phase: Phase
+    scene: Scene
     schedule: Schedule
     motion: Motion
     program: Program
     report: Report
+    rungs: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def transfers(self) -> dict[str, str]:
+        """How its transfer moves were found, in words, by the name of the phase; empty without any."""
+        words = ", ".join(f"{robot} {rung}" for robot, rung in self.rungs.items())
+        return {self.phase.name: words} if words else {}
 
     @property
     def name(self) -> str | None:
-        """Name of the only task of a phase of its own; None when all tasks are worked on together."""
-        return self.phase.task
+        """Name of the phase among several; None for the only one of a program."""
+        return self.phase.label
 
     @property
     def moving(self) -> tuple[str, ...]:
@@ -45,7 +57,8 @@ class Solution:
     Attributes:
         cell: The cell that was solved, with every start posture filled in.
         motion: Joint positions in all rows of the program, and its plan.
-        runs: One run for each phase of the program: one, or one per task in the pairwise mode.
+        runs: One run for each phase of the program: one, or one per task in the pairwise mode; of a program of several
+            cycles those of the first one, which the others repeat row by row.
         remark: Note on the chosen start when no trial of a start was free of faults.
     """
 

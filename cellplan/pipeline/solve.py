@@ -20,11 +20,13 @@ from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_home
 from cellplan.pipeline.plan.program import ProgramClock, refuse_clock_name
 from cellplan.pipeline.plan.retiming import retimed
 from cellplan.pipeline.plan.rounded import rounded
-from cellplan.pipeline.plan.run import PlannedRun, plan_run
+from cellplan.pipeline.plan.run import plan_run
+from cellplan.pipeline.plan.sequence import plan_program
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.sequence.only_task import with_only_task
 from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.scene import Scene
@@ -61,13 +63,15 @@ def solve_with_plots(
     """
     scene, solution = solve_motion(cell, task=task, progress=progress)
     for run in solution.runs:
-        plots.begin(run.report, cell=solution.cell)
+        plots.begin(run.report, cell=run.scene.cell)
     return certified(solution, scene, progress=progress)
 
 
 def solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[Scene, Solution]:
     """All phases, verified but for their clearance, and the scene of the solved cell; see ``solve``."""
     refuse_clock_name(cell)
+    if cell.program is not None:
+        return _solve_program(cell if task is None else with_only_task(cell, task), progress=progress)
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     paths = clock_paths(cell, toolpaths.values())
@@ -80,26 +84,49 @@ def solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[S
     if depends_on_homes(started, planned):
         planned = [plan_run(solved, paths, phase, progress=progress) for phase in plan.program]
     scene = replace(scene, cell=solved)
-    motion, runs = _runs(scene, plan, planned, progress=progress)
+    nominal = [replace(run.motion, q=standing(solved, run.phase, run.motion.q)) for run in planned]
+    clock = ProgramClock.of(solved, plan, [run.schedule for run in planned])
+    motion, runs = _runs(solved, clock, nominal, [scene] * len(planned), progress=progress)
     return scene, Solution(cell=solved, motion=motion, runs=runs, remark=choice.warning)
+
+
+def _solve_program(cell: Cell, *, progress: Progress) -> tuple[Scene, Solution]:
+    """The stages of a program from home to home, verified but for their clearance, and the scene with the part held."""
+    planned = plan_program(cell, progress=progress)
+    stages, cycles = planned.stages, planned.cycles
+    plan = Plan(phases=tuple(each.stage.phase for each in stages) * cycles)
+    clock = ProgramClock.of(planned.cell, plan, [each.schedule for each in stages] * cycles)
+    motions, scenes = [each.motion for each in stages] * cycles, [each.scene for each in stages] * cycles
+    motion, runs = _runs(planned.cell, clock, motions, scenes, cycles=cycles, progress=progress)
+    runs = tuple(replace(run, rungs=each.rungs) for run, each in zip(runs, stages, strict=False))
+    remark = "; ".join(planned.remarks) or None
+    return replace(planned.scenes.held, cell=planned.cell), Solution(
+        cell=planned.cell, motion=motion, runs=runs, remark=remark
+    )
 
 
 def certified(solution: Solution, scene: Scene, *, progress: Progress) -> Solution:
     """The solution with the clearance of every phase checked and the verdict in the headers of its tables."""
-    reports = [with_clearance(run.report, scene, run.schedule, progress=progress) for run in solution.runs]
-    program = with_verdict(solution.cell, solution.program, solution.plan.program, reports)
+    reports = [with_clearance(run.report, run.scene, run.schedule, progress=progress) for run in solution.runs]
+    program = with_verdict(solution.cell, solution.program, [run.phase for run in solution.runs], reports)
     runs = zip(solution.runs, reports, strict=True)
     return replace(solution, runs=tuple(replace(run, report=report, program=program) for run, report in runs))
 
 
 def _runs(
-    scene: Scene, plan: Plan, planned: Sequence[PlannedRun], *, progress: Progress
+    cell: Cell,
+    clock: ProgramClock,
+    nominal: Sequence[Motion],
+    scenes: Sequence[Scene],
+    *,
+    cycles: int = 1,
+    progress: Progress,
 ) -> tuple[Motion, tuple[Run, ...]]:
-    """The motion of the program, and its phases verified on the rows that would be written, but for their clearance."""
-    cell = scene.cell
-    nominal = [replace(run.motion, q=standing(cell, run.phase, run.motion.q)) for run in planned]
-    clock = ProgramClock.of(cell, plan, [run.schedule for run in planned])
-    clock, motions = retimed(scene, clock, nominal, progress=progress)
+    """The motion of the program, and its phases verified on the rows that would be written, but for their clearance.
+
+    Of several cycles, which have the same rows, the phases of the first are verified.
+    """
+    clock, motions = retimed(scenes, clock, nominal, progress=progress)
     motion = clock.motion([each.q for each in motions])
     program = render_program(cell, motion)
     tasks = [task.name for task in cell.tasks if task.name in clock.plan.process]
@@ -107,17 +134,13 @@ def _runs(
     program = replace(program, clock=text)
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
     runs = []
-    for place, (schedule, own) in enumerate(zip(clock.schedules, motions, strict=True)):
+    for place in range(len(motions) // cycles):
+        schedule, own = clock.schedules[place], motions[place]
         phase, rows = clock.plan.program[place], clock.cut(tables, place)
-        report = verify_motion(scene, schedule, rows, moving=phase.moving, progress=progress)
+        report = verify_motion(scenes[place], schedule, rows, moving=phase.moving, progress=progress)
+        report = replace(report, mode=str(cell.motion.mode), phases=clock.timed_phases)
         runs.append(
-            Run(
-                phase=phase,
-                schedule=schedule,
-                motion=own,
-                program=program,
-                report=replace(report, phases=clock.timed_phases),
-            )
+            Run(phase=phase, scene=scenes[place], schedule=schedule, motion=own, program=program, report=report)
         )
     return motion, tuple(runs)
 

@@ -14,13 +14,10 @@ from cellplan.io.run.joint_tables import parse_table
 from cellplan.io.run.stored import CLOCK
 from cellplan.model.cell import Cell, Timing
 from cellplan.model.motion import JointTable
-from cellplan.model.plan import Plan
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
-from cellplan.pipeline.plan.nominal_times import with_nominal_times
+from cellplan.pipeline.plan.demanded import DemandedProgram
 from cellplan.pipeline.plan.program import ProgramClock, moved_while_holding
-from cellplan.planning.modes import plan_phases
-from cellplan.scene.scene import Scene
 
 
 def verify(
@@ -31,10 +28,10 @@ def verify(
     Args:
         cell: The cell the tables were made for.
         tables: Text of one joint table per robot, by robot name.
-        task: Name of the only task that was worked on, or of the phase to verify where the program has one per task;
-            the report counts time from the start of that phase.
+        task: Name of the only task that was worked on, or of the phase to verify where the program has several; the
+            report counts time from the start of that phase.
         clock: Text of the clock of the program, ``tables/clock.csv``: for its nominal times where the cell has another
-            ``motion.timing`` than ``as_written``.
+            ``motion.timing`` than ``as_written``, and for the rows of transfer moves of a program from home to home.
         progress: Called with the stage and the fraction done.
 
     Raises:
@@ -42,16 +39,10 @@ def verify(
             holds still in this phase.
     """
     parsed = [parse_table(text, f"tables/{name}.csv") for name, text in tables.items()]
-    plan = plan_phases(cell) if any(table.gaps for table in parsed) else plan_phases(cell, only=task)
-    place = _place(plan, task)
-    program = ProgramClock.from_cell(cell, plan)
-    if cell.motion.timing is not Timing.AS_WRITTEN:
-        file = f"tables/{CLOCK}.csv"
-        if not clock:
-            raise InputError(
-                f"clock: expected the text of {file}, as motion.timing is {cell.motion.timing}, got nothing"
-            )
-        program = with_nominal_times(program, parse_clock(clock, file), cell, file=file)
+    is_whole = cell.program is not None or any(table.gaps for table in parsed)
+    demanded = DemandedProgram.of(cell, only=None if is_whole else task)
+    place = _place(demanded, task)
+    program = _on_clock(cell, demanded, clock)
     _refuse_other_rows(program, parsed)
     phase, schedule = program.plan.program[place], program.schedules[place]
     own = program.cut(parsed, place)
@@ -61,19 +52,31 @@ def verify(
                 f"table of '{table.robot}': expected no motion in the phase '{phase.name}': it holds still"
             )
     with nothing_kept():  # a proof rests on the cell itself
-        report = verify_tables(Scene.from_cell(cell), schedule, own, moving=phase.moving, progress=progress)
+        report = verify_tables(demanded.scenes(cell)[place], schedule, own, moving=phase.moving, progress=progress)
     return replace(report, phases=program.timed_phases)
 
 
-def _place(plan: Plan, task: str | None) -> int:
+def _place(demanded: DemandedProgram, task: str | None) -> int:
     """Number of the phase to verify among those of the program."""
-    if len(plan.program) == 1:
+    names = demanded.labels
+    if len(names) == 1:
         return 0
-    names = [phase.name for phase in plan.program]
     if task not in names:
         got = "none" if task is None else f"'{task}'"
         raise InputError(f"task: this cell has one phase per task: expected one of {listed(names)}, got {got}")
     return names.index(task)
+
+
+def _on_clock(cell: Cell, demanded: DemandedProgram, clock: str) -> ProgramClock:
+    """The demanded program on its clock; the text of the stored one is needed where the cell leaves times open."""
+    file = f"tables/{CLOCK}.csv"
+    if clock:
+        return demanded.clock(cell, parse_clock(clock, file), file=file)
+    if cell.motion.timing is not Timing.AS_WRITTEN:
+        raise InputError(f"clock: expected the text of {file}, as motion.timing is {cell.motion.timing}, got nothing")
+    if demanded.stages:
+        raise InputError(f"clock: expected the text of {file}, as the program goes from home to home, got nothing")
+    return ProgramClock.from_cell(cell, demanded.plan)
 
 
 def _refuse_other_rows(clock: ProgramClock, tables: list[JointTable]) -> None:

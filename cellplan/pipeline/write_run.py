@@ -10,7 +10,6 @@ from cellplan.io.run.folder import MANIFEST, RunFolder
 from cellplan.io.run.joint_tables import program_digest
 from cellplan.io.run.manifest import render_manifest
 from cellplan.io.run.stored import CLOCK
-from cellplan.model.cell import Cell
 from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.background_plots import BackgroundPlots
@@ -64,10 +63,11 @@ def write_run(
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            record = _write_report(target, cell, run, provenance, background)
+            record = _write_report(target, run, provenance, background)
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
-            record = summary_record(reports, cell=cell, provenance=provenance)
+            transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
+            record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers)
             target.write_text("report.json", as_json(record))
             target.write_text("report.html", overview_page(record, cell=cell))
         target.write_text("cell.yaml", render_cell(cell))
@@ -89,11 +89,12 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _write_report(target: RunFolder, cell: Cell, run: Run, provenance: Provenance, plots: BackgroundPlots) -> Record:
+def _write_report(target: RunFolder, run: Run, provenance: Provenance, plots: BackgroundPlots) -> Record:
     """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
+    cell = run.scene.cell
     place = "" if run.name is None else f"{run.name}/"
     begun = plots.pictures(run.report, cell=cell)
-    record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion)
+    record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion, transfers=run.transfers)
     target.write_text(f"{place}report.json", as_json(record))
     target.write_text(f"{place}series.json", series_json(run.report, run.motion))
     pictures = begun()

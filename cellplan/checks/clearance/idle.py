@@ -1,29 +1,27 @@
 """Idle robots: each stays at its home, from the first row of its table to the last."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Robot
-from cellplan.model.idle import idle_robots
-from cellplan.model.motion import Schedule
 from cellplan.model.report import Check
 
 HOME_TOL: Final = 1e-7  # [deg] or [mm]: tables have twelve decimals, and cells as many
 
 
-def check_idle(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> list[Check]:
+def check_idle(cell: Cell, idle: Sequence[str], times: Array, q: Mapping[str, Array]) -> list[Check]:
     """One check for each idle robot: its largest distance from its home.
 
     Args:
         cell: The cell; a robot without a home is held against its first row.
-        schedule: The tasks that are worked on.
+        idle: Names of the idle robots.
+        times: Times of the rows in [s], shape (N,).
         q: Positions in [rad] or [m] by robot, shape (N, n).
     """
-    idle = idle_robots(cell, [scheduled.task.name for scheduled in schedule.tasks])
-    return [_stands(cell.robot(name), schedule.times, q[name]) for name in idle]
+    return [_stands(cell.robot(name), times, q[name]) for name in idle]
 
 
 def _stands(robot: Robot, times: Array, q: Array) -> Check:

@@ -208,12 +208,7 @@ def _times(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
 def _holding(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """Postures at which tasks begin are given once; a holder's only of a part that is held, at tasks of others."""
     holders = [robot for _, robot in holders_as_written(document)]
-    first = _first_tasks(valid, document)
     for name, task in valid.tasks.items():
-        start = "start_deg" if task.start_deg is not None else "start"
-        if getattr(task, start) is not None and first.get(task.robot) == name:
-            text = f"unexpected key, '{name}' is the first task of '{task.robot}': give robots.{task.robot}.{start}"
-            yield document.key_finding(("tasks", name, start), text)
         holder = "holder_deg" if task.holder_deg is not None else "holder"
         if getattr(task, holder) is None:
             continue
@@ -227,12 +222,3 @@ def _holding(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
         text = "expected a part that a robot holds, got one that is fixed in the world: choose simultaneous"
         yield document.finding(("motion", "mode"), text)
 
-
-def _first_tasks(valid: ValidEntries, document: YamlDocument) -> dict[str, str]:
-    """The first task of each robot, by robot."""
-    operators = {task: robot for task, _, robot in operators_as_written(document)}
-    found: dict[str, str] = {}
-    for robot, entry in valid.robots.items():
-        own = [name for name in entry.order or operators if operators.get(name) == robot]
-        found |= {robot: own[0]} if own else {}
-    return found

@@ -23,9 +23,7 @@ from cellplan.model.units import MM
 CONFIGURATIONS: Final = frozenset({"start", "start_deg", "home", "home_deg", "holder", "holder_deg"})
 
 
-def render_cell(
-    cell: Cell, starts: Mapping[str, Array] | None = None, *, task_starts: Mapping[str, Array] | None = None
-) -> str:
+def render_cell(cell: Cell, starts: Mapping[str, Array] | None = None) -> str:
     """The cell as a cell file that loads to the same cell again.
 
     Files are named as in the original, so the text loads only from a folder from which these names lead to them. Mode,
@@ -34,28 +32,25 @@ def render_cell(
     Args:
         cell: The cell, as ``load_cell`` gave it or changed since.
         starts: Start postures that were found, by robot, in [rad] or [m]; those written in the cell stay.
-        task_starts: Those of later tasks of a robot, by task, likewise.
 
     Raises:
         ValueError: The cell was not read from a file.
     """
-    return yaml_text(written_document(cell, starts, task_starts=task_starts))
+    return yaml_text(written_document(cell, starts))
 
 
-def written_document(
-    cell: Cell, starts: Mapping[str, Array] | None = None, *, task_starts: Mapping[str, Array] | None = None
-) -> dict[str, Any]:
+def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> dict[str, Any]:
     """The cell as plain values in the units of a cell file, every default filled in; see ``render_cell``."""
     if not cell.origin.document:
         raise ValueError("a cell that was not read from a file has no words to write")
     document: dict[str, Any] = dict(cell.origin.document)
-    found, found_later = starts or {}, task_starts or {}
+    found = starts or {}
     robots, tasks = document["robots"], document["tasks"]
     document["robots"] = {robot.name: _robot(robots[robot.name], robot, found.get(robot.name)) for robot in cell.robots}
     document["part"] = _part(document["part"], cell.part)
     document["tasks"] = {task.name: _task(tasks[task.name], task) for task in cell.tasks}
     if cell.program is not None:
-        in_program = {task.name: _postures(cell, task, found_later.get(task.name)) for task in cell.tasks}
+        in_program = {task.name: _postures(cell, task) for task in cell.tasks}
         document["tasks"] = {name: _with_postures(entry, in_program[name]) for name, entry in document["tasks"].items()}
     document["motion"] = _motion(document["motion"], cell)
     document["solver"] = _solver(document["solver"], cell.solver)
@@ -127,12 +122,12 @@ def _with_postures(entry: Mapping[str, Any], postures: Mapping[str, Any]) -> dic
     return {key: written[key] for key in TaskEntry.model_fields if key in written}
 
 
-def _postures(cell: Cell, task: Task, found: Array | None) -> dict[str, Any]:
-    """Start posture of a task that is not the first of its robot, and the posture of the first holder if given."""
+def _postures(cell: Cell, task: Task) -> dict[str, Any]:
+    """Start posture of a task, if it is not that of its robot, and the posture of the first holder if given."""
     robot, names = cell.robot(task.robot), [other.name for other in cell.tasks]
     first = next((name for name in sequence_of(cell, task.robot) if name in names), task.name)
-    start = task.start_posture if task.start_posture is not None else found
-    written = {} if first == task.name else _configuration("start", robot.model, start)
+    is_of_robot = first == task.name and task.start_posture is None
+    written = {} if is_of_robot else _configuration("start", robot.model, task.start_posture)
     if task.holder_posture is not None and cell.carrier is not None:
         written |= _configuration("holder", cell.robots[cell.carrier].model, task.holder_posture)
     return written

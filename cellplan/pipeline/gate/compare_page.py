@@ -26,7 +26,7 @@ EXCERPT_LENGTH: Final = 40  # [characters] shown of a page from where it differs
 
 def drawn_again(cell: Cell, motions: Sequence[VerifiedMotion]) -> Drawings:
     """The pictures of what was found, by the place of the run and by file name."""
-    return {motion.name or "": pictures(_sheets(motion, cell)) for motion in motions}
+    return {motion.name or "": pictures(_sheets(motion, motion.cell)) for motion in motions}
 
 
 def page_findings(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], drawn: Drawings) -> Iterator[str]:
@@ -41,8 +41,8 @@ def page_findings(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotio
     for motion in motions:
         place = motion.name or ""
         yield from _foreign_pieces(stored, place, drawn[place])
-        record = _of_the_run(stored, place, run_record(motion.report, cell=cell, provenance=_provenance(stored, place)))
-        yield from _page_finding(stored, place, cell=cell, motion=motion, record=record)
+        record = _of_the_run(stored, place, run_record(motion.report, cell=motion.cell, provenance=_provenance(stored, place)))
+        yield from _page_finding(stored, place, cell=motion.cell, motion=motion, record=record)
     if "runs" in stored.record:
         reports = {str(motion.name): motion.report for motion in motions}
         expected = summary_record(reports, cell=cell, provenance=_provenance(stored, ""))

@@ -13,7 +13,6 @@ from cellplan.io.input.findings import listed, shown
 from cellplan.io.run.joint_tables import other_header_line, parse_header
 from cellplan.io.run.stored import CELL, SERIES, StoredRun, read_stored_run
 from cellplan.model.cell import Cell
-from cellplan.model.plan import Plan
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.model.verified_run import ACCESS_TOKEN, VerifiedMotion, VerifiedRun
@@ -21,10 +20,11 @@ from cellplan.pipeline.gate.compare_page import drawn_again, other_pictures, pag
 from cellplan.pipeline.gate.compare_report import differences, misshapen_series
 from cellplan.pipeline.gate.stored_cell import load_stored_cell
 from cellplan.pipeline.gate.stored_rows import StoredRows, read_rows
+from cellplan.pipeline.plan.demanded import DemandedProgram
 from cellplan.pipeline.plan.headers import table_headers
 from cellplan.pipeline.plan.program import ProgramClock
 from cellplan.pipeline.write_run import versions
-from cellplan.planning.modes import homeless, plan_phases
+from cellplan.planning.modes import homeless
 from cellplan.report.record.common import Provenance, Record
 from cellplan.report.record.idle import missing_moves
 from cellplan.report.record.run import run_record
@@ -62,14 +62,13 @@ def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], prog
     stored = read_stored_run(folder)
     _refuse_failed(stored)
     source = load_stored_cell(stored, cell=cell, allow_dirs=allow_dirs)
-    plan = _plan(source.cell, stored)
-    rows = read_rows(stored, source.cell, ProgramClock.from_cell(source.cell, plan))
-    clock = rows.clock
-    scene = Scene.from_cell(source.cell)
-    motions = tuple(_verified(scene, rows, place, progress=progress) for place in range(len(clock.schedules)))
+    demanded = _demanded(source.cell, stored)
+    rows = read_rows(stored, source.cell, demanded)
+    scenes = demanded.scenes(source.cell)
+    motions = tuple(_verified(scene, rows, place, cell=source.cell, progress=progress) for place, scene in enumerate(scenes))
     _refuse_failing(stored, motions)
     rows.refuse_other_starts(source.cell)
-    _refuse_other_headers(stored, source.cell, clock, motions)
+    _refuse_other_headers(stored, source.cell, rows.clock, motions)
     _refuse_other_report(stored, source.cell, motions)
     of_pages = _refuse_other_pages(stored, source.cell, motions)
     return VerifiedRun(
@@ -84,7 +83,7 @@ def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], prog
             *source.remarks,
             *_other_versions(stored),
             *of_pages,
-            *missing_moves(source.cell, {phase.task: phase.tasks for phase in plan.program}),
+            *missing_moves(source.cell, {phase.label: phase.tasks for phase in demanded.plan.program}),
         ),
         token=ACCESS_TOKEN,
     )
@@ -100,34 +99,46 @@ def _refuse_failed(stored: StoredRun) -> None:
         raise NotVerifiedError([f"{stored.folder}: the run failed{first}; it has no tables to verify"])
 
 
-def _plan(cell: Cell, stored: StoredRun) -> Plan:
-    """The plan that the stored phases must be: all tasks of the cell, or the one that was chosen."""
-    tasks = list(stored.record["runs"] if "runs" in stored.record else stored.record["tasks"])
-    every = [task.name for task in cell.tasks]
+def _demanded(cell: Cell, stored: StoredRun) -> DemandedProgram:
+    """The program that the stored phases must be: all tasks of the cell, or the one that was chosen."""
     file = stored.file("", "report.json")
-    if tasks != every and (len(tasks) != 1 or tasks[0] not in every):
-        raise InputError(f"{file}: tasks: expected {listed(every)} or one of them, got {listed(map(str, tasks))}")
-    plan = plan_phases(cell, only=None if tasks == every else tasks[0])
-    unknown = sorted({name for phase in plan.program for name in homeless(cell, phase)})
+    only = None if cell.program is not None else _only_task(cell, stored, file)
+    demanded = DemandedProgram.of(cell, only=only)
+    phases = demanded.plan.program
+    unknown = sorted({name for phase in phases for name in homeless(cell, phase)})
+    if demanded.stages:
+        unknown = [robot.name for robot in cell.robots if robot.home is None]
     if unknown:
         raise InputError(
             f"{stored.file('', CELL)}: robots: expected an explicit home of every idle robot, got auto for "
             f"{listed(unknown)}"
         )
-    places = [phase.task or "" for phase in plan.program]
-    if places != list(stored.records):
+    if demanded.labels != list(stored.records):
         raise InputError(f"{file}: expected the phases of the mode {cell.motion.mode}, got {listed(stored.records)}")
-    return plan
+    return demanded
 
 
-def _verified(scene: Scene, rows: StoredRows, place: int, *, progress: Progress) -> VerifiedMotion:
+def _only_task(cell: Cell, stored: StoredRun, file: str) -> str | None:
+    """Name of the only task that was chosen; None for all."""
+    tasks = list(stored.record["runs"] if "runs" in stored.record else stored.record["tasks"])
+    every = [task.name for task in cell.tasks]
+    if tasks != every and (len(tasks) != 1 or tasks[0] not in every):
+        raise InputError(f"{file}: tasks: expected {listed(every)} or one of them, got {listed(map(str, tasks))}")
+    return None if tasks == every else str(tasks[0])
+
+
+def _verified(
+    scene: Scene, rows: StoredRows, place: int, *, cell: Cell, progress: Progress
+) -> VerifiedMotion:
     """Make all checks again on the rows of one phase."""
-    clock = rows.clock
+    clock, mode = rows.clock, cell.motion.mode
     phase, schedule = clock.plan.program[place], clock.schedules[place]
     tables = rows.of_phase(place)
     report = verify(scene, schedule, list(tables.values()), moving=phase.moving, progress=progress)
-    report = replace(report, phases=clock.timed_phases)
-    return VerifiedMotion(name=phase.task, moving=phase.moving, schedule=schedule, tables=tables, report=report)
+    report = replace(report, mode=str(mode), phases=clock.timed_phases)
+    return VerifiedMotion(
+        name=phase.label, cell=scene.cell, moving=phase.moving, schedule=schedule, tables=tables, report=report
+    )
 
 
 def _refuse_other_headers(
@@ -138,7 +149,8 @@ def _refuse_other_headers(
     Other versions may name neither, and may have other lines.
     """
     is_same = _is_of_this_version(stored)
-    headers = table_headers(cell, clock.plan.program, [motion.report for motion in motions], digests={})
+    phases = clock.plan.program[: len(motions)]
+    headers = table_headers(cell, phases, [motion.report for motion in motions], digests={})
     for robot, text in stored.tables.items():
         file = stored.file("", f"tables/{robot}.csv")
         header = parse_header(text, file)
@@ -176,7 +188,7 @@ def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[Verifi
     """Refuse reports that say something else than was found."""
     provenance = Provenance(versions=stored.manifest.versions, digests={})
     expected: dict[str, Record] = {
-        motion.name or "": run_record(motion.report, cell=cell, provenance=provenance) for motion in motions
+        motion.name or "": run_record(motion.report, cell=motion.cell, provenance=provenance) for motion in motions
     }
     got: dict[str, Record] = dict(stored.records)
     if "runs" in stored.record:

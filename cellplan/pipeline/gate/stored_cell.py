@@ -138,7 +138,8 @@ def _differences(old: object, new: object, path: KeyPath = ()) -> Iterator[tuple
 
 def _may_differ(path: KeyPath, old: object) -> bool:
     """Whether a run may have another value there than its cell file."""
-    return len(path) == 3 and path[0] == "robots" and path[2] in SEARCHED_KEYS and (old == "auto" or old is None)
+    is_searched = len(path) == 3 and path[0] in ("robots", "tasks") and path[2] in SEARCHED_KEYS
+    return is_searched and (old == "auto" or old is None)
 
 
 def _foreign(stored: StoredRun, cell: Path, difference: tuple[KeyPath, object, object]) -> InputError:

@@ -8,16 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
 from cellplan.io.input.findings import listed, shown
 from cellplan.io.run.clock_table import ClockText, parse_clock
 from cellplan.io.run.joint_tables import MM_PER_M, TableHeader, parse_header, parse_table, program_digest, row_place
 from cellplan.io.run.stored import CLOCK, StoredRun
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, Robot
 from cellplan.model.motion import ClockTable, JointTable, Motion
 from cellplan.model.phase import NOT_IN_PROGRAM, Phase
 from cellplan.model.plan import rows_of
 from cellplan.pipeline.plan.headers import left_out_of_program
-from cellplan.pipeline.plan.nominal_times import with_nominal_times
+from cellplan.pipeline.plan.demanded import DemandedProgram, others_than_first_cycle
 from cellplan.pipeline.plan.program import ProgramClock, moved_while_holding
 
 START_TOL: Final = 1e-9  # [rad] or [m] tables and cells have twelve decimals of a degree, millimetre or metre
@@ -30,13 +31,15 @@ class StoredRows:
 
     Attributes:
         stored: The run.
+        program: The phases that the cell demands, and the cell in each of them.
         clock: The plan on its clock, and the desired tool poses: all from the cell but for the nominal times of the
-            rows of a retimed program.
+            rows of a retimed program, and the number of rows of transfer moves.
         tables: The joint tables with all rows of the program, by robot.
         motion: The same as one motion.
     """
 
     stored: StoredRun
+    program: DemandedProgram
     clock: ProgramClock
     tables: dict[str, JointTable]
     motion: Motion
@@ -52,14 +55,37 @@ class StoredRows:
         Raises:
             InputError: With file and line.
         """
-        for phase in self.clock.plan.program:
+        for phase, own in zip(self.clock.plan.program, self.program.cells, strict=False):
             first = rows_of(phase, self.clock.sigma).start
+            for robot in own.robots if phase.tasks else ():
+                if robot.start is not None and robot.name not in phase.idle:
+                    self._refuse_other(robot, first, robot.start, "start posture")
+        if self.program.stages:
             for robot in cell.robots:
-                off = np.abs(self.tables[robot.name].q[first] - robot.start)
-                if robot.name not in phase.idle and not np.all(off <= START_TOL):
-                    joint = robot.model.joint_names[int(np.argmax(off))]
-                    place = self.place(robot.name, first)
-                    raise InputError(f"{place}: {joint}: expected the start posture of the cell, got another one")
+                for row in (0, len(self.clock.times) - 1):
+                    self._refuse_other(robot, row, robot.home, "home")
+
+    def refuse_other_cycles(self, cell: Cell) -> None:
+        """Refuse cycles that have other rows than the first.
+
+        Raises:
+            InputError: With file and line.
+        """
+        count, phases = len(self.program.cells), self.clock.plan.program
+        for place in range(count if self.program.cycles > 1 else 0):
+            rows = [rows_of(phase, self.clock.sigma) for phase in phases[place::count]]
+            for robot in cell.robots:
+                other = others_than_first_cycle([self.tables[robot.name].q[each] for each in rows])
+                if other is not None:
+                    at = self.place(robot.name, rows[other[0]].start + other[1])
+                    raise InputError(f"{at}: expected the same row as in the first cycle, got another one")
+
+    def _refuse_other(self, robot: Robot, row: int, q: Array | None, what: str) -> None:
+        """Refuse a row in which a robot is in another configuration than one that the cell states."""
+        off = np.abs(self.tables[robot.name].q[row] - q)
+        if not np.all(off <= START_TOL):
+            joint = robot.model.joint_names[int(np.argmax(off))]
+            raise InputError(f"{self.place(robot.name, row)}: {joint}: expected the {what} of the cell, got another one")
 
     def refuse_motion_in_hold(self, cell: Cell) -> None:
         """Refuse a robot that moves in a phase in which it holds still.
@@ -83,31 +109,32 @@ class StoredRows:
         return row_place(self.stored.tables[robot], self.stored.file("", f"tables/{robot}.csv"), row)
 
 
-def read_rows(stored: StoredRun, cell: Cell, clock: ProgramClock) -> StoredRows:
+def read_rows(stored: StoredRun, cell: Cell, demanded: DemandedProgram) -> StoredRows:
     """Read the tables of a run back, each under the header and on the clock that it must have.
 
     Args:
         stored: The run.
         cell: Its cell.
-        clock: The plan on its clock, as the time laws of the cell have it.
+        demanded: The program that the cell demands.
 
     Raises:
         InputError: With file and line, when something is not as the plan of the cell demands.
     """
     texts = {robot.name: stored.tables[robot.name] for robot in cell.robots if robot.name in stored.tables}
     program = program_digest(texts)
-    tables = _joint_tables(stored, cell, clock.plan.program, program)
+    tables = _joint_tables(stored, cell, demanded.plan.program, program)
     file = stored.file("", f"tables/{CLOCK}.csv")
     written = parse_clock(stored.clock, file)
-    clock = with_nominal_times(clock, written, cell, file=file)
+    clock = demanded.clock(cell, written, file=file)
     for name, table in tables.items():
         _refuse_other_times(stored, name, table, clock)
     for finding in _clock_findings(written, clock, cell=cell, program=program):
         raise InputError(f"{file}{finding}")
     q = np.concatenate([table.q for table in tables.values()], axis=1)
     motion = Motion(times=written.table.times, sigma=written.table.sigma, q=q, plan=clock.plan)
-    rows = StoredRows(stored=stored, clock=clock, tables=tables, motion=motion)
+    rows = StoredRows(stored=stored, program=demanded, clock=clock, tables=tables, motion=motion)
     rows.refuse_motion_in_hold(cell)
+    rows.refuse_other_cycles(cell)
     return rows
 
 

@@ -45,10 +45,12 @@ def table_headers(
 
 def left_out_of_program(cell: Cell, phases: Sequence[Phase]) -> str:
     """One line on moves that a program leaves out, those of each phase after its name; empty when there are none."""
+    if cell.program is not None:
+        return ""
     if len(phases) == 1:
         return not_in_program(cell, phases[0].tasks)
     names = listed(phase.name for phase in phases)
-    moves = missing_moves(cell, {phase.task: phase.tasks for phase in phases})
+    moves = missing_moves(cell, {phase.label: phase.tasks for phase in phases})
     return "; ".join([f"phases {names}: the motion from each to the next is {NOT_IN_PROGRAM}", *moves])
 
 

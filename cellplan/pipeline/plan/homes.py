@@ -195,10 +195,16 @@ class _Search:
 
 def _idle_run(scene: Scene, run: PlannedRun, robot: str) -> _IdleRun:
     """One run as the robot has to stand it out; those whose homes are not known yet are not there."""
-    of_run = scene_of_run(scene, run.phase.tasks)
+    own = scene if run.scene is None else replace(run.scene, cell=with_homes_of(run.scene.cell, scene.cell))
+    of_run = scene_of_run(own, run.phase.tasks)
     away = {row for name in homeless(scene.cell, run.phase) - {robot} for row in rows_moved_by(of_run, name)}
     rows = [row for row in rows_moved_by(of_run, robot) if row not in away]
     return _IdleRun(run=run, scene=scene_of_rows(of_run, rows), q=standing(scene.cell, run.phase, run.motion.q))
+
+
+def with_homes_of(cell: Cell, other: Cell) -> Cell:
+    """A cell with the homes of another one, which has the same robots."""
+    return replace(cell, robots=tuple(replace(robot, home=other.robot(robot.name).home) for robot in cell.robots))
 
 
 def _first_failed(checks: Sequence[Check]) -> Check | None:

@@ -32,8 +32,10 @@ def with_nominal_times(clock: ProgramClock, written: ClockText, cell: Cell, *, f
 
 def _refuse_other(written: ClockText, cell: Cell, phases: Sequence[Phase], *, file: str) -> None:
     """Refuse nominal times of a retimed program that do not rise from the beginning of each phase to its end."""
-    sigma, row = written.table.sigma, 0
+    sigma, row, end = written.table.sigma, 0, -1.0
     for phase in phases:
+        row -= phase.begin == end  # a phase begins in the last row of the one before it
+        end = phase.end
         last = row + int(np.searchsorted(sigma[row:], phase.end, side="right")) - 1
         for place, demanded in ((min(row, len(sigma) - 1), phase.begin), (max(last, 0), phase.end)):
             if sigma[place] != demanded:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Final, Self
 
 import numpy as np
@@ -15,7 +14,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.clock import Clock
 from cellplan.model.motion import ClockTable, JointTable, Motion, Schedule
 from cellplan.model.phase import Hold, Phase
-from cellplan.model.plan import Plan, rows_of
+from cellplan.model.plan import Interval, Plan, rows_of
 from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import TIME_DECIMALS, retimed_schedule, schedule_tasks
@@ -27,8 +26,9 @@ STILL_TOL: Final = 1e-9  # [rad] or [m] tables have twelve decimals of a degree 
 class ProgramClock:
     """A plan on the clock of its program, and the desired tool poses of each phase.
 
-    The rows of the phases follow one another, a step of the clock apart. In the step between two phases lies what is
-    not part of the program: no motion is described or certified there.
+    The rows of the phases follow one another. A phase begins in the last row of the one before it; where something that
+    is not part of the program lies between two phases, it takes the step between their rows, and no motion is
+    described or certified there.
 
     Attributes:
         plan: The plan, its phases on the nominal time of the whole program.
@@ -51,10 +51,10 @@ class ProgramClock:
             plan: The plan, on no clock yet.
             schedules: Desired tool poses of each phase of the program.
         """
-        counts = [len(schedule.times) for schedule in schedules]
-        times = np.round(np.arange(sum(counts)) * cell.motion.step, TIME_DECIMALS)
-        first = np.cumsum([0, *counts])
-        ends = [(float(times[a]), float(times[b - 1])) for a, b in pairwise(first)]
+        steps = [len(schedule.times) - 1 for schedule in schedules]
+        first = np.cumsum([0, *(own + gap for own, gap in zip(steps, _gap_steps(plan), strict=True))]).tolist()
+        times = np.round(np.arange(first[-1] + 1) * cell.motion.step, TIME_DECIMALS)
+        ends = [(float(times[row]), float(times[row + own])) for row, own in zip(first[:-1], steps, strict=True)]
         placed = [replace(phase, begin=b, end=e) for phase, (b, e) in zip(plan.program, ends, strict=True)]
         return cls(plan=_placed(plan, placed, schedules), times=times, sigma=times, schedules=tuple(schedules))
 
@@ -100,7 +100,16 @@ class ProgramClock:
     def motion(self, q: Sequence[Array]) -> Motion:
         """The motion of the program from that of its phases, shape (n, nq) each."""
         clock = Clock(times=self.times, sigma=self.sigma)
-        return Motion(times=clock.times, sigma=clock.sigma, q=np.concatenate(q), plan=self.plan)
+        return Motion(times=clock.times, sigma=clock.sigma, q=self.joined(q), plan=self.plan)
+
+    def joined(self, rows: Sequence[Array]) -> Array:
+        """The rows of all phases one after the other; a row that two of them share is that of the first.
+
+        Args:
+            rows: Values in the rows of each phase of the program, shape (n, ...) each.
+        """
+        shared = [False, *(gap == 0 for gap in _gap_steps(self.plan)[:-1])]
+        return np.concatenate([own[1:] if skip else own for own, skip in zip(rows, shared, strict=True)])
 
     def table(self, tasks: Sequence[str]) -> ClockTable:
         """What happens at each row.
@@ -113,7 +122,7 @@ class ProgramClock:
         for phase, schedule in zip(self.plan.program, self.schedules, strict=True):
             rows = rows_of(phase, self.sigma)
             names[rows] = [phase.name] * (rows.stop - rows.start)
-            for scheduled in schedule.tasks:
+            for scheduled in (each for each in schedule.tasks if each.task.name in lengths):
                 lengths[scheduled.task.name][rows] = scheduled.travelled
                 lengths[scheduled.task.name][rows.stop :] = scheduled.travelled[-1]
         process = {task: _within(self.sigma, self.plan.process[task]) for task in tasks}
@@ -159,18 +168,26 @@ def moved_while_holding(phase: Phase, robot: str, q: Array) -> tuple[int, int] |
     return (int(row[0]), int(joint[0])) if len(row) else None
 
 
+def _gap_steps(plan: Plan) -> list[int]:
+    """Steps between the last row of each phase of the program and the first of the next: 1 over a gap, else 0."""
+    after = [not phase.in_program for phase in plan.phases[1:]]
+    gaps = [int(gap) for phase, gap in zip(plan.phases, [*after, False], strict=True) if phase.in_program]
+    return gaps
+
+
 def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) -> Plan:
     """The plan with the phases of its program on the clock, and all others between them."""
     left = list(placed)
     phases: list[Phase] = []
     for phase in plan.phases:
         phases.append(left.pop(0) if phase.in_program else replace(phase, begin=phases[-1].end, end=left[0].begin))
-    stops, process = {}, {}
+    stops: dict[str, tuple[float, ...]] = {}
+    process: dict[str, tuple[Interval, ...]] = {}
     for phase, schedule in zip(placed, schedules, strict=True):
         for scheduled in schedule.tasks:
-            name = scheduled.task.name
-            process[name] = ((phase.begin + scheduled.task.start, phase.begin + scheduled.end),)
-            stops[name] = tuple(phase.begin + stop for stop in scheduled.stops)
+            name, begin = scheduled.task.name, phase.begin
+            process[name] = (*process.get(name, ()), (begin + scheduled.task.start, begin + scheduled.end))
+            stops[name] = (*stops.get(name, ()), *(begin + stop for stop in scheduled.stops))
     return replace(plan, phases=tuple(phases), stops=stops, process=process)
 
 

@@ -26,12 +26,12 @@ NOMINAL_STEP: Final = 1e-4  # [s] of nominal time over which the speed of a tool
 
 
 def retimed(
-    scene: Scene, clock: ProgramClock, motions: Sequence[Motion], *, progress: Progress = silent
+    scenes: Sequence[Scene], clock: ProgramClock, motions: Sequence[Motion], *, progress: Progress = silent
 ) -> tuple[ProgramClock, list[Motion]]:
     """A program and the motions of its phases on the clock that the cell's timing asks for.
 
     Args:
-        scene: The scene of the solved cell.
+        scenes: The scene of each phase of the program.
         clock: The program as its time laws have it.
         motions: Motion of each of its phases, likewise.
         progress: Called with the stage and the fraction done.
@@ -42,17 +42,17 @@ def retimed(
     Raises:
         InputError: The joints cannot go as fast as the demanded cycle asks for.
     """
-    cell = scene.cell
-    if cell.motion.timing is Timing.AS_WRITTEN:
+    if scenes[0].cell.motion.timing is Timing.AS_WRITTEN:
         return clock, list(motions)
     paths, nominal = [], []
     for place, (phase, motion) in enumerate(zip(clock.plan.program, motions, strict=True)):
         progress("retiming", place / len(motions))
         paths.append(joint_path(motion))
-        sigma = np.round(phase.begin + _nominal_times(scene, clock.schedules[place], paths[-1]), TIME_DECIMALS)
+        own = _nominal_times(scenes[place], clock.schedules[place], paths[-1]) if phase.tasks else motion.times
+        sigma = np.round(phase.begin + own, TIME_DECIMALS)
         sigma[0], sigma[-1] = phase.begin, phase.end
         nominal.append(sigma)
-    clock = clock.retimed(np.concatenate(nominal))
+    clock = clock.retimed(clock.joined(nominal))
     made: list[Motion] = []
     for phase, path, motion, sigma in zip(clock.plan.program, paths, motions, nominal, strict=True):
         own = sigma - phase.begin
@@ -182,6 +182,12 @@ class RowLimits:
 def row_limits(scene: Scene, schedule: Schedule) -> RowLimits:
     """The limits in the rows of one phase; its schedule names the tasks."""
     return RowLimits(scene, schedule.paths, joint_bounds(scene.cell), scene.cell.motion.step)
+
+
+def transfer_retimer(scene: Scene) -> Retimer:
+    """What transfer moves are timed by: the limits of all joints, of the tools in the world and of the part."""
+    limits = RowLimits(scene, (), joint_bounds(scene.cell), scene.cell.motion.step)
+    return Retimer(bounds=limits.bounds, step=limits.step, feed_share=limits.feed_share, slower=limits.slower)
 
 
 def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath) -> Array:

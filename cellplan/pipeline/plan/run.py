@@ -14,6 +14,7 @@ from cellplan.planning.modes import standing
 from cellplan.planning.refine_motion import plan_within_accuracy
 from cellplan.planning.timing.schedule import schedule_paths
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -24,11 +25,13 @@ class PlannedRun:
         phase: Tasks, moving robots and idle robots.
         schedule: Where every tool must be.
         motion: What all joints do.
+        scene: The scene in which it is judged where that is not the scene of the cell.
     """
 
     phase: Phase
     schedule: Schedule
     motion: Motion
+    scene: Scene | None = None
 
 
 def plan_run(cell: Cell, paths: Mapping[str, ClockedPath], phase: Phase, *, progress: Progress = silent) -> PlannedRun:

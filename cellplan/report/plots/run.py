@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
-from cellplan.model.report import ClearanceClass, ClosureAccuracy, JointUse, Report, TaskAccuracy
+from cellplan.model.report import ClearanceClass, ClosureAccuracy, Conditioning, JointUse, Report, TaskAccuracy
 from cellplan.model.task import Frame
 from cellplan.report.plots import palette
 from cellplan.report.plots.palette import INK, LIMIT
@@ -68,12 +68,18 @@ def motion_sheets(report: Report, *, cell: Cell) -> dict[str, Sheet]:
         sheets[f"task_{accuracy.task}"] = _task_sheet(accuracy, report.times, cell)
     for closure in report.closures:
         sheets[f"closure_{closure.robot}"] = _closure_sheet(closure, report.times, cell)
-    for robot in report.q:
+    for robot in report.q if report.tasks else _moving(report):
         uses = [use for use in report.joints if use.robot == robot]
         sheets[f"positions_{robot}"] = _positions_sheet(robot, uses, report, colours[robot])
         sheets[f"velocities_{robot}"] = _velocities_sheet(robot, uses, report, colours[robot])
-    sheets["singularity"] = _singularity_sheet(report, colours)
+    if report.conditioning is not None:
+        sheets["singularity"] = _singularity_sheet(report.conditioning, report.times, colours)
     return sheets
+
+
+def _moving(report: Report) -> list[str]:
+    """Names of the robots that move at all."""
+    return [name for name, q in report.q.items() if np.any(q != q[0])]
 
 
 def clearance_sheets(report: Report, *, cell: Cell) -> dict[str, Sheet]:
@@ -235,9 +241,8 @@ def _clearance_sheet(report: Report, required: float) -> Sheet:
     return sheet
 
 
-def _singularity_sheet(report: Report, colours: Mapping[str, str]) -> Sheet:
+def _singularity_sheet(conditioning: Conditioning, times: Array, colours: Mapping[str, str]) -> Sheet:
     """Singular values, condition and manipulability of the whole stack, then the smallest value of each robot."""
-    conditioning = report.conditioning
     series = {
         "all robots together": conditioning.stack,
         "their condition": conditioning.condition,
@@ -246,11 +251,11 @@ def _singularity_sheet(report: Report, colours: Mapping[str, str]) -> Sheet:
     }
     rows = math.ceil(len(series) / JOINT_COLUMNS)
     title = "smallest singular values, condition and manipulability along the motion"
-    sheet = Sheet(title, rows=rows, columns=JOINT_COLUMNS, times=report.times)
+    sheet = Sheet(title, rows=rows, columns=JOINT_COLUMNS, times=times)
     for index, (name, values) in enumerate(series.items()):
         worst = int(np.argmin(values))
         unit, scale = _power_of_ten(float(values.max()))
-        at_s, smallest = float(report.times[worst]), scale * float(values[worst])
+        at_s, smallest = float(times[worst]), scale * float(values[worst])
         is_long = len(name + unit) > MAX_TITLE_LETTERS
         panel = sheet.panel(
             index,
@@ -259,7 +264,7 @@ def _singularity_sheet(report: Report, colours: Mapping[str, str]) -> Sheet:
             span=(0.0, scale * float(values.max()) or 1.0),
             is_floored=True,
         )
-        sheet.curve(panel, report.times, scale * values, colour=colours.get(name, INK))
+        sheet.curve(panel, times, scale * values, colour=colours.get(name, INK))
         sheet.dot(panel, at_s, smallest)
     return sheet
 

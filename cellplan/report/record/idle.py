@@ -4,7 +4,8 @@ from collections.abc import Iterable, Mapping
 from typing import TypedDict
 
 from cellplan.model.cell import Cell
-from cellplan.model.idle import idle_robots, not_in_program
+from cellplan.model.idle import not_in_program
+from cellplan.model.report import Report
 
 
 class IdleRecord(TypedDict):
@@ -14,15 +15,9 @@ class IdleRecord(TypedDict):
     not_in_program: list[str]
 
 
-def idle_record(cell: Cell, tasks: Iterable[str]) -> IdleRecord:
-    """Idle robots of one run, and moves that its program does not contain.
-
-    Args:
-        cell: The cell.
-        tasks: Names of its tasks.
-    """
-    names = tuple(tasks)
-    return {"idle": list(idle_robots(cell, names)), "not_in_program": missing_moves(cell, {None: names})}
+def idle_record(cell: Cell, report: Report) -> IdleRecord:
+    """Idle robots of one run, and moves that its program does not contain."""
+    return {"idle": list(report.idle), "not_in_program": missing_moves(cell, {None: report.tasks})}
 
 
 def missing_moves(cell: Cell, runs: Mapping[str | None, Iterable[str]]) -> list[str]:

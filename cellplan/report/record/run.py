@@ -1,5 +1,6 @@
 """``report.json``: the record of a run in printed units (deg, mm, s), built from typed records."""
 
+from collections.abc import Mapping
 from typing import Annotated, Final
 
 from cellplan.model.cell import Cell
@@ -102,14 +103,21 @@ class RunRecord(HeadRecord):
     exclusions: Annotated[list[ExclusionRecord], "pairs with reduced requirements"]
     closest_pairs: Annotated[list[ClosestPair], "the ten closest pairs, nearest first"]
     clearance_proof: Annotated[ProofRecord, "evidence for the distances between the samples"]
-    singularity: Annotated[SingularityRecord, "distance to singularities"]
+    singularity: Annotated[SingularityRecord | None, "distance to singularities; null where no task is worked on"]
     motion_share: Annotated[dict[str, MotionShareRecord], "by robot"]
     speeds: Annotated[dict[str, SpeedRecord], "by robot"]
     checks: Annotated[list[CheckRecord], "every verified statement"]
     idle: Annotated[list[str], "idle robots of this run; their tables keep them at their homes"]
 
 
-def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Motion | None = None) -> RunRecord:
+def run_record(
+    report: Report,
+    *,
+    cell: Cell,
+    provenance: Provenance,
+    motion: Motion | None = None,
+    transfers: Mapping[str, str] | None = None,
+) -> RunRecord:
     """The record of one run.
 
     Args:
@@ -117,6 +125,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
         cell: Its cell.
         provenance: Origin of the result.
         motion: The planned motion, for the effort of its steps; None if it is not available.
+        transfers: How the transfer moves of its phase were found, by the name of the phase.
     """
     clearance = report.clearance
     return {
@@ -142,7 +151,7 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
         "motion_share": motion_share_record(report, cell),
         "speeds": {robot: speed_record(speed) for robot, speed in report.speeds.items()},
         "checks": [check_record(check) for check in report.checks],
-        **idle_record(cell, report.tasks),
+        **idle_record(cell, report),
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "rests_on": rests_on_record(cell, report.loads),
@@ -152,6 +161,6 @@ def run_record(report: Report, *, cell: Cell, provenance: Provenance, motion: Mo
         "remarks": [text for _, text in cell.remarks],
         "left_out": left_out_record(clearance.left_out),
         "closure": closures_record(report, cell),
-        "solver": solver_record(cell.solver, motion),
+        "solver": solver_record(cell.solver, motion, transfers),
         "accelerations": accelerations_record(report.accelerations),
     }

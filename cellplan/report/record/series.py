@@ -34,13 +34,6 @@ def series(report: Report, motion: Motion | None = None) -> Tree:
     every = max(1, math.ceil(last / MAX_STEPS))
     steps = np.arange(0, last, every)
     samples = np.append(steps, last)
-    conditioning = report.conditioning
-    of_stack = {
-        "smallest_singular_value": conditioning.stack,
-        "condition": conditioning.condition,
-        "squared_condition": conditioning.squared_condition,
-        "manipulability": conditioning.manipulability,
-    }
     return {
         "schema": SCHEMA,
         "every": every,
@@ -52,7 +45,7 @@ def series(report: Report, motion: Motion | None = None) -> Tree:
             }
             for accuracy in report.accuracy
         },
-        "conditioning": {name: values[samples] for name, values in of_stack.items()},
+        "conditioning": {name: values[samples] for name, values in _of_stack(report).items()},
         "joints": {
             robot: _joint_series(
                 [use for use in report.joints if use.robot == robot], q=q[samples], qd=report.qd[robot][steps]
@@ -61,6 +54,19 @@ def series(report: Report, motion: Motion | None = None) -> Tree:
         },
         "iterations": None if motion is None or motion.iterations is None else motion.iterations[steps],
         "slack": None if motion is None or motion.slack is None else motion.slack[steps],
+    }
+
+
+def _of_stack(report: Report) -> dict[str, Array]:
+    """Distance of all robots together from singularities, shape (N,) each; nothing where no task is worked on."""
+    conditioning = report.conditioning
+    if conditioning is None:
+        return {}
+    return {
+        "smallest_singular_value": conditioning.stack,
+        "condition": conditioning.condition,
+        "squared_condition": conditioning.squared_condition,
+        "manipulability": conditioning.manipulability,
     }
 
 

@@ -1,5 +1,6 @@
 """Solver in the record of a run: the method, its settings, and the effort of its steps."""
 
+from collections.abc import Mapping
 from typing import Annotated, Final, TypedDict
 
 import numpy as np
@@ -111,14 +112,18 @@ class SolverRecord(TypedDict):
     iterations: Annotated[IterationsRecord | None, "evaluations of the tasks per step; null in the accurate mode"]
     slack: Annotated[SlackRecord | None, "task slack; null if the method has none"]
     resolution: Annotated[ResolutionRecord | None, "effort of the accurate mode; null without a record of it"]
+    transfers: Annotated[dict[str, str] | None, "by phase: how its transfer moves were found; null without such moves"]
 
 
-def solver_record(solver: SolverSettings, motion: Motion | None = None) -> SolverRecord:
+def solver_record(
+    solver: SolverSettings, motion: Motion | None = None, transfers: Mapping[str, str] | None = None
+) -> SolverRecord:
     """The method with its settings under the keys of the cell file, and the effort of its steps.
 
     Args:
         solver: The settings.
         motion: The planned motion; None if it is not available, or if there are several.
+        transfers: How the transfer moves of each phase were found; None or empty without such moves.
     """
     return {
         "method": solver.method,
@@ -140,6 +145,7 @@ def solver_record(solver: SolverSettings, motion: Motion | None = None) -> Solve
         "iterations": None if motion is None else _iterations_record(motion),
         "slack": None if motion is None else _slack_record(motion),
         "resolution": None if motion is None else _resolution_record(motion),
+        "transfers": dict(transfers) if transfers else None,
     }
 
 

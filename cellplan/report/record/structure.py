@@ -85,7 +85,7 @@ def _matrix_record(cell: Cell, matrix: MatrixShape) -> dict[str, Any]:
     values = matrix.singular_values
     robots = [robot.name for robot in cell.robots]
     return {
-        "run": matrix.phase.task,
+        "run": matrix.phase.label,
         "rows": sum(matrix.rows),
         "columns": sum(matrix.columns),
         "row_blocks": dict(zip(matrix.blocks, matrix.rows, strict=True)),

@@ -49,27 +49,40 @@ class RunEntry(_RunEntry, total=False):
     max_orientation_error_between_rows_deg: Annotated[Number, "largest angle between the rows"]
 
 
-class SummaryRecord(HeadRecord):
-    """The record of several runs: the worst of tasks, joints, clearance and accelerations."""
-
+class _SummaryRecord(HeadRecord):
     runs: Annotated[dict[str, RunEntry], "by task: the runs"]
     closure: Annotated[dict[str, ClosureRecord], "by co-holder; empty if one robot holds the part"]
     checks: Annotated[list[RunCheckRecord], "every verified statement, with its run"]
 
 
-def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Provenance) -> SummaryRecord:
+class SummaryRecord(_SummaryRecord, total=False):
+    """The record of several runs: the worst of tasks, joints, clearance and accelerations."""
+
+    cycles: Annotated[int, "how often the phases follow one another; only for a program from home to home"]
+
+
+def summary_record(
+    reports: Mapping[str, Report],
+    *,
+    cell: Cell,
+    provenance: Provenance,
+    transfers: Mapping[str, str] | None = None,
+) -> SummaryRecord:
     """The record of several runs, one after another.
 
     Tasks, joints, clearance and accelerations are the worst of all runs; everything else is in the report of each run.
 
     Args:
-        reports: Report by the name of the run, which is its task and its folder.
+        reports: Report by the name of the run, which is its phase and its folder.
         cell: The cell.
         provenance: Origin of the result.
+        transfers: How the transfer moves of each phase were found, by the name of the phase.
     """
     runs = list(reports.values())
+    tasks = {task.name for task in cell.tasks}
+    own = [report for report in runs if tasks.issuperset(report.tasks)]  # straight moves of holders have a report each
     accelerations = merge_accelerations(report.accelerations for report in runs)
-    return {
+    record: SummaryRecord = {
         "schema": SCHEMA,
         "cell": cell.name,
         "status": "passed" if all(report.passed for report in runs) else "failed",
@@ -78,7 +91,7 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "clock_from": clock_from(cell),
         "phases": phases_record(runs[0].phases),
         "runs": {name: _run_entry(name, report, cell) for name, report in reports.items()},
-        "tasks": {name: record for report in runs for name, record in tasks_record(report, cell).items()},
+        "tasks": {name: record for report in own for name, record in tasks_record(report, cell).items()},
         "open_surfaces": open_surfaces_record(cell),
         "remarks": [text for _, text in cell.remarks],
         "closure": worst_closures_record(runs, cell),
@@ -94,15 +107,21 @@ def summary_record(reports: Mapping[str, Report], *, cell: Cell, provenance: Pro
         "rests_on": rests_on_record(cell, worst_loads(runs)),
         **origin_record(cell, provenance),
         "caution": CAUTION,
-        "solver": solver_record(cell.solver),
+        "solver": solver_record(cell.solver, transfers=transfers),
         "accelerations": accelerations_record(accelerations),
     }
+    if cell.program is not None:
+        record["cycles"] = cell.program.cycles
+    return record
 
 
 def _run_entry(name: str, report: Report, cell: Cell) -> RunEntry:
     """What the summary holds of one run."""
     entry: RunEntry = {"status": status(report), "folder": name, "cycle_time_s": number(report.cycle_time)}
-    for task in tasks_record(report, cell).values():
+    if not {task.name for task in cell.tasks}.issuperset(report.tasks):
+        return entry
+    tasks = tasks_record(report, cell).values()
+    for task in sorted(tasks, key=lambda each: each["max_position_error_mm"] or 0.0)[-1:]:
         entry["robot"] = task["robot"]
         entry["max_position_error_mm"] = task["max_position_error_mm"]
         entry["max_position_error_at_s"] = task["max_position_error_at_s"]

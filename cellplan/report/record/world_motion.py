@@ -42,8 +42,10 @@ class SpeedRecord(TypedDict):
     axis_peak_at_s: Annotated[Number, "its time"]
 
 
-def singularity_record(conditioning: Conditioning, times: Array) -> SingularityRecord:
+def singularity_record(conditioning: Conditioning | None, times: Array) -> SingularityRecord | None:
     """Smallest singular values, condition and manipulability; mixed units: metres and radians."""
+    if conditioning is None:
+        return None
     return {
         "stack": smallest(conditioning.stack, times),
         "condition": smallest(conditioning.condition, times),

@@ -1,0 +1,131 @@
+"""What a cell demands of the rows of its program: its phases on the clock, and the scene of each of them.
+
+Of a stored program only the number of rows of its transfer moves is used here: their duration is free, their limits,
+ends and clearance are checked.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.io.input.findings import listed
+from cellplan.io.run.clock_table import ClockText
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Schedule
+from cellplan.model.plan import Plan
+from cellplan.pipeline.plan.nominal_times import with_nominal_times
+from cellplan.pipeline.plan.program import ProgramClock
+from cellplan.pipeline.plan.sequence import dwell_times
+from cellplan.planning.modes import plan_phases
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.sequence.scenes import StageScenes
+from cellplan.planning.sequence.stages import Stage, program_stages
+from cellplan.planning.timing.schedule import TIME_DECIMALS, schedule_tasks
+from cellplan.scene.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DemandedProgram:
+    """The program that a cell demands.
+
+    Attributes:
+        plan: Its phases, on no clock yet; those of all cycles.
+        cells: The cell as it is in each phase of the first cycle.
+        stages: The stages of one cycle of a program from home to home; empty for any other.
+        cycles: How often its phases follow one another.
+    """
+
+    plan: Plan
+    cells: tuple[Cell, ...]
+    stages: tuple[Stage, ...] = ()
+    cycles: int = 1
+
+    @classmethod
+    def of(cls, cell: Cell, *, only: str | None = None) -> "DemandedProgram":
+        """The program of a solved cell.
+
+        Args:
+            cell: The cell, its starts and homes filled in.
+            only: Name of the only task of a program that is not from home to home; None for all.
+        """
+        if cell.program is None:
+            plan = plan_phases(cell, only=only)
+            return cls(plan=plan, cells=(cell,) * len(plan.program))
+        stages, cycles = program_stages(cell), cell.program.cycles
+        plan = Plan(phases=tuple(stage.phase for stage in stages) * cycles)
+        return cls(plan=plan, cells=tuple(stage.cell for stage in stages), stages=stages, cycles=cycles)
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the phases of one cycle; empty for the only one of a program."""
+        return [phase.label or "" for phase in self.plan.program[: len(self.cells)]]
+
+    def clock(self, cell: Cell, written: ClockText, *, file: str) -> ProgramClock:
+        """The program on its clock.
+
+        Args:
+            cell: The cell.
+            written: The clock of a run, for the number of rows of transfer moves, and the nominal times of a retimed
+                program.
+            file: File of that clock.
+
+        Raises:
+            InputError: With file and line, when it has other phases, or the nominal times do not rise through them.
+        """
+        if not self.stages:
+            return with_nominal_times(ProgramClock.from_cell(cell, self.plan), written, cell, file=file)
+        steps = self._steps(written, file)
+        schedules = [self._schedule(place, steps[place]) for place in range(len(self.plan.phases))]
+        clock = ProgramClock.of(cell, self.plan, schedules)
+        return with_nominal_times(clock, written, cell, file=file)
+
+    def scenes(self, cell: Cell) -> list[Scene]:
+        """The scene of each phase of the first cycle."""
+        if not self.stages:
+            return [Scene.from_cell(cell)] * len(self.cells)
+        made = StageScenes.of(cell)
+        return [made.of_stage(stage) for stage in self.stages]
+
+    def _steps(self, written: ClockText, file: str) -> list[int]:
+        """Steps of each phase as the clock of a run has them."""
+        names, first = [], [0]
+        for name, rows in groupby(written.table.phases):
+            names.append(name)
+            first.append(first[-1] + len(list(rows)))
+        demanded = [phase.name for phase in self.plan.phases]
+        for place, name in enumerate(demanded):
+            if names[place : place + 1] != [name]:
+                line = written.line(min(first[min(place, len(first) - 1)], len(written.table.times) - 1))
+                got = listed(names[place : place + 1]) or "none"
+                raise InputError(f"{file}:{line}: phase: expected '{name}' as in the plan of the cell, got {got}")
+        if len(names) > len(demanded):
+            line = written.line(first[len(demanded)])
+            raise InputError(f"{file}:{line}: phase: expected the end after '{demanded[-1]}', got '{names[-1]}'")
+        first[-1] -= 1  # every other phase ends in the first row of the next one
+        return np.diff(first).tolist()
+
+    def _schedule(self, place: int, steps: int) -> Schedule:
+        """Desired tool poses of one phase as the time laws of its cell have them."""
+        stage = self.stages[place % len(self.stages)]
+        if stage.phase.tasks:
+            return schedule_tasks(stage.cell, [build_toolpath(task, stage.cell.part) for task in stage.cell.tasks])
+        if stage.dwell is not None:
+            return Schedule(times=dwell_times(stage), tasks=())
+        times = np.round(np.arange(max(1, steps) + 1) * stage.cell.motion.step, TIME_DECIMALS)
+        return Schedule(times=times, tasks=())
+
+
+def others_than_first_cycle(q: Sequence[np.ndarray]) -> tuple[int, int] | None:
+    """The first cycle and row in which a phase has other rows than in the first cycle; None where all repeat it.
+
+    Args:
+        q: Rows of one phase in each cycle, shape (n, joints) each.
+    """
+    for cycle, rows in enumerate(q[1:], start=1):
+        other = np.flatnonzero(np.any(rows != q[0], axis=1)) if rows.shape == q[0].shape else np.array([0])
+        if len(other):
+            return cycle, int(other[0])
+    return None

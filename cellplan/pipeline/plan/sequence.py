@@ -1,0 +1,272 @@
+"""Plan a program from home to home: the stages with tasks first, then homes, then the transfer moves between them."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.run_pairs import scene_of_run
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Motion, Schedule
+from cellplan.model.phase import Hold, Phase
+from cellplan.model.progress import Progress, silent
+from cellplan.model.task import Task
+from cellplan.pipeline.plan.homes import find_homes, with_homes
+from cellplan.pipeline.plan.retiming import transfer_retimer
+from cellplan.pipeline.plan.rounded import rounded
+from cellplan.pipeline.plan.run import PlannedRun, plan_run
+from cellplan.pipeline.plan.start import chosen_start
+from cellplan.planning.modes import standing
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.sequence.approach_starts import with_approach_starts
+from cellplan.planning.sequence.part_moves import PartMove
+from cellplan.planning.sequence.scenes import StageScenes
+from cellplan.planning.sequence.stages import Stage, program_stages
+from cellplan.planning.start.given import examine_given_starts
+from cellplan.planning.timing.schedule import TIME_DECIMALS, clock_paths
+from cellplan.planning.transfer.plan import plan_transfer
+from cellplan.scene.scene import Scene
+
+CLOSED: Final = 1e-9  # [rad] or [m] within which co-holders are back where they began
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlannedStage:
+    """One stage of a program with its motion, nothing of it verified yet.
+
+    Attributes:
+        stage: The stage of the solved cell.
+        scene: The scene that it is judged in.
+        schedule: Desired tool poses; no task in transfer moves and dwells.
+        motion: What all joints do.
+        rungs: How the transfer move of each robot was found, by robot.
+    """
+
+    stage: Stage
+    scene: Scene
+    schedule: Schedule
+    motion: Motion
+    rungs: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlannedProgram:
+    """One cycle of a program from home to home.
+
+    Attributes:
+        cell: The solved cell: starts, homes and the starts of all tasks filled in.
+        scenes: The scenes of its stages.
+        stages: The stages in their order, each beginning where the one before ends.
+        remarks: Notes on starts that were found, where no trial was without fault.
+    """
+
+    cell: Cell
+    scenes: StageScenes
+    stages: tuple[PlannedStage, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def cycles(self) -> int:
+        """How often the stages follow one another."""
+        return 1 if self.cell.program is None else self.cell.program.cycles
+
+
+def plan_program(cell: Cell, *, progress: Progress = silent) -> PlannedProgram:
+    """Plan all stages of one cycle.
+
+    Args:
+        cell: The cell; it has a program.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The tasks cannot be worked with, or in no order.
+        NoSolutionError: No start or home was found, a tool lost its path, or a robot finds no way.
+    """
+    scenes = StageScenes.of(cell)
+    search = _Worked(cell, scenes, progress)
+    runs = [run for stage in program_stages(cell) if (run := search.run(stage)) is not None]
+    started = search.cell
+    at_home = _everyone_at_home(started, runs[0])
+    around_held = [at_home, *(run for run in runs if run.scene is None)]
+    others = [run for run in runs if run.scene is not None]
+    found = find_homes(replace(scenes.held, cell=started), [*around_held, *others], progress=progress)
+    solved = _with_all_homes(with_homes(started, found, given=cell))
+    stages = _joined(solved, scenes, runs, progress=progress)
+    return PlannedProgram(cell=solved, scenes=scenes, stages=tuple(stages), remarks=tuple(search.remarks))
+
+
+class _Worked:
+    """Stages with tasks, planned one after the other.
+
+    Attributes:
+        cell: The cell with the starts that were found so far.
+        remarks: Notes on starts without a faultless trial.
+    """
+
+    def __init__(self, cell: Cell, scenes: StageScenes, progress: Progress) -> None:
+        """Begin with the cell as it was written."""
+        self.cell, self.remarks = cell, list[str]()
+        self._scenes, self._progress, self._last = scenes, progress, np.zeros(0)
+
+    def run(self, stage: Stage) -> PlannedRun | None:
+        """The motion of a stage; None of one without tasks."""
+        if not stage.phase.tasks:
+            return None
+        own = self._with_known_starts(stage)
+        scene = replace(self._scenes.of_stage(stage), cell=own)
+        toolpaths = {task.name: build_toolpath(task, own.part) for task in own.tasks}
+        paths = clock_paths(own, toolpaths.values())
+        own = with_rounded_starts(with_approach_starts(own, scene.chains, toolpaths), own)
+        scene = replace(scene, cell=own)
+        examine_given_starts(own, toolpaths)
+        choice = chosen_start(scene, paths, progress=self._progress)
+        started = _with_starts(own, choice.start)
+        if choice.warning is not None:
+            self.remarks.append(f"{stage.phase.name}: {choice.warning}")
+        self._record(stage, started)
+        planned = plan_run(started, paths, stage.phase, progress=self._progress)
+        self._last = planned.motion.q[-1]
+        return planned if stage.move is None else replace(planned, scene=scene)
+
+    def _with_known_starts(self, stage: Stage) -> Cell:
+        """The cell of a stage with starts that earlier stages found or lead to."""
+        own = stage.cell
+        is_continued = stage.move in (PartMove.LIFT, PartMove.RELEASE)
+        robots = []
+        for robot in own.robots:
+            known = self.cell.robot(robot.name)
+            start = robot.start
+            if is_continued and robot.name in self.cell.positioners[:1]:
+                start = self._last[own.columns(robot.name)]
+            elif start is None and robot.name in own.positioners and stage.move is None:
+                start = known.start
+            robots.append(replace(robot, start=start))
+        return replace(own, robots=tuple(robots))
+
+    def _record(self, stage: Stage, started: Cell) -> None:
+        """Keep the starts of a block: of the holders, of each task, and of each robot in its first task."""
+        if stage.move is not None:
+            return
+        at_work = {task.robot: task.name for task in started.tasks}
+        robots = []
+        for robot in self.cell.robots:
+            is_new = robot.start is None and (robot.name in at_work or robot.name in self.cell.positioners)
+            robots.append(replace(robot, start=started.robot(robot.name).start) if is_new else robot)
+        tasks = [_with_posture(task, started) if task.name in at_work.values() else task for task in self.cell.tasks]
+        self.cell = replace(self.cell, robots=tuple(robots), tasks=tuple(tasks))
+
+
+def with_rounded_starts(cell: Cell, given: Cell) -> Cell:
+    """The cell with starts that differ from the given ones rounded to what is written of them."""
+    robots = []
+    for robot in cell.robots:
+        is_same = robot.start is given.robot(robot.name).start
+        robots.append(robot if is_same else replace(robot, start=rounded(robot, np.asarray(robot.start))))
+    return replace(cell, robots=tuple(robots))
+
+
+def _with_posture(task: Task, started: Cell) -> Task:
+    """A task with the configuration in which its robot begins it."""
+    return replace(task, start_posture=started.robot(task.robot).start)
+
+
+def _with_starts(cell: Cell, start: Array) -> Cell:
+    """The cell with every start filled in; found ones are rounded to what is written of them."""
+    robots = (
+        robot if robot.start is not None else replace(robot, start=rounded(robot, start[cell.columns(robot.name)]))
+        for robot in cell.robots
+    )
+    return replace(cell, robots=tuple(robots))
+
+
+def _everyone_at_home(cell: Cell, run: PlannedRun) -> PlannedRun:
+    """A moment in which all operators are at their homes and the holders where they begin."""
+    robots = (replace(robot, start=robot.home if robot.start is None else robot.start) for robot in cell.robots)
+    own = replace(cell, robots=tuple(robots), tasks=())
+    roles = {robot.name: Hold(at_home=robot.name not in cell.positioners) for robot in cell.robots}
+    times = np.array([0.0, cell.motion.step])
+    start = np.concatenate(
+        [
+            run.motion.q[0, cell.columns(robot.name)] if robot.start is None else robot.start
+            for robot in own.robots
+        ]
+    )
+    motion = Motion(times=times, q=np.stack([start, start]))
+    return PlannedRun(phase=Phase(name="home", roles=roles), schedule=Schedule(times=times, tasks=()), motion=motion)
+
+
+def _with_all_homes(cell: Cell) -> Cell:
+    """The cell with the homes of holders too: their starts where nothing else is given."""
+    return replace(
+        cell, robots=tuple(robot if robot.home is not None else replace(robot, home=robot.start) for robot in cell.robots)
+    )
+
+
+def _joined(
+    cell: Cell, scenes: StageScenes, runs: Sequence[PlannedRun], *, progress: Progress
+) -> Iterator[PlannedStage]:
+    """The stages of a solved cell, with the transfer moves and dwells between the planned ones."""
+    stages, left = program_stages(cell), list(runs)
+    home = np.concatenate([robot.home for robot in cell.robots if robot.home is not None])
+    last = home
+    for number, stage in enumerate(stages):
+        scene = scenes.of_stage(stage)
+        if stage.phase.tasks:
+            run = left.pop(0)
+            motion = replace(run.motion, q=standing(cell, stage.phase, run.motion.q))
+            made = PlannedStage(stage=stage, scene=scene, schedule=run.schedule, motion=motion, rungs={})
+        elif stage.dwell is not None:
+            made = _dwelling(stage, scene, last)
+        else:
+            progress("planning transfer moves", number / len(stages))
+            goal = standing(cell, stages[number + 1].phase, left[0].motion.q[0]) if left else home
+            made = _transferred(stage, scene, last, goal, progress)
+        yield made
+        last = made.motion.q[-1]
+
+
+def _dwelling(stage: Stage, scene: Scene, q: Array) -> PlannedStage:
+    """All robots at rest for the time of a dwell, rounded up to whole steps."""
+    times = dwell_times(stage)
+    motion = Motion(times=times, q=np.tile(q, (len(times), 1)))
+    return PlannedStage(
+        stage=stage, scene=scene, schedule=Schedule(times=times, tasks=()), motion=motion, rungs={}
+    )
+
+
+def dwell_times(stage: Stage) -> Array:
+    """Times of the rows of a dwell in [s], shape (N,)."""
+    step = stage.cell.motion.step
+    count = max(1, int(np.ceil((stage.dwell or 0.0) / step - CLOSED)))
+    times: Array = np.round(np.arange(count + 1) * step, TIME_DECIMALS)
+    return times
+
+
+def _transferred(stage: Stage, scene: Scene, start: Array, goal: Array, progress: Progress) -> PlannedStage:
+    """The transfer moves of one stage.
+
+    Raises:
+        InputError: Co-holders would have to move by themselves.
+        TransferNotFoundError: No way was found.
+    """
+    cell = scene.cell
+    for name in cell.positioners if len(cell.positioners) > 1 else ():
+        columns = cell.columns(name)
+        if np.any(np.abs(goal[columns] - start[columns]) > CLOSED):
+            raise InputError(
+                f"{cell.origin.at('program')}: expected holders that begin and end at their starts, as '{name}' and the "
+                "other holders of the part cannot be moved one by one; set motion.cyclic: true, and no home of theirs"
+            )
+    found = plan_transfer(
+        scene_of_run(scene, ()), start, goal, retimer=transfer_retimer(scene), seed=cell.solver.seed, progress=progress
+    )
+    return PlannedStage(
+        stage=stage,
+        scene=scene,
+        schedule=Schedule(times=found.times, tasks=()),
+        motion=Motion(times=found.times, q=found.q),
+        rungs={robot: str(rung) for robot, rung in found.rungs.items()},
+    )

@@ -1,0 +1,91 @@
+"""Straight moves by which a holder grips a part that lies in the cell, lifts it, lowers it and lets it go.
+
+Each of them is a task of the holder in the world, its tool upright to itself: the part lies where the cell says.
+"""
+
+from dataclasses import replace
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.program import PartPlace
+from cellplan.model.task import Frame, SampledPath, Task, TimeLaw, TimeLawKind, Tolerance
+from cellplan.model.time_law import peak_rate
+
+PEAK_SPEED: Final = 0.1  # [m/s] of the tool near a part that is gripped or put down: slow
+QUINTIC: Final = TimeLaw(kind=TimeLawKind.QUINTIC)
+TOLERANCE: Final = Tolerance(position=1e-4, orientation=np.deg2rad(0.01))
+ALL_AXES: Final = (0, 1, 2, 3, 4, 5)
+
+
+class PartMove(StrEnum):
+    """What a straight move of a holder does, and the phase it makes."""
+
+    GRIP = "grip"
+    LIFT = "lift"
+    LOWER = "lower"
+    RELEASE = "release"
+
+    @property
+    def task(self) -> str:
+        """Name of its task; no task of a cell file has such a name."""
+        return f"part@{self.value}"
+
+
+def part_lying(cell: Cell, place: PartPlace) -> Cell:
+    """The cell while its part lies in it, held by nobody."""
+    return replace(cell, tasks=(), part=replace(cell.part, held_by=(), X_WP=place.X_WP))
+
+
+def with_move(cell: Cell, move: PartMove, place: PartPlace, holder: str) -> Cell:
+    """The cell with a straight move of the holder as its only task.
+
+    Gripping and letting go are straight along the axis of the holder's tool; lifting and lowering are vertical.
+
+    Args:
+        cell: The cell as it is meanwhile: with the part lying in it, or held.
+        move: What is done.
+        place: Where the part lies.
+        holder: Name of the robot.
+    """
+    grasp = next(grasp for grasp in cell.part.held_by if grasp.robot == holder)
+    at = place.X_WP @ grasp.X_PT
+    up = np.array([0.0, 0.0, 1.0])
+    away = {PartMove.GRIP: -at[:3, 2], PartMove.RELEASE: -at[:3, 2]}.get(move, up)
+    length = place.approach if move in (PartMove.GRIP, PartMove.RELEASE) else place.lift
+    ends = np.stack([at[:3, 3] + length * away, at[:3, 3]])
+    if move in (PartMove.LIFT, PartMove.RELEASE):
+        ends = ends[::-1]
+    is_lying = move in (PartMove.GRIP, PartMove.RELEASE)
+    own = part_lying(cell, place) if is_lying else cell
+    return replace(own, tasks=(_task(move, holder, ends, at[:3, :3]),))
+
+
+def _task(move: PartMove, robot: str, ends: Array, R: Array) -> Task:
+    """The task of a straight move from one point to another, shape (2, 3), with one orientation of the tool."""
+    length = float(np.linalg.norm(ends[1] - ends[0]))
+    path = SampledPath(
+        source=move.value, points=ends, axes=None, rotations=np.stack([R, R]), is_smooth=False, is_closed=False
+    )
+    return Task(
+        name=move.task,
+        robot=robot,
+        path=path,
+        project=None,
+        plane_offset=0.0,
+        tool_axis=None,
+        tool_x=np.array([1.0, 0.0, 0.0]),
+        turn=0.0,
+        axes=ALL_AXES,
+        is_spin_free=False,
+        tolerance=TOLERANCE,
+        start=0.0,
+        duration=float(np.ceil(100.0 * peak_rate(QUINTIC) * length / PEAK_SPEED) / 100.0),
+        feed=None,
+        time_law=QUINTIC,
+        blend=None,
+        relative_to=Frame.WORLD,
+    )

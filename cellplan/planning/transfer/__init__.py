@@ -1,0 +1,1 @@
+"""Transfer moves between two configurations at rest: straight, in turn, or in joint space and time."""

@@ -1,0 +1,153 @@
+"""One robot after the other: each straight or by trees in its joint space, while all others stand.
+
+Robots that have moved stand at their goals, the others at their starts. Orders of straight moves are tried first, then
+those in which trees may grow; what was found for a robot among the same standing robots is used again.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import permutations
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.model.progress import Progress
+from cellplan.model.seeds import generator
+from cellplan.planning.transfer.blended_lines import BlendedLine
+from cellplan.planning.transfer.move_check import MoveCheck, Others
+from cellplan.planning.transfer.query import STAGE, TransferQuery
+from cellplan.planning.transfer.shortened import rounded_line, shortened
+from cellplan.planning.transfer.trees import connected
+
+MOST_ORDERS: Final = 120  # orders of the robots that are tried
+DRAWN: Final = 3000  # configurations drawn for one robot among others that stand
+MOST_FAILED: Final = 6  # searches by trees that fail before no further one is begun
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RobotMove:
+    """Move of one robot while the others stand.
+
+    Attributes:
+        robot: Its name.
+        line: Its way, smooth.
+    """
+
+    robot: str
+    line: BlendedLine
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether it goes straight from start to goal."""
+        return len(self.line.q) == 2
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Tried:
+    """What was tried in vain.
+
+    Attributes:
+        orders: Orders of the robots that were tried.
+        searches: Searches by trees that failed.
+        drawn: Configurations drawn in them.
+        reached: Configurations reached from the start and from the goal in the last search of each robot.
+        refused: How often each pair of bodies was too near, by their names.
+    """
+
+    orders: int = 0
+    searches: int = 0
+    drawn: int = 0
+    reached: dict[str, tuple[int, int]] = field(default_factory=dict)
+    refused: Counter[tuple[str, str]] = field(default_factory=Counter)
+
+
+class InTurn:
+    """Moves of one robot after the other.
+
+    Attributes:
+        tried: What was tried in vain.
+    """
+
+    def __init__(self, query: TransferQuery, *, reserve: float, progress: Progress) -> None:
+        """Prepare; nothing is planned yet.
+
+        Args:
+            query: Who moves from where to where.
+            reserve: Distance in [m] beyond the demanded one while planning.
+            progress: Called with the stage and the fraction done.
+        """
+        self.tried = Tried()
+        self._query, self._reserve, self._progress = query, reserve, progress
+        self._checks: dict[tuple[str, frozenset[str]], MoveCheck | None] = {}
+        self._known: dict[tuple[str, frozenset[str], bool], RobotMove | None] = {}
+
+    def moves(self) -> Iterator[list[RobotMove]]:
+        """Moves of all robots in their order, one list for each order that is free."""
+        orders = list(permutations(self._query.movers))[:MOST_ORDERS]
+        for planned in (False, True):
+            for order in orders:
+                self.tried.orders += not planned
+                moves = self._in_order(order, planned=planned)
+                if moves is not None:
+                    yield moves
+
+    def _in_order(self, order: tuple[str, ...], *, planned: bool) -> list[RobotMove] | None:
+        moves: list[RobotMove] = []
+        for place, robot in enumerate(order):
+            move = self._move(robot, frozenset(order[:place]), planned=planned)
+            if move is None:
+                return None
+            moves.append(move)
+        return moves
+
+    def _move(self, robot: str, moved: frozenset[str], *, planned: bool) -> RobotMove | None:
+        """The move of a robot after some others have moved; None where none was found."""
+        key = (robot, moved, planned)
+        if key not in self._known:
+            straight = self._known.get((robot, moved, False)) if planned else None
+            self._known[key] = straight or self._plan(robot, moved, planned=planned)
+        return self._known[key]
+
+    def _plan(self, robot: str, moved: frozenset[str], *, planned: bool) -> RobotMove | None:
+        query, check = self._query, self._check(robot, moved)
+        if check is None:
+            return None
+        ends, box = query.ends_of(robot), query.box(robot)
+        if not planned:
+            return self._rounded(check, np.array(ends)) if check.is_free(*ends) else None
+        if self.tried.searches >= MOST_FAILED:
+            return None
+        rng = generator(f"transfer of {robot} after {sorted(moved)}", query.seed)
+        found = connected(check, ends, box=box, drawn=DRAWN, rng=rng, tick=self._tick)
+        if found.way is None:
+            self.tried.searches += 1
+            self.tried.drawn += DRAWN
+            self.tried.reached[robot] = found.reached
+            return None
+        return self._rounded(check, shortened(check, found.way, box.velocity, rng))
+
+    def _rounded(self, check: MoveCheck, way: Array) -> RobotMove:
+        """A way through via points, shape (K, n), as a smooth move."""
+        cell = self._query.scene.cell
+        velocity = cell.robot(check.robot).model.velocity
+        return RobotMove(robot=check.robot, line=rounded_line(check, way, cell.columns(check.robot), velocity))
+
+    def _check(self, robot: str, moved: frozenset[str]) -> MoveCheck | None:
+        """The check among robots that stand; None where an end of the move is blocked by one of them."""
+        key = (robot, moved)
+        if key not in self._checks:
+            query = self._query
+            standing = query.standing(moved)
+            check = MoveCheck(query.scene, robot, Others.moving(query.scene, standing[None]), reserve=self._reserve)
+            check.refused = self.tried.refused
+            ends = query.ends_of(robot)
+            for end in ends:
+                check.relax_at(end)
+            is_open = all(check.are_free(end[None]) for end in ends)
+            self._checks[key] = check if is_open else None
+        return self._checks[key]
+
+    def _tick(self, share: float) -> None:
+        self._progress(STAGE, share)

@@ -1,0 +1,153 @@
+"""Two trees that grow towards each other: a way of one robot through its joint space, straight from node to node.
+
+[Kuffner2000]_: one tree is extended towards a configuration that is drawn, the other one then runs towards the new node
+as far as it comes; then they change places. Distances are those of the joints in shares of their top speeds, in
+seconds. The search ends by the number of configurations drawn, so that it is the same on every machine.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.planning.transfer.move_check import MoveCheck
+
+STEP: Final = 0.3  # [s] longest edge, as the time that the joints take at top speed
+BOXES: Final = (0.1, 0.35, 1.0)  # shares of the joint ranges that are drawn from beside both ends, in turn
+SAME: Final = 1e-9  # [s] nodes that are nearer to each other are one
+
+
+@dataclass(slots=True, eq=False)
+class Tree:
+    """Configurations in seconds, each with the one it was reached from.
+
+    Attributes:
+        nodes: Configurations divided by top speeds, shape (n,) each; the root first.
+        parents: Index of the node each one was reached from.
+    """
+
+    nodes: Array
+    count: int = 1
+    parents: list[int] = field(default_factory=lambda: [0])
+
+    @classmethod
+    def at(cls, root: Array, *, room: int) -> "Tree":
+        """A tree of its root only, with room for so many nodes."""
+        nodes = np.empty((room, len(root)))
+        nodes[0] = root
+        return cls(nodes)
+
+    def nearest(self, x: Array) -> int:
+        """Index of the node nearest to a configuration."""
+        apart = self.nodes[: self.count] - x
+        return int(np.argmin(np.einsum("ij,ij->i", apart, apart)))
+
+    def add(self, x: Array, parent: int) -> int:
+        """Add a node; its index."""
+        if self.count == len(self.nodes):
+            self.nodes = np.concatenate([self.nodes, np.empty_like(self.nodes)])
+        self.nodes[self.count] = x
+        self.parents.append(parent)
+        self.count += 1
+        return self.count - 1
+
+    def way_to(self, index: int) -> list[Array]:
+        """Nodes from the root to one of them."""
+        way = [self.nodes[index]]
+        while index:
+            index = self.parents[index]
+            way.append(self.nodes[index])
+        return way[::-1]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """What a search came to.
+
+    Attributes:
+        way: Via points in [rad] or [m] from start to goal, shape (K, n); None where none was found.
+        reached: Configurations reached from the start and from the goal.
+    """
+
+    way: Array | None
+    reached: tuple[int, int]
+
+
+def connected(
+    check: MoveCheck,
+    ends: tuple[Array, Array],
+    *,
+    box: "JointBox",
+    drawn: int,
+    rng: np.random.Generator,
+    tick: Callable[[float], object],
+) -> Found:
+    """A way between two configurations.
+
+    Args:
+        check: Which moves are free.
+        ends: Start and goal in [rad] or [m], shape (n,) each.
+        box: What configurations are drawn from.
+        drawn: How many of them at most.
+        rng: Where they come from.
+        tick: Called with the fraction done.
+    """
+    scale, (start, goal) = box.velocity, ends
+    trees = [Tree.at(start / scale, room=256), Tree.at(goal / scale, room=256)]
+    for number in range(drawn):
+        tick(number / drawn)
+        mine, other = trees[number % 2], trees[1 - number % 2]
+        new = _extended(check, mine, box.draw(rng, number, start, goal) / scale, scale)
+        if new is None:
+            continue
+        met = _run(check, other, mine.nodes[new], scale)
+        if met is not None:
+            ends = (new, met) if number % 2 == 0 else (met, new)
+            way = trees[0].way_to(ends[0]) + trees[1].way_to(ends[1])[-2::-1]
+            found = np.array(way) * scale
+            found[0], found[-1] = start, goal
+            return Found(way=found, reached=(trees[0].count, trees[1].count))
+    return Found(way=None, reached=(trees[0].count, trees[1].count))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointBox:
+    """Configurations that a robot may be in.
+
+    Attributes:
+        lower: Lower limits in [rad] or [m], finite, shape (n,).
+        upper: Likewise.
+        velocity: Top speeds in [rad/s] or [m/s], shape (n,).
+    """
+
+    lower: Array
+    upper: Array
+    velocity: Array
+
+    def draw(self, rng: np.random.Generator, number: int, start: Array, goal: Array) -> Array:
+        """A configuration from the limits, more often from near the ends of the way."""
+        beside = BOXES[number // 2 % len(BOXES)] * (self.upper - self.lower)
+        low = np.maximum(self.lower, np.minimum(start, goal) - beside)
+        high = np.minimum(self.upper, np.maximum(start, goal) + beside)
+        return rng.uniform(low, high)
+
+
+def _extended(check: MoveCheck, tree: Tree, x: Array, scale: Array) -> int | None:
+    """Index of a new node at most one step from the nearest one towards a configuration; None where that is blocked."""
+    near = tree.nearest(x)
+    apart = x - tree.nodes[near]
+    length = float(np.linalg.norm(apart))
+    if length < SAME:
+        return near
+    new = x if length <= STEP else tree.nodes[near] + apart * (STEP / length)
+    return tree.add(new, near) if check.is_free(tree.nodes[near] * scale, new * scale) else None
+
+
+def _run(check: MoveCheck, tree: Tree, x: Array, scale: Array) -> int | None:
+    """Index of the node of a tree that is at a configuration, after steps towards it; None where one is blocked."""
+    while True:
+        new = _extended(check, tree, x, scale)
+        if new is None or np.linalg.norm(tree.nodes[new] - x) < SAME:
+            return new

@@ -1,0 +1,38 @@
+"""Cells for tests of transfer moves: bundled arms among obstacles, and what a transfer is planned with."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from builders.scene_builders import make_cell, placed, stick
+from cellplan.geometry.transforms import Array
+from cellplan.io.robots.bundled import load_bundled
+from cellplan.model.cell import CheckSettings, Obstacle, Robot
+from cellplan.model.robot import RobotModel
+from cellplan.pipeline.plan.retiming import RowLimits, joint_bounds
+from cellplan.planning.timing.retime import Retimer
+from cellplan.scene.scene import Scene
+
+CHECKS = CheckSettings(clearance=0.005, contact_zone=0.02)
+STEP = 0.004  # [s]
+
+
+def arm(name: str, model: str | RobotModel, base: Array | None = None) -> Robot:
+    """A robot with a slender tool of 250 mm."""
+    loaded = load_bundled(model) if isinstance(model, str) else model
+    return placed(name, loaded, base=base, tool=stick(0.25, 0.02))
+
+
+def scene_of(*robots: Robot, things: Sequence[Obstacle] = (), step: float = STEP) -> Scene:
+    """The scene of a cell without tasks."""
+    cell = make_cell(*robots, things=things, checks=CHECKS)
+    return Scene.from_cell(replace(cell, motion=replace(cell.motion, step=step)))
+
+
+def retimer_of(scene: Scene) -> Retimer:
+    """The limits of all joints, as the pipeline has them."""
+    limits = RowLimits(scene, (), joint_bounds(scene.cell), scene.cell.motion.step)
+    return Retimer(
+        bounds=limits.bounds, step=limits.step, feed_share=lambda sigma: np.zeros(len(sigma)), slower=limits.slower
+    )
