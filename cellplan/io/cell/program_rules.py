@@ -221,4 +221,3 @@ def _holding(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     if valid.motion is not None and valid.motion.mode == "semi_coordinated" and not holders:
         text = "expected a part that a robot holds, got one that is fixed in the world: choose simultaneous"
         yield document.finding(("motion", "mode"), text)
-

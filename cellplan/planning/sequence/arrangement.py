@@ -18,8 +18,8 @@ class Block:
     """Tasks that begin together with everything at rest; the next block begins when all of them are done.
 
     Attributes:
-        tasks: Names of the tasks in the order of the cell, at most one for each robot; none for a rest before them all.
-        dwell: Time in [s] for which all robots stand still after the tasks.
+        tasks: Names of the tasks in the order of the cell, at most one for each robot; none for a rest after them all.
+        dwell: Time in [s] for which all robots stand still before the tasks begin.
     """
 
     tasks: tuple[str, ...]
@@ -44,17 +44,15 @@ def arrange(cell: Cell) -> tuple[Block, ...]:
     progress = SequenceProgress(cell)
     blocks: list[Block] = []
     while True:
-        if (dwell := progress.pass_marks()) > 0.0:
-            last = blocks.pop() if blocks else Block(())
-            blocks.append(Block(last.tasks, last.dwell + dwell))
+        dwell = progress.pass_marks()
         if progress.is_finished:
-            return tuple(blocks)
-        previous = cell.task(blocks[-1].tasks[0]) if blocks and blocks[-1].tasks else None
+            return (*blocks, Block((), dwell)) if dwell > 0.0 else tuple(blocks)
+        previous = cell.task(blocks[-1].tasks[0]) if blocks else None
         tasks = _chosen(cell, progress.ready(), previous)
         if not tasks:
             raise progress.deadlock()
         progress.finish(tasks)
-        blocks.append(Block(tuple(task.name for task in tasks)))
+        blocks.append(Block(tuple(task.name for task in tasks), dwell))
 
 
 def _chosen(cell: Cell, ready: Sequence[Task], previous: Task | None) -> list[Task]:
