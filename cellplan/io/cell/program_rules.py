@@ -53,7 +53,7 @@ def program_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Fi
 def posture_findings(
     valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument
 ) -> Iterator[Finding]:
-    """Postures that tasks give have a value for each joint, within its limits."""
+    """Start postures and holder configurations of tasks have a value for each joint, within its limits."""
     holders = [robot for _, robot in holders_as_written(document)]
     for name, task in valid.tasks.items():
         for key, robot, given in (
@@ -72,7 +72,7 @@ def posture_findings(
 def _limits(
     path: KeyPath, given: tuple[float, ...] | dict[str, Any], model: RobotModel, document: YamlDocument
 ) -> Iterator[Finding]:
-    """A posture is within the limits of all joints."""
+    """A configuration is within the limits of all joints."""
     for joint, position in zip(model.joints, configuration_in_si(model, given), strict=True):
         if not joint.lower <= position <= joint.upper:
             unit, scale = joint.display_unit
@@ -206,7 +206,7 @@ def _times(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
 
 
 def _holding(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
-    """Postures at which tasks begin are given once; a holder's only of a part that is held, at tasks of others."""
+    """The configuration of the holder is given only where a robot holds the part, and in tasks of other robots."""
     holders = [robot for _, robot in holders_as_written(document)]
     for name, task in valid.tasks.items():
         holder = "holder_deg" if task.holder_deg is not None else "holder"

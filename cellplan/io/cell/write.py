@@ -50,8 +50,10 @@ def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> d
     document["part"] = _part(document["part"], cell.part)
     document["tasks"] = {task.name: _task(tasks[task.name], task) for task in cell.tasks}
     if cell.program is not None:
-        in_program = {task.name: _postures(cell, task) for task in cell.tasks}
-        document["tasks"] = {name: _with_postures(entry, in_program[name]) for name, entry in document["tasks"].items()}
+        in_program = {task.name: _configurations(cell, task) for task in cell.tasks}
+        document["tasks"] = {
+            name: _with_configurations(entry, in_program[name]) for name, entry in document["tasks"].items()
+        }
     document["motion"] = _motion(document["motion"], cell)
     document["solver"] = _solver(document["solver"], cell.solver)
     document["checks"] = _checks(document["checks"], cell.checks)
@@ -116,14 +118,14 @@ def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
     return written
 
 
-def _with_postures(entry: Mapping[str, Any], postures: Mapping[str, Any]) -> dict[str, Any]:
-    """A task of a program with its postures in place of those of the file."""
-    written = {key: value for key, value in entry.items() if key not in CONFIGURATIONS} | dict(postures)
+def _with_configurations(entry: Mapping[str, Any], configurations: Mapping[str, Any]) -> dict[str, Any]:
+    """A task of a program with its configurations in place of those of the file."""
+    written = {key: value for key, value in entry.items() if key not in CONFIGURATIONS} | dict(configurations)
     return {key: written[key] for key in TaskEntry.model_fields if key in written}
 
 
-def _postures(cell: Cell, task: Task) -> dict[str, Any]:
-    """Start posture of a task, if it is not that of its robot, and the posture of the first holder if given."""
+def _configurations(cell: Cell, task: Task) -> dict[str, Any]:
+    """Start posture of a task, if it is not that of its robot, and the configuration of the first holder if given."""
     robot, names = cell.robot(task.robot), [other.name for other in cell.tasks]
     first = next((name for name in sequence_of(cell, task.robot) if name in names), task.name)
     is_of_robot = first == task.name and task.start_posture is None

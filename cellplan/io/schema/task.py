@@ -232,8 +232,8 @@ class TaskEntry(Entry):
     )
     holder_deg: tuple[Angle, ...] | None = Field(
         default=None,
-        description="Posture of the first holder at which this task begins, and at which it is done in the modes "
-        "part_at_rest and semi_coordinated; the holder's start posture when absent. Only with program.",
+        description="Configuration of the first holder in which this task begins, and in which it is done in the "
+        "modes part_at_rest and semi_coordinated; the holder's start posture when absent. Only with program.",
     )
     holder: dict[str, JointPosition] | None = Field(
         default=None,
@@ -340,7 +340,7 @@ class TaskEntry(Entry):
 
     @property
     def given_holder(self) -> tuple[float, ...] | dict[str, float] | None:
-        """Posture of the first holder that was written down; None for that holder's start posture."""
+        """Configuration of the first holder that was written down; None for that holder's start posture."""
         return self.holder_deg if self.holder_deg is not None else self.holder
 
     @property

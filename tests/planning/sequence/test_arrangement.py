@@ -200,12 +200,12 @@ def _with_order(*names: str) -> Cell:
         (cell_of({"op0": "a"}, {"a": ["x"]}), "tasks.a.after: expected a task of this cell, got 'x'"),
         (
             at_postures(cell_of({"op0": "a", "op1": "b"}), {"a": 0, "b": 1}),
-            "tasks.b.holder_deg: expected the posture of the holder for 'a' in the mode simultaneous, got another: "
+            "tasks.b.holder_deg: expected the configuration of the holder for 'a' in the mode simultaneous, got another: "
             "choose semi_coordinated, or let one come after the other",
         ),
         (
             at_postures(cell_of({"op0": "a b"}, mode=Mode.PART_AT_REST), {"b": 1}),
-            "tasks.b.holder_deg: expected the posture of the holder for 'a' in the mode part_at_rest, got another: "
+            "tasks.b.holder_deg: expected the configuration of the holder for 'a' in the mode part_at_rest, got another: "
             "choose semi_coordinated",
         ),
     ],
@@ -232,7 +232,7 @@ def test_a_task_of_the_holder_sets_the_posture_at_which_others_begin_with_it():
     cell = replace(cell, tasks=(cell.tasks[0], replace(cell.tasks[1], start_posture=np.ones(3))))
 
     assert arrange(cell) == (Block(("a", "b")),)
-    with pytest.raises(InputError, match=r"tasks\.a\.holder_deg: expected the posture of the holder for 'b'"):
+    with pytest.raises(InputError, match=r"tasks\.a\.holder_deg: expected the configuration of the holder for 'b'"):
         arrange(at_postures(cell, {"a": 0.5}))
 
 
