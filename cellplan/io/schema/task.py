@@ -224,8 +224,8 @@ class TaskEntry(Entry):
     )
     start_deg: Configuration | None = Field(
         default=None,
-        description="Start posture of its robot for this task, one angle per joint; auto finds one. When absent that of "
-        "the robot for its first task, and auto for later ones. Only with program.",
+        description="Start posture of its robot for this task, one angle per joint; auto finds one. When absent that "
+        "of the robot for its first task, and auto for later ones. Only with program.",
     )
     start: PositionChoice | None = Field(
         default=None, description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes start_deg."

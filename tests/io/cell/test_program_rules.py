@@ -12,6 +12,7 @@ from cellplan.io.cell.write import render_cell
 from cellplan.model.cell import Cell, Mode
 from cellplan.model.program import Mark
 from cellplan.model.task import StraightMove
+from cellplan.planning.sequence.only_task import with_only_task
 
 Load = Callable[..., Cell]
 Refuse = Callable[..., list[str]]
@@ -211,6 +212,16 @@ def test_found_starts_of_later_tasks_are_written(load: Load, tmp_path: Path) -> 
 
     np.testing.assert_allclose(again.tasks[1].start_posture, found, rtol=1e-15)
     assert again.tasks[0].start_posture is None
+
+
+def test_a_task_that_is_left_out_is_in_no_order_of_the_copy(load: Load, tmp_path: Path) -> None:
+    cell = load(*changes(order="[ring, m1, second]", second="after: ring", program="{marks: [m1]}"))
+
+    (tmp_path / "again").write_text(render_cell(with_only_task(cell, "second")), encoding="utf-8")
+    again = load_cell(tmp_path / "again")
+
+    assert again.robot("worker").order == ("m1", "second")
+    assert [(task.name, task.after) for task in again.tasks] == [("second", ())]
 
 
 def test_values_of_a_program_are_set_by_address(load: Load) -> None:

@@ -200,13 +200,13 @@ def _with_order(*names: str) -> Cell:
         (cell_of({"op0": "a"}, {"a": ["x"]}), "tasks.a.after: expected a task of this cell, got 'x'"),
         (
             at_postures(cell_of({"op0": "a", "op1": "b"}), {"a": 0, "b": 1}),
-            "tasks.b.holder_deg: expected the configuration of the holder for 'a' in the mode simultaneous, got another: "
-            "choose semi_coordinated, or let one come after the other",
+            "tasks.b.holder_deg: expected the configuration of the holder for 'a' in the mode simultaneous, got "
+            "another: choose semi_coordinated, or let one come after the other",
         ),
         (
             at_postures(cell_of({"op0": "a b"}, mode=Mode.PART_AT_REST), {"b": 1}),
-            "tasks.b.holder_deg: expected the configuration of the holder for 'a' in the mode part_at_rest, got another: "
-            "choose semi_coordinated",
+            "tasks.b.holder_deg: expected the configuration of the holder for 'a' in the mode part_at_rest, got "
+            "another: choose semi_coordinated",
         ),
     ],
 )
