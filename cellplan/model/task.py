@@ -223,8 +223,8 @@ class Task:
             is carried; P then reads W in everything that is said of the task.
         tool_depth: Largest depth in [m] that the tool may have in the part, along its axis.
         after: Names of the tasks of any robots that must be done before it begins.
-        start_posture: Configuration of its robot at its start in [rad] or [m], shape (n,); None for a task that is the
-            first of its robot, or of which it is to be searched.
+        start_posture: Configuration of its robot at its start in [rad] or [m], shape (n,); None for that of the robot
+            if the task is its first one, and for one that is to be searched otherwise.
         holder_posture: Configuration of the first holder at its start, likewise; None for that holder's start posture.
         origin: File and lines that the task was read from; empty for a task made in Python.
     """

@@ -53,7 +53,7 @@ def program_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Fi
 def posture_findings(
     valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument
 ) -> Iterator[Finding]:
-    """Postures that tasks give have a value for each joint, within its limits."""
+    """Start postures and holder configurations of tasks have a value for each joint, within its limits."""
     holders = [robot for _, robot in holders_as_written(document)]
     for name, task in valid.tasks.items():
         for key, robot, given in (
@@ -72,12 +72,12 @@ def posture_findings(
 def _limits(
     path: KeyPath, given: tuple[float, ...] | dict[str, Any], model: RobotModel, document: YamlDocument
 ) -> Iterator[Finding]:
-    """A posture is within the limits of all joints."""
+    """A configuration is within the limits of all joints."""
     for joint, position in zip(model.joints, configuration_in_si(model, given), strict=True):
         if not joint.lower <= position <= joint.upper:
             unit, scale = joint.display_unit
             low, high, got = (f"{scale * value:.6g}" for value in (joint.lower, joint.upper, position))
-            yield document.finding(path, f"expected '{joint.name}' from {low} to {high} {unit}, got {got}")
+            yield document.finding(path, f"expected '{joint.name}' within its limits {low} .. {high} {unit}, got {got}")
 
 
 def _without_program(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
@@ -112,7 +112,7 @@ def _marks(marks: list[tuple[KeyPath, str]], valid: ValidEntries, document: Yaml
     seen: set[str] = set()
     orders = [robot.order or () for robot in valid.robots.values()]
     for path, name in marks:
-        if name in document.root.get("tasks", {}):
+        if name in valid.names["tasks"]:
             yield document.finding(path, f"expected a name that no task has, got '{name}', a task: rename the mark")
         elif name in seen:
             yield document.finding(path, f"expected each mark once, got '{name}' twice")
@@ -143,7 +143,7 @@ def _orders(marks: list[tuple[KeyPath, str]], valid: ValidEntries, document: Yam
 
 def _preceding(marks: list[tuple[KeyPath, str]], valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """What a task comes after is another task of the cell."""
-    names, known = [name for _, name in marks], list(document.root.get("tasks", {}))
+    names, known = [name for _, name in marks], valid.names["tasks"]
     for name, task in valid.tasks.items():
         for index, other in enumerate(task.preceding):
             place: KeyPath = (
@@ -206,7 +206,7 @@ def _times(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
 
 
 def _holding(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
-    """Postures at which tasks begin are given once; a holder's only of a part that is held, at tasks of others."""
+    """The configuration of the holder is given only where a robot holds the part, and in tasks of other robots."""
     holders = [robot for _, robot in holders_as_written(document)]
     for name, task in valid.tasks.items():
         holder = "holder_deg" if task.holder_deg is not None else "holder"

@@ -50,8 +50,8 @@ def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> d
     document["part"] = _part(document["part"], cell.part)
     document["tasks"] = {task.name: _task(tasks[task.name], task) for task in cell.tasks}
     if cell.program is not None:
-        in_program = {task.name: _postures(cell, task) for task in cell.tasks}
-        document["tasks"] = {name: _with_postures(entry, in_program[name]) for name, entry in document["tasks"].items()}
+        written = document["tasks"]
+        document["tasks"] = {task.name: _in_sequence(written[task.name], task, cell) for task in cell.tasks}
     document["motion"] = _motion(document["motion"], cell)
     document["solver"] = _solver(document["solver"], cell.solver)
     document["checks"] = _checks(document["checks"], cell.checks)
@@ -73,7 +73,7 @@ def as_written(model: RobotModel, q: Array) -> Array:
 
 def _robot(entry: Mapping[str, Any], robot: Robot, found: Array | None) -> dict[str, Any]:
     """A robot with its weights, start posture and home written out."""
-    written = {key: value for key, value in entry.items() if key not in CONFIGURATIONS}
+    written = {key: value for key, value in entry.items() if key not in {*CONFIGURATIONS, "order"}}
     written["base"] = _pose(entry["base"], robot.X_WB)
     written |= _configuration("start", robot.model, robot.start if robot.start is not None else found)
     written |= _configuration("home", robot.model, robot.home)
@@ -116,21 +116,18 @@ def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
     return written
 
 
-def _with_postures(entry: Mapping[str, Any], postures: Mapping[str, Any]) -> dict[str, Any]:
-    """A task of a program with its postures in place of those of the file."""
-    written = {key: value for key, value in entry.items() if key not in CONFIGURATIONS} | dict(postures)
-    return {key: written[key] for key in TaskEntry.model_fields if key in written}
-
-
-def _postures(cell: Cell, task: Task) -> dict[str, Any]:
-    """Start posture of a task, if it is not that of its robot, and the posture of the first holder if given."""
+def _in_sequence(entry: Mapping[str, Any], task: Task, cell: Cell) -> dict[str, Any]:
+    """A task of a program with what comes before it, its start posture and the configuration of the first holder."""
+    written = {key: value for key, value in entry.items() if key not in {*CONFIGURATIONS, "after"}}
+    if task.after:
+        written["after"] = list(task.after)
     robot, names = cell.robot(task.robot), [other.name for other in cell.tasks]
     first = next((name for name in sequence_of(cell, task.robot) if name in names), task.name)
-    is_of_robot = first == task.name and task.start_posture is None
-    written = {} if is_of_robot else _configuration("start", robot.model, task.start_posture)
+    if first != task.name or task.start_posture is not None:
+        written |= _configuration("start", robot.model, task.start_posture)
     if task.holder_posture is not None and cell.carrier is not None:
         written |= _configuration("holder", cell.robots[cell.carrier].model, task.holder_posture)
-    return written
+    return {key: written[key] for key in TaskEntry.model_fields if key in written}
 
 
 def _solver(entry: Mapping[str, Any], solver: SolverSettings) -> dict[str, Any]:

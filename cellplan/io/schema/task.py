@@ -224,16 +224,16 @@ class TaskEntry(Entry):
     )
     start_deg: Configuration | None = Field(
         default=None,
-        description="Start posture of its robot for this task, one angle per joint; auto, the default, finds one. Only "
-        "with program, and only for later tasks of a robot: the start posture of the robot is that of its first one.",
+        description="Start posture of its robot for this task, one angle per joint; auto finds one. When absent that "
+        "of the robot for its first task, and auto for later ones. Only with program.",
     )
     start: PositionChoice | None = Field(
         default=None, description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes start_deg."
     )
     holder_deg: tuple[Angle, ...] | None = Field(
         default=None,
-        description="Posture of the first holder at which this task begins, and at which it is done in the modes "
-        "part_at_rest and semi_coordinated; the holder's start posture when absent. Only with program.",
+        description="Configuration of the first holder in which this task begins, and in which it is done in the "
+        "modes part_at_rest and semi_coordinated; the holder's start posture when absent. Only with program.",
     )
     holder: dict[str, JointPosition] | None = Field(
         default=None,
@@ -340,7 +340,7 @@ class TaskEntry(Entry):
 
     @property
     def given_holder(self) -> tuple[float, ...] | dict[str, float] | None:
-        """Posture of the first holder that was written down; None for that holder's start posture."""
+        """Configuration of the first holder that was written down; None for that holder's start posture."""
         return self.holder_deg if self.holder_deg is not None else self.holder
 
     @property

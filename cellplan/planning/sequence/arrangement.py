@@ -18,8 +18,8 @@ class Block:
     """Tasks that begin together with everything at rest; the next block begins when all of them are done.
 
     Attributes:
-        tasks: Names of the tasks in the order of the cell, at most one for each robot; none for a rest before them all.
-        dwell: Time in [s] for which all robots stand still after the tasks.
+        tasks: Names of the tasks in the order of the cell, at most one for each robot; none for a rest after them all.
+        dwell: Time in [s] for which all robots stand still before the tasks begin.
     """
 
     tasks: tuple[str, ...]
@@ -31,30 +31,28 @@ def arrange(cell: Cell) -> tuple[Block, ...]:
 
     In every mode the orders of the robots, ``after`` and the marks hold, and a task comes as early as they allow.
     Pairwise has one task in each block, the first of the cell that may begin; semi-coordinated only tasks at one
-    posture of the first holder, the present one as long as there are any for it.
+    configuration of the first holder, the present one as long as there are any for it.
 
     Args:
         cell: The cell, with any number of tasks for each robot.
 
     Raises:
         InputError: A name does not exist or stands in the order of another robot, robots wait for one another in a
-            circle, or tasks that begin together need different postures of the holder.
+            circle, or tasks that begin together need different configurations of the holder.
     """
     _require_names(cell)
     progress = SequenceProgress(cell)
     blocks: list[Block] = []
     while True:
-        if (dwell := progress.pass_marks()) > 0.0:
-            last = blocks.pop() if blocks else Block(())
-            blocks.append(Block(last.tasks, last.dwell + dwell))
+        dwell = progress.pass_marks()
         if progress.is_finished:
-            return tuple(blocks)
-        previous = cell.task(blocks[-1].tasks[0]) if blocks and blocks[-1].tasks else None
+            return (*blocks, Block((), dwell)) if dwell > 0.0 else tuple(blocks)
+        previous = cell.task(blocks[-1].tasks[0]) if blocks else None
         tasks = _chosen(cell, progress.ready(), previous)
         if not tasks:
             raise progress.deadlock()
         progress.finish(tasks)
-        blocks.append(Block(tuple(task.name for task in tasks)))
+        blocks.append(Block(tuple(task.name for task in tasks), dwell))
 
 
 def _chosen(cell: Cell, ready: Sequence[Task], previous: Task | None) -> list[Task]:
@@ -64,39 +62,41 @@ def _chosen(cell: Cell, ready: Sequence[Task], previous: Task | None) -> list[Ta
             return list(ready[:1])
         case Mode.SEMI_COORDINATED:
             groups = [
-                [task for task in ready if _same_posture(cell, task, other)] for other in (previous, *ready) if other
+                [task for task in ready if _same_configuration(cell, task, other)]
+                for other in (previous, *ready)
+                if other
             ]
             return next((group for group in groups if group), [])
         case Mode.SIMULTANEOUS:
-            _require_one_posture(cell, ready, "choose semi_coordinated, or let one come after the other")
+            _require_one_configuration(cell, ready, "choose semi_coordinated, or let one come after the other")
         case Mode.PART_AT_REST:
-            _require_one_posture(cell, cell.tasks, "choose semi_coordinated")
+            _require_one_configuration(cell, cell.tasks, "choose semi_coordinated")
     return list(ready)
 
 
-def _require_one_posture(cell: Cell, tasks: Sequence[Task], cure: str) -> None:
-    """Refuse tasks that are worked on together at different postures of the first holder.
+def _require_one_configuration(cell: Cell, tasks: Sequence[Task], cure: str) -> None:
+    """Refuse tasks that are worked on together at different configurations of the first holder.
 
-    Where the holder has a task of its own, the others need not name the posture at which that begins.
+    Where the holder has a task of its own, the others need not name the configuration in which that begins.
     """
     own = [task for task in tasks if task.robot in cell.positioners[:1]]
     first = next(iter(own or tasks), None)
     for task in tasks:
-        if first and not (own and task.holder_posture is None) and not _same_posture(cell, first, task):
+        if first and not (own and task.holder_posture is None) and not _same_configuration(cell, first, task):
             raise InputError(
-                f"{task.where('holder_deg')}: expected the posture of the holder for '{first.name}' in the mode "
+                f"{task.where('holder_deg')}: expected the configuration of the holder for '{first.name}' in the mode "
                 f"{cell.motion.mode}, got another: {cure}"
             )
 
 
-def _same_posture(cell: Cell, one: Task, other: Task) -> bool:
-    """Whether two tasks begin at the same posture of the first holder."""
-    a, b = (_holder_posture(cell, task) for task in (one, other))
+def _same_configuration(cell: Cell, one: Task, other: Task) -> bool:
+    """Whether two tasks begin at the same configuration of the first holder."""
+    a, b = (_holder_configuration(cell, task) for task in (one, other))
     return bool(np.array_equal(a, b)) if a is not None and b is not None else a is b
 
 
-def _holder_posture(cell: Cell, task: Task) -> Array | None:
-    """Posture of the first holder at the start of a task; None for its start posture, when it is to be found."""
+def _holder_configuration(cell: Cell, task: Task) -> Array | None:
+    """Configuration of the first holder at the start of a task; None for its start posture, when it is to be found."""
     if cell.carrier is None:
         return None
     own = task.start_posture if task.robot == cell.robots[cell.carrier].name else task.holder_posture

@@ -72,6 +72,9 @@ def _worked_on(cell: Cell) -> Iterator[Stage]:
     """A stage for each block of tasks, after one in which all robots stand where a mark asks for it."""
     first = first_blocks(cell)
     for number, block in enumerate(arrange(cell), start=1):
+        if not block.tasks:
+            yield Stage(phase=_at_home(cell, f"dwell-{number}"), cell=replace(cell, tasks=()), dwell=block.dwell)
+            continue
         own = _cell_of_block(cell, block, first)
         work = _phase(own, f"work-{number}")
         if block.dwell > 0.0:
@@ -82,6 +85,13 @@ def _worked_on(cell: Cell) -> Iterator[Stage]:
 def _dwell(work: Phase, name: str) -> Phase:
     """A phase in which all robots stand where another one begins."""
     return Phase(name=name, roles={robot: Hold(at_home=robot in work.idle) for robot in work.roles})
+
+
+def _at_home(cell: Cell, name: str) -> Phase:
+    """A phase in which all operators stand at their homes and the holders stand still."""
+    return Phase(
+        name=name, roles={robot.name: Hold(at_home=robot.name not in cell.positioners) for robot in cell.robots}
+    )
 
 
 def _picked_up(cell: Cell, program: ProgramSettings) -> Iterator[Stage]:

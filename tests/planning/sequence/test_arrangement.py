@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell, Mode
+from cellplan.model.phase import Hold
 from cellplan.model.program import Mark, ProgramSettings
 from cellplan.planning.sequence.arrangement import Block, arrange
+from cellplan.planning.sequence.stages import program_stages
 
 ROBOTS = ("op0", "op1", "op2")
 CELL = random_cell(0, operators=3, joints=3)
@@ -131,13 +133,13 @@ def test_a_posture_of_the_holder_is_kept_as_long_as_there_are_tasks_for_it():
 
 
 def test_marks_hold_those_that_take_part_and_their_dwells_are_rests_of_all():
-    cell = cell_of({"op0": "M a N b", "op1": "M c d N", "op2": "e f g"}, marks={"M": 0.5, "N": 0.25})
+    cell = cell_of({"op0": "M a N b O", "op1": "M c d N", "op2": "e f g"}, marks={"M": 0.5, "N": 0.25, "O": 2.0})
 
     assert arrange(cell) == (
-        Block((), 0.5),
-        Block(("a", "c", "e")),
-        Block(("d", "f"), 0.25),
-        Block(("b", "g")),
+        Block(("a", "c", "e"), 0.5),
+        Block(("d", "f")),
+        Block(("b", "g"), 0.25),
+        Block((), 2.0),
     )
 
 
@@ -198,13 +200,13 @@ def _with_order(*names: str) -> Cell:
         (cell_of({"op0": "a"}, {"a": ["x"]}), "tasks.a.after: expected a task of this cell, got 'x'"),
         (
             at_postures(cell_of({"op0": "a", "op1": "b"}), {"a": 0, "b": 1}),
-            "tasks.b.holder_deg: expected the posture of the holder for 'a' in the mode simultaneous, got another: "
-            "choose semi_coordinated, or let one come after the other",
+            "tasks.b.holder_deg: expected the configuration of the holder for 'a' in the mode simultaneous, got "
+            "another: choose semi_coordinated, or let one come after the other",
         ),
         (
             at_postures(cell_of({"op0": "a b"}, mode=Mode.PART_AT_REST), {"b": 1}),
-            "tasks.b.holder_deg: expected the posture of the holder for 'a' in the mode part_at_rest, got another: "
-            "choose semi_coordinated",
+            "tasks.b.holder_deg: expected the configuration of the holder for 'a' in the mode part_at_rest, got "
+            "another: choose semi_coordinated",
         ),
     ],
 )
@@ -230,5 +232,22 @@ def test_a_task_of_the_holder_sets_the_posture_at_which_others_begin_with_it():
     cell = replace(cell, tasks=(cell.tasks[0], replace(cell.tasks[1], start_posture=np.ones(3))))
 
     assert arrange(cell) == (Block(("a", "b")),)
-    with pytest.raises(InputError, match=r"tasks\.a\.holder_deg: expected the posture of the holder for 'b'"):
+    with pytest.raises(InputError, match=r"tasks\.a\.holder_deg: expected the configuration of the holder for 'b'"):
         arrange(at_postures(cell, {"a": 0.5}))
+
+
+def test_a_mark_after_all_tasks_is_a_rest_at_home():
+    cell = cell_of({"op0": "a M b N", "op1": "c N"}, marks={"M": 0.5, "N": 2.0})
+
+    stages = program_stages(cell)
+
+    assert [(stage.phase.name, stage.dwell) for stage in stages] == [
+        ("transfer-1", None),
+        ("work-1", None),
+        ("transfer-2", None),
+        ("dwell-2", 0.5),
+        ("work-2", None),
+        ("transfer-3", None),
+        ("dwell-3", 2.0),
+    ]
+    assert stages[-1].phase.roles == {"holder": Hold()} | dict.fromkeys(ROBOTS, Hold(at_home=True))
