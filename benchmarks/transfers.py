@@ -17,7 +17,7 @@ import numpy as np
 from coal_shapes import coal_shape
 
 from cellplan.errors import TransferNotFoundError
-from cellplan.geometry.shapes import Box, Cylinder, HalfSpace, Solid, Sphere
+from cellplan.geometry.shapes import Box, Cylinder, HalfSpace, Solid, Sphere, bounding_sphere
 from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
 from cellplan.io.robots.bundled import load_bundled
 from cellplan.io.robots.urdf.load import load_urdf
@@ -37,6 +37,7 @@ KEPT_OFF: Final = 0.03  # [m] that obstacles keep from what is swept on the know
 THINGS: Final = 10  # obstacles of a cell
 ROW_STEP: Final = 0.004  # [s]
 FINE: Final = 0.004  # [rad] largest move of a joint between two samples of brute force
+COARSE: Final = 0.02  # [rad] likewise where a cell is made: no body comes farther than twice KEPT_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,9 +133,9 @@ class BruteForce:
         return bool(result.isCollision())
 
 
-def finer(q: Array) -> Array:
+def finer(q: Array, move: float = FINE) -> Array:
     """Samples between rows, joints straight from row to row, shape (K, n)."""
-    counts = np.maximum(1, np.ceil(np.abs(np.diff(q, axis=0)).max(axis=1) / FINE).astype(int))
+    counts = np.maximum(1, np.ceil(np.abs(np.diff(q, axis=0)).max(axis=1) / move).astype(int))
     pieces = [a + np.arange(n)[:, None] / n * (b - a) for a, b, n in zip(q[:-1], q[1:], counts, strict=True)]
     return np.concatenate([*pieces, q[-1:]])
 
@@ -143,9 +144,10 @@ def free_case(model: RobotModel, rng: np.random.Generator) -> Case:
     """A cell round a known way."""
     bare = scene_with(model, ())
     way = _known_way(bare, rng)
-    swept = finer(way)[::4]
-    poses = bare.body_poses(swept)
-    shapes = [coal_shape(body.shape) for body in bare.engine.bodies]
+    poses = bare.body_poses(finer(way, COARSE))
+    engine = bare.engine
+    shapes = [coal_shape(body.shape) for body in engine.bodies]
+    centres = np.array([poses.R[k] @ centre + poses.p[k] for k, centre in enumerate(engine.centres)])
     straight = way[0] + np.linspace(0.2, 0.8, 7)[:, None] * (way[-1] - way[0])
     tips = bare.chains["arm"].tool_poses(straight)[:, :3, 3]
     things: list[Obstacle] = []
@@ -153,7 +155,9 @@ def free_case(model: RobotModel, rng: np.random.Generator) -> Case:
         shape = _drawn_shape(rng)
         at = tips[rng.integers(len(tips))] * rng.uniform(0.6, 1.0) + rng.normal(scale=0.1, size=3)
         thing = Obstacle(name=f"thing{len(things)}", shape=shape, X_WS=pose_from(rotation_exp(rng.normal(size=3)), at))
-        if _is_off(thing, shapes, poses.R, poses.p):
+        gaps = np.linalg.norm(centres - at, axis=2) - engine.radii[:, None] - bounding_sphere(shape)[1]
+        near = np.argwhere(gaps < KEPT_OFF).tolist()
+        if all(_distance(shapes[k], poses.R[k, i], poses.p[k, i], thing) >= KEPT_OFF for k, i in near):
             things.append(thing)
     return Case(scene_with(model, things), way[0], way[-1])
 
@@ -172,8 +176,7 @@ def walled_case(model: RobotModel, rng: np.random.Generator) -> Case:
         for _ in range(20):
             at = centre + rng.normal(scale=0.5 * case.scene.engine.radii[link], size=3)
             block = Obstacle(name="block", shape=Box((0.05, 0.05, 0.05)), X_WS=pose(tuple(at)))
-            floor, *things = case.scene.cell.obstacles
-            scene = scene_with(model, [*things, block])
+            scene = scene_with(model, [*case.scene.cell.obstacles[1:], block])
             if _blocks(scene, link, q) and BruteForce(_with_clearance(scene)).contact(np.array([start, goal])) is None:
                 return Case(scene, start, goal)
 
@@ -185,7 +188,11 @@ def _known_way(bare: Scene, rng: np.random.Generator) -> Array:
     force = BruteForce(bare)
     while True:
         way = rng.uniform(lower, upper, (3, len(lower)))
-        if abs(way[2, 0] - way[0, 0]) > 1.0 and force.contact(finer(way)[::2]) is None:
+        if (
+            abs(way[2, 0] - way[0, 0]) > 1.0
+            and force.contact(finer(way, 0.3)) is None
+            and (force.contact(finer(way, COARSE)) is None)
+        ):
             return way
 
 
@@ -195,18 +202,12 @@ def _drawn_shape(rng: np.random.Generator) -> Solid:
     return shapes[int(rng.integers(3))]
 
 
-def _is_off(thing: Obstacle, shapes: Sequence[coal.CollisionGeometry], R: Array, p: Array) -> bool:
-    """Whether an obstacle keeps off all bodies at all samples."""
-    if isinstance(thing.shape, HalfSpace):
-        return False
-    shape, place = coal_shape(thing.shape), coal.Transform3s(thing.X_WS[:3, :3], thing.X_WS[:3, 3])
-    for k, own in enumerate(shapes):
-        for sample in range(R.shape[1]):
-            result = coal.DistanceResult()
-            at = coal.Transform3s(R[k, sample], p[k, sample])
-            if coal.distance(own, at, shape, place, coal.DistanceRequest(), result) < KEPT_OFF:
-                return False
-    return True
+def _distance(own: coal.CollisionGeometry, R: Array, p: Array, thing: Obstacle) -> float:
+    """Distance of a body and an obstacle in [m]."""
+    place = coal.Transform3s(thing.X_WS[:3, :3], thing.X_WS[:3, 3])
+    return coal.distance(
+        own, coal.Transform3s(R, p), coal_shape(thing.shape), place, coal.DistanceRequest(), coal.DistanceResult()
+    )
 
 
 def _blocks(scene: Scene, link: int, q: Array) -> bool:
@@ -276,7 +277,7 @@ def main() -> None:
             said = one.reason if one.found is None else f"{one.found.times[-1]:.3f} s {set(one.found.rungs.values())}"
             print(f"{number:3d} {one.model:22s} {one.seconds:6.2f} s CPU  {said} {one.contact or ''}", flush=True)
         print(
-            f"{'walled in' if is_walled else 'free'}: {found} of {count} found, {contacts} with contact by brute force, "
+            f"{'walled in' if is_walled else 'free'}: {found} of {count} found, {contacts} touch by brute force, "
             f"CPU median {np.median(seconds):.2f} s, most {max(seconds):.2f} s"
         )
 
