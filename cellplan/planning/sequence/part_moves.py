@@ -3,6 +3,7 @@
 Each of them is a task of the holder in the world, its tool upright to itself: the part lies where the cell says.
 """
 
+import math
 from dataclasses import replace
 from enum import StrEnum
 from typing import Final
@@ -17,7 +18,7 @@ from cellplan.model.time_law import peak_rate
 
 PEAK_SPEED: Final = 0.1  # [m/s] of the tool near a part that is gripped or put down: slow
 QUINTIC: Final = TimeLaw(kind=TimeLawKind.QUINTIC)
-TOLERANCE: Final = Tolerance(position=1e-4, orientation=np.deg2rad(0.01))
+TOLERANCE: Final = Tolerance(position=1e-4, orientation=math.radians(0.01))
 ALL_AXES: Final = (0, 1, 2, 3, 4, 5)
 
 
