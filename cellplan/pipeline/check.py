@@ -75,7 +75,9 @@ def _check_program(cell: Cell, progress: Progress) -> CellCheck:
     robots = []
     for robot in cell.robots:
         own = next((one.cell for one in made.values() if first.get(robot.name) in one.path_lengths), None)
-        robots.append(robot if own is None or robot.start is not None else replace(robot, start=own.robot(robot.name).start))
+        robots.append(
+            robot if own is None or robot.start is not None else replace(robot, start=own.robot(robot.name).start)
+        )
     return CellCheck(
         cell=replace(cell, robots=tuple(robots)),
         found=tuple(dict.fromkeys(name for one in made.values() for name in one.found)),

@@ -14,6 +14,7 @@ from cellplan.model.cell import Cell, Relation
 from cellplan.model.phase import Phase
 from cellplan.model.task import Frame, PlaneName
 from cellplan.planning.modes import plan_phases
+from cellplan.planning.sequence.stages import program_stages
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
 from cellplan.planning.tracking.motion_task import closures
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
@@ -86,8 +87,15 @@ def explain(cell: Cell) -> Structure:
         plane=plane,
         graph=graph,
         circuits=circuits(graph, spanning_tree(graph)),
-        matrices=tuple(_matrix(cell, model, phase) for phase in plan_phases(cell).program),
+        matrices=tuple(_matrix(own, model, phase) for own, phase in _worked_on(cell)),
     )
+
+
+def _worked_on(cell: Cell) -> list[tuple[Cell, Phase]]:
+    """The phases in which tasks of the cell are worked on, each with the cell as it is then."""
+    if cell.program is None:
+        return [(cell, phase) for phase in plan_phases(cell).program]
+    return [(stage.cell, stage.phase) for stage in program_stages(cell) if stage.phase.tasks and stage.move is None]
 
 
 def _plane(cell: Cell) -> PlaneName | None:

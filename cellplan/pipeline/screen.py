@@ -2,6 +2,7 @@
 
 from functools import reduce
 
+from cellplan.errors import InputError
 from cellplan.model.cell import Cell
 from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
 from cellplan.planning.modes import plan_phases
@@ -25,6 +26,8 @@ def screen(cell: Cell, candidates: Candidates, *, task: str | None = None, accur
         InputError: The cell cannot be worked with, or there is no such task.
         ValueError: The candidates are not cells of these robots.
     """
+    if cell.program is not None:
+        raise InputError(f"{cell.origin.at('program')}: expected a cell without a program from home to home")
     paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     runs = [
         screen_layouts(

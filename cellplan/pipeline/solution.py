@@ -17,21 +17,29 @@ class Run:
 
     Attributes:
         phase: The phase on the clock of the program.
-        scene: The scene that it is judged in, with the cell as it is in this phase.
         schedule: Desired tool poses.
         motion: Joint positions of all robots, as they were planned.
         program: The program as text, in which this phase has its rows.
         report: Result of the checks on these rows.
         rungs: How the transfer move of each robot was found, by robot; empty without transfer moves.
+        scene: The scene that it is judged in, with the cell as it is in this phase; None for that of the whole program.
     """
 
     phase: Phase
-    scene: Scene
     schedule: Schedule
     motion: Motion
     program: Program
     report: Report
     rungs: Mapping[str, str] = field(default_factory=dict)
+    scene: Scene | None = None
+
+    def cell_of(self, whole: Cell) -> Cell:
+        """The cell as it is in this phase.
+
+        Args:
+            whole: The cell of the whole program.
+        """
+        return whole if self.scene is None else self.scene.cell
 
     @property
     def transfers(self) -> dict[str, str]:

@@ -63,7 +63,7 @@ def solve_with_plots(
     """
     scene, solution = solve_motion(cell, task=task, progress=progress)
     for run in solution.runs:
-        plots.begin(run.report, cell=run.scene.cell)
+        plots.begin(run.report, cell=run.cell_of(solution.cell))
     return certified(solution, scene, progress=progress)
 
 
@@ -98,7 +98,7 @@ def _solve_program(cell: Cell, *, progress: Progress) -> tuple[Scene, Solution]:
     clock = ProgramClock.of(planned.cell, plan, [each.schedule for each in stages] * cycles)
     motions, scenes = [each.motion for each in stages] * cycles, [each.scene for each in stages] * cycles
     motion, runs = _runs(planned.cell, clock, motions, scenes, cycles=cycles, progress=progress)
-    runs = tuple(replace(run, rungs=each.rungs) for run, each in zip(runs, stages, strict=False))
+    runs = tuple(replace(run, rungs=each.rungs, scene=each.scene) for run, each in zip(runs, stages, strict=True))
     remark = "; ".join(planned.remarks) or None
     return replace(planned.scenes.held, cell=planned.cell), Solution(
         cell=planned.cell, motion=motion, runs=runs, remark=remark
@@ -107,7 +107,7 @@ def _solve_program(cell: Cell, *, progress: Progress) -> tuple[Scene, Solution]:
 
 def certified(solution: Solution, scene: Scene, *, progress: Progress) -> Solution:
     """The solution with the clearance of every phase checked and the verdict in the headers of its tables."""
-    reports = [with_clearance(run.report, run.scene, run.schedule, progress=progress) for run in solution.runs]
+    reports = [with_clearance(run.report, run.scene or scene, run.schedule, progress=progress) for run in solution.runs]
     program = with_verdict(solution.cell, solution.program, [run.phase for run in solution.runs], reports)
     runs = zip(solution.runs, reports, strict=True)
     return replace(solution, runs=tuple(replace(run, report=report, program=program) for run, report in runs))
@@ -139,9 +139,7 @@ def _runs(
         phase, rows = clock.plan.program[place], clock.cut(tables, place)
         report = verify_motion(scenes[place], schedule, rows, moving=phase.moving, progress=progress)
         report = replace(report, mode=str(cell.motion.mode), phases=clock.timed_phases)
-        runs.append(
-            Run(phase=phase, scene=scenes[place], schedule=schedule, motion=own, program=program, report=report)
-        )
+        runs.append(Run(phase=phase, schedule=schedule, motion=own, program=program, report=report))
     return motion, tuple(runs)
 
 

@@ -10,6 +10,7 @@ from cellplan.io.run.folder import MANIFEST, RunFolder
 from cellplan.io.run.joint_tables import program_digest
 from cellplan.io.run.manifest import render_manifest
 from cellplan.io.run.stored import CLOCK
+from cellplan.model.cell import Cell
 from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.background_plots import BackgroundPlots
@@ -63,7 +64,7 @@ def write_run(
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            record = _write_report(target, run, provenance, background)
+            record = _write_report(target, run.cell_of(cell), run, provenance, background)
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
             transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
@@ -89,9 +90,8 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _write_report(target: RunFolder, run: Run, provenance: Provenance, plots: BackgroundPlots) -> Record:
+def _write_report(target: RunFolder, cell: Cell, run: Run, provenance: Provenance, plots: BackgroundPlots) -> Record:
     """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
-    cell = run.scene.cell
     place = "" if run.name is None else f"{run.name}/"
     begun = plots.pictures(run.report, cell=cell)
     record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion, transfers=run.transfers)

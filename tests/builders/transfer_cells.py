@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from builders.scene_builders import make_cell, placed, stick
+from builders.scene_builders import body, joint, make_cell, placed, stick
+from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import Array
 from cellplan.io.robots.bundled import load_bundled
 from cellplan.model.cell import CheckSettings, Obstacle, Robot
@@ -36,3 +37,20 @@ def retimer_of(scene: Scene) -> Retimer:
     return Retimer(
         bounds=limits.bounds, step=limits.step, feed_share=lambda sigma: np.zeros(len(sigma)), slower=limits.slower
     )
+
+
+def gantry(name: str, *, radius: float = 0.1, z: float = 0.0) -> Robot:
+    """A disc that two sliding joints move in a plane within 1 m to each side."""
+    joints = tuple(
+        replace(joint(axis, k - 1, axis=np.eye(3)[k], slides=True), lower=-1.0, upper=1.0, velocity=1.0)
+        for k, axis in enumerate("xy")
+    )
+    model = RobotModel(
+        name="gantry",
+        source="test",
+        joints=joints,
+        flange_link=1,
+        X_BF=np.eye(4),
+        bodies=(body("disc", 1, shape=Cylinder(radius, 0.05), at=(0.0, 0.0, z)),),
+    )
+    return placed(name, model)

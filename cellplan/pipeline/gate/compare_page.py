@@ -24,7 +24,7 @@ PAGE: Final = "report.html"
 EXCERPT_LENGTH: Final = 40  # [characters] shown of a page from where it differs
 
 
-def drawn_again(cell: Cell, motions: Sequence[VerifiedMotion]) -> Drawings:
+def drawn_again(motions: Sequence[VerifiedMotion]) -> Drawings:
     """The pictures of what was found, by the place of the run and by file name."""
     return {motion.name or "": pictures(_sheets(motion, motion.cell)) for motion in motions}
 
@@ -41,7 +41,9 @@ def page_findings(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotio
     for motion in motions:
         place = motion.name or ""
         yield from _foreign_pieces(stored, place, drawn[place])
-        record = _of_the_run(stored, place, run_record(motion.report, cell=motion.cell, provenance=_provenance(stored, place)))
+        record = _of_the_run(
+            stored, place, run_record(motion.report, cell=motion.cell, provenance=_provenance(stored, place))
+        )
         yield from _page_finding(stored, place, cell=motion.cell, motion=motion, record=record)
     if "runs" in stored.record:
         reports = {str(motion.name): motion.report for motion in motions}

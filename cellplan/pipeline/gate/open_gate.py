@@ -65,7 +65,9 @@ def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], prog
     demanded = _demanded(source.cell, stored)
     rows = read_rows(stored, source.cell, demanded)
     scenes = demanded.scenes(source.cell)
-    motions = tuple(_verified(scene, rows, place, cell=source.cell, progress=progress) for place, scene in enumerate(scenes))
+    motions = tuple(
+        _verified(scene, rows, place, cell=source.cell, progress=progress) for place, scene in enumerate(scenes)
+    )
     _refuse_failing(stored, motions)
     rows.refuse_other_starts(source.cell)
     _refuse_other_headers(stored, source.cell, rows.clock, motions)
@@ -127,9 +129,7 @@ def _only_task(cell: Cell, stored: StoredRun, file: str) -> str | None:
     return None if tasks == every else str(tasks[0])
 
 
-def _verified(
-    scene: Scene, rows: StoredRows, place: int, *, cell: Cell, progress: Progress
-) -> VerifiedMotion:
+def _verified(scene: Scene, rows: StoredRows, place: int, *, cell: Cell, progress: Progress) -> VerifiedMotion:
     """Make all checks again on the rows of one phase."""
     clock, mode = rows.clock, cell.motion.mode
     phase, schedule = clock.plan.program[place], clock.schedules[place]
@@ -221,7 +221,7 @@ def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[Verifie
     """Refuse pages that say something else than was found; remarks about what may be rounding or another version."""
     if not _is_of_this_version(stored):
         return ("the page and the texts of the report were not compared: another version of cellplan wrote them",)
-    drawn = drawn_again(cell, motions)
+    drawn = drawn_again(motions)
     _refuse_because(stored, list(page_findings(stored, cell, motions, drawn)))
     other = list(other_pictures(stored, drawn))
     remark = f"some pictures differ from those rendered here, by rounding or by editing: {listed(other)}"

@@ -17,8 +17,8 @@ from cellplan.model.cell import Cell, Robot
 from cellplan.model.motion import ClockTable, JointTable, Motion
 from cellplan.model.phase import NOT_IN_PROGRAM, Phase
 from cellplan.model.plan import rows_of
-from cellplan.pipeline.plan.headers import left_out_of_program
 from cellplan.pipeline.plan.demanded import DemandedProgram, others_than_first_cycle
+from cellplan.pipeline.plan.headers import left_out_of_program
 from cellplan.pipeline.plan.program import ProgramClock, moved_while_holding
 
 START_TOL: Final = 1e-9  # [rad] or [m] tables and cells have twelve decimals of a degree, millimetre or metre
@@ -85,7 +85,9 @@ class StoredRows:
         off = np.abs(self.tables[robot.name].q[row] - q)
         if not np.all(off <= START_TOL):
             joint = robot.model.joint_names[int(np.argmax(off))]
-            raise InputError(f"{self.place(robot.name, row)}: {joint}: expected the {what} of the cell, got another one")
+            raise InputError(
+                f"{self.place(robot.name, row)}: {joint}: expected the {what} of the cell, got another one"
+            )
 
     def refuse_motion_in_hold(self, cell: Cell) -> None:
         """Refuse a robot that moves in a phase in which it holds still.

@@ -171,8 +171,7 @@ def moved_while_holding(phase: Phase, robot: str, q: Array) -> tuple[int, int] |
 def _gap_steps(plan: Plan) -> list[int]:
     """Steps between the last row of each phase of the program and the first of the next: 1 over a gap, else 0."""
     after = [not phase.in_program for phase in plan.phases[1:]]
-    gaps = [int(gap) for phase, gap in zip(plan.phases, [*after, False], strict=True) if phase.in_program]
-    return gaps
+    return [int(gap) for phase, gap in zip(plan.phases, [*after, False], strict=True) if phase.in_program]
 
 
 def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) -> Plan:

@@ -22,6 +22,7 @@ from cellplan.pipeline.plan.start import chosen_start
 from cellplan.planning.modes import standing
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.sequence.approach_starts import with_approach_starts
+from cellplan.planning.sequence.near_starts import near_start
 from cellplan.planning.sequence.part_moves import PartMove
 from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import Stage, program_stages
@@ -109,7 +110,7 @@ class _Worked:
     def __init__(self, cell: Cell, scenes: StageScenes, progress: Progress) -> None:
         """Begin with the cell as it was written."""
         self.cell, self.remarks = cell, list[str]()
-        self._scenes, self._progress, self._last = scenes, progress, np.zeros(0)
+        self._scenes, self._progress, self._last = scenes, progress, dict[str, Array]()
 
     def run(self, stage: Stage) -> PlannedRun | None:
         """The motion of a stage; None of one without tasks."""
@@ -122,13 +123,17 @@ class _Worked:
         own = with_rounded_starts(with_approach_starts(own, scene.chains, toolpaths), own)
         scene = replace(scene, cell=own)
         examine_given_starts(own, toolpaths)
-        choice = chosen_start(scene, paths, progress=self._progress)
-        started = _with_starts(own, choice.start)
-        if choice.warning is not None:
-            self.remarks.append(f"{stage.phase.name}: {choice.warning}")
+        start = near_start(scene, paths, self._last) if self._last else None
+        if start is None:
+            choice = chosen_start(scene, paths, progress=self._progress)
+            start = choice.start
+            if choice.warning is not None:
+                self.remarks.append(f"{stage.phase.name}: {choice.warning}")
+        started = _with_starts(own, start)
         self._record(stage, started)
         planned = plan_run(started, paths, stage.phase, progress=self._progress)
-        self._last = planned.motion.q[-1]
+        at_work = set(stage.phase.roles) - set(stage.phase.idle)
+        self._last |= {name: planned.motion.q[-1, own.columns(name)] for name in sorted(at_work)}
         return planned if stage.move is None else replace(planned, scene=scene)
 
     def _with_known_starts(self, stage: Stage) -> Cell:
@@ -140,7 +145,7 @@ class _Worked:
             known = self.cell.robot(robot.name)
             start = robot.start
             if is_continued and robot.name in self.cell.positioners[:1]:
-                start = self._last[own.columns(robot.name)]
+                start = self._last[robot.name]
             elif start is None and robot.name in own.positioners and stage.move is None:
                 start = known.start
             robots.append(replace(robot, start=start))
@@ -189,10 +194,7 @@ def _everyone_at_home(cell: Cell, run: PlannedRun) -> PlannedRun:
     roles = {robot.name: Hold(at_home=robot.name not in cell.positioners) for robot in cell.robots}
     times = np.array([0.0, cell.motion.step])
     start = np.concatenate(
-        [
-            run.motion.q[0, cell.columns(robot.name)] if robot.start is None else robot.start
-            for robot in own.robots
-        ]
+        [run.motion.q[0, cell.columns(robot.name)] if robot.start is None else robot.start for robot in own.robots]
     )
     motion = Motion(times=times, q=np.stack([start, start]))
     return PlannedRun(phase=Phase(name="home", roles=roles), schedule=Schedule(times=times, tasks=()), motion=motion)
@@ -201,7 +203,8 @@ def _everyone_at_home(cell: Cell, run: PlannedRun) -> PlannedRun:
 def _with_all_homes(cell: Cell) -> Cell:
     """The cell with the homes of holders too: their starts where nothing else is given."""
     return replace(
-        cell, robots=tuple(robot if robot.home is not None else replace(robot, home=robot.start) for robot in cell.robots)
+        cell,
+        robots=tuple(robot if robot.home is not None else replace(robot, home=robot.start) for robot in cell.robots),
     )
 
 
@@ -232,9 +235,7 @@ def _dwelling(stage: Stage, scene: Scene, q: Array) -> PlannedStage:
     """All robots at rest for the time of a dwell, rounded up to whole steps."""
     times = dwell_times(stage)
     motion = Motion(times=times, q=np.tile(q, (len(times), 1)))
-    return PlannedStage(
-        stage=stage, scene=scene, schedule=Schedule(times=times, tasks=()), motion=motion, rungs={}
-    )
+    return PlannedStage(stage=stage, scene=scene, schedule=Schedule(times=times, tasks=()), motion=motion, rungs={})
 
 
 def dwell_times(stage: Stage) -> Array:

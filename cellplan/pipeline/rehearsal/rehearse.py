@@ -79,6 +79,11 @@ def rehearse(
             f"{cell.origin.at('part.held_by')}: expected one robot that holds the part, got {len(cell.part.held_by)}: "
             "the pose of a part between several holders depends on their stiffness, which a cell does not state"
         )
+    if cell.program is not None:
+        raise InputError(
+            f"{cell.origin.at('program')}: expected a cell without a program from home to home, as rehearsals have no "
+            "measured errors of transfer moves; rehearse its tasks without this key"
+        )
     solution = solve(cell, progress=progress)
     trials = errors.trials if errors.is_random else 1
     _refuse_too_many(solution.runs, trials, errors)

@@ -4,9 +4,8 @@ Robots that have moved stand at their goals, the others at their starts. Orders 
 those in which trees may grow; what was found for a robot among the same standing robots is used again.
 """
 
-from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import permutations
 from typing import Final
 
@@ -18,6 +17,7 @@ from cellplan.model.seeds import generator
 from cellplan.planning.transfer.blended_lines import BlendedLine
 from cellplan.planning.transfer.move_check import MoveCheck, Others
 from cellplan.planning.transfer.query import STAGE, TransferQuery
+from cellplan.planning.transfer.reasons import Tried
 from cellplan.planning.transfer.shortened import rounded_line, shortened
 from cellplan.planning.transfer.trees import connected
 
@@ -44,25 +44,6 @@ class RobotMove:
         return len(self.line.q) == 2
 
 
-@dataclass(slots=True, kw_only=True, eq=False)
-class Tried:
-    """What was tried in vain.
-
-    Attributes:
-        orders: Orders of the robots that were tried.
-        searches: Searches by trees that failed.
-        drawn: Configurations drawn in them.
-        reached: Configurations reached from the start and from the goal in the last search of each robot.
-        refused: How often each pair of bodies was too near, by their names.
-    """
-
-    orders: int = 0
-    searches: int = 0
-    drawn: int = 0
-    reached: dict[str, tuple[int, int]] = field(default_factory=dict)
-    refused: Counter[tuple[str, str]] = field(default_factory=Counter)
-
-
 class InTurn:
     """Moves of one robot after the other.
 
@@ -70,16 +51,16 @@ class InTurn:
         tried: What was tried in vain.
     """
 
-    def __init__(self, query: TransferQuery, *, reserve: float, progress: Progress) -> None:
+    def __init__(self, query: TransferQuery, tried: Tried, *, reserve: float, progress: Progress) -> None:
         """Prepare; nothing is planned yet.
 
         Args:
             query: Who moves from where to where.
+            tried: Receives what is tried in vain.
             reserve: Distance in [m] beyond the demanded one while planning.
             progress: Called with the stage and the fraction done.
         """
-        self.tried = Tried()
-        self._query, self._reserve, self._progress = query, reserve, progress
+        self.tried, self._query, self._reserve, self._progress = tried, query, reserve, progress
         self._checks: dict[tuple[str, frozenset[str]], MoveCheck | None] = {}
         self._known: dict[tuple[str, frozenset[str], bool], RobotMove | None] = {}
 
@@ -122,9 +103,7 @@ class InTurn:
         rng = generator(f"transfer of {robot} after {sorted(moved)}", query.seed)
         found = connected(check, ends, box=box, drawn=DRAWN, rng=rng, tick=self._tick)
         if found.way is None:
-            self.tried.searches += 1
-            self.tried.drawn += DRAWN
-            self.tried.reached[robot] = found.reached
+            self.tried.failed(robot, DRAWN, found.reached)
             return None
         return self._rounded(check, shortened(check, found.way, box.velocity, rng))
 

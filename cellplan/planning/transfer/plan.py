@@ -1,4 +1,4 @@
-"""Transfer moves: from one configuration at rest to another, planned by the first of a few ways that succeeds.
+"""Transfer moves: from one configuration at rest to another, planned by the first of three ways that succeeds.
 
 All robots of which the configuration changes move; the others stand. What is planned is made smooth, retimed to the
 limits of all joints and then certified as it stands in the rows: nothing is retimed after it was certified.
@@ -18,16 +18,16 @@ from cellplan.model.rung import Rung
 from cellplan.planning.timing.retime import Retimer
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.planning.transfer.blended_lines import joint_path
+from cellplan.planning.transfer.in_time import InTime
 from cellplan.planning.transfer.in_turn import InTurn, RobotMove
 from cellplan.planning.transfer.query import STAGE, TransferQuery
+from cellplan.planning.transfer.reasons import Tried, not_found, require_free_ends
 from cellplan.planning.transfer.straight_time import straight_rows
 from cellplan.scene.scene import Scene
 
-RESERVES: Final = (
-    0.002,
-    0.006,
-)  # [m] kept beyond the demand while planning: the larger one where the certificate refuses what was found
-MOST_RETIMED: Final = 3  # orders that are retimed and certified
+RESERVES: Final = (0.002, 0.006)  # [m] beyond the demand while planning; the larger where the certificate refuses
+RESERVES_IN_TIME: Final = (0.004, 0.012)  # [m] likewise where several robots move
+MOST_RETIMED: Final = 3  # orders of the robots that are retimed and certified
 STRAIGHT_ROWS: Final = 33  # rows of a straight move that is certified before it is retimed
 
 
@@ -49,9 +49,16 @@ class PlannedTransfer:
 def plan_transfer(
     scene: Scene, start: Array, goal: Array, *, retimer: Retimer, seed: int, progress: Progress = silent
 ) -> PlannedTransfer:
-    """Plan the move of all robots of which the configuration changes.
+    """Plan the move of all robots of which the configuration changes, by the first of these ways that is free.
 
-    All of them straight in joint space and together, where that is free.
+    1. All of them straight in joint space and together, in the time of the closed form.
+    2. One robot after the other, each by two trees in its joint space while all others stand: those that have moved at
+       their goals, the others at their starts. The moves follow each other in time; none overlap.
+    3. All of them in the same span of time, each planned in joint space and time against the motion of those planned
+       before it.
+
+    Ways found by trees are shortened and their corners rounded off, so that accelerations are continuous. In the end
+    the rows are certified with all pairs of the scene.
 
     Args:
         scene: The scene of the phase: its pairs carry the demands that count in it.
@@ -65,39 +72,41 @@ def plan_transfer(
         TransferNotFoundError: The start or the goal comes too close to something, or no way was found.
     """
     query = TransferQuery.of(scene, start, goal, seed=seed)
-    query.require_free_ends()
+    progress(STAGE, 0.0)
+    require_free_ends(query)
     if not query.movers:
         return PlannedTransfer(times=np.array([0.0, retimer.step]), q=np.array([start, goal]), rungs={})
-    progress(STAGE, 0.0)
-    found = _straight(query, retimer)
-    for reserve in RESERVES:
-        found = found or _in_turn(query, retimer, reserve, progress)
+    share = np.linspace(0.0, 1.0, STRAIGHT_ROWS)[:, None]
+    straight = start + share * (goal - start)
+    if certify(scene, straight, with_minimum=False).is_kept:
+        rows = straight_rows(start, goal, retimer)
+        found = _in_rows(query, rows, retimer, dict.fromkeys(query.movers, Rung.STRAIGHT))
+        if found is not None:
+            return found
+    in_turn, in_time = Tried(), Tried() if len(query.movers) > 1 else None
+    found = _in_turn(query, retimer, in_turn, progress)
+    if found is None and in_time is not None:
+        found = _in_time(query, retimer, in_time, progress)
     if found is None:
-        raise query.not_found()
+        raise not_found(query, straight, in_turn, in_time)
     return found
 
 
-def _straight(query: TransferQuery, retimer: Retimer) -> PlannedTransfer | None:
-    """All robots straight in joint space, on one common share of the way; None where that is not free."""
-    share = np.linspace(0.0, 1.0, STRAIGHT_ROWS)[:, None]
-    if not certify(query.scene, query.start + share * (query.goal - query.start), with_minimum=False).is_kept:
-        return None
-    q = straight_rows(query.start, query.goal, retimer)
-    return in_rows(query, q, retimer, dict.fromkeys(query.movers, Rung.STRAIGHT))
-
-
-def _in_turn(query: TransferQuery, retimer: Retimer, reserve: float, progress: Progress) -> PlannedTransfer | None:
-    """One robot after the other; None where no order is found or certified."""
-    search = InTurn(query, reserve=reserve, progress=progress)
-    for moves in islice(search.moves(), MOST_RETIMED):
-        rows, q = [query.start[None]], query.start
-        for move in moves:
-            rows.append(_rows_of(move, q, retimer)[1:])
-            q = rows[-1][-1]
-        rungs = {move.robot: Rung.IN_TURN for move in moves}
-        found = in_rows(query, np.concatenate(rows), retimer, rungs)
-        if found is not None:
-            return found
+def _in_turn(query: TransferQuery, retimer: Retimer, tried: Tried, progress: Progress) -> PlannedTransfer | None:
+    """One robot after the other; None where no order is found, or none is certified."""
+    for reserve in RESERVES:
+        before = tried.uncertified
+        for moves in islice(InTurn(query, tried, reserve=reserve, progress=progress).moves(), MOST_RETIMED):
+            rows = [query.start[None]]
+            for move in moves:
+                rows.append(_rows_of(move, rows[-1][-1], retimer)[1:])
+            rungs = {move.robot: Rung.IN_TURN for move in moves}
+            found = _in_rows(query, np.concatenate(rows), retimer, rungs)
+            if found is not None:
+                return found
+            tried.uncertified += 1
+        if tried.uncertified == before:
+            break  # nothing was found; with more reserve neither
     return None
 
 
@@ -113,7 +122,23 @@ def _rows_of(move: RobotMove, q: Array, retimer: Retimer) -> Array:
     return rows
 
 
-def in_rows(query: TransferQuery, q: Array, retimer: Retimer, rungs: Mapping[str, Rung]) -> PlannedTransfer | None:
+def _in_time(query: TransferQuery, retimer: Retimer, tried: Tried, progress: Progress) -> PlannedTransfer | None:
+    """All robots in the same span of time; None where no order is found, or none is certified."""
+    for reserve in RESERVES_IN_TIME:
+        before = tried.uncertified
+        for lines in islice(InTime(query, tried, reserve=reserve, progress=progress).lines(), MOST_RETIMED):
+            path = joint_path(query.start, lines)
+            rows = path.at(retimer.fastest(path).sigma)
+            found = _in_rows(query, rows, retimer, dict.fromkeys(query.movers, Rung.IN_TIME))
+            if found is not None:
+                return found
+            tried.uncertified += 1
+        if tried.uncertified == before:
+            break
+    return None
+
+
+def _in_rows(query: TransferQuery, q: Array, retimer: Retimer, rungs: Mapping[str, Rung]) -> PlannedTransfer | None:
     """Rows, shape (N, nq), as a transfer move; None where they are not certified to keep what is demanded."""
     q[0], q[-1] = query.start, query.goal
     if not certify(query.scene, q, with_minimum=False).is_kept:

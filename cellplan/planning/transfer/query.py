@@ -1,4 +1,4 @@
-"""Transfer query: from which configuration to which, who moves, and why there is no way."""
+"""Transfer query: from which configuration to which, and which robots move."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -6,11 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.certify.certify import certify
-from cellplan.errors import TransferNotFoundError
 from cellplan.geometry.transforms import Array
-from cellplan.model.report import ClearanceClass
-from cellplan.model.units import MM
 from cellplan.planning.transfer.trees import JointBox
 from cellplan.scene.scene import Scene
 
@@ -68,27 +64,6 @@ class TransferQuery:
             velocity=model.velocity,
         )
 
-    def require_free_ends(self) -> None:
-        """Refuse a start or a goal that keeps less distance than is demanded.
-
-        Raises:
-            TransferNotFoundError: With the pair of bodies, their distance and what is demanded.
-        """
-        for name, q in (("start", self.start), ("goal", self.goal)):
-            at_rest = np.array([q, q])
-            if certify(self.scene, at_rest, with_minimum=False).is_kept:
-                continue
-            bound = certify(self.scene, at_rest)
-            pairs = [pair for kind in ClearanceClass for pair in bound.of_class(kind) if not pair.is_kept]
-            worst = min(pairs, key=lambda pair: (pair.proved - pair.demand, pair.row))
-            first, second = bound.names(worst)
-            held = "touches" if worst.touches else f"is {worst.proved * MM:.3g} mm from"
-            demand = f", {worst.demand * MM:g} mm are demanded" if worst.keeps_clearance else ""
-            raise TransferNotFoundError(
-                f"{self.place}: the {name} of the transfer move of {self.named} comes too close: '{first}' {held} "
-                f"'{second}'{demand}: let approach and retract leave more room, or move one of the two"
-            )
-
     @property
     def place(self) -> str:
         """Where in the cell file the robots that move stand."""
@@ -98,7 +73,3 @@ class TransferQuery:
     def named(self) -> str:
         """The robots that move."""
         return ", ".join(f"'{name}'" for name in self.movers) or "no robot"
-
-    def not_found(self) -> TransferNotFoundError:
-        """The error of a query without a way."""
-        return TransferNotFoundError(f"{self.place}: found no transfer move of {self.named}")

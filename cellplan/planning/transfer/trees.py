@@ -104,8 +104,8 @@ def connected(
             continue
         met = _run(check, other, mine.nodes[new], scale)
         if met is not None:
-            ends = (new, met) if number % 2 == 0 else (met, new)
-            way = trees[0].way_to(ends[0]) + trees[1].way_to(ends[1])[-2::-1]
+            ahead, back = (new, met) if number % 2 == 0 else (met, new)
+            way = trees[0].way_to(ahead) + trees[1].way_to(back)[-2::-1]
             found = np.array(way) * scale
             found[0], found[-1] = start, goal
             return Found(way=found, reached=(trees[0].count, trees[1].count))

@@ -49,16 +49,13 @@ class RunEntry(_RunEntry, total=False):
     max_orientation_error_between_rows_deg: Annotated[Number, "largest angle between the rows"]
 
 
-class _SummaryRecord(HeadRecord):
+class SummaryRecord(HeadRecord):
+    """The record of several runs: the worst of tasks, joints, clearance and accelerations."""
+
     runs: Annotated[dict[str, RunEntry], "by task: the runs"]
     closure: Annotated[dict[str, ClosureRecord], "by co-holder; empty if one robot holds the part"]
     checks: Annotated[list[RunCheckRecord], "every verified statement, with its run"]
-
-
-class SummaryRecord(_SummaryRecord, total=False):
-    """The record of several runs: the worst of tasks, joints, clearance and accelerations."""
-
-    cycles: Annotated[int, "how often the phases follow one another; only for a program from home to home"]
+    cycles: Annotated[int | None, "how often the phases follow one another; null unless from home to home"]
 
 
 def summary_record(
@@ -82,7 +79,7 @@ def summary_record(
     tasks = {task.name for task in cell.tasks}
     own = [report for report in runs if tasks.issuperset(report.tasks)]  # straight moves of holders have a report each
     accelerations = merge_accelerations(report.accelerations for report in runs)
-    record: SummaryRecord = {
+    return {
         "schema": SCHEMA,
         "cell": cell.name,
         "status": "passed" if all(report.passed for report in runs) else "failed",
@@ -109,10 +106,8 @@ def summary_record(
         "caution": CAUTION,
         "solver": solver_record(cell.solver, transfers=transfers),
         "accelerations": accelerations_record(accelerations),
+        "cycles": None if cell.program is None else cell.program.cycles,
     }
-    if cell.program is not None:
-        record["cycles"] = cell.program.cycles
-    return record
 
 
 def _run_entry(name: str, report: Report, cell: Cell) -> RunEntry:

@@ -37,6 +37,7 @@ def figure_lines(record: Record) -> list[str]:
     """The worst values of a run."""
     return [
         f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_clock_text(record)}{_method_text(record['solver'])}",
+        *_program_lines(record),
         *_task_lines(record["tasks"]),
         *_closure_lines(record.get("closure", {})),
         *_margin_lines(record["joints"]),
@@ -113,6 +114,17 @@ def _speed_lines(joints: Record) -> Iterator[str]:
     if driven:
         ratio, joint, at_s = max(driven)
         yield f"  largest joint speed {100.0 * ratio:.4g} % of its limit: {joint}{_time(at_s)}"
+
+
+def _program_lines(record: Record) -> Iterator[str]:
+    """The phases of a program from home to home, and how its transfer moves were found."""
+    if not record.get("cycles"):
+        return
+    runs, found = record["runs"], record["solver"]["transfers"] or {}
+    phases = ", ".join(f"{name} {run['cycle_time_s']:.3f} s" for name, run in runs.items())
+    yield f"  from home to home, {record['cycles']} x: {phases}"
+    for name, words in found.items():
+        yield f"  {name}: {words}"
 
 
 def _drift_lines(repeatability: Record) -> Iterator[str]:

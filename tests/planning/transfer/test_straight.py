@@ -105,12 +105,13 @@ def test_without_a_difference_nobody_moves(pair: tuple[Scene, PlannedTransfer]) 
 def test_the_limit_of_tool_speed_slows_a_straight_move(pair: tuple[Scene, PlannedTransfer]) -> None:
     scene, fast = pair
     checks = replace(scene.cell.checks, tool_speed=1.0)
-    slow = replace(scene, cell=replace(scene.cell, checks=checks))
+    motion = replace(scene.cell.motion, step=0.01)
+    slow = replace(scene, cell=replace(scene.cell, checks=checks, motion=motion))
 
     found = plan_transfer(slow, fast.q[0], fast.q[-1], retimer=retimer_of(slow), seed=0)
 
     tips = scene.chains["kuka"].tool_poses(found.q[:, :6])[:, :3, 3]
-    speeds = np.linalg.norm(np.diff(tips, axis=0), axis=1) / scene.cell.motion.step
+    speeds = np.linalg.norm(np.diff(tips, axis=0), axis=1) / motion.step
     assert 0.95 <= speeds.max() <= 1.0 + 1e-9
     assert certify(slow, found.q, with_minimum=False).is_kept
 

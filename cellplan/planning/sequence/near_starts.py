@@ -1,0 +1,68 @@
+"""Starts of later tasks: near where the robots are anyway, so that no transfer move changes the branch for nothing."""
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.clocked_path import ClockedPath
+from cellplan.model.name_order import NameOrder
+from cellplan.model.seeds import generator
+from cellplan.model.task import Frame, Task
+from cellplan.planning.start.given import part_pose
+from cellplan.planning.start.inverse_kinematics import reaching_configurations, within_limits
+from cellplan.planning.start.trial_motion import StartTrials
+from cellplan.scene.scene import Scene
+
+SEEDS: Final = 24  # configurations round the last one from which the inverse kinematics begins
+SPREAD: Final = 0.5  # [rad or m] of these round it
+
+
+def near_start(scene: Scene, paths: Mapping[str, ClockedPath], last: Mapping[str, Array]) -> Array | None:
+    """The nearest starts that the robots find for their tasks, tried together as the search for starts does.
+
+    Args:
+        scene: The scene with the cell of a block; starts that are to be found are None.
+        paths: Paths of its tasks, by task name.
+        last: Configuration in which each robot was before, in [rad] or [m], shape (n,), by robot.
+
+    Returns:
+        The stacked start configuration, shape (nq,); None where a robot was nowhere before, or the motion from it is
+        not sound.
+    """
+    cell = scene.cell
+    by_robot = {task.robot: task for task in cell.tasks}
+    found: list[Array] = []
+    for robot in cell.robots:
+        start: Array | None = robot.start
+        if start is None and robot.name in last:
+            task = by_robot.get(robot.name)
+            start = last[robot.name] if task is None else _nearest(scene, task, paths[task.name], last[robot.name])
+        if start is None:
+            return None
+        found.append(start)
+    start = np.concatenate(found)
+    trial = StartTrials(scene, paths).judge(NameOrder.of(cell).sorted(start))
+    return NameOrder.of(cell).as_listed(trial.start) if trial.is_sound else None
+
+
+def _nearest(scene: Scene, task: Task, path: ClockedPath, last: Array) -> Array | None:
+    """The configuration nearest to the last one, by the time at top speed, that puts a tool on its start."""
+    cell, chain = scene.cell, scene.chains[task.robot]
+    holder = cell.robot(cell.positioners[0]).start if cell.positioners else None
+    X_WR = np.eye(4) if task.relative_to is Frame.WORLD else part_pose(cell, holder)
+    if X_WR is None:
+        return None
+    random = generator(task.robot, cell.solver.seed).uniform(-SPREAD, SPREAD, (SEEDS, len(last)))
+    seeds = np.concatenate([last[None], last + random])
+    model = cell.robot(task.robot).model
+    arrived = reaching_configurations(chain, task, path.toolpath.X_PT_start, X_WP=X_WR, seeds=seeds)
+    inside = arrived[np.all((arrived >= model.lower) & (arrived <= model.upper), axis=1)]
+    turned = within_limits(model, arrived)
+    q = np.concatenate([inside, turned])
+    if not len(q):
+        return None
+    times = (np.abs(q - last) / model.velocity).max(axis=1)
+    nearest: Array = q[int(np.argmin(np.round(times, 6)))]
+    return nearest

@@ -1,0 +1,106 @@
+"""Transfer reasons: why no transfer move was found, in one line: what was tried, and what was too close most often."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Final
+
+from cellplan.certify.certify import certify
+from cellplan.errors import TransferNotFoundError
+from cellplan.geometry.arrays import Array
+from cellplan.model.report import ClearanceClass
+from cellplan.model.units import MM
+from cellplan.planning.transfer.query import TransferQuery
+
+SHOWN: Final = 2  # pairs of bodies that are named
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Tried:
+    """What one way of planning tried in vain.
+
+    Attributes:
+        orders: Orders of the robots.
+        searches: Searches by trees that failed.
+        drawn: Configurations drawn in them.
+        reached: Configurations reached from start and goal in the last search of each robot that failed.
+        refused: How often each pair of bodies was too near, by their names.
+        uncertified: Moves that were found but are not certified between their rows.
+    """
+
+    orders: int = 0
+    searches: int = 0
+    drawn: int = 0
+    reached: dict[str, tuple[int, int]] = field(default_factory=dict)
+    refused: Counter[tuple[str, str]] = field(default_factory=Counter)
+    uncertified: int = 0
+
+    def failed(self, robot: str, drawn: int, reached: tuple[int, int]) -> None:
+        """Count a search that found no way."""
+        self.searches += 1
+        self.drawn += drawn
+        self.reached[robot] = reached
+
+
+def require_free_ends(query: TransferQuery) -> None:
+    """Refuse a start or a goal that keeps less distance than is demanded.
+
+    Raises:
+        TransferNotFoundError: With the pair of bodies, their distance and what is demanded.
+    """
+    for name, q in (("start", query.start), ("goal", query.goal)):
+        at_rest = q[None].repeat(2, axis=0)
+        if not certify(query.scene, at_rest, with_minimum=False).is_kept:
+            raise TransferNotFoundError(
+                f"{query.place}: the {name} of the transfer move of {query.named} comes too close: "
+                f"{_nearest_words(query, at_rest)}: let approach and retract leave more room, or move one of the two"
+            )
+
+
+def not_found(query: TransferQuery, straight: Array, in_turn: Tried, in_time: Tried | None) -> TransferNotFoundError:
+    """The error of a query for which no way was found.
+
+    Args:
+        query: What was asked for.
+        straight: Some rows of the straight move, shape (K, nq).
+        in_turn: What was tried of one robot after the other.
+        in_time: What was tried of all robots at once; None where a single one moves.
+    """
+    words = [f"straight, {_nearest_words(query, straight)}"]
+    name = "one robot after the other" if in_time is not None else "by trees in its joint space"
+    words.append(f"{name}, {_tried_words(in_turn)}")
+    refused = in_turn.refused
+    if in_time is not None:
+        words.append(f"all at once in joint space and time, {_tried_words(in_time)}")
+        refused = refused + in_time.refused
+    often = [f"'{a}' too close to '{b}' ({count} times)" for (a, b), count in refused.most_common(SHOWN)]
+    most = f"; most often {' and '.join(often)}" if often else ""
+    return TransferNotFoundError(
+        f"{query.place}: found no transfer move of {query.named}: {'; '.join(words)}{most}: "
+        "give another home or start, move what is in the way, or lower the clearance"
+    )
+
+
+def _tried_words(tried: Tried) -> str:
+    """What one way of planning tried."""
+    words = []
+    if tried.orders > 1:
+        words.append(f"in {tried.orders} orders")
+    if tried.searches:
+        reached = [
+            f"{a} reached from the start of '{name}' and {b} from its goal" for name, (a, b) in tried.reached.items()
+        ]
+        words.append(f"{tried.drawn} configurations drawn ({', '.join(reached)})")
+    if tried.uncertified:
+        words.append(f"{tried.uncertified} found that could not be certified between their rows")
+    return " ".join(words) or "a robot that stands blocks an end of the move"
+
+
+def _nearest_words(query: TransferQuery, q: Array) -> str:
+    """Which pair falls short of its demand most over some rows, shape (K, nq), and by how much."""
+    bound = certify(query.scene, q)
+    pairs = [pair for kind in ClearanceClass for pair in bound.of_class(kind) if not pair.is_kept]
+    worst = min(pairs, key=lambda pair: (pair.proved - pair.demand, pair.row))
+    first, second = bound.names(worst)
+    held = "touches" if worst.touches else f"is {worst.proved * MM:.3g} mm from"
+    demand = f", {worst.demand * MM:g} mm are demanded" if worst.keeps_clearance else ""
+    return f"'{first}' {held} '{second}'{demand}"

@@ -1,0 +1,206 @@
+"""Robots that cannot all go straight: one after the other, or at once in joint space and time; and what is refused."""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders.scene_builders import thing
+from builders.transfer_cells import gantry, retimer_of, scene_of
+
+from cellplan.certify.certify import certify
+from cellplan.errors import TransferNotFoundError
+from cellplan.geometry.shapes import Box
+from cellplan.geometry.transforms import Array, pose
+from cellplan.model.rung import Rung
+from cellplan.planning.transfer.plan import PlannedTransfer, plan_transfer
+from cellplan.scene.scene import Scene
+
+RADIUS, CLEARANCE = 0.1, 0.005  # [m]
+STEP = 0.02  # [s]: few rows are retimed quickly
+FINE = 100  # samples between two rows, 0.2 mm apart at top speed
+ROUNDED_BACK = 1e-9  # [m] of distances of circles, computed twice
+
+
+WALL = (0.05, 1.2)  # [m]
+
+
+def wall(name: str, size: tuple[float, float], at: tuple[float, float] = (0.0, 0.0)) -> object:
+    return thing(name, Box((*size, 0.2)), pose((*at, 0.0)))
+
+
+def transfer(scene: Scene, start: list[float], goal: list[float], seed: int = 0) -> PlannedTransfer:
+    return plan_transfer(scene, np.array(start), np.array(goal), retimer=retimer_of(scene), seed=seed)
+
+
+def densely(q: Array) -> Array:
+    share = np.arange(FINE)[:, None] / FINE
+    return np.concatenate([*(a + share * (b - a) for a, b in pairwise(q)), q[-1:]])
+
+
+def distance_to_box(centres: Array, size: tuple[float, float]) -> Array:
+    """Distance of discs from a rectangle round the origin, by its closed form."""
+    outside = np.maximum(np.abs(centres) - 0.5 * np.array(size), 0.0)
+    return np.linalg.norm(outside, axis=1) - RADIUS
+
+
+def assert_at_limits(scene: Scene, found: PlannedTransfer) -> None:
+    """Rates from row to row, with rest before and after, keep the limits."""
+    bounds, step = retimer_of(scene).bounds, scene.cell.motion.step
+    still = np.zeros((1, found.q.shape[1]))
+    velocity = np.diff(found.q, axis=0) / step
+    acceleration = np.diff(np.concatenate([still, velocity, still]), axis=0) / step
+    jerk = np.diff(acceleration, axis=0) / step
+    for rates, limit in ((velocity, bounds.velocity), (acceleration, bounds.acceleration), (jerk, bounds.jerk)):
+        assert float((np.abs(rates) / limit).max()) <= 1.0 + 1e-9
+
+
+@pytest.fixture(scope="module")
+def swapped() -> tuple[Scene, PlannedTransfer]:
+    """Two discs that change places: none can go first, so both move at once."""
+    scene = scene_of(gantry("a"), gantry("b"), step=STEP)
+    return scene, transfer(scene, [-0.5, 0.0, 0.5, 0.0], [0.5, 0.0, -0.5, 0.0])
+
+
+def round_a_wall() -> tuple[Scene, PlannedTransfer]:
+    scene = scene_of(gantry("a"), things=[wall("wall", WALL)], step=STEP)
+    return scene, transfer(scene, [-0.5, 0.1], [0.5, 0.1])
+
+
+@pytest.fixture(scope="module")
+def rounded() -> tuple[Scene, PlannedTransfer]:
+    """A disc on the other side of a wall that it can go round."""
+    return round_a_wall()
+
+
+def test_a_disc_goes_round_a_wall(rounded: tuple[Scene, PlannedTransfer]) -> None:
+    scene, found = rounded
+
+    assert found.rungs == {"a": Rung.IN_TURN}
+    assert distance_to_box(densely(found.q), WALL).min() >= CLEARANCE - ROUNDED_BACK
+    assert np.array_equal(found.q[[0, -1]], [[-0.5, 0.1], [0.5, 0.1]])
+    assert_at_limits(scene, found)
+
+
+def test_discs_whose_ways_cross_go_one_after_the_other() -> None:
+    scene = scene_of(gantry("a"), gantry("b"), step=STEP)
+
+    found = transfer(scene, [-0.5, 0.0, 0.0, -0.5], [0.5, 0.0, 0.0, 0.5])
+
+    assert found.rungs == {"a": Rung.IN_TURN, "b": Rung.IN_TURN}
+    moves = np.diff(found.q, axis=0) != 0.0
+    assert not np.any(moves[:, :2].any(axis=1) & moves[:, 2:].any(axis=1))
+    q = densely(found.q)
+    assert np.linalg.norm(q[:, :2] - q[:, 2:], axis=1).min() >= 2.0 * RADIUS + CLEARANCE - ROUNDED_BACK
+    assert_at_limits(scene, found)
+
+
+def test_a_disc_that_blocks_the_goal_of_another_goes_first() -> None:
+    scene = scene_of(gantry("a"), gantry("b"), step=STEP)
+
+    found = transfer(scene, [-0.5, 0.0, 0.5, 0.0], [0.5, 0.0, 0.4, 0.5])
+
+    first = int(np.flatnonzero(found.q[:, 0] != -0.5)[0])
+    assert found.rungs["a"] in {Rung.STRAIGHT, Rung.IN_TURN}
+    assert np.any(found.q[: first + 1, 2:] != [0.5, 0.0])
+
+
+def test_discs_that_change_places_move_at_once(swapped: tuple[Scene, PlannedTransfer]) -> None:
+    scene, found = swapped
+
+    assert found.rungs == {"a": Rung.IN_TIME, "b": Rung.IN_TIME}
+    q = densely(found.q)
+    assert np.linalg.norm(q[:, :2] - q[:, 2:], axis=1).min() >= 2.0 * RADIUS + CLEARANCE - ROUNDED_BACK
+    assert np.array_equal(found.q[[0, -1]], [[-0.5, 0.0, 0.5, 0.0], [0.5, 0.0, -0.5, 0.0]])
+    moves = np.diff(found.q, axis=0) != 0.0
+    assert np.any(moves[:, :2].any(axis=1) & moves[:, 2:].any(axis=1))
+    assert_at_limits(scene, found)
+
+
+def test_what_is_found_is_certified_in_its_rows(swapped: tuple[Scene, PlannedTransfer]) -> None:
+    scene, found = swapped
+
+    assert certify(scene, found.q).is_kept
+
+
+PROGRAM = """
+import hashlib, sys
+sys.path[:0] = {paths!r}
+from test_ladder import round_a_wall
+_, found = round_a_wall()
+print(hashlib.sha256(found.q.tobytes() + found.times.tobytes()).hexdigest())
+"""
+
+
+def test_another_process_finds_the_same_bytes(rounded: tuple[Scene, PlannedTransfer]) -> None:
+    _, found = rounded
+    here = hashlib.sha256(found.q.tobytes() + found.times.tobytes()).hexdigest()
+    paths = [str(Path(__file__).parent), str(Path(__file__).resolve().parents[2])]
+
+    there = subprocess.run(
+        [sys.executable, "-c", PROGRAM.format(paths=paths)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONHASHSEED": "7"},
+    )
+
+    assert there.stdout.strip() == here
+
+
+def test_a_search_is_left_by_ctrl_c() -> None:
+    scene = scene_of(gantry("a"), things=[wall("wall", (0.05, 4.0))], step=STEP)
+    stages: list[float] = []
+
+    def interrupt(stage: str, share: float) -> None:
+        stages.append(share)
+        if share > 0.0:
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        plan_transfer(
+            scene,
+            np.array([-0.5, 0.0]),
+            np.array([0.5, 0.0]),
+            retimer=retimer_of(scene),
+            seed=0,
+            progress=interrupt,
+        )
+
+    assert len([share for share in stages if share > 0.0]) == 1
+
+
+def test_a_wall_without_a_gap_is_refused_with_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cellplan.planning.transfer.in_turn.DRAWN", 200)
+    scene = scene_of(gantry("a"), things=[wall("wall", (0.05, 4.0))], step=STEP)
+
+    with pytest.raises(TransferNotFoundError) as refused:
+        transfer(scene, [-0.5, 0.0], [0.5, 0.0])
+
+    assert str(refused.value) == (
+        "<cell>: robots.a: found no transfer move of 'a': straight, 'a/disc' touches 'wall', 5 mm are demanded; by "
+        "trees in its joint space, 200 configurations drawn (41 reached from the start of 'a' and 36 from its goal); "
+        "most often 'a/disc' too close to 'wall' (201 times): give another home or start, move what is in the way, or "
+        "lower the clearance"
+    )
+
+
+def test_discs_that_cannot_pass_each_other_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cellplan.planning.transfer.in_time.DRAWN", 20)
+    walls = [wall("left", (3.0, 0.02), (0.0, 0.2)), wall("right", (3.0, 0.02), (0.0, -0.2))]
+    scene = scene_of(gantry("a"), gantry("b"), things=walls, step=STEP)
+
+    with pytest.raises(TransferNotFoundError) as refused:
+        transfer(scene, [-0.5, 0.0, 0.5, 0.0], [0.5, 0.0, -0.5, 0.0])
+
+    words = str(refused.value)
+    assert words.startswith(
+        "<cell>: robots: found no transfer move of 'a', 'b': straight, 'a/disc' touches 'b/disc', 5 mm are demanded; "
+        "one robot after the other, in 2 orders; all at once in joint space and time, in 4 orders "
+    )
+    assert "'a/disc' too close to 'b/disc'" in words

@@ -1,0 +1,30 @@
+"""Real arms among random obstacles: ways that are known to be there are found, and none is found where there is none."""
+
+import numpy as np
+import pytest
+from transfers import free_case, models, outcome, walled_case
+
+COUNT = 20
+FEWEST = 19  # of the cells with a way: a search that ends by a count may miss one
+
+
+@pytest.mark.slow
+def test_transfers_of_real_arms_are_found_and_touch_nothing() -> None:
+    arms = models()
+    cases = (free_case(arms[k % len(arms)], np.random.default_rng([k, False])) for k in range(COUNT))
+
+    outcomes = [outcome(case) for case in cases]
+
+    assert [each.contact for each in outcomes if each.contact is not None] == []
+    assert sum(each.found is not None for each in outcomes) >= FEWEST
+
+
+@pytest.mark.slow
+def test_arms_that_are_walled_in_are_refused_with_what_is_in_the_way() -> None:
+    arms = models()
+    cases = (walled_case(arms[k % len(arms)], np.random.default_rng([k, True])) for k in range(COUNT))
+
+    outcomes = [outcome(case) for case in cases]
+
+    assert [each.model for each in outcomes if each.found is not None] == []
+    assert all("'block'" in each.reason for each in outcomes)
