@@ -14,6 +14,16 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.joint_path import JointPath
+from cellplan.planning.timing.kept_rates import (
+    FEWEST_STEPS,
+    RATES,
+    AtKeptRate,
+    AtRest,
+    KeptRate,
+    least_steps,
+    spans_within,
+    whole_steps,
+)
 from cellplan.planning.timing.path_length import Stretch, stretches
 from cellplan.planning.timing.retimed_path import AsWritten, RestToRest, RetimedPath, Rows
 from cellplan.planning.timing.speed_profile import SpeedProfile, fastest_profile
@@ -58,12 +68,14 @@ class Retimer:
         feed_share: Share of the tools' speed limits that is taken up at the speed of the nominal time, at nominal times
             in [s], shape (N,) to shape (N,).
         slower: By which factor the rows have to be slower for every limit to hold in them; at most 1 where all hold.
+        kept: Where the rate of the nominal time is demanded.
     """
 
     bounds: JointBounds
     step: float
     feed_share: Callable[[Array], Array]
     slower: Slower
+    kept: tuple[KeptRate, ...] = ()
 
     def fastest(self, path: JointPath) -> RetimedPath:
         """The fastest motion found along a path.
@@ -71,7 +83,12 @@ class Retimer:
         Args:
             path: The joints over the nominal time.
         """
-        made = [self._settled(piece) for piece in stretches(path, self.bounds.velocity)]
+        made: list[tuple[int, Rows]] = []
+        rest = 0.0
+        for piece in stretches(path, self.bounds.velocity):
+            made += [*self._rest(rest, float(piece.sigma[0])), self._kept(piece) or self._settled(piece)]
+            rest = float(piece.sigma[-1])
+        made += self._rest(rest, path.end)
         found = RetimedPath(
             motions=tuple(motion for _, motion in made), counts=tuple(count for count, _ in made), end=path.end
         )
@@ -80,8 +97,33 @@ class Retimer:
             factor = self.slower(sigma, path.at(sigma))
             if factor <= 1.0:
                 return found
-            found = replace(found, counts=tuple(_longer(count, factor) for count in found.counts))
+            both = zip(found.motions, found.counts, strict=True)
+            counts = tuple(count if motion.is_fixed else _longer(count, factor) for motion, count in both)
+            if counts == found.counts:
+                return found
+            found = replace(found, counts=counts)
         return found
+
+    def _rest(self, begin: float, end: float) -> list[tuple[int, Rows]]:
+        """What is demanded of a rest of all joints with its steps; nothing where no time has to pass."""
+        spans = spans_within(self.kept, begin, end)
+        waits = AtRest(begin, end, spans)
+        return [(whole_steps(waits.seconds, self.step), waits)] if len(spans) else []
+
+    def _kept(self, piece: Stretch) -> tuple[int, Rows] | None:
+        """The motion of one stretch with the demanded rates; None where nothing is demanded, or limits forbid it."""
+        begin, end = float(piece.sigma[0]), float(piece.sigma[-1])
+        spans = spans_within(self.kept, begin, end)
+        spans = spans[np.diff(spans, axis=1)[:, 0] > FEWEST_STEPS * self.step]
+        if not len(spans):
+            return None
+        left = min(each.tolerance for each in self.kept if each.begin < end and each.end > begin)
+        for share in RATES:
+            motion = AtKeptRate(piece, spans, 1.0 - left * (1.0 - share), self.step)
+            count = least_steps(motion, lambda sigma: self.slower(sigma, piece.path.at(sigma)) <= 1.0)
+            if count is not None:
+                return count, motion
+        return None
 
     def _settled(self, piece: Stretch) -> tuple[int, Rows]:
         """The motion of one stretch with its steps, from so many lengths that twice as many change it little."""
