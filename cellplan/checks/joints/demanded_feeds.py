@@ -5,11 +5,11 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.acceleration_limits import acceleration_limit
-from cellplan.checks.joints.accelerations import point_accelerations
+from cellplan.checks.joints.acceleration_limits import acceleration_limit, retimed_jerk_limit
+from cellplan.checks.joints.accelerations import jerks, point_accelerations
 from cellplan.checks.tools.tracking import relative_to_task_frame
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, Timing
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.report import Check
 from cellplan.model.task import TIME_TOLERANCE, Process
@@ -42,7 +42,9 @@ def check_feeds(scene: Scene, schedule: Schedule, q: Mapping[str, Array], X_WP: 
 
 
 def nearest_to_limit(cell: Cell, times: Array, q: Mapping[str, Array], step: int) -> tuple[str, str, float]:
-    """The joint that is nearest to its limit of velocity or acceleration in a step: name, limit, and share of it.
+    """The joint that is nearest to one of its limits in a step: name, limit, and share of it.
+
+    In a retimed program the jerk counts as well, as it is limited there.
 
     Args:
         cell: The cell.
@@ -55,10 +57,15 @@ def nearest_to_limit(cell: Cell, times: Array, q: Mapping[str, Array], step: int
     for robot in cell.robots:
         own, h = q[robot.name], times[step + 1] - times[step]
         velocity = np.abs(own[step + 1] - own[step]) / h
-        acceleration = np.abs(point_accelerations(times, own))[around].max(axis=0)
+        signed = point_accelerations(times, own)
+        acceleration = np.abs(signed)[around].max(axis=0)
+        jerk = jerks(times, signed[..., None], window=robot.controller_cycle)[around].max(axis=0)
         for index, joint in enumerate(robot.model.joints):
             name, limit = f"{robot.name} {joint.name}", acceleration_limit(robot, index)[0]
             found.append((float(velocity[index] / joint.velocity), name, "velocity"))
+            most = None if cell.motion.timing is Timing.AS_WRITTEN else retimed_jerk_limit(cell, robot, index)
+            if most is not None:
+                found.append((float(jerk[index] / most), name, "jerk"))
             if limit is not None:
                 found.append((float(acceleration[index] / limit), name, "acceleration"))
     share, joint_name, kind = max(found)

@@ -329,7 +329,9 @@ def build_motion(entry: MotionEntry) -> MotionSettings:
     return MotionSettings(
         mode=Mode(entry.mode),
         duration=entry.duration_s,
-        step=entry.step_s,
+        step=entry.row_step,
+        grid=None if entry.grid_ms is None else entry.grid_ms.si,
+        finer=None if entry.row_step == entry.step_s else entry.step_s,
         cyclic=entry.cyclic,
         locked=tuple(LockedJoint(robot=it.robot, joint=it.joint, since=it.from_s) for it in entry.locked_joints),
         timing=Timing(entry.timing) if isinstance(entry.timing, str) else Timing.CYCLE,

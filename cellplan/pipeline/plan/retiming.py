@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.acceleration_limits import acceleration_limit, part_acceleration
+from cellplan.checks.joints.acceleration_limits import acceleration_limit, part_acceleration, retimed_jerk_limit
 from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
 from cellplan.checks.joints.limits import joint_uses
 from cellplan.checks.tools.tracking import part_poses
@@ -19,6 +19,7 @@ from cellplan.model.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import Task
 from cellplan.pipeline.plan.program import ProgramClock
+from cellplan.pipeline.plan.step_errors import StepErrors
 from cellplan.planning.timing.kept_rates import KeptRate
 from cellplan.planning.timing.retime import JointBounds, Retimer
 from cellplan.planning.timing.schedule import TIME_DECIMALS
@@ -81,10 +82,7 @@ def joint_bounds(cell: Cell) -> JointBounds:
             limit = acceleration_limit(robot, index)[0]
             velocity.append(joint.velocity)
             acceleration.append(np.inf if limit is None else limit)
-            if joint.jerk is None or robot.acceleration.is_unlimited:
-                jerk.append(acceleration[-1] / cell.motion.build_up if cell.motion.build_up else np.inf)
-            else:
-                jerk.append(joint.jerk)
+            jerk.append(retimed_jerk_limit(cell, robot, index) or np.inf)
     return JointBounds(velocity=np.array(velocity), acceleration=np.array(acceleration), jerk=np.array(jerk))
 
 
@@ -98,6 +96,7 @@ class RowLimits:
         bounds: Limits of all joints.
         step: Time between two rows in [s].
         path: The joints over the nominal time; needed for the speed of the tools in the world only.
+        errors: Errors of the tools between rows; None where they do not bound the speed.
     """
 
     scene: Scene
@@ -105,6 +104,7 @@ class RowLimits:
     bounds: JointBounds
     step: float
     path: JointPath | None = None
+    errors: StepErrors | None = None
 
     def shares(self, times: Array, q: Array) -> tuple[Array, Array, Array]:
         """Largest velocity, acceleration and jerk of each joint, in shares of the limits, shape (nq,) each."""
@@ -131,7 +131,7 @@ class RowLimits:
         """
         times = np.round(np.arange(len(q)) * self.step, TIME_DECIMALS)
         velocity, acceleration, jerk = (float(shares.max()) for shares in self.shares(times, q))
-        feed = max(self._waits(sigma), *self.feeds(sigma, times).values())
+        feed = max([self._waits(sigma), *self.feeds(sigma, times).values()])
         tools = float(self._tool_moves(q[:-1], q[1:]).max()) / self.step
         return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, tools, self._part_share(times, q) ** 0.5)
 
@@ -167,6 +167,8 @@ class RowLimits:
                 share = np.maximum(share, is_moving * np.linalg.norm(twists[:, :3], axis=1) / path.task.feed)
             for begin, end in path.rests:
                 share = np.maximum(share, (sigma >= begin) & (sigma <= end))
+        if self.errors is not None:
+            share = np.maximum(share, self.errors.steepness(sigma, self.step))
         if self.path is not None:
             q, move = self.path.at(sigma), 0.5 * NOMINAL_STEP * self.path.at(sigma, 1)
             share = np.maximum(share, self._tool_moves(q - move, q + move) / NOMINAL_STEP)
@@ -216,13 +218,15 @@ def _largest_feed(task: Task) -> float:
 
 def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath) -> Array:
     """Nominal times of the rows of one phase in [s], shape (N,)."""
-    limits, motion = replace(row_limits(scene, schedule), path=path), scene.cell.motion
+    errors, motion = StepErrors(scene, schedule.paths, path), scene.cell.motion
+    limits = replace(row_limits(scene, schedule), path=path, errors=errors)
     retimer = Retimer(
         bounds=limits.bounds,
         step=motion.step,
         feed_share=limits.feed_share,
         slower=limits.slower,
         kept=kept_rates(schedule.paths),
+        errors=errors,
     )
     fastest = retimer.fastest(path)
     if motion.cycle is None:

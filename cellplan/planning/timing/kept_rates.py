@@ -163,7 +163,7 @@ def least_steps(motion: AtKeptRate, is_allowed: Callable[[Array], bool]) -> int 
 
 
 def spans_within(kept: Sequence[KeptRate], begin: float, end: float) -> Array:
-    """What is demanded between two nominal times in [s]: stretches that do not overlap, in their order, shape (n, 2)."""
+    """What is demanded between two nominal times in [s]: stretches in their order that do not overlap, shape (n, 2)."""
     found: list[list[float]] = []
     for each in sorted(kept, key=lambda one: one.begin):
         low, high = max(each.begin, begin), min(each.end, end)

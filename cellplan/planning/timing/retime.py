@@ -8,7 +8,7 @@ motion with that jerk. The motion is then made slower as a whole until every lim
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -36,11 +36,23 @@ WINDOWS: Final = (1.0, 1.4, 2.0, 2.4)  # [-] windows tried, in times that the je
 BEND_SHARES: Final = (0.8, 0.6, 0.4)  # [-] tried with them: what the bends of the path may take up of the jerk limits
 RESERVE: Final = 0.95  # [-] share of the acceleration limits with a limit of jerk: the means take up the rest
 MOST_STRETCHINGS: Final = 40  # [-] until every limit holds
+MOST_TIGHTENINGS: Final = 6  # [-] times that the speed is lowered where tools miss their tolerances between rows
+MOST_ROOTS: Final = 8  # [-] times that errors between rows are taken to grow with the square of the step
 MARGIN: Final = 1e-7  # [-] by which a motion is made slower than the limits ask for
 
 Slower = Callable[
     [Array, Array], float
 ]  # nominal times and joints in the rows -> factor of time that the limits ask for
+
+
+class StepTolerance(Protocol):
+    """Errors of tools between rows, where the joints move linearly."""
+
+    def largest(self, sigma: Array) -> Array:
+        """Largest error in each step between nominal times in [s], as a share of what is allowed, shape (N - 1,)."""
+
+    def tighten(self, sigma: Array) -> bool:
+        """Lower the largest speeds where steps miss a tolerance; whether none does."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,6 +81,8 @@ class Retimer:
             in [s], shape (N,) to shape (N,).
         slower: By which factor the rows have to be slower for every limit to hold in them; at most 1 where all hold.
         kept: Where the rate of the nominal time is demanded.
+        errors: Errors of the tools between rows, which ``feed_share`` then bounds the speed by; None for no such limit.
+            Where they cannot be kept by a slower motion they are left to the checks.
     """
 
     bounds: JointBounds
@@ -76,6 +90,7 @@ class Retimer:
     feed_share: Callable[[Array], Array]
     slower: Slower
     kept: tuple[KeptRate, ...] = ()
+    errors: StepTolerance | None = None
 
     def fastest(self, path: JointPath) -> RetimedPath:
         """The fastest motion found along a path.
@@ -139,7 +154,22 @@ class Retimer:
             count, motion = self._best(piece, points)
             if abs(count - before) <= max(1.0, SETTLED * before):
                 break
+        for _ in range(MOST_TIGHTENINGS):
+            if self.errors is None or self.errors.tighten(motion.rows(count)):
+                break
+            count, motion = self._best(piece, points)
+        count = self._tolerant(count, motion)
+        slow = self._tolerant(slow, written) if slow < count else slow
         return (slow, written) if slow < count else (count, motion)
+
+    def _tolerant(self, count: int, motion: Rows) -> int:
+        """Steps of a motion made slower until no tool is farther off between rows than is allowed."""
+        for number in range(MOST_STRETCHINGS):
+            share = float(self.errors.largest(motion.rows(count)).max()) if self.errors else 0.0
+            if share <= 1.0:
+                break
+            count = _longer(count, share**0.5) if number < MOST_ROOTS else count + 1
+        return count
 
     def _best(self, piece: Stretch, points: int) -> tuple[int, Rows]:
         """The shortest motion of one stretch among the windows and shares that are tried, and its steps."""
