@@ -182,12 +182,16 @@ def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) 
         phases.append(left.pop(0) if phase.in_program else replace(phase, begin=phases[-1].end, end=left[0].begin))
     stops: dict[str, tuple[float, ...]] = {}
     process: dict[str, tuple[Interval, ...]] = {}
+    dwells: set[Interval] = set()
     for phase, schedule in zip(placed, schedules, strict=True):
+        begin = phase.begin
         for scheduled in schedule.tasks:
-            name, begin = scheduled.task.name, phase.begin
-            process[name] = (*process.get(name, ()), (begin + scheduled.task.start, begin + scheduled.end))
-            stops[name] = (*stops.get(name, ()), *(begin + stop for stop in scheduled.stops))
-    return replace(plan, phases=tuple(phases), stops=stops, process=process)
+            task = scheduled.task
+            own = (begin + task.start, begin + scheduled.end + task.off_delay)
+            process[task.name] = (*process.get(task.name, ()), own)
+            stops[task.name] = (*stops.get(task.name, ()), *(begin + stop for stop in scheduled.stops))
+        dwells |= {(begin + first, begin + last) for path in schedule.paths for first, last in path.rests}
+    return replace(plan, phases=tuple(phases), stops=stops, process=process, dwells=tuple(sorted(dwells)))
 
 
 def _within(times: Array, stretches: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
