@@ -41,6 +41,7 @@ def verify(
     tables: Sequence[JointTable],
     *,
     moving: Sequence[str],
+    idle: Sequence[str] | None = None,
     progress: Progress = silent,
 ) -> Report:
     """Check tool errors, closed grasps, joint limits and clearance of a run: both steps below, one after the other.
@@ -52,12 +53,13 @@ def verify(
         schedule: Desired tool poses at every sample.
         tables: One joint table per robot, parsed from its text.
         moving: Names of the robots that may move; the others must stand still.
+        idle: Names of the robots that must be at their homes; None for those without a task, unless they may move.
         progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: A table is missing, or does not fit the cell or the clock.
     """
-    report = verify_motion(scene, schedule, tables, moving=moving, progress=progress)
+    report = verify_motion(scene, schedule, tables, moving=moving, idle=idle, progress=progress)
     return with_clearance(report, scene, schedule, progress=progress)
 
 
@@ -67,6 +69,7 @@ def verify_motion(
     tables: Sequence[JointTable],
     *,
     moving: Sequence[str],
+    idle: Sequence[str] | None = None,
     progress: Progress = silent,
 ) -> Report:
     """Check everything but the clearance of a run; arguments and errors are those of ``verify``.
@@ -76,7 +79,8 @@ def verify_motion(
     cell = scene.cell
     q = _positions(cell, schedule, tables)
     at_work = [scheduled.task.name for scheduled in schedule.tasks]
-    idle = [name for name in idle_robots(cell, at_work) if name not in moving]
+    if idle is None:
+        idle = [name for name in idle_robots(cell, at_work) if name not in moving]
     progress("checking tool errors and joints", 0.0)
     X_WP = part_poses(cell, scene.chains, q)
     accuracy, closures = _errors(scene, schedule, q, X_WP)

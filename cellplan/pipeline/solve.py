@@ -137,7 +137,7 @@ def _runs(
     for place in range(len(motions) // cycles):
         schedule, own = clock.schedules[place], motions[place]
         phase, rows = clock.plan.program[place], clock.cut(tables, place)
-        report = verify_motion(scenes[place], schedule, rows, moving=phase.moving, progress=progress)
+        report = verify_motion(scenes[place], schedule, rows, moving=phase.moving, idle=phase.idle, progress=progress)
         report = replace(report, mode=str(cell.motion.mode), phases=clock.timed_phases)
         runs.append(Run(phase=phase, schedule=schedule, motion=own, program=program, report=report))
     return motion, tuple(runs)

@@ -52,7 +52,9 @@ def verify(
                 f"table of '{table.robot}': expected no motion in the phase '{phase.name}': it holds still"
             )
     with nothing_kept():  # a proof rests on the cell itself
-        report = verify_tables(demanded.scenes(cell)[place], schedule, own, moving=phase.moving, progress=progress)
+        report = verify_tables(
+            demanded.scenes(cell)[place], schedule, own, moving=phase.moving, idle=phase.idle, progress=progress
+        )
     return replace(report, phases=program.timed_phases)
 
 

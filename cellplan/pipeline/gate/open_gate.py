@@ -134,7 +134,7 @@ def _verified(scene: Scene, rows: StoredRows, place: int, *, cell: Cell, progres
     clock, mode = rows.clock, cell.motion.mode
     phase, schedule = clock.plan.program[place], clock.schedules[place]
     tables = rows.of_phase(place)
-    report = verify(scene, schedule, list(tables.values()), moving=phase.moving, progress=progress)
+    report = verify(scene, schedule, list(tables.values()), moving=phase.moving, idle=phase.idle, progress=progress)
     report = replace(report, mode=str(mode), phases=clock.timed_phases)
     return VerifiedMotion(
         name=phase.label, cell=scene.cell, moving=phase.moving, schedule=schedule, tables=tables, report=report

@@ -250,4 +250,5 @@ def test_a_mark_after_all_tasks_is_a_rest_at_home():
         ("transfer-3", None),
         ("dwell-3", 2.0),
     ]
+    assert (stages[3].phase.idle, stages[3].phase.moving) == (("op1", "op2"), ())
     assert stages[-1].phase.roles == {"holder": Hold()} | dict.fromkeys(ROBOTS, Hold(at_home=True))
