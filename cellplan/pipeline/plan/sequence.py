@@ -270,5 +270,5 @@ def _transferred(stage: Stage, scene: Scene, start: Array, goal: Array, progress
         scene=scene,
         schedule=Schedule(times=found.times, tasks=()),
         motion=Motion(times=found.times, q=found.q),
-        rungs={robot: str(rung) for robot, rung in found.rungs.items()},
+        rungs={robot: rung.words for robot, rung in found.rungs.items()},
     )

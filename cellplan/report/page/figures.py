@@ -23,7 +23,7 @@ def key_figures(record: Record) -> Entries:
         "unit": "s",
         "detail": f"{record['samples']} samples, {small(1e3 * record['step_s'])} ms apart{_clock_text(record)}"
         if "samples" in record
-        else f"{len(record['runs'])} runs, one after another",
+        else f"{len(record['runs'])} {'phases' if record['cycles'] else 'runs'}, one after another",
     }
     return [
         cycle,
