@@ -11,7 +11,8 @@ from builders.two_phases import PAIR
 
 from cellplan import Cell, load_cell, solve
 from cellplan.errors import InputError
-from cellplan.pipeline.fastest import ShortestCycles, fastest, scaled_values
+from cellplan.pipeline.fastest.scaling import scaled_values
+from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
 
 STEP = 0.01
 
@@ -36,7 +37,7 @@ def test_the_time_laws_keep_all_limits_and_would_not_a_step_faster(cell: Cell, f
     cycle = found.by_time_laws
     binding = cycle.bindings[0]
 
-    assert found.written == 2.0
+    assert found.as_written.cycle == 2.0
     assert cycle.solution.passed
     assert (binding.robot, binding.kind) == ("left", "acceleration")
     assert binding.share <= 1.0

@@ -76,8 +76,8 @@ def production_curve(
 def _values(base: Cell, shortest: TimedProgram, factor: float) -> dict[str, object]:
     """Values with which a program takes longer by a factor, up to whole steps."""
     if shortest.law is Law.COMMON_SPEED:
-        step = base.motion.step
-        steps = max(steps_within(factor * shortest.longest_phase, step), steps_within(shortest.longest_phase, step) + 1)
+        step, longest = base.motion.step, max(shortest.phases)
+        steps = max(steps_within(factor * longest, step), steps_within(longest, step) + 1)
         return {"motion.timing": {"cycle_s": round(steps * step, 9)}}
     scaled = base.with_values(shortest.values)
     return scaled_values(scaled, whole_steps(scaled, factor))

@@ -100,10 +100,12 @@ def calmest(
     found = [program for program in (common, laws) if program.cycle <= cycle + NEAR]
     if laws.cycle < cycle:
         found += _by_time_laws(base, cycle, written, solved)
-    each = steps_within(cycle / len(common.solution.runs), step) * step
-    if common.cycle < cycle and each >= common.longest_phase - NEAR:
+    between = common.cycle - sum(common.phases)
+    each = steps_within((cycle - between) / len(common.phases), step) * step
+    if common.cycle < cycle and each >= max(common.phases) - NEAR:
         values: dict[str, object] = {"motion.timing": {"cycle_s": round(each, 9)}}
         found.append(solved(Law.COMMON_SPEED, values, "demand"))
+    found = [program for program in found if program.cycle <= cycle + NEAR]
     return MetDemand(per_hour=per_hour, allowed=allowed, program=min(found, key=lambda program: program.load))
 
 

@@ -109,7 +109,7 @@ class TimedProgram:
     @property
     def figures(self) -> LoadFigures:
         """Its key figures; the clearance is among them once it is certified."""
-        return load_figures([run.report for run in self.solution.runs], self.load)
+        return load_figures([run.report for run in self.solution.runs], cycle=self.cycle, load=self.load)
 
     @property
     def cycle(self) -> float:
@@ -117,9 +117,9 @@ class TimedProgram:
         return float(self.solution.motion.times[-1])
 
     @property
-    def longest_phase(self) -> float:
-        """Time of the phase that takes most of it, in [s]."""
-        return max(float(run.report.times[-1]) for run in self.solution.runs)
+    def phases(self) -> list[float]:
+        """Time of each of its phases in [s]; there may be a step between two."""
+        return [run.report.cycle_time for run in self.solution.runs]
 
 
 def _rows(scene: Scene, run: Run) -> tuple[RowLimits, Array]:

@@ -6,6 +6,7 @@ from typing import Any, Final
 from cellplan.io.cell.changes import plain_values
 from cellplan.io.cell.write import render_cell
 from cellplan.io.run.folder import RunFolder
+from cellplan.io.yaml.writer import flow_text
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.fastest.demand import MetDemand
 from cellplan.pipeline.fastest.shortest import ShortestCycles
@@ -33,7 +34,8 @@ def write_fastest(found: ShortestCycles, folder: Path, *, progress: Progress = s
     """Write the shortest cycles into a folder, which appears whole or not at all.
 
     It holds ``fastest.json``, ``fastest.html``, ``curve.csv``, a run folder for every program by its name, and for a
-    demand ``demand.yaml``: the cell of which ``cellplan solve`` gives that program.
+    demand ``demand.yaml``: the cell of which ``cellplan solve`` gives that program. It names files as the cell does, so
+    it loads from the folder of that cell.
 
     Args:
         found: As ``fastest`` returns it.
@@ -91,6 +93,7 @@ def _program(program: TimedProgram, written: float) -> ProgramRecord:
         "cycle_s": number(program.cycle),
         "share_of_written": number(program.cycle / written),
         "settings": plain_values(program.values),
+        "options": [f"{address}={flow_text(value)}" for address, value in plain_values(program.values).items()],
         "binding": [
             {
                 "phase": each.phase,
@@ -103,7 +106,7 @@ def _program(program: TimedProgram, written: float) -> ProgramRecord:
             for each in program.bindings
         ],
         "figures": program.figures,
-        **program_figures([run.report for run in program.solution.runs]),
+        **program_figures([run.report for run in program.solution.runs], program.cycle),
     }
     return record
 

@@ -8,7 +8,7 @@ from cellplan.report.page.render import inline_svg, template
 from cellplan.report.plots.fastest import COLOURS, SHOWN, curve_sheets, curves_of, single_programs
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.record.common import Entries, Record
-from cellplan.report.text.fastest import TITLES, saving_text
+from cellplan.report.text.fastest import TITLES, binding_lines, saving_text
 
 NAMES: Final = {**TITLES, "demand": "for the demand"}
 SINGLES: Final = (NAMES["reduced_speed"], NAMES["demand"])  # beside the curve
@@ -37,6 +37,7 @@ def fastest_page(record: Record) -> str:
         legend=[(COLOURS[law], NAMES[law]) for law in legend],
         titles=TITLES,
         saving=saving_text,
+        binding=binding_lines,
         caution=CAUTION,
     )
 
@@ -55,13 +56,13 @@ def _figures(programs: Mapping[str, Record]) -> Entries:
     for name, program in programs.items():
         figures = program["figures"]
         detail = f"{figures['parts_per_h']:.1f} parts per hour"
-        binding = program["binding"][0]["text"] if len(program["binding"]) == 1 else ""
+        binding = binding_lines(program)
         entries.append(
             {
                 "label": name,
                 "value": f"{program['cycle_s']:g}",
                 "unit": "s",
-                "detail": f"{detail}; {binding}" if binding else detail,
+                "detail": f"{detail}; {binding[0]}" if len(binding) == 1 else detail,
                 "is_bad": program["status"] != "passed",
             }
         )

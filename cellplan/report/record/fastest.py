@@ -33,6 +33,7 @@ class ProgramRecord(TypedDict):
     cycle_s: Annotated[Number, "time from the first row to the last one"]
     share_of_written: Annotated[Number, "share of the cycle as it is written"]
     settings: Annotated[dict[str, Any], "by address: values of the cell file with which `solve` gives it"]
+    options: Annotated[list[str], "the same as `KEY=VALUE` for `--set`"]
     binding: Annotated[list[BindingRecord], "what binds each phase"]
     figures: Annotated[LoadFigures, "its load"]
     robots: Annotated[dict[str, RobotSpeedRecord], "by robot: speeds in the world"]
@@ -78,13 +79,18 @@ class FastestRecord(TypedDict):
     versions: Annotated[dict[str, str], "versions of cellplan and of the packages that the numbers depend on"]
 
 
-def program_figures(reports: Sequence[Report]) -> dict[str, Any]:
-    """Verdict, errors, clearance and speeds of a program, from the report of each phase."""
+def program_figures(reports: Sequence[Report], cycle: float) -> dict[str, Any]:
+    """Verdict, errors, clearance and speeds of a program.
+
+    Args:
+        reports: The report of each phase.
+        cycle: Time from the first row of the program to the last one in [s].
+    """
     key = key_figures(reports)
     failed = [check.message for report in reports for check in report.checks if not check.passed]
     return {
         "status": "failed" if failed else "passed",
-        "robots": dict(robot_speeds(reports)),
+        "robots": dict(robot_speeds(reports, cycle)),
         "largest_position_error_mm": key["max_position_error_mm"],
         "largest_orientation_error_deg": key["max_orientation_error_deg"],
         "smallest_clearance_mm": key["min_clearance_mm"],

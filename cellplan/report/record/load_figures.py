@@ -46,21 +46,21 @@ class RobotSpeedRecord(TypedDict):
     axis: Annotated[str, "that axis"]
 
 
-def load_figures(reports: Sequence[Report], load: float) -> LoadFigures:
+def load_figures(reports: Sequence[Report], *, cycle: float, load: float) -> LoadFigures:
     """The load of a program.
 
     Args:
         reports: The report of each phase.
+        cycle: Time from the first row of the program to the last one in [s].
         load: Share of its time in which the limits would allow the same motion.
     """
     key = key_figures(reports)
-    cycle = sum(report.cycle_time for report in reports)
-    speeds = robot_speeds(reports)
+    speeds = robot_speeds(reports, cycle)
     tool = max(speeds, key=lambda name: speeds[name]["tool_peak_mm_s"] or 0.0)
     axis = max(speeds, key=lambda name: speeds[name]["axis_peak_mm_s"] or 0.0)
     above = max(speeds, key=lambda name: speeds[name]["share_above_250_mm_s"] or 0.0)
     return {
-        "cycle_time_s": key["cycle_time_s"],
+        "cycle_time_s": number(cycle),
         "parts_per_h": number(SECONDS_PER_HOUR / cycle),
         "load_ratio": number(load),
         "max_velocity_ratio": key["max_velocity_ratio"],
@@ -82,10 +82,9 @@ def load_figures(reports: Sequence[Report], load: float) -> LoadFigures:
     }
 
 
-def robot_speeds(reports: Sequence[Report]) -> Mapping[str, RobotSpeedRecord]:
-    """Speeds of each robot in the world over all phases, by robot."""
+def robot_speeds(reports: Sequence[Report], cycle: float) -> Mapping[str, RobotSpeedRecord]:
+    """Speeds of each robot in the world over all phases, by robot; arguments as in ``load_figures``."""
     found: dict[str, RobotSpeedRecord] = {}
-    cycle = sum(report.cycle_time for report in reports)
     for name in reports[0].speeds:
         every = [report.speeds[name] for report in reports]
         above = sum(speed.share_above_reduced * report.cycle_time for speed, report in zip(every, reports, strict=True))

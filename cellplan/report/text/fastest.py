@@ -17,6 +17,8 @@ FIGURES: Final = {
     "max_tool_speed_mm_s": "tool speed",
     "energy_proxy_s": "energy proxy",
 }  # what a demand saves, by figure
+KINDS: Final = ("velocity", "acceleration")
+BINDS: Final = 0.9  # [-] of a limit: less is a load and no bound
 HEADINGS: Final = ("cycle s", "parts/h", "velocity %", "acceleration %", "tool mm/s", "energy proxy s", "margin deg")
 
 
@@ -45,12 +47,20 @@ def saving_text(record: Record) -> str:
     return ", ".join(parts)
 
 
+def binding_lines(program: Record) -> list[str]:
+    """What binds each phase of a program, or how near its joints come to their limits where nothing does."""
+    binding, figures = program["binding"], program["figures"]
+    if max(figures["load_ratio"], *(each["percent"] / 100.0 for each in binding)) >= BINDS:
+        return [each["text"] if len(binding) == 1 else f"phase {each['phase']}: {each['text']}" for each in binding]
+    shares = ((figures[f"max_{kind}_ratio"], figures[f"max_{kind}_joint"], kind) for kind in KINDS)
+    reached = [f"{100.0 * share:.3g} % of a limit of {kind} ({joint})" for share, joint, kind in shares if share]
+    return [f"nothing binds: joints reach {', '.join(reached)}"]
+
+
 def _program_lines(title: str, program: Record) -> Iterator[str]:
     """One program: its cycle, what binds, speeds, errors, clearance and failed checks."""
     yield f"  {title}: {program['cycle_s']:g} s, {100.0 * program['share_of_written']:.3g} % of the written time"
-    for each in program["binding"]:
-        phase = "" if len(program["binding"]) == 1 else f"phase {each['phase']}: "
-        yield f"    {phase}{each['text']}"
+    yield from (f"    {line}" for line in binding_lines(program))
     figures, clearance = program["figures"], program["smallest_clearance_mm"]
     distance = "nothing to keep clear of" if clearance is None else f"smallest clearance {clearance:.4g} mm"
     yield (
@@ -60,8 +70,9 @@ def _program_lines(title: str, program: Record) -> Iterator[str]:
     above = figures["share_above_250_mm_s"]
     share = f"for {100.0 * above:.3g} % of the time ({figures['share_above_250_robot']})" if above else "never"
     yield (
-        f"    tools up to {figures['max_tool_speed_mm_s']:.4g} mm/s ({figures['max_tool_speed_robot']}), above 250 mm/s "
-        f"{share}; axes up to {figures['max_axis_speed_mm_s']:.4g} mm/s ({figures['max_axis_speed_joint']})"
+        f"    tools up to {figures['max_tool_speed_mm_s']:.4g} mm/s ({figures['max_tool_speed_robot']}), "
+        f"above 250 mm/s {share}; "
+        f"axes up to {figures['max_axis_speed_mm_s']:.4g} mm/s ({figures['max_axis_speed_joint']})"
     )
     for message in program["failed"]:
         yield f"    FAILED {message}"
@@ -70,13 +81,14 @@ def _program_lines(title: str, program: Record) -> Iterator[str]:
 def _demand_lines(demand: Record) -> Iterator[str]:
     """The calmest program that meets the demand."""
     program = demand["program"]
-    law = TITLES[program["law"]]
-    yield (f"  demand {demand['parts_per_h']:g}/h, a part in {demand['allowed_cycle_s']:g} s at most: calmest {law}")
-    yield from (f"  {line}" for line in _program_lines(f"{law}", program))
+    yield f"  demand {demand['parts_per_h']:g}/h, a part in {demand['allowed_cycle_s']:g} s at most; calmest program:"
+    yield from (f"  {line}" for line in _program_lines(TITLES[program["law"]], program))
     if demand["idle_s"]:
         yield (
             f"    the robots wait for {demand['idle_s']:g} s of each cycle: a longer motion would save next to nothing"
         )
+    options = " ".join(f"--set '{each}'" for each in program["options"])
+    yield f"    gives it: cellplan solve {options}"
     yield f"    against the shortest cycle: {saving_text(demand['saving_against_shortest'])}"
     yield f"    against the program as written: {saving_text(demand['saving_against_written'])}"
 
