@@ -15,7 +15,7 @@ from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 HOUR: Final = 3600.0  # [s]
 PER_HOUR: Final = {"h": 1.0, "min": 60.0}  # [1/h] of one in each unit
 WRITTEN: Final = re.compile(r"(\d{1,9}(?:\.\d{1,9})?)\s*/\s*(h|min)")
-SLOWEST: Final = 10.0  # [-] of the shortest cycle: a longer one saves next to nothing, the robots wait instead
+SLOWEST: Final = 10.0  # [-] of the shortest cycle, unless the written one is longer: then the robots wait instead
 MOST_TRIALS: Final = 8  # factors tried until all phases fit the cycle
 NEAR: Final = 1e-9  # [s] of a cycle: rounding
 
@@ -96,7 +96,7 @@ def calmest(
     """
     step = base.motion.step
     allowed = steps_within(HOUR / per_hour, step) * step
-    cycle = min(allowed, steps_within(SLOWEST * common.cycle, step) * step)
+    cycle = min(allowed, max(steps_within(SLOWEST * common.cycle, step) * step, written.cycle))
     found = [program for program in (common, laws) if program.cycle <= cycle + NEAR]
     if laws.cycle < cycle:
         found += _by_time_laws(base, cycle, written, solved)
