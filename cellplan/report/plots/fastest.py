@@ -95,7 +95,7 @@ def _draw(
         across = np.array([panel.first, panel.last])
         sheet.curve(panel, across, np.full(2, shown.limit), colour=LIMIT, width=0.9)
         at = float(panel.y(np.array([shown.limit]))[0])
-        sheet.write(panel.left + panel.width, at + 0.03, shown.limit_name, size=7, color=GREY, ha="right")
+        sheet.write(panel.left + panel.width, at - 0.04, shown.limit_name, size=7, color=GREY, ha="right", va="top")
     for law, points in curves.items():
         found = [(point["cycle_time_s"], shown.scale * point[name]) for point in points if point[name] is not None]
         if found:
