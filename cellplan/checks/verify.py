@@ -10,6 +10,7 @@ from cellplan.checks.clearance.idle import check_idle
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.checks.clearance.tool_depth import check_depths, tool_depths
 from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
+from cellplan.checks.joints.demanded_feeds import check_feeds
 from cellplan.checks.joints.drift import check_joint_drift, repeatability
 from cellplan.checks.joints.limits import check_joints, joint_uses
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
@@ -85,7 +86,7 @@ def verify_motion(
     checks += [*joint_checks, *check_accelerations(cell, accelerations), *check_tool_speeds(cell, speeds)]
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
-    checks += [*check_idle(cell, schedule, q), *check_payload(loads)]
+    checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, schedule, q), *check_payload(loads)]
     return Report(
         cell=cell.name,
         mode=str(cell.motion.mode),

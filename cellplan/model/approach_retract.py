@@ -10,7 +10,7 @@ REST_TO_REST = TimeLaw(kind=TimeLawKind.QUINTIC)
 
 
 def stand_off(times: Array, task: Task, X_PT: Array, *, V_PT_P: Array, end: float) -> None:
-    """Shift the poses before the start and after the end of a path, in place, where the task asks for it.
+    """Shift the poses before the start and after the end of a task, in place, where it asks for it.
 
     An approach goes straight along the tool's axis, from rest to rest, and is over when the path starts; leaving begins
     when the path ends. Before and after that the tool rests off the part.
@@ -20,7 +20,7 @@ def stand_off(times: Array, task: Task, X_PT: Array, *, V_PT_P: Array, end: floa
         task: The task.
         X_PT: Reference poses, held still before the start and after the end of the path, shape (N, 4, 4).
         V_PT_P: Reference twists, zero there, shape (N, 6).
-        end: End of the path in [s].
+        end: Time in [s] at which the tool leaves the end of its path.
     """
     if task.approach is not None:
         _back_off(X_PT, V_PT_P, task.start - times, distance=task.approach.distance, duration=task.approach.duration)

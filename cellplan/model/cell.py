@@ -208,13 +208,15 @@ class MotionSettings:
     Attributes:
         mode: Which robots move.
         duration: Length of the common clock in [s]; None when it ends with the last task.
-        step: Time between two samples in [s].
+        step: Time between two rows in [s]: that of the grid, where there is one.
         cyclic: Whether all joints are to end where they started.
         locked: Joints that fail during the motion.
         timing: Whether the time laws say when the joints are where, or the limits of the joints.
         cycle: Time in [s] that each phase of a program takes; None unless the timing demands one.
         build_up: Time in [s] in which a joint without a stated limit of jerk is taken to build up its acceleration
             where a program is retimed; None for no limit.
+        grid: Grid of the controller in [s], on which all rows lie; None for rows of every step.
+        finer: Step in [s] of a method that goes from row to row, as ``step_s`` says; None where it is that of the rows.
     """
 
     mode: Mode
@@ -225,6 +227,8 @@ class MotionSettings:
     timing: Timing = Timing.AS_WRITTEN
     cycle: float | None = None
     build_up: float | None = 0.05
+    grid: float | None = None
+    finer: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -31,6 +31,7 @@ class TaskSchedule:
         cycle_ends: Times in [s] at which the tool has come back to the pose of its start, all constrained
             components together, one per cycle; none when it does not come back.
         stops: Times in [s] at which a stretch of the path with its own start and stop of the time law begins or ends.
+        demanded: Stretches of time in [s] in which the feed of a process is demanded, as (from, to).
     """
 
     task: Task
@@ -41,6 +42,12 @@ class TaskSchedule:
     end: float
     cycle_ends: tuple[float, ...] = ()
     stops: tuple[float, ...] = ()
+    demanded: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def begin(self) -> float:
+        """Time in [s] at which the tool starts along its path."""
+        return self.stops[0] if self.stops else self.task.start
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

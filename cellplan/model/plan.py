@@ -18,8 +18,10 @@ class Plan:
     Attributes:
         phases: All phases in their order, those without rows in the program among them; neighbours share their ends.
         stops: Nominal times in [s] at which the time law brings the tool of a task to rest, by task.
-        dwells: Stretches of nominal time at which the clock waits: none while every program runs as it is written.
-        process: Stretches of nominal time in [s] in which the tool of a task is on its path, by task.
+        dwells: Stretches of nominal time in [s] that take no less time in any program, as (from, to): the delays of
+            processes, and dwells.
+        process: Stretches of nominal time in [s] in which the tool of a task is on its path, by task; with the delays
+            of a process.
     """
 
     phases: tuple[Phase, ...] = ()

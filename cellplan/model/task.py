@@ -147,6 +147,7 @@ class TimeLawKind(StrEnum):
     CONSTANT = "constant"
     TRAPEZOID = "trapezoid"
     QUINTIC = "quintic"
+    STEADY = "steady"  # of a process: its feed, but for smooth ramps of a given time at both ends
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,6 +191,29 @@ class StraightMove:
     duration: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Process:
+    """What a tool does along its path at a demanded feed: welding, sealing, dispensing.
+
+    The process is on from the start of the task to the end of the path and of its delay. The tool rests during both
+    delays, speeds up during the ramp behind the first one, and slows down during the ramp before the last one; so it
+    does before and after each stop at a corner. Between the ramps its feed is demanded.
+
+    Attributes:
+        feed: Demanded speed of the tool along its path in [m/s].
+        tolerance: Share of the feed by which the speed may differ from it.
+        on_delay: Time in [s] for which the tool rests at the start of the path with the process on.
+        off_delay: Likewise at its end.
+        ramp: Time in [s] in which the tool comes from rest to the feed, and from the feed to rest.
+    """
+
+    feed: float
+    tolerance: float = 0.05
+    on_delay: float = 0.0
+    off_delay: float = 0.0
+    ramp: float = 0.1
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Task:
     """One operator's work on the part.
@@ -208,10 +232,11 @@ class Task:
         axes: Constrained components of the tool's motion in P, in the order x, y, z, rx, ry, rz.
         is_spin_free: Whether rotation about the tool's own axis is left open.
         tolerance: Largest allowed error.
-        start: Start of the path on the common clock in [s]; an approach ends then.
+        start: Start of the path on the common clock in [s]; an approach ends then, and a process is switched on.
         duration: Time for the whole path in [s], all cycles together; None when the feed, a trajectory or the common
             clock decides.
-        feed: Largest speed along the path on the surface in [m/s]; None when the duration decides.
+        feed: Largest speed along the path on the surface in [m/s], that of the process if there is one; None when the
+            duration decides.
         time_law: Law of each stretch between stops.
         blend: Corner rounding distance in [m]; None means that the tool stops at every corner.
         settle: Time in [s] after the start during which the tool may come from beside its path: errors are reported
@@ -219,6 +244,8 @@ class Task:
         repeat: Number of passes along a closed path.
         approach: Motion of the tool to the start of its path; None when it starts there.
         retract: Motion of the tool away from the end of its path; None when it stays there.
+        process: Process with a demanded feed along the path; None for none.
+        dwell: Time in [s] for which the tool rests at the end of its path, the process off, before it leaves.
         relative_to: Frame that path and axes are given in. In the world, the first holder's task says where the part
             is carried; P then reads W in everything that is said of the task.
         tool_depth: Largest depth in [m] that the tool may have in the part, along its axis.
@@ -245,6 +272,8 @@ class Task:
     repeat: int = 1
     approach: StraightMove | None = None
     retract: StraightMove | None = None
+    process: Process | None = None
+    dwell: float = 0.0
     relative_to: Frame = Frame.PART
     tool_depth: float = 1e-3
     origin: Origin = field(default_factory=Origin, compare=False, repr=False)
@@ -260,9 +289,24 @@ class Task:
         return self.origin.at(shared if shared in self.origin.lines and own not in self.origin.lines else own)
 
     @property
+    def feed_key(self) -> str:
+        """Key that gives the feed."""
+        return "feed_mm_s" if self.process is None else "process.feed_mm_s"
+
+    @property
+    def moves_from(self) -> float:
+        """Time in [s] at which the tool starts along its path: after the delay of its process."""
+        return self.start + (self.process.on_delay if self.process else 0.0)
+
+    @property
+    def off_delay(self) -> float:
+        """Time in [s] for which the process stays on at the end of the path."""
+        return self.process.off_delay if self.process else 0.0
+
+    @property
     def leaving(self) -> float:
-        """Time in [s] after the end of the path that a retreat takes."""
-        return self.retract.duration if self.retract else 0.0
+        """Time in [s] after the end of the path that the delay of the process, the dwell and a retreat take."""
+        return self.off_delay + self.dwell + (self.retract.duration if self.retract else 0.0)
 
     def time_for_path(self, clock: float | None) -> float | None:
         """Time for the whole path in [s]: its own, or the rest of the common clock; None when neither is given.

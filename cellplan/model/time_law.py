@@ -20,12 +20,19 @@ class Advance:
     acceleration: Array
 
 
-def advance(law: TimeLaw, tau: Array) -> Advance:
+def advance(law: TimeLaw, tau: Array, ramp: Array | float | None = None) -> Advance:
     """How far a law has come at shares ``tau`` of the time, 0..1, shape (N,).
 
     Constant: ``sigma = tau``. Quintic: ``sigma = 10 tau^3 - 15 tau^4 + 6 tau^5``, at rest and without acceleration at
     both ends. Trapezoid: even speeding up and slowing down, each during ``ramp`` of the time, at rest at both ends.
+    Steady: likewise, with accelerations that start and end at zero.
+
+    Args:
+        law: The law.
+        tau: Shares of the time, shape (N,).
+        ramp: Share of the time that a ramp takes, one for all or shape (N,); that of the law when left out.
     """
+    share = law.ramp if ramp is None else ramp
     match law.kind:
         case TimeLawKind.CONSTANT:
             return Advance(share=tau, rate=np.ones_like(tau), acceleration=np.zeros_like(tau))
@@ -37,7 +44,9 @@ def advance(law: TimeLaw, tau: Array) -> Advance:
                 acceleration=60.0 * tau * rest * (1.0 - 2.0 * tau),
             )
         case TimeLawKind.TRAPEZOID:
-            return _trapezoid(tau, law.ramp)
+            return _trapezoid(tau, share)
+        case TimeLawKind.STEADY:
+            return _steady(tau, share)
 
 
 def peak_rate(law: TimeLaw) -> float:
@@ -47,27 +56,41 @@ def peak_rate(law: TimeLaw) -> float:
             return 1.0
         case TimeLawKind.QUINTIC:
             return 1.875
-        case TimeLawKind.TRAPEZOID:
+        case TimeLawKind.TRAPEZOID | TimeLawKind.STEADY:
             return 1.0 / (1.0 - law.ramp)
 
 
-def reached_at(law: TimeLaw, share: Array) -> Array:
+def reached_at(law: TimeLaw, share: Array, ramp: Array | float | None = None) -> Array:
     """Shares of the time, 0..1, at which a law has come to shares of the stretch, shape (N,): by halving."""
     tau: Array = np.where(share >= 1.0, 1.0, 0.0)
     is_inside = (share > 0.0) & (share < 1.0)
-    inside = share[is_inside]
+    inside, own = share[is_inside], ramp[is_inside] if isinstance(ramp, np.ndarray) else ramp
     if not len(inside):
         return tau
     low, high = np.zeros_like(inside), np.ones_like(inside)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        is_short = advance(law, middle).share < inside
+        is_short = advance(law, middle, own).share < inside
         low, high = np.where(is_short, middle, low), np.where(is_short, high, middle)
     tau[is_inside] = 0.5 * (low + high)
     return tau
 
 
-def _trapezoid(tau: Array, ramp: float) -> Advance:
+def _steady(tau: Array, ramp: Array | float) -> Advance:
+    """As a trapezoid, but with the rate ``3 x^2 - 2 x^3`` of the top one at a share x of a ramp."""
+    v = 1.0 / (1.0 - ramp)
+    x = np.minimum(np.minimum(tau, 1.0 - tau) / ramp, 1.0)
+    begun = v * ramp * x**3 * (1.0 - 0.5 * x)
+    ramps = [tau < ramp, 1.0 - tau < ramp]
+    bend = 6.0 * v / ramp * x * (1.0 - x)
+    return Advance(
+        share=np.select(ramps, [begun, 1.0 - begun], v * (tau - 0.5 * ramp)),
+        rate=v * x * x * (3.0 - 2.0 * x),
+        acceleration=np.select(ramps, [bend, -bend], 0.0),
+    )
+
+
+def _trapezoid(tau: Array, ramp: Array | float) -> Advance:
     """Speeding up to the rate ``v = 1 / (1 - ramp)``, keeping it, and slowing down in mirror image."""
     v = 1.0 / (1.0 - ramp)
     rest = 1.0 - tau

@@ -32,9 +32,9 @@ checks: {clearance_mm: 5}
 ROBOTS = ("left", "right")
 
 
-def seal_program(run: Path) -> None:
+def seal_program(run: Path, robots: tuple[str, ...] = ROBOTS) -> None:
     """Make headers, reports and manifest carry the digests of the rows and files as they are now."""
-    texts = {name: (run / "tables" / f"{name}.csv").read_text() for name in ROBOTS}
+    texts = {name: (run / "tables" / f"{name}.csv").read_text() for name in robots}
     program = program_digest(texts)
     for path in (run / "tables").iterdir():
         path.write_text(re.sub("# program digest: sha256 .*", f"# program digest: sha256 {program}", path.read_text()))

@@ -70,6 +70,14 @@ def acceleration_limit(robot: Robot, index: int) -> tuple[float | None, LimitSou
     return joint.top_speed / seconds, LimitSource.ASSUMED
 
 
+def retimed_jerk_limit(cell: Cell, robot: Robot, index: int) -> float | None:
+    """Largest jerk of one joint in [rad/s^3] or [m/s^3] that a retimed program has: stated, or assumed."""
+    joint, limit = robot.model.joints[index], acceleration_limit(robot, index)[0]
+    if joint.jerk is not None and not robot.acceleration.is_unlimited:
+        return joint.jerk
+    return None if limit is None or not cell.motion.build_up else limit / cell.motion.build_up
+
+
 def check_accelerations(cell: Cell, found: MotionAccelerations) -> list[Check]:
     """Acceleration of every joint that has a limit, jerk where a limit is stated, and that of the part."""
     checks: list[Check] = []

@@ -82,7 +82,7 @@ def _cycle_times(schedule: Schedule) -> Array:
     """Times at which all tools are at their start together, shape (cycles + 1,); fewer than two: no cycle."""
     if not schedule.tasks or not all(scheduled.cycle_ends for scheduled in schedule.tasks):
         return np.zeros(0)
-    bounds = [np.array([scheduled.task.start, *scheduled.cycle_ends]) for scheduled in schedule.tasks]
+    bounds = [np.array([scheduled.begin, *scheduled.cycle_ends]) for scheduled in schedule.tasks]
     is_common = all(len(b) == len(bounds[0]) and np.abs(b - bounds[0]).max() <= TIME_TOLERANCE for b in bounds)
     cycle_times = bounds[0] if is_common else np.array([min(b[0] for b in bounds), max(b[-1] for b in bounds)])
     settled = max(scheduled.task.judged_from for scheduled in schedule.tasks)

@@ -84,7 +84,7 @@ def _process_speed(scheduled: TaskSchedule, times: Array, X_WT: Array, *, X_WP: 
     """Speeds between the samples from the start of the path, once settled, to its end; None for a tool at rest."""
     task = scheduled.task
     tolerance = 1e-6 * float(times[-1])  # rounding of times
-    begin = task.start + task.settle
+    begin = scheduled.begin + task.settle
     steps = np.flatnonzero((times[:-1] >= begin - tolerance) & (times[1:] <= scheduled.end + tolerance))
     if not len(steps) or not scheduled.length > 0.0:
         return None

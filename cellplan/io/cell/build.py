@@ -21,6 +21,7 @@ from cellplan.io.schema.task import (
     BlendEntry,
     PathEntry,
     PolylineEntry,
+    ProcessEntry,
     TaskEntry,
     ToleranceEntry,
     TrapezoidEntry,
@@ -48,6 +49,7 @@ from cellplan.model.task import (
     PathSpec,
     PlaneName,
     PolygonPath,
+    Process,
     RunDirection,
     SampledPath,
     SpacePolylinePath,
@@ -146,7 +148,8 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader, or
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
     path = _path(name, entry.path, read_targets)
-    law = entry.time_law or motion.time_law
+    process = _process(entry.process)
+    law = _time_law(entry.time_law or motion.time_law) if process is None else TimeLaw(kind=TimeLawKind.STEADY)
     corners = entry.corners or motion.corners
     return Task(
         name=name,
@@ -162,16 +165,31 @@ def build_task(name: str, document: CellDocument, read_targets: TargetReader, or
         tolerance=_tolerance(entry.tolerance),
         start=entry.begins_s,
         duration=entry.duration_s,
-        feed=si_or_none(entry.feed_mm_s),
-        time_law=_time_law(law),
+        feed=si_or_none(entry.feed_mm_s) if process is None else process.feed,
+        time_law=law,
         blend=corners.blend_mm.si if isinstance(corners, BlendEntry) else None,
         settle=entry.settle_s,
         repeat=entry.repeat,
         approach=_straight_move(entry.approach_mm, entry.approach_s),
         retract=_straight_move(entry.retract_mm, entry.retract_s),
+        process=process,
+        dwell=entry.dwell_s,
         relative_to=Frame(entry.relative_to),
         tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm).si,
         origin=origin,
+    )
+
+
+def _process(entry: ProcessEntry | None) -> Process | None:
+    """A process with its feed in [m/s]."""
+    if entry is None:
+        return None
+    return Process(
+        feed=entry.feed_mm_s.si,
+        tolerance=entry.tolerance_percent / 100.0,
+        on_delay=entry.on_delay_s,
+        off_delay=entry.off_delay_s,
+        ramp=entry.ramp_s,
     )
 
 
@@ -234,7 +252,8 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
             entry.setdefault("tool_depth_mm", document.checks.tool_depth_mm)
         entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
         if name not in timed:
-            entry.setdefault("time_law", motion["time_law"])
+            if task.process is None:
+                entry.setdefault("time_law", motion["time_law"])
             entry.setdefault("corners", motion["corners"])
         if task.path.is_planar and task.path.project is None:
             entry["path"].setdefault("offset_mm", 0.0)
@@ -310,7 +329,9 @@ def build_motion(entry: MotionEntry) -> MotionSettings:
     return MotionSettings(
         mode=Mode(entry.mode),
         duration=entry.duration_s,
-        step=entry.step_s,
+        step=entry.row_step,
+        grid=None if entry.grid_ms is None else entry.grid_ms.si,
+        finer=None if entry.row_step == entry.step_s else entry.step_s,
         cyclic=entry.cyclic,
         locked=tuple(LockedJoint(robot=it.robot, joint=it.joint, since=it.from_s) for it in entry.locked_joints),
         timing=Timing(entry.timing) if isinstance(entry.timing, str) else Timing.CYCLE,

@@ -12,7 +12,7 @@ from cellplan.model.task import SampledPath, TimedPath
 
 Targets = Mapping[str, SampledPath | TimedPath]  # what was read of the files of paths, by task
 
-OWN_CLOCK: Final = ("duration_s", "feed_mm_s", "time_law", "corners")  # what a trajectory decides by itself
+OWN_CLOCK: Final = ("duration_s", "feed_mm_s", "process", "time_law", "corners")  # what a trajectory decides by itself
 
 
 def target_findings(valid: ValidEntries, targets: Targets, document: YamlDocument) -> Iterator[Finding]:

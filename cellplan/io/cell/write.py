@@ -130,7 +130,7 @@ def _checks(entry: Mapping[str, Any], checks: CheckSettings) -> dict[str, Any]:
 
 def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:
     """The motion with the mode and clock of the cell; a clock that ends with the last task has no length."""
-    written = {**entry, "mode": str(cell.motion.mode), "step_s": cell.motion.step}
+    written = {**entry, "mode": str(cell.motion.mode), "step_s": cell.motion.finer or cell.motion.step}
     written["duration_s"] = cell.motion.duration
     written["timing"] = str(cell.motion.timing) if cell.motion.cycle is None else {"cycle_s": cell.motion.cycle}
     return {key: written[key] for key in MotionEntry.model_fields if written.get(key) is not None}

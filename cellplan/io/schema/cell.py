@@ -154,7 +154,12 @@ class MotionEntry(Entry):
         description="Length of the common clock; every task ends within it. When absent, every task has a time of its "
         "own (duration_s, feed_mm_s or a file with times) and the clock ends with the last one.",
     )
-    step_s: Seconds = Field(default=0.001, description="Time between two samples.")
+    step_s: Seconds = Field(default=0.001, description="Time between two rows; with grid_ms that of the solver only.")
+    grid_ms: CycleTime | None = Field(
+        default=None,
+        description="Grid of the controllers, 2, 4, 8 or 12 for example: all rows lie on it. A multiple of "
+        "step_s; when absent the rows are step_s apart.",
+    )
     timing: TimingChoice = Field(
         default="as_written",
         description="When the joints are where: as the durations, feeds and time laws say; as fast as all joints can "
@@ -179,9 +184,11 @@ class MotionEntry(Entry):
     @model_validator(mode="after")
     def _has_a_sensible_clock(self) -> Self:
         """At least one step, a bounded number of samples, and a cycle of whole steps."""
-        cycle = self.timing.cycle_s if isinstance(self.timing, CycleEntry) else self.step_s
-        if abs(cycle / self.step_s - round(cycle / self.step_s)) > WHOLE_STEPS:
-            raise rule(f"expected a multiple of step_s = {self.step_s:g}, got {cycle:g}", "timing.cycle_s")
+        if self.grid_ms is not None and not _is_multiple(self.row_step, self.step_s):
+            raise rule(f"expected a multiple of step_s = {self.step_s:g} s, got {self.grid_ms:g}", "grid_ms")
+        if isinstance(self.timing, CycleEntry) and not _is_multiple(self.timing.cycle_s, self.row_step):
+            own = f"step_s = {self.step_s:g}" if self.grid_ms is None else f"grid_ms = {self.grid_ms:g}"
+            raise rule(f"expected a multiple of {own}, got {self.timing.cycle_s:g}", "timing.cycle_s")
         if self.duration_s is None:
             return self
         if self.step_s > self.duration_s:
@@ -190,6 +197,16 @@ class MotionEntry(Entry):
             steps = self.duration_s / self.step_s
             raise rule(f"expected at most {SAMPLE_LIMIT} samples (duration_s / step_s), got {steps:.9g}", "step_s")
         return self
+
+    @property
+    def row_step(self) -> float:
+        """Time between two rows in [s]."""
+        return self.step_s if self.grid_ms is None else self.grid_ms.si
+
+
+def _is_multiple(time: float, step: float) -> bool:
+    """Whether a time is a whole number of steps, at least one, but for rounding."""
+    return round(time / step) >= 1 and abs(time / step - round(time / step)) <= WHOLE_STEPS
 
 
 class ExclusionEntry(Entry):

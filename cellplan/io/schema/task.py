@@ -28,6 +28,7 @@ PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
 FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
 DEEPEST_CUT_MM: Final = 100.0  # a tool that is to stand deeper in the part is no tool that works on its surface
+EXCLUDED_BY_PROCESS: Final = ("duration_s", "feed_mm_s", "time_law", "settle_s")
 LONGEST_S: Final = 1e6  # [s] eleven days: longer is a wrong unit
 MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
@@ -194,6 +195,28 @@ class ToleranceEntry(Entry):
     )
 
 
+class ProcessEntry(Entry):
+    """A process that demands a feed: welding, sealing, dispensing."""
+
+    feed_mm_s: SlidingSpeed = Field(
+        description="Demanded speed of the tool along its path on the surface, but for the ramps beside each stop."
+    )
+    tolerance_percent: Annotated[float, Field(gt=0.0, le=50.0)] = Field(
+        default=5.0, description="By how much the speed between two rows may differ from the feed."
+    )
+    on_delay_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
+        default=0.0, description="Time for which the tool rests at the start of its path with the process on."
+    )
+    off_delay_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
+        default=0.0, description="Time for which the tool rests at the end of its path with the process on."
+    )
+    ramp_s: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
+        default=0.1,
+        description="Time in which the tool comes from rest to the feed and back, at both ends of the path and at "
+        "corners at which it stops; the process is on, the feed is not judged.",
+    )
+
+
 ToolDepth = Annotated[Mm, Within(ge=0.0, le=DEEPEST_CUT_MM)]
 StandOff = Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
@@ -243,6 +266,15 @@ class TaskEntry(Entry):
     feed_mm_s: SlidingSpeed | None = Field(
         default=None, description="Largest speed along the path on the surface; excludes duration_s."
     )
+    process: ProcessEntry | None = Field(
+        default=None,
+        description="Process with a demanded feed; it is on from the start of the path, when an approach is over, to "
+        "its end. Excludes duration_s, feed_mm_s, time_law and settle_s.",
+    )
+    dwell_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
+        default=0.0,
+        description="Time for which the tool rests at the end of its path, the process off, before it leaves.",
+    )
     repeat: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
         default=1, description="Number of cycles along the path; more than one only for a closed path."
     )
@@ -276,6 +308,9 @@ class TaskEntry(Entry):
         """Duration or feed; each word once; only a path on the part can be projected onto its surface."""
         if self.duration_s is not None and self.feed_mm_s is not None:
             raise rule("expected either duration_s or feed_mm_s, got both", "feed_mm_s")
+        for key in EXCLUDED_BY_PROCESS if self.process else ():
+            if getattr(self, key):
+                raise rule("unexpected key, process decides how fast the tool moves along its path", key)
         if self.relative_to == "world" and self.path.project is not None:
             raise rule("unexpected key, a path in the world is not projected onto the part", "path.project")
         if self.relative_to == "world" and self.tool_depth_mm is not None:
@@ -295,8 +330,9 @@ class TaskEntry(Entry):
 
     @property
     def leaving_s(self) -> float:
-        """Time after the path that the retraction takes."""
-        return self.retract_s if self.retract_mm else 0.0
+        """Time after the path that the delay of a process, the dwell and the retraction take."""
+        off_delay = self.process.off_delay_s if self.process else 0.0
+        return off_delay + self.dwell_s + (self.retract_s if self.retract_mm else 0.0)
 
     @property
     def begins_s(self) -> float:

@@ -68,7 +68,7 @@ def _scaled_task(task: Task, factor: float) -> dict[str, object]:
         values["start_s"] = task.start * factor
     if task.duration is not None:
         values["duration_s"] = task.duration * factor
-    if task.feed is not None:
+    if task.feed is not None and task.process is None:
         values["feed_mm_s"] = MM * task.feed / factor
     for key, move in (("approach_s", task.approach), ("retract_s", task.retract)):
         if move is not None:

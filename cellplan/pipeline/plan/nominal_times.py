@@ -1,6 +1,7 @@
 """Nominal times of a retimed program: all that is taken from a run beside its times and joint positions."""
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -8,7 +9,10 @@ from cellplan.errors import InputError
 from cellplan.io.run.clock_table import ClockText
 from cellplan.model.cell import Cell, Timing
 from cellplan.model.phase import Phase
+from cellplan.model.plan import Plan
 from cellplan.pipeline.plan.program import ProgramClock
+
+RATE_TOL: Final = 1e-9  # [s] by which a step may fall short of the rest in it: nominal times have twelve decimals
 
 
 def with_nominal_times(clock: ProgramClock, written: ClockText, cell: Cell, *, file: str) -> ProgramClock:
@@ -22,11 +26,12 @@ def with_nominal_times(clock: ProgramClock, written: ClockText, cell: Cell, *, f
 
     Raises:
         InputError: With file and line, when the nominal times do not rise from the beginning of each phase to its end,
-            or a phase lasts for another time than the demanded one.
+            a phase lasts for another time than the demanded one, or a delay or a dwell for less.
     """
     if cell.motion.timing is Timing.AS_WRITTEN:
         return clock
     _refuse_other(written, cell, clock.plan.program, file=file)
+    _refuse_shorter_rests(written, clock.plan, file=file)
     return clock.retimed(written.table.sigma)
 
 
@@ -59,3 +64,18 @@ def _refuse_other(written: ClockText, cell: Cell, phases: Sequence[Phase], *, fi
         raise InputError(
             f"{file}:{written.line(row)}: expected no row after the end of the last phase, got another one"
         )
+
+
+def _refuse_shorter_rests(written: ClockText, plan: Plan, *, file: str) -> None:
+    """Refuse a step of the rows that takes less time than the part of a delay or a dwell in it."""
+    sigma, step = written.table.sigma, np.diff(written.table.times)
+    for begin, end in plan.dwells:
+        within = np.minimum(sigma[1:], end) - np.maximum(sigma[:-1], begin)
+        short = np.flatnonzero(within > step + RATE_TOL)
+        if len(short):
+            place = int(short[0])
+            raise InputError(
+                f"{file}:{written.line(place + 1)}: sigma_s: expected at most {float(step[place]):g} s more than in "
+                f"the row before, as the delay or dwell from {begin:g} to {end:g} s of the nominal time keeps its "
+                f"time, got {float(sigma[place + 1] - sigma[place]):g} s more"
+            )

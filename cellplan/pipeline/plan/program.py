@@ -15,7 +15,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.clock import Clock
 from cellplan.model.motion import ClockTable, JointTable, Motion, Schedule
 from cellplan.model.phase import Hold, Phase
-from cellplan.model.plan import Plan, rows_of
+from cellplan.model.plan import Interval, Plan, rows_of
 from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import TIME_DECIMALS, retimed_schedule, schedule_tasks
@@ -166,12 +166,16 @@ def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) 
     for phase in plan.phases:
         phases.append(left.pop(0) if phase.in_program else replace(phase, begin=phases[-1].end, end=left[0].begin))
     stops, process = {}, {}
+    dwells: set[Interval] = set()
     for phase, schedule in zip(placed, schedules, strict=True):
         for scheduled in schedule.tasks:
             name = scheduled.task.name
-            process[name] = ((phase.begin + scheduled.task.start, phase.begin + scheduled.end),)
+            process[name] = (
+                (phase.begin + scheduled.task.start, phase.begin + scheduled.end + scheduled.task.off_delay),
+            )
             stops[name] = tuple(phase.begin + stop for stop in scheduled.stops)
-    return replace(plan, phases=tuple(phases), stops=stops, process=process)
+        dwells |= {(phase.begin + begin, phase.begin + end) for path in schedule.paths for begin, end in path.rests}
+    return replace(plan, phases=tuple(phases), stops=stops, process=process, dwells=tuple(sorted(dwells)))
 
 
 def _within(times: Array, stretches: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:

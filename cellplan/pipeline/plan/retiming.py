@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.acceleration_limits import acceleration_limit, part_acceleration
+from cellplan.checks.joints.acceleration_limits import acceleration_limit, part_acceleration, retimed_jerk_limit
 from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
 from cellplan.checks.joints.limits import joint_uses
 from cellplan.checks.tools.tracking import part_poses
@@ -17,11 +17,15 @@ from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.joint_path import JointPath
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
+from cellplan.model.task import Task
 from cellplan.pipeline.plan.program import ProgramClock
+from cellplan.pipeline.plan.step_errors import StepErrors
+from cellplan.planning.timing.kept_rates import KeptRate
 from cellplan.planning.timing.retime import JointBounds, Retimer
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.scene.scene import Scene
 
+ROUNDING: Final = 5e-10  # [s] of nominal times in rows
 NOMINAL_STEP: Final = 1e-4  # [s] of nominal time over which the speed of a tool is taken
 
 
@@ -78,10 +82,7 @@ def joint_bounds(cell: Cell) -> JointBounds:
             limit = acceleration_limit(robot, index)[0]
             velocity.append(joint.velocity)
             acceleration.append(np.inf if limit is None else limit)
-            if joint.jerk is None or robot.acceleration.is_unlimited:
-                jerk.append(acceleration[-1] / cell.motion.build_up if cell.motion.build_up else np.inf)
-            else:
-                jerk.append(joint.jerk)
+            jerk.append(retimed_jerk_limit(cell, robot, index) or np.inf)
     return JointBounds(velocity=np.array(velocity), acceleration=np.array(acceleration), jerk=np.array(jerk))
 
 
@@ -95,6 +96,7 @@ class RowLimits:
         bounds: Limits of all joints.
         step: Time between two rows in [s].
         path: The joints over the nominal time; needed for the speed of the tools in the world only.
+        errors: Errors of the tools between rows; None where they do not bound the speed.
     """
 
     scene: Scene
@@ -102,6 +104,7 @@ class RowLimits:
     bounds: JointBounds
     step: float
     path: JointPath | None = None
+    errors: StepErrors | None = None
 
     def shares(self, times: Array, q: Array) -> tuple[Array, Array, Array]:
         """Largest velocity, acceleration and jerk of each joint, in shares of the limits, shape (nq,) each."""
@@ -128,7 +131,7 @@ class RowLimits:
         """
         times = np.round(np.arange(len(q)) * self.step, TIME_DECIMALS)
         velocity, acceleration, jerk = (float(shares.max()) for shares in self.shares(times, q))
-        feed = max(self.feeds(sigma, times).values(), default=0.0)
+        feed = max([self._waits(sigma), *self.feeds(sigma, times).values()])
         tools = float(self._tool_moves(q[:-1], q[1:]).max()) / self.step
         return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, tools, self._part_share(times, q) ** 0.5)
 
@@ -140,10 +143,19 @@ class RowLimits:
             times: Their times in [s], shape (N,).
         """
         return {
-            path.task.name: float((np.diff(path.targets(sigma)[2]) / np.diff(times)).max() / path.task.feed)
+            path.task.name: float((np.diff(path.targets(sigma)[2]) / np.diff(times)).max() / _largest_feed(path.task))
             for path in self.paths
             if path.task.feed is not None
         }
+
+    def _waits(self, sigma: Array) -> float:
+        """Longest stretch of nominal time of a delay or a dwell in a step, as a share of the step."""
+        within = [
+            np.minimum(sigma[1:], end) - np.maximum(sigma[:-1], begin)
+            for path in self.paths
+            for begin, end in path.rests
+        ]
+        return float(np.max(within, initial=0.0) - ROUNDING) / self.step
 
     def feed_share(self, sigma: Array) -> Array:
         """Share of the speed limits of the tools that is taken up at the speed of the nominal time, shape (N,)."""
@@ -153,6 +165,10 @@ class RowLimits:
                 twists = path.targets(sigma)[1]
                 is_moving = (sigma >= path.start) & (sigma <= path.end)
                 share = np.maximum(share, is_moving * np.linalg.norm(twists[:, :3], axis=1) / path.task.feed)
+            for begin, end in path.rests:
+                share = np.maximum(share, (sigma >= begin) & (sigma <= end))
+        if self.errors is not None:
+            share = np.maximum(share, self.errors.steepness(sigma, self.step))
         if self.path is not None:
             q, move = self.path.at(sigma), 0.5 * NOMINAL_STEP * self.path.at(sigma, 1)
             share = np.maximum(share, self._tool_moves(q - move, q + move) / NOMINAL_STEP)
@@ -184,16 +200,45 @@ def row_limits(scene: Scene, schedule: Schedule) -> RowLimits:
     return RowLimits(scene, schedule.paths, joint_bounds(scene.cell), scene.cell.motion.step)
 
 
+def kept_rates(paths: Sequence[ClockedPath]) -> tuple[KeptRate, ...]:
+    """Where the rate of the nominal time is demanded: while a process is on, and in dwells."""
+    found = []
+    for path in paths:
+        process = path.task.process
+        if process is not None:
+            found.append(KeptRate(begin=path.start, end=path.end, tolerance=process.tolerance))
+        found += [KeptRate(begin=begin, end=end) for begin, end in path.rests]
+    return tuple(found)
+
+
+def _largest_feed(task: Task) -> float:
+    """Largest speed in [m/s] of a task with a feed."""
+    return (task.feed or np.inf) * (1.0 + (task.process.tolerance if task.process else 0.0))
+
+
 def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath) -> Array:
     """Nominal times of the rows of one phase in [s], shape (N,)."""
-    limits, motion = replace(row_limits(scene, schedule), path=path), scene.cell.motion
-    retimer = Retimer(bounds=limits.bounds, step=motion.step, feed_share=limits.feed_share, slower=limits.slower)
+    errors, motion = StepErrors(scene, schedule.paths, path), scene.cell.motion
+    limits = replace(row_limits(scene, schedule), path=path, errors=errors)
+    retimer = Retimer(
+        bounds=limits.bounds,
+        step=motion.step,
+        feed_share=limits.feed_share,
+        slower=limits.slower,
+        kept=kept_rates(schedule.paths),
+        errors=errors,
+    )
     fastest = retimer.fastest(path)
     if motion.cycle is None:
         return fastest.sigma
     steps = round(motion.cycle / motion.step)
     if fastest.steps <= steps:
         sigma = fastest.lasting(steps).sigma
+        if len(sigma) != steps + 1:
+            raise InputError(
+                f"{scene.cell.origin.at('motion.timing')}: expected a cycle of {fastest.steps * motion.step:g} s, as "
+                f"feeds of processes, delays and dwells decide how long all motion takes, got {motion.cycle:g}"
+            )
         if limits.slower(sigma, path.at(sigma)) <= 1.0:
             return sigma
     least = max(fastest.steps, steps + (fastest.steps <= steps)) * motion.step

@@ -64,7 +64,7 @@ class AccurateRun:
         self._precision = Precision(
             accuracy=accuracy,
             configuration_tol=STEADY if cell.motion.cyclic else None,
-            shortest=min(cell.motion.step, SHORTEST_SHARE * self.end),
+            shortest=min(cell.motion.finer or cell.motion.step, SHORTEST_SHARE * self.end),
         )
         self.sweeps = self.solves = 0
         self._tasks, self._placement, self._grasps, self._offset = tasks, placement, grasps, offset
@@ -155,5 +155,5 @@ def _paced(drift: Array, begin: float, end: float) -> Drift:
 def _settled(cell: Cell, schedule: Schedule, grasps: int) -> Array:
     """Times in [s] until which each tool, and that of each further holder, may be on its way to where it belongs."""
     given = [path.task.start + path.task.settle if path.task.settle else 0.0 for path in schedule.paths]
-    soon = min(SETTLING_STEPS * cell.motion.step, 0.5 * float(schedule.times[-1]))
+    soon = min(SETTLING_STEPS * (cell.motion.finer or cell.motion.step), 0.5 * float(schedule.times[-1]))
     return np.maximum(np.array(given + [0.0] * grasps), soon)

@@ -8,12 +8,22 @@ motion with that jerk. The motion is then made slower as a whole until every lim
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.joint_path import JointPath
+from cellplan.planning.timing.kept_rates import (
+    FEWEST_STEPS,
+    RATES,
+    AtKeptRate,
+    AtRest,
+    KeptRate,
+    least_steps,
+    spans_within,
+    whole_steps,
+)
 from cellplan.planning.timing.path_length import Stretch, stretches
 from cellplan.planning.timing.retimed_path import AsWritten, RestToRest, RetimedPath, Rows
 from cellplan.planning.timing.speed_profile import SpeedProfile, fastest_profile
@@ -26,11 +36,23 @@ WINDOWS: Final = (1.0, 1.4, 2.0, 2.4)  # [-] windows tried, in times that the je
 BEND_SHARES: Final = (0.8, 0.6, 0.4)  # [-] tried with them: what the bends of the path may take up of the jerk limits
 RESERVE: Final = 0.95  # [-] share of the acceleration limits with a limit of jerk: the means take up the rest
 MOST_STRETCHINGS: Final = 40  # [-] until every limit holds
+MOST_TIGHTENINGS: Final = 6  # [-] times that the speed is lowered where tools miss their tolerances between rows
+MOST_ROOTS: Final = 8  # [-] times that errors between rows are taken to grow with the square of the step
 MARGIN: Final = 1e-7  # [-] by which a motion is made slower than the limits ask for
 
 Slower = Callable[
     [Array, Array], float
 ]  # nominal times and joints in the rows -> factor of time that the limits ask for
+
+
+class StepTolerance(Protocol):
+    """Errors of tools between rows, where the joints move linearly."""
+
+    def largest(self, sigma: Array) -> Array:
+        """Largest error in each step between nominal times in [s], as a share of what is allowed, shape (N - 1,)."""
+
+    def tighten(self, sigma: Array) -> bool:
+        """Lower the largest speeds where steps miss a tolerance; whether none does."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,12 +80,17 @@ class Retimer:
         feed_share: Share of the tools' speed limits that is taken up at the speed of the nominal time, at nominal times
             in [s], shape (N,) to shape (N,).
         slower: By which factor the rows have to be slower for every limit to hold in them; at most 1 where all hold.
+        kept: Where the rate of the nominal time is demanded.
+        errors: Errors of the tools between rows, which ``feed_share`` then bounds the speed by; None for no such limit.
+            Where they cannot be kept by a slower motion they are left to the checks.
     """
 
     bounds: JointBounds
     step: float
     feed_share: Callable[[Array], Array]
     slower: Slower
+    kept: tuple[KeptRate, ...] = ()
+    errors: StepTolerance | None = None
 
     def fastest(self, path: JointPath) -> RetimedPath:
         """The fastest motion found along a path.
@@ -71,7 +98,12 @@ class Retimer:
         Args:
             path: The joints over the nominal time.
         """
-        made = [self._settled(piece) for piece in stretches(path, self.bounds.velocity)]
+        made: list[tuple[int, Rows]] = []
+        rest = 0.0
+        for piece in stretches(path, self.bounds.velocity):
+            made += [*self._rest(rest, float(piece.sigma[0])), self._kept(piece) or self._settled(piece)]
+            rest = float(piece.sigma[-1])
+        made += self._rest(rest, path.end)
         found = RetimedPath(
             motions=tuple(motion for _, motion in made), counts=tuple(count for count, _ in made), end=path.end
         )
@@ -80,8 +112,33 @@ class Retimer:
             factor = self.slower(sigma, path.at(sigma))
             if factor <= 1.0:
                 return found
-            found = replace(found, counts=tuple(_longer(count, factor) for count in found.counts))
+            both = zip(found.motions, found.counts, strict=True)
+            counts = tuple(count if motion.is_fixed else _longer(count, factor) for motion, count in both)
+            if counts == found.counts:
+                return found
+            found = replace(found, counts=counts)
         return found
+
+    def _rest(self, begin: float, end: float) -> list[tuple[int, Rows]]:
+        """What is demanded of a rest of all joints with its steps; nothing where no time has to pass."""
+        spans = spans_within(self.kept, begin, end)
+        waits = AtRest(begin, end, spans)
+        return [(whole_steps(waits.seconds, self.step), waits)] if len(spans) else []
+
+    def _kept(self, piece: Stretch) -> tuple[int, Rows] | None:
+        """The motion of one stretch with the demanded rates; None where nothing is demanded, or limits forbid it."""
+        begin, end = float(piece.sigma[0]), float(piece.sigma[-1])
+        spans = spans_within(self.kept, begin, end)
+        spans = spans[np.diff(spans, axis=1)[:, 0] > FEWEST_STEPS * self.step]
+        if not len(spans):
+            return None
+        left = min(each.tolerance for each in self.kept if each.begin < end and each.end > begin)
+        for share in RATES:
+            motion = AtKeptRate(piece, spans, 1.0 - left * (1.0 - share), self.step)
+            count = least_steps(motion, lambda sigma: self.slower(sigma, piece.path.at(sigma)) <= 1.0)
+            if count is not None:
+                return count, motion
+        return None
 
     def _settled(self, piece: Stretch) -> tuple[int, Rows]:
         """The motion of one stretch with its steps, from so many lengths that twice as many change it little."""
@@ -97,7 +154,22 @@ class Retimer:
             count, motion = self._best(piece, points)
             if abs(count - before) <= max(1.0, SETTLED * before):
                 break
+        for _ in range(MOST_TIGHTENINGS):
+            if self.errors is None or self.errors.tighten(motion.rows(count)):
+                break
+            count, motion = self._best(piece, points)
+        count = self._tolerant(count, motion)
+        slow = self._tolerant(slow, written) if slow < count else slow
         return (slow, written) if slow < count else (count, motion)
+
+    def _tolerant(self, count: int, motion: Rows) -> int:
+        """Steps of a motion made slower until no tool is farther off between rows than is allowed."""
+        for number in range(MOST_STRETCHINGS):
+            share = float(self.errors.largest(motion.rows(count)).max()) if self.errors else 0.0
+            if share <= 1.0:
+                break
+            count = _longer(count, share**0.5) if number < MOST_ROOTS else count + 1
+        return count
 
     def _best(self, piece: Stretch, points: int) -> tuple[int, Rows]:
         """The shortest motion of one stretch among the windows and shares that are tried, and its steps."""

@@ -18,6 +18,10 @@ class Rows(Protocol):
     def rows(self, count: int) -> Array:
         """Nominal times of its rows in [s] when it takes so many steps, both ends included, shape (count + 1,)."""
 
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it must take the steps that it takes."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AsWritten:
@@ -28,6 +32,11 @@ class AsWritten:
     def rows(self, count: int) -> Array:
         """See ``Rows``."""
         return np.linspace(self.piece.sigma[0], self.piece.sigma[-1], count + 1)
+
+    @property
+    def is_fixed(self) -> bool:
+        """See ``Rows``."""
+        return False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +58,11 @@ class RestToRest:
         lengths = self.profile.at(share * self.duration, self.window)
         lengths[-1] = self.piece.length
         return self.piece.at(np.maximum.accumulate(lengths))
+
+    @property
+    def is_fixed(self) -> bool:
+        """See ``Rows``."""
+        return False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,14 +93,16 @@ class RetimedPath:
         return np.round(sigma, TIME_DECIMALS)
 
     def lasting(self, steps: int) -> Self:
-        """The same motion slower as a whole, so that all loads fall alike.
+        """The same motion slower as a whole, so that all loads fall alike; what is fixed takes no more.
 
         Args:
             steps: What it is to take, at least as many as it takes.
         """
-        if not self.counts:
+        given = np.array(self.counts)
+        free = np.array([not motion.is_fixed for motion in self.motions], dtype=bool)
+        if not free.any():
             return self
-        exact = np.array(self.counts) * (steps / sum(self.counts))
+        exact = np.where(free, given * ((steps - given[~free].sum()) / given[free].sum()), given)
         counts = np.floor(exact).astype(int)
         counts[np.argsort(counts - exact, kind="stable")[: steps - int(counts.sum())]] += 1
         return replace(self, counts=tuple(counts.tolist()))

@@ -14,9 +14,10 @@ from cellplan.model.cell import Cell
 from cellplan.model.clock import Clock
 from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.task import TIME_TOLERANCE, Task
-from cellplan.model.time_law import peak_rate, reached_at
+from cellplan.model.task import TIME_TOLERANCE, Process, Task
+from cellplan.model.time_law import peak_rate
 from cellplan.model.toolpath import Toolpath
+from cellplan.model.units import MM
 from cellplan.planning.timing.sample_memory import require_memory
 
 MOST_SAMPLES: Final = 2_000_000  # tables longer than this fill disks, not controllers
@@ -57,7 +58,7 @@ def retimed_schedule(schedule: Schedule, clock: Clock) -> Schedule:
         nominal = _on_clock(clock.sigma, path)
         own = [path.task.start, nominal.end, *nominal.cycle_ends, *nominal.stops]
         start, end, *rest = clock.reached_at(np.array(own)).tolist()
-        cycles = len(nominal.cycle_ends)
+        cycles, demanded = len(nominal.cycle_ends), np.array(nominal.demanded).reshape(-1, 2)
         tasks.append(
             replace(
                 nominal,
@@ -66,6 +67,7 @@ def retimed_schedule(schedule: Schedule, clock: Clock) -> Schedule:
                 end=end,
                 cycle_ends=tuple(rest[:cycles]),
                 stops=tuple(rest[cycles:]),
+                demanded=tuple((begin, end) for begin, end in clock.reached_at(demanded).tolist()),
             )
         )
     return Schedule(times=clock.times, tasks=tuple(tasks), paths=schedule.paths, clock=clock)
@@ -130,7 +132,7 @@ def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
         task, whole = path.task, path.end - path.start
         duration = whole / task.repeat
         if duration < least * (1.0 - STEP_TOLERANCE) - TIME_TOLERANCE:
-            key = "duration_s" if task.feed is None else "feed_mm_s"
+            key = "duration_s" if task.feed is None else task.feed_key
             own = "path" if path.toolpath.is_timed else key
             what = "a task" if task.repeat == 1 else "a cycle"
             raise InputError(
@@ -167,7 +169,7 @@ def _examine_end(cell: Cell, path: ClockedPath) -> None:
         return
     key, why = "duration_s", ""
     if task.feed is not None:
-        key, why = "feed_mm_s", f" ({1e3 * length:.4g} mm at up to {1e3 * task.feed:g} mm/s)"
+        key, why = task.feed_key, f" ({1e3 * length:.4g} mm at up to {1e3 * task.feed:g} mm/s)"
     elif path.toolpath.is_timed:
         key, why = "path", " (by the times of its file)"
     raise InputError(
@@ -190,7 +192,7 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
     rests = (times < corners[0] - TIME_TOLERANCE) | (times > corners[-1] - TIME_TOLERANCE)
     V_PT_P[rests] = 0.0
     _even_out_jumps(times, corners, X_PT, V_PT_P=V_PT_P)
-    stand_off(times, task, X_PT, V_PT_P=V_PT_P, end=path.end)
+    stand_off(times, task, X_PT, V_PT_P=V_PT_P, end=path.leaves)
     return TaskSchedule(
         task=task,
         X_PT=X_PT,
@@ -198,20 +200,22 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
         travelled=travelled,
         length=path.toolpath.length,
         end=path.end,
-        cycle_ends=_cycle_ends(task, path.toolpath, corners),
+        cycle_ends=_cycle_ends(path, corners),
         stops=tuple(corners.tolist()),
+        demanded=path.demanded,
     )
 
 
-def _cycle_ends(task: Task, toolpath: Toolpath, corners: Array) -> tuple[float, ...]:
+def _cycle_ends(path: ClockedPath, corners: Array) -> tuple[float, ...]:
     """Times at which the tool is back at its start; none when it does not come back, or turned."""
+    task, toolpath = path.task, path.toolpath
     turn = np.pi - abs(abs(toolpath.turn) % (2.0 * np.pi) - np.pi)
     is_turned = turn > WHOLE_TURN and not task.is_spin_free and any(axis >= ROTATIONS for axis in task.axes)
     if not toolpath.is_closed or is_turned:
         return ()
     shares = np.arange(1, task.repeat + 1) / task.repeat
     if toolpath.runs_on and not toolpath.is_timed:
-        shares = reached_at(task.time_law, shares)
+        return tuple(path.reached_at(share) for share in shares.tolist())
     return tuple((corners[0] + shares * (corners[-1] - corners[0])).tolist())
 
 
@@ -235,6 +239,8 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
     if toolpath.is_timed:
         return task.start + toolpath.duration * np.arange(task.repeat + 1.0)
     behind = _stops(task, toolpath)
+    if task.process is not None:
+        return _at_feed(task, task.process, behind)
     if task.feed is not None:
         return task.start + peak_rate(task.time_law) / task.feed * behind
     duration = task.time_for_path(cell.motion.duration)
@@ -249,6 +255,18 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
             f"{cell.motion.duration:g} s, got {task.start:g}; make motion.duration_s longer"
         )
     return task.start + duration * (behind / behind[-1])
+
+
+def _at_feed(task: Task, process: Process, behind: Array) -> Array:
+    """Times in [s] of the stops of a path with a demanded feed: a ramp takes half of its time for its length."""
+    lengths, least = np.diff(behind), process.feed * process.ramp
+    if lengths.min() < least:
+        raise InputError(
+            f"{task.where('process.ramp_s')}: expected ramps that leave the feed of {MM * process.feed:g} mm/s some of "
+            f"each side, got {process.ramp:g} s for one of {MM * lengths.min():.4g} mm; round the corners "
+            f"(corners: {{blend_mm: 5}}) or make it shorter than {lengths.min() / process.feed:.3g} s"
+        )
+    return task.moves_from + np.append(0.0, np.cumsum(lengths / process.feed + process.ramp))
 
 
 def _stops(task: Task, toolpath: Toolpath) -> Array:

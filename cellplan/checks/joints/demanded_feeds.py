@@ -1,0 +1,107 @@
+"""Demanded feeds: speeds of tools along their paths between rows, and the joint that is nearest to its limit there."""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.joints.acceleration_limits import acceleration_limit, retimed_jerk_limit
+from cellplan.checks.joints.accelerations import jerks, point_accelerations
+from cellplan.checks.tools.tracking import relative_to_task_frame
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell, Timing
+from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.report import Check
+from cellplan.model.task import TIME_TOLERANCE, Process
+from cellplan.model.units import MM
+from cellplan.scene.scene import Scene
+
+BESIDE: Final = 2  # [-] rows on both sides of a place whose accelerations count there
+PERCENT: Final = 100.0
+
+
+def check_feeds(scene: Scene, schedule: Schedule, q: Mapping[str, Array], X_WP: Array) -> Iterator[Check]:
+    """The speed of every tool with a demanded feed against it.
+
+    Between the ramps of its path the speed between two rows must be within the tolerance; in the ramps it must not be
+    larger.
+
+    Args:
+        scene: The cell made computable.
+        schedule: The clock and the tasks.
+        q: Positions by robot in [rad] or [m], shape (N, n) each.
+        X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
+    """
+    for scheduled in schedule.tasks:
+        task = scheduled.task
+        if task.process is not None:
+            X_WT = scene.chains[task.robot].tool_poses(q[task.robot])
+            points = relative_to_task_frame(task, X_WT, X_WP)[:, :3, 3]
+            speeds = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(schedule.times)
+            yield _check(scene.cell, scheduled, task.process, times=schedule.times, speeds=speeds, q=q)
+
+
+def nearest_to_limit(cell: Cell, times: Array, q: Mapping[str, Array], step: int) -> tuple[str, str, float]:
+    """The joint that is nearest to one of its limits in a step: name, limit, and share of it.
+
+    In a retimed program the jerk counts as well, as it is limited there.
+
+    Args:
+        cell: The cell.
+        times: Times of the rows in [s], shape (N,).
+        q: Positions by robot in [rad] or [m], shape (N, n) each.
+        step: Number of the first row of the step.
+    """
+    around = slice(max(0, step - BESIDE), step + BESIDE + 2)
+    found = []
+    for robot in cell.robots:
+        own, h = q[robot.name], times[step + 1] - times[step]
+        velocity = np.abs(own[step + 1] - own[step]) / h
+        signed = point_accelerations(times, own)
+        acceleration = np.abs(signed)[around].max(axis=0)
+        jerk = jerks(times, signed[..., None], window=robot.controller_cycle)[around].max(axis=0)
+        for index, joint in enumerate(robot.model.joints):
+            name, limit = f"{robot.name} {joint.name}", acceleration_limit(robot, index)[0]
+            found.append((float(velocity[index] / joint.velocity), name, "velocity"))
+            most = None if cell.motion.timing is Timing.AS_WRITTEN else retimed_jerk_limit(cell, robot, index)
+            if most is not None:
+                found.append((float(jerk[index] / most), name, "jerk"))
+            if limit is not None:
+                found.append((float(acceleration[index] / limit), name, "acceleration"))
+    share, joint_name, kind = max(found)
+    return joint_name, kind, share
+
+
+def _check(
+    cell: Cell, scheduled: TaskSchedule, process: Process, *, times: Array, speeds: Array, q: Mapping[str, Array]
+) -> Check:
+    """The largest difference of the speed from the feed, as a share of the feed."""
+    task, off = scheduled.task, speeds / process.feed - 1.0
+    demanded = np.zeros(len(speeds), dtype=bool)
+    for begin, end in scheduled.demanded:
+        demanded |= (times[:-1] >= begin - TIME_TOLERANCE) & (times[1:] <= end + TIME_TOLERANCE)
+    moves = (times[1:] > scheduled.begin + TIME_TOLERANCE) & (times[:-1] < scheduled.end - TIME_TOLERANCE)
+    off = np.where(demanded, np.abs(off), np.where(moves, off, 0.0))
+    worst, of = int(np.argmax(off)), f"feed of task '{task.name}'"
+    limit = f"demanded {MM * process.feed:g} mm/s within {PERCENT * process.tolerance:g} %"
+    passed, value = bool(off[worst] <= process.tolerance), float(off[worst])
+    message = (
+        f"{of}: {MM * speeds[worst]:.4g} mm/s at {MM * scheduled.travelled[worst]:.4g} mm of its path, "
+        f"{times[worst]:.3f} s, {limit}"
+    )
+    if not demanded.any():
+        passed, value = False, 1.0
+        message = f"{of}: expected two rows between its ramps, got none, {limit}; make the step or the ramps shorter"
+    elif not passed:
+        joint, kind, share = nearest_to_limit(cell, times, q, worst)
+        message += f"; {joint} is at {PERCENT * share:.3g} % of its {kind} limit there"
+    return Check(
+        name="process_feed",
+        subject=task.name,
+        passed=passed,
+        value=PERCENT * value,
+        limit=PERCENT * process.tolerance,
+        unit="%",
+        at_s=float(times[worst]),
+        message=message,
+    )
