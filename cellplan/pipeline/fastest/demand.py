@@ -68,7 +68,7 @@ def refuse_unless_possible(per_hour: float, shortest: TimedProgram, step: float)
     allowed = steps_within(HOUR / per_hour, step) * step
     if shortest.cycle <= allowed + NEAR:
         return
-    binding = max(shortest.bindings, key=lambda each: each.share)
+    binding = max(shortest.bindings, key=lambda each: each.time_share)
     raise NoSolutionError(
         f"--demand: expected at most {_floored(HOUR / shortest.cycle)}/h, one part in {shortest.cycle:.6g} s, where "
         f"{binding.text}; got {per_hour:g}/h, one part in {HOUR / per_hour:.6g} s"

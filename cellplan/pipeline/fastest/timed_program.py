@@ -10,12 +10,14 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, joint_at
 from cellplan.model.progress import Progress
+from cellplan.model.report import TaskAccuracy
 from cellplan.pipeline.plan.retiming import RowLimits, row_limits
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.pipeline.solve import certified, solve_motion
 from cellplan.report.record.load_figures import LoadFigures, load_figures
 from cellplan.scene.scene import Scene
 
+TASK_LIMITS: Final = ("feed", "tolerance between rows")
 KINDS: Final = ("velocity", "acceleration", "jerk")
 ORDERS: Final = (1.0, 0.5, 1.0 / 3.0)  # how the time that a limit asks for grows with its share
 
@@ -29,7 +31,7 @@ class Law(StrEnum):
     REDUCED_SPEED = "reduced_speed"
 
 
-RETIMED: Final = (Law.COMMON_SPEED, Law.REDUCED_SPEED)  # feeds are upper limits in these
+RETIMED: Final = (Law.COMMON_SPEED, Law.REDUCED_SPEED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,9 +41,10 @@ class Binding:
     Attributes:
         phase: Name of the phase.
         robot: Name of the robot.
-        joint: Name of the joint; that of the task for a feed.
-        kind: Its limit: velocity, acceleration, jerk, feed or tool speed.
+        joint: Name of the joint; that of the task for its feed and its tolerance between rows.
+        kind: Its limit: velocity, acceleration, jerk, tool speed, feed or tolerance between rows.
         share: What is reached of it, 0..1.
+        time_share: Share of the time of the phase that it asks for, 0..1.
     """
 
     phase: str
@@ -49,11 +52,12 @@ class Binding:
     joint: str
     kind: str
     share: float
+    time_share: float
 
     @property
     def text(self) -> str:
         """One line of text."""
-        limit = self.kind if self.kind == "feed" else f"{self.kind} limit"
+        limit = self.kind if self.kind in TASK_LIMITS else f"{self.kind} limit"
         name = self.robot if self.kind == "tool speed" else f"{self.robot} {self.joint}"
         return f"{name} binds at {100.0 * self.share:.4g} % of its {limit}"
 
@@ -98,7 +102,7 @@ class TimedProgram:
             values=values,
             solution=solution,
             scene=scene,
-            bindings=tuple(_binding(scene, run, has_feeds=law in RETIMED) for run in solution.runs),
+            bindings=tuple(_binding(scene, run, is_retimed=law in RETIMED) for run in solution.runs),
             load=max(_slower(scene, limits, q) for limits, q in rows),
         )
 
@@ -133,19 +137,30 @@ def _slower(scene: Scene, limits: RowLimits, q: Array) -> float:
     return replace(limits, scene=scene, paths=()).slower(np.zeros(len(q)), q)
 
 
-def _binding(scene: Scene, run: Run, *, has_feeds: bool) -> Binding:
-    """The joint, the feed or the tool that asks for most time in one phase."""
+def _binding(scene: Scene, run: Run, *, is_retimed: bool) -> Binding:
+    """The limit that asks for most time in one phase; those of a task are limits of retimed programs."""
     limits, q = _rows(scene, run)
     shares = limits.shares(run.schedule.times, q)
     asked = np.array([share**order for share, order in zip(shares, ORDERS, strict=True)])
     kind, column = np.unravel_index(int(asked.argmax()), asked.shape)
     robot, joint = joint_at(scene.cell, int(column))
     found = [(float(asked.max()), robot, joint, KINDS[kind], float(shares[kind][column]))]
-    for name, feed in limits.feeds(run.motion.sigma, run.motion.times).items() if has_feeds else ():
+    for name, feed in limits.feeds(run.motion.sigma, run.motion.times).items() if is_retimed else ():
         found.append((feed, scene.cell.task(name).robot, name, "feed", feed))
+    for errors in run.report.accuracy if is_retimed else ():
+        share = _share_between(errors, scene.cell)
+        found.append((share**0.5, errors.robot, errors.task, "tolerance between rows", share))
     if scene.cell.checks.tool_speed is not None:
         for name, speed in run.report.speeds.items():
             share = speed.tool_peak / scene.cell.checks.tool_speed
             found.append((share, name, "", "tool speed", share))
-    _, robot, joint, name, share = max(found, key=lambda each: each[0])
-    return Binding(phase=run.phase.name, robot=robot, joint=joint, kind=name, share=share)
+    most, robot, joint, name, share = max(found, key=lambda each: each[0])
+    return Binding(phase=run.phase.name, robot=robot, joint=joint, kind=name, share=share, time_share=most)
+
+
+def _share_between(errors: TaskAccuracy, cell: Cell) -> float:
+    """Largest error of a tool between rows as a share of its tolerance; it grows with the square of the speed."""
+    if errors.between is None:
+        return 0.0
+    position, orientation = cell.task(errors.task).tolerance.between
+    return max(errors.between.position.largest / position, errors.between.orientation.largest / orientation)

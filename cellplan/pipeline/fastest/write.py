@@ -101,6 +101,7 @@ def _program(program: TimedProgram, written: float) -> ProgramRecord:
                 "joint": each.joint,
                 "limit": each.kind,
                 "percent": number(100.0 * each.share),
+                "time_percent": number(100.0 * each.time_share),
                 "text": each.text,
             }
             for each in program.bindings

@@ -19,9 +19,10 @@ class BindingRecord(TypedDict):
 
     phase: Annotated[str, "name of the phase"]
     robot: Annotated[str, "name of the robot"]
-    joint: Annotated[str, "name of the joint; that of the task for a feed; empty for a tool speed"]
-    limit: Annotated[str, "`velocity`, `acceleration`, `jerk`, `feed` or `tool speed`"]
+    joint: Annotated[str, "name of the joint; that of the task for its own limits; empty for a tool speed"]
+    limit: Annotated[str, "`velocity`, `acceleration`, `jerk`, `tool speed`, `feed` or `tolerance between rows`"]
     percent: Annotated[Number, "what is reached of it"]
+    time_percent: Annotated[Number, "how much of the time of the phase it asks for"]
     text: Annotated[str, "one line of text"]
 
 

@@ -18,7 +18,7 @@ FIGURES: Final = {
     "energy_proxy_s": "energy proxy",
 }  # what a demand saves, by figure
 KINDS: Final = ("velocity", "acceleration")
-BINDS: Final = 0.9  # [-] of a limit: less is a load and no bound
+BINDS: Final = 90.0  # [%] of the time: a limit that asks for less does not bind
 HEADINGS: Final = ("cycle s", "parts/h", "velocity %", "acceleration %", "tool mm/s", "energy proxy s", "margin deg")
 
 
@@ -50,7 +50,7 @@ def saving_text(record: Record) -> str:
 def binding_lines(program: Record) -> list[str]:
     """What binds each phase of a program, or how near its joints come to their limits where nothing does."""
     binding, figures = program["binding"], program["figures"]
-    if max(figures["load_ratio"], *(each["percent"] / 100.0 for each in binding)) >= BINDS:
+    if max(each["time_percent"] for each in binding) >= BINDS:
         return [each["text"] if len(binding) == 1 else f"phase {each['phase']}: {each['text']}" for each in binding]
     shares = ((figures[f"max_{kind}_ratio"], figures[f"max_{kind}_joint"], kind) for kind in KINDS)
     reached = [f"{100.0 * share:.3g} % of a limit of {kind} ({joint})" for share, joint, kind in shares if share]
