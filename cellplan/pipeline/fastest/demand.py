@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final, Self
 
@@ -99,12 +100,13 @@ def calmest(
     cycle = min(allowed, max(steps_within(SLOWEST * common.cycle, step) * step, written.cycle))
     found = [program for program in (common, laws) if program.cycle <= cycle + NEAR]
     if laws.cycle < cycle:
-        found += _by_time_laws(base, cycle, written, solved)
+        with suppress(InputError, NoSolutionError):
+            found += _by_time_laws(base, cycle, written, solved)
     between = common.cycle - sum(common.phases)
     each = steps_within((cycle - between) / len(common.phases), step) * step
     if common.cycle < cycle and each >= max(common.phases) - NEAR:
-        values: dict[str, object] = {"motion.timing": {"cycle_s": round(each, 9)}}
-        found.append(solved(Law.COMMON_SPEED, values, "demand"))
+        with suppress(InputError, NoSolutionError):  # demanded feeds may leave no choice of the cycle
+            found.append(solved(Law.COMMON_SPEED, {"motion.timing": {"cycle_s": round(each, 9)}}, "demand"))
     found = [program for program in found if program.cycle <= cycle + NEAR]
     return MetDemand(per_hour=per_hour, allowed=allowed, program=min(found, key=lambda program: program.load))
 
