@@ -88,9 +88,9 @@ def goals_of(found: Mapping[str, ShortestCycles]) -> Iterator[Goal]:
     for name in found:
         slower = laws[name].cycle
         yield goal(f"the common speed is not slower than the time laws: {name}", common[name], 0.0, slower)
-    programs = [*laws.values(), *(p for name in (NO_JERK, WITH_JERK) for p in found[name].programs.values())]
+    programs = [program for each in found.values() for program in each.programs.values()]
     passed = sum(program.solution.passed for program in programs)
-    text = "every program by the time laws or with limits of acceleration passes every check, its clearance certified"
+    text = "every program passes every check, its clearance certified"
     yield Goal(text=text, measured=f"{passed} of {len(programs)}", met=passed == len(programs))
 
 
