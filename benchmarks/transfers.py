@@ -8,7 +8,7 @@ which passes there whatever the other joints do: there is no way by construction
 import argparse
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -34,6 +34,7 @@ BUNDLED: Final = ("kuka_kr6", "abb_irb1600_8_145", "staubli_rx160", "ur5e", "ur1
 OUTSIDE: Final = ("kuka_kr16_2", "kuka_kr5_arc", "abb_irb1600_8_145", "staubli_rx160")  # below ../shared/robots
 CLEARANCE: Final = 0.005  # [m]
 KEPT_OFF: Final = 0.03  # [m] that obstacles keep from what is swept on the known way
+BLOCKS_TRIED: Final = 400  # places of the block for one pair of start and goal
 THINGS: Final = 10  # obstacles of a cell
 ROW_STEP: Final = 0.004  # [s]
 FINE: Final = 0.004  # [rad] largest move of a joint between two samples of brute force
@@ -163,22 +164,26 @@ def free_case(model: RobotModel, rng: np.random.Generator) -> Case:
 
 
 def walled_case(model: RobotModel, rng: np.random.Generator) -> Case:
-    """A cell with a block in the way of a point that the first joint alone moves."""
+    """A cell with a block that the first link touches where all ways pass, whatever the other joints do."""
+    bare = scene_with(model, ())
+    engine = bare.engine
+    shapes = [coal_shape(body.shape) for body in engine.bodies]
+    at_zero = bare.body_poses(np.zeros((1, len(model.joints))))
+    out = np.linalg.norm([at_zero.R[k, 0, :2] @ c + at_zero.p[k, 0, :2] for k, c in enumerate(engine.centres)], axis=1)
+    link = max((k for k in range(len(shapes)) if bare.carrier(k).link == 0), key=lambda k: float(out[k]))
     while True:
-        case = free_case(model, rng)
-        start, goal = case.start.copy(), case.goal.copy()
-        between = 0.5 * (start[0] + goal[0])
-        link = next(k for k in range(len(case.scene.engine.bodies)) if case.scene.carrier(k).link == 0)
-        q = start.copy()
-        q[0] = between
-        poses = case.scene.body_poses(q[None])
-        centre = poses.R[link, 0] @ case.scene.engine.centres[link] + poses.p[link, 0]
-        for _ in range(20):
-            at = centre + rng.normal(scale=0.5 * case.scene.engine.radii[link], size=3)
+        way = _known_way(bare, rng)
+        q = np.array([way[0], way[-1], way[0]])
+        q[2, 0] = 0.5 * (way[0, 0] + way[-1, 0])
+        poses = bare.body_poses(q)
+        centre = poses.R[link, 2] @ engine.centres[link] + poses.p[link, 2]
+        for _ in range(BLOCKS_TRIED):
+            at = centre + rng.normal(scale=0.7 * engine.radii[link], size=3)
             block = Obstacle(name="block", shape=Box((0.05, 0.05, 0.05)), X_WS=pose(tuple(at)))
-            scene = scene_with(model, [*case.scene.cell.obstacles[1:], block])
-            if _blocks(scene, link, q) and BruteForce(_with_clearance(scene)).contact(np.array([start, goal])) is None:
-                return Case(scene, start, goal)
+            touched = _distance(shapes[link], poses.R[link, 2], poses.p[link, 2], block) <= 0.0
+            ends = ((k, i) for i in range(2) for k in range(len(shapes)))
+            if touched and all(_distance(shapes[k], poses.R[k, i], poses.p[k, i], block) > KEPT_OFF for k, i in ends):
+                return Case(scene_with(model, [block]), way[0], way[-1])
 
 
 def _known_way(bare: Scene, rng: np.random.Generator) -> Array:
@@ -208,20 +213,6 @@ def _distance(own: coal.CollisionGeometry, R: Array, p: Array, thing: Obstacle) 
     return coal.distance(
         own, coal.Transform3s(R, p), coal_shape(thing.shape), place, coal.DistanceRequest(), coal.DistanceResult()
     )
-
-
-def _blocks(scene: Scene, link: int, q: Array) -> bool:
-    """Whether the block touches the first link when the first joint is where all ways pass."""
-    poses, block = scene.body_poses(q[None]), len(scene.engine.bodies)
-    names = [scene.carrier(k).name for k in range(block)]
-    return BruteForce(scene).touch(link, names.index("block"), poses.R[:, 0], poses.p[:, 0])
-
-
-def _with_clearance(scene: Scene) -> Scene:
-    """The same with a block that is larger by a little more than the clearance to each side."""
-    *things, block = scene.cell.obstacles
-    larger = replace(block, shape=Box((0.07, 0.07, 0.07)))
-    return scene_with(scene.cell.robots[0].model, [*things[1:], larger])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,8 +257,10 @@ def main() -> None:
     """Print one line for each cell, and the counts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cells", type=int, default=20, help="cells of either kind")
-    count = parser.parse_args().cells
-    for is_walled in (False, True):
+    parser.add_argument("--kind", choices=("free", "walled"), help="only these")
+    options = parser.parse_args()
+    count = options.cells
+    for is_walled in [kind == "walled" for kind in ("free", "walled") if options.kind in {None, kind}]:
         found = contacts = 0
         seconds = []
         for number, case in enumerate(cases(count, is_walled=is_walled)):

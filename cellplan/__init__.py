@@ -3,11 +3,11 @@
 The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
-- compute: ``solve``, ``screen``, ``sweep``, ``rehearse``
+- compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``rehearse``
 - verify: ``verify``, ``open_gate``
-- write: ``write_run``, ``write_rehearsal``, ``export_program``
+- write: ``write_run``, ``write_fastest``, ``write_rehearsal``, ``export_program``
 - inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``
-- results: ``Solution``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``
+- results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``
 - errors: ``CellplanError``
 
 Names are imported at first use, so that ``import cellplan`` and the help of the command line are fast.
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from cellplan.model.task import Task
     from cellplan.model.toolpath import Toolpath
     from cellplan.pipeline.export import export_program
+    from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
+    from cellplan.pipeline.fastest.write import write_fastest
     from cellplan.pipeline.gate.open_gate import open_gate
     from cellplan.pipeline.rehearsal.rehearse import rehearse
     from cellplan.pipeline.rehearsal.write import write_rehearsal
@@ -56,11 +58,13 @@ _HOME: Final = {
     "Report": "model.report",
     "Robot": "model.cell",
     "Screening": "planning.layout_screening",
+    "ShortestCycles": "pipeline.fastest.shortest",
     "Solution": "pipeline.solution",
     "SweepJob": "pipeline.sweep",
     "Task": "model.task",
     "Toolpath": "model.toolpath",
     "export_program": "pipeline.export",
+    "fastest": "pipeline.fastest.shortest",
     "load_cell": "io.cell.load",
     "load_errors": "io.cell_errors",
     "open_gate": "pipeline.gate.open_gate",
@@ -69,6 +73,7 @@ _HOME: Final = {
     "solve": "pipeline.solve",
     "sweep": "pipeline.sweep",
     "verify": "pipeline.verify",
+    "write_fastest": "pipeline.fastest.write",
     "write_rehearsal": "pipeline.rehearsal.write",
     "write_run": "pipeline.write_run",
 }
@@ -85,12 +90,14 @@ __all__ = [
     "Report",
     "Robot",
     "Screening",
+    "ShortestCycles",
     "Solution",
     "SweepJob",
     "Task",
     "Toolpath",
     "__version__",
     "export_program",
+    "fastest",
     "load_cell",
     "load_errors",
     "open_gate",
@@ -99,6 +106,7 @@ __all__ = [
     "solve",
     "sweep",
     "verify",
+    "write_fastest",
     "write_rehearsal",
     "write_run",
 ]

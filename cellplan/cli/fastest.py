@@ -1,9 +1,7 @@
-"""``cellplan fastest``: the shortest cycle of a cell within the limits of all joints."""
-
-from __future__ import annotations
+"""``cellplan fastest``: the shortest cycle of a cell, its production curve, and the calmest program for a demand."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -12,26 +10,38 @@ from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
-if TYPE_CHECKING:
-    from cellplan.pipeline.fastest import ShortestCycle, ShortestCycles
-
 SCHEMA = "cellplan.fastest/1"
-TITLES = {"time_laws": "by its time laws", "common_speed": "by the best common speed"}
 
 Output = Annotated[
     Path | None,
-    typer.Option("-o", "--output", metavar="DIR", help="Write the run folders DIR/time_laws and DIR/common_speed."),
+    typer.Option("-o", "--output", metavar="DIR", help="Write record, page, curve and a run folder per program."),
 ]
 TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Work on this task only.")]
+Demand = Annotated[
+    str | None,
+    typer.Option("--demand", metavar="N/h", help="Parts per hour (or N/min): choose the calmest program for them."),
+]
+Points = Annotated[
+    int, typer.Option("--points", metavar="N", min=0, max=50, help="Calmer cycles of each law on the production curve.")
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", metavar="N", min=1, help="Processes for the production curve (default: one for each processor)."
+    ),
+]
 
 
 def fastest(  # noqa: PLR0913, PLR0917 - the options of the command
     cell: CellFile,
     output: Output = None,
+    demand: Demand = None,
+    points: Points = 4,
     mode: Mode = None,
     method: Method = None,
     settings: Settings = None,
     task: TaskName = None,
+    workers: Workers = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
@@ -39,95 +49,35 @@ def fastest(  # noqa: PLR0913, PLR0917 - the options of the command
     """Find the shortest cycle that keeps velocity, acceleration and jerk of all joints, and verify it.
 
     First with the time laws of the cell, all faster by one factor; then along the same path with the best speed that
-    all robots share. Exit status: 0 both programs passed every check, 1 a check failed, 2 bad input, 3 no solution,
-    4 internal error.
+    all robots share; then with no tool faster than 250 mm/s. Exit status: 0 every program passed every check, 1 a
+    check failed, 2 bad input, 3 no solution or a demand that cannot be met, 4 internal error.
     """
     with json_failure(SCHEMA, desired=as_json):
+        from cellplan.guard import processors
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
-        from cellplan.pipeline.fastest import fastest as shortest
+        from cellplan.pipeline.fastest.demand import read_demand
+        from cellplan.pipeline.fastest.shortest import fastest as shortest
+        from cellplan.pipeline.fastest.write import fastest_record, write_fastest
         from cellplan.pipeline.overrides import require_task, with_overrides
-        from cellplan.pipeline.write_run import write_run
+        from cellplan.report.text.fastest import fastest_lines
 
+        per_hour = None if demand is None else read_demand(demand)
         given = load_cell(cell, allow_dirs=allow_dir or ())
         changed = with_overrides(given, settings or (), mode=mode, method=method)
         require_task(changed, task)
-        folders = {} if output is None else {name: output / name for name in TITLES}
-        for folder in folders.values():
-            refuse_unless_replaceable(folder)
+        if output is not None:
+            refuse_unless_replaceable(output)
         with progress_listener(quiet=quiet) as progress:
-            found = shortest(changed, task=task, progress=progress)
-            cycles = {"time_laws": found.by_time_laws, "common_speed": found.by_common_speed}
-            for name, folder in folders.items():
-                write_run(cycles[name].solution, folder, progress=progress)
-    record = _record(changed.name, found, cycles)
+            found = shortest(
+                changed, task=task, demand=per_hour, points=points, workers=workers or processors(), progress=progress
+            )
+            record = fastest_record(found) if output is None else write_fastest(found, output, progress=progress)
     status = ExitStatus.PASSED if found.passed else ExitStatus.CHECK_FAILED
     if as_json:
-        where = {"folders": {name: str(folder) for name, folder in folders.items()}}
-        say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **where, **record})
+        where = {} if output is None else {"folder": str(output), "report_path": str(output / "fastest.html")}
+        say_json({**record, "exit": int(status), **where})
     else:
-        say("\n".join(_lines(record) + [f"{name}: {folder}" for name, folder in folders.items()]))
+        written = [] if output is None else [f"report: {output / 'fastest.html'}", f"curve: {output / 'curve.csv'}"]
+        say("\n".join([*fastest_lines(record), *written]))
     raise typer.Exit(status)
-
-
-def _record(name: str, found: ShortestCycles, cycles: dict[str, ShortestCycle]) -> dict[str, Any]:
-    """The result in printed units."""
-    from cellplan.report.record.common import number
-
-    return {
-        "cell": name,
-        "status": "passed" if found.passed else "failed",
-        "written_s": number(found.written),
-        "cycles": {kind: _cycle(cycle, found.written) for kind, cycle in cycles.items()},
-    }
-
-
-def _cycle(cycle: ShortestCycle, written: float) -> dict[str, Any]:
-    """One shortest cycle."""
-    from cellplan.model.units import DEG, MM
-    from cellplan.pipeline.fastest import figures
-    from cellplan.report.record.common import number
-
-    found = figures(cycle.solution)
-    scales = (("position_error_mm", "position", MM), ("orientation_error_deg", "orientation", DEG))
-    clearance = found["clearance"]
-    failed = [check.message for run in cycle.solution.runs for check in run.report.checks if not check.passed]
-    return {
-        "status": "passed" if cycle.solution.passed else "failed",
-        "cycle_s": number(cycle.cycle),
-        "share_of_written": number(cycle.cycle / written),
-        "binding": [
-            {
-                "phase": each.phase,
-                "robot": each.robot,
-                "joint": each.joint,
-                "limit": each.kind,
-                "percent": number(100.0 * each.share),
-            }
-            for each in cycle.bindings
-        ],
-        **{f"largest_{key}": number(scale * (found[name] or 0.0)) for key, name, scale in scales},
-        "smallest_clearance_mm": None if clearance is None else number(MM * clearance),
-        "failed": failed,
-    }
-
-
-def _lines(record: dict[str, Any]) -> list[str]:
-    """The result as lines of text."""
-    lines = [f"{record['cell']}: {record['status']}", f"  as written: {record['written_s']:g} s"]
-    for kind, cycle in record["cycles"].items():
-        lines.append(
-            f"  {TITLES[kind]}: {cycle['cycle_s']:g} s, {100.0 * cycle['share_of_written']:.3g} % of the written time"
-        )
-        for each in cycle["binding"]:
-            phase = "" if len(cycle["binding"]) == 1 else f"phase {each['phase']}: "
-            limit = f"{each['percent']:.4g} % of its {each['limit']}{'' if each['limit'] == 'feed' else ' limit'}"
-            lines.append(f"    {phase}{each['robot']} {each['joint']} binds at {limit}")
-        clearance = cycle["smallest_clearance_mm"]
-        distance = "nothing to keep clear of" if clearance is None else f"smallest clearance {clearance:.4g} mm"
-        lines.append(
-            f"    largest tool error {cycle['largest_position_error_mm']:.2g} mm, "
-            f"{cycle['largest_orientation_error_deg']:.2g} deg; {distance}"
-        )
-        lines += [f"    FAILED {message}" for message in cycle["failed"]]
-    return lines

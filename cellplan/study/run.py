@@ -47,16 +47,16 @@ def run_trials(
         CellplanError: A worker process ended by itself.
     """
     left = variants[len(journal.trials) :]
-    with _outcomes(left, evaluate, workers) as outcomes:
-        for variant, outcome in zip(left, outcomes, strict=True):
+    with outcomes(left, evaluate, workers) as found:
+        for variant, outcome in zip(left, found, strict=True):
             journal.append(Trial(variant=variant, outcome=outcome))
             progress(f"variant {len(journal.trials)} of {len(variants)}", len(journal.trials) / len(variants))
     return list(journal.trials)
 
 
 @contextmanager
-def _outcomes(variants: Sequence[Variant], evaluate: Evaluate, workers: int | Executor) -> Iterator[Iterator[Outcome]]:
-    """Outcomes in the order of the variants."""
+def outcomes(variants: Sequence[Variant], evaluate: Evaluate, workers: int | Executor) -> Iterator[Iterator[Outcome]]:
+    """Outcomes in the order of the variants, for a ``with`` statement; arguments as in ``run_trials``."""
     if isinstance(workers, Executor):
         yield _in_order(variants, evaluate, workers, ahead=BEGUN)
     elif min(workers, len(variants)) <= 1:

@@ -64,6 +64,10 @@ class RunFolder:
             raise _cannot_write(self.path, error) from error
         return self
 
+    def within(self, name: str) -> Path:
+        """Place of a run folder of its own that appears together with this one."""
+        return self._draft / name
+
     def write_text(self, name: str, text: str) -> None:
         """Write a text file in UTF-8, line breaks as given; ``name`` is relative, with ``/`` between folders.
 

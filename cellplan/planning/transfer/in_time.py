@@ -1,8 +1,8 @@
 """All robots in the same span of time: one after the other is planned, against the motion of those planned before.
 
 A robot goes straight as soon as that is free, or waits until it is, or trees grow in its joint space and time. Those
-that are still to be planned are not there for it: they keep away from it later ([Erdmann1987]_). Several orders of the
-robots and two spans are tried.
+that are still to be planned are not there for it: they keep away from it later, which is prioritised planning (Erdmann
+and Lozano-Perez 1987). Several orders of the robots and two spans are tried.
 """
 
 from collections.abc import Iterator

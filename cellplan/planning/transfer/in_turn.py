@@ -22,7 +22,7 @@ from cellplan.planning.transfer.shortened import rounded_line, shortened
 from cellplan.planning.transfer.trees import connected
 
 MOST_ORDERS: Final = 120  # orders of the robots that are tried
-DRAWN: Final = 3000  # configurations drawn for one robot among others that stand
+DRAWN: Final = 1000  # configurations drawn for one robot among others that stand
 MOST_FAILED: Final = 6  # searches by trees that fail before no further one is begun
 
 

@@ -47,7 +47,7 @@ class Others:
         arms = LeverArms(scene, q)
         steps = arms.steps(q)
         travel = np.zeros((len(scene.engine.bodies), len(q)))
-        for index in range(len(travel)):
+        for index in range(len(travel) if len(q) > 1 else 0):
             travel[index, 1:] = np.cumsum(arms.chain(None, index).reach(steps))
         return cls(poses=scene.body_poses(q), travel=travel)
 
@@ -117,7 +117,7 @@ class MoveCheck:
         spare = self._spare(q[few], at[few], everything, self._travel(way[few], at[few], everything))
         if spare is None or len(few) == len(q):
             return spare is not None
-        places, between = self._not_cleared(spare, self._travel(way[few], at[few], everything))
+        places, between = _not_cleared(spare, self._travel(way[few], at[few], everything))
         if not places.size:
             return True
         travel = self._travel(way, at, places)
@@ -135,12 +135,6 @@ class MoveCheck:
         for side in self._ends[places].T:
             travel = travel + np.where(side[:, None] >= 0, self._others.travel[side][:, moments], 0.0)
         return travel
-
-    @staticmethod
-    def _not_cleared(spare: Array, travel: Array) -> tuple[Indices, Flags]:
-        """Pairs that may be too near between two samples, and whether any is after each sample, shape (K,)."""
-        open_ = spare[:, :-1] + spare[:, 1:] < np.diff(travel, axis=1)
-        return np.flatnonzero(open_.any(axis=1)), np.append(open_.any(axis=0), True)
 
     def _spare(
         self, q: Array, moments: Indices, places: Indices, travel: Array, *, is_clear: Flags | None = None
@@ -272,6 +266,12 @@ def _ends(scene: Scene, row: int) -> Pair:
     """The engine's bodies of a pair; -1 for a half-space."""
     pair = scene.pairs[row]
     return (pair.first, -1) if pair.solids is None else pair.solids
+
+
+def _not_cleared(spare: Array, travel: Array) -> tuple[Indices, Flags]:
+    """Pairs that may be too near between two samples, and whether any is after each sample, shape (K,)."""
+    open_ = spare[:, :-1] + spare[:, 1:] < np.diff(travel, axis=1)
+    return np.flatnonzero(open_.any(axis=1)), np.append(open_.any(axis=0), True)
 
 
 def _own_bodies(scene: Scene, robot: str) -> dict[int, tuple[int, Array]]:

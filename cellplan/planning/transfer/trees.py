@@ -1,8 +1,8 @@
 """Two trees that grow towards each other: a way of one robot through its joint space, straight from node to node.
 
-[Kuffner2000]_: one tree is extended towards a configuration that is drawn, the other one then runs towards the new node
-as far as it comes; then they change places. Distances are those of the joints in shares of their top speeds, in
-seconds. The search ends by the number of configurations drawn, so that it is the same on every machine.
+As in RRT-Connect (Kuffner and LaValle 2000), one tree is extended towards a configuration that is drawn, the other one
+then runs towards the new node as far as it comes; then they change places. Distances are those of the joints in shares
+of their top speeds, in seconds. The search ends by the number of configurations drawn: the same on every machine.
 """
 
 from collections.abc import Callable

@@ -11,7 +11,7 @@ from typing import Any
 
 from cellplan.report.plots.no_backend import no_backend
 from cellplan.report.plots.palette import INK
-from cellplan.report.plots.sheet import WIDTH, Line, Mark, Rectangle, Sheet
+from cellplan.report.plots.sheet import Line, Mark, Rectangle, Sheet
 
 with no_backend():
     import matplotlib as mpl
@@ -67,7 +67,7 @@ def paint(sheets: Mapping[str, Sheet]) -> dict[str, bytes]:
 
 def _figure(sheet: Sheet) -> Figure:
     """A sheet as a figure of the plotting library."""
-    figure = Figure(figsize=(WIDTH, sheet.height))
+    figure = Figure(figsize=(sheet.width, sheet.height))
     for mark in sheet.marks:
         artist = _artist(mark)
         artist.set_transform(figure.dpi_scale_trans)

@@ -82,13 +82,24 @@ class Sheet:
     """A grid of panels that share the time axis; lengths are in inches from the lower left corner.
 
     Attributes:
-        height: Of the sheet in inches; all are equally wide.
+        height: Of the sheet in inches.
+        width: Likewise.
         marks: Drawing primitives, in drawing order.
         times: Times in [s] that the panels show.
     """
 
-    def __init__(self, title: str, *, rows: int, columns: int, times: Array, across: str = "time in s") -> None:
+    def __init__(
+        self,
+        title: str,
+        *,
+        rows: int,
+        columns: int,
+        times: Array,
+        across: str = "time in s",
+        width: float = WIDTH,
+    ) -> None:
         """Create a grid of panels over ``times`` in [s], or over the quantity that ``across`` names."""
+        self.width = width
         self.rows, self.columns, self.times, self.across = rows, columns, times, across
         self.height = HEAD + rows * ROW + FOOT
         self.marks: list[Mark] = []
@@ -107,7 +118,7 @@ class Sheet:
             is_floored: Whether the lower edge is the smallest value itself, without padding.
         """
         row, column = divmod(index, self.columns)
-        width = (WIDTH - LEFT - RIGHT - (self.columns - 1) * GAP) / self.columns
+        width = (self.width - LEFT - RIGHT - (self.columns - 1) * GAP) / self.columns
         low, high = span
         padding = PADDING_FRACTION * (high - low) or 1.0
         panel = Panel(

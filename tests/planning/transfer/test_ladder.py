@@ -137,6 +137,7 @@ print(hashlib.sha256(found.q.tobytes() + found.times.tobytes()).hexdigest())
 """
 
 
+@pytest.mark.slow
 def test_another_process_finds_the_same_bytes(rounded: tuple[Scene, PlannedTransfer]) -> None:
     _, found = rounded
     here = hashlib.sha256(found.q.tobytes() + found.times.tobytes()).hexdigest()

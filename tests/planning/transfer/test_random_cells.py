@@ -1,4 +1,4 @@
-"""Real arms among random obstacles: ways that are known to be there are found, and none is found where there is none."""
+"""Real arms among random obstacles: ways known to be there are found, and none where there is none."""
 
 import numpy as np
 import pytest

@@ -1,0 +1,155 @@
+"""Shortest cycle of a cell: by its time laws, and with the best common speed of all robots along the same path."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Final
+
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.model.cell import Cell
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report import REDUCED_SPEED
+from cellplan.model.units import MM
+from cellplan.pipeline.fastest.curve import CurvePoint, production_curve
+from cellplan.pipeline.fastest.demand import MetDemand, calmest, refuse_unless_possible
+from cellplan.pipeline.fastest.scaling import refuse_fixed_times, scaled_values, whole_steps
+from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
+
+MOST_TRIALS: Final = 8  # durations tried until every limit holds
+POINTS: Final = 4  # calmer cycles of each law on the production curve
+
+PAYS: Final = 12.0  # [s] of work on the curve: less is done before further processes have started
+
+SolvedAt = Callable[[Law, dict[str, object], str], TimedProgram]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShortestCycles:
+    """The shortest cycles of a cell, and what calmer ones load it with.
+
+    Attributes:
+        as_written: The program as it is written; its clearance is not checked.
+        by_time_laws: With the durations, feeds and laws of the cell, all faster or slower by one factor.
+        by_common_speed: With the best speed of all robots together along the path that the time laws give.
+        at_reduced_speed: The same with no tool tip faster than 250 mm/s in the world; None where this is not possible.
+        remark: Why there is no program at reduced speed; empty where there is one.
+        curve: The production curve: both laws at the shortest cycle and at calmer ones, the shortest first.
+        demand: The calmest program that meets a demand; None where none was asked for.
+    """
+
+    as_written: TimedProgram
+    by_time_laws: TimedProgram
+    by_common_speed: TimedProgram
+    at_reduced_speed: TimedProgram | None
+    remark: str = ""
+    curve: tuple[CurvePoint, ...] = ()
+    demand: MetDemand | None = None
+
+    @property
+    def programs(self) -> dict[str, TimedProgram]:
+        """The programs that were solved and verified in full, by name."""
+        found = {"time_laws": self.by_time_laws, "common_speed": self.by_common_speed}
+        if self.at_reduced_speed is not None:
+            found["reduced_speed"] = self.at_reduced_speed
+        if self.demand is not None:
+            found["demand"] = self.demand.program
+        return found
+
+    @property
+    def passed(self) -> bool:
+        """Whether all these programs passed every check."""
+        return all(program.solution.passed for program in self.programs.values())
+
+
+def fastest(
+    cell: Cell,
+    *,
+    task: str | None = None,
+    demand: float | None = None,
+    points: int = POINTS,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> ShortestCycles:
+    """The shortest time in which a program keeps the velocity, acceleration and jerk limits of all joints.
+
+    Feeds are scaled with the time laws; for the common speed they are upper limits. Other checks, as tool errors and
+    clearance, are made at the times found and do not change these.
+
+    Args:
+        cell: The cell, as ``load_cell`` gives it; its own timing does not matter.
+        task: Name of the only task to work on.
+        demand: Parts per hour that the calmest program is chosen for.
+        points: Number of calmer cycles of each law on the production curve.
+        workers: Largest number of processes that solve these; one where more would not pay.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The cell cannot be worked with, or a task has times that do not follow the clock.
+        NoSolutionError: No start posture or no home was found, the time laws keep no limit however slow they are, or
+            the demand cannot be met.
+    """
+    refuse_fixed_times(cell)
+    base = cell.with_values({"motion.timing": "as_written"})
+
+    def solved(law: Law, values: dict[str, object], title: str) -> TimedProgram:
+        return TimedProgram.solved(base, law, values, task=task, progress=_within(progress, title))
+
+    written = solved(Law.AS_WRITTEN, {}, "as written")
+    laws = _by_time_laws(base, written, solved)
+    begun = perf_counter()
+    common = solved(Law.COMMON_SPEED, {"motion.timing": "fastest"}, "common speed")
+    processes = workers if 2 * points * (perf_counter() - begun) > PAYS else 1
+    if demand is not None:
+        refuse_unless_possible(demand, min(laws, common, key=lambda each: each.cycle), cell.motion.step)
+    laws = laws.certified(_within(progress, "time laws"))
+    common = common.certified(_within(progress, "common speed"))
+    reduced, remark = _at_reduced_speed(common, solved, progress)
+    met = None
+    if demand is not None:
+        met = calmest(base, demand, written=written, laws=laws, common=common, solved=solved)
+        met = met.certified(_within(progress, "demand"))
+    curve = production_curve(base, (laws, common), task=task, points=points, workers=processes, progress=progress)
+    return ShortestCycles(
+        as_written=written,
+        by_time_laws=laws,
+        by_common_speed=common,
+        at_reduced_speed=reduced,
+        remark=remark,
+        curve=curve,
+        demand=met,
+    )
+
+
+def _by_time_laws(base: Cell, written: TimedProgram, solved: SolvedAt) -> TimedProgram:
+    """The program with which all limits hold and a step less would break one.
+
+    Raises:
+        NoSolutionError: No program keeps them.
+    """
+    now, factor = written, 1.0
+    for _ in range(MOST_TRIALS):
+        if now.load <= 1.0 and factor != 1.0:
+            return now
+        factor = whole_steps(base, factor * now.load, longer_than=factor if now.load > 1.0 else 0.0)
+        now = solved(Law.TIME_LAWS, scaled_values(base, factor), "time laws")
+    raise NoSolutionError(
+        f"{base.origin.at('motion.time_law')}: expected time laws that keep all limits when slow enough, got "
+        "speeds that jump; use the time law quintic, or write acceleration: unlimited"
+    )
+
+
+def _at_reduced_speed(common: TimedProgram, solved: SolvedAt, progress: Progress) -> tuple[TimedProgram | None, str]:
+    """The best common speed with all tools at reduced speed, or why there is none."""
+    if max(speed.tool_peak for run in common.solution.runs for speed in run.report.speeds.values()) <= REDUCED_SPEED:
+        return common, ""
+    values = {"motion.timing": "fastest", "checks.tool_speed_mm_s": MM * REDUCED_SPEED}
+    try:
+        found = solved(Law.REDUCED_SPEED, values, "reduced speed")
+    except (InputError, NoSolutionError) as error:
+        return None, str(error).splitlines()[0]
+    return found.certified(_within(progress, "reduced speed")), ""
+
+
+def _within(progress: Progress, title: str) -> Progress:
+    """A listener that names what is being solved."""
+    return lambda stage, share: progress(f"{title}: {stage}", share)

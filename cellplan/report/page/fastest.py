@@ -1,0 +1,69 @@
+"""``fastest.html``: the shortest cycles of a cell and its production curve as one self-contained page."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from cellplan.model.report import CAUTION
+from cellplan.report.page.render import inline_svg, template
+from cellplan.report.plots.fastest import COLOURS, SHOWN, curve_sheets, curves_of, single_programs
+from cellplan.report.plots.rendering import pictures
+from cellplan.report.record.common import Entries, Record
+from cellplan.report.text.fastest import TITLES, binding_lines, saving_text
+
+NAMES: Final = {**TITLES, "demand": "for the demand"}
+SINGLES: Final = (NAMES["reduced_speed"], NAMES["demand"])  # beside the curve
+
+
+def fastest_page(record: Record) -> str:
+    """The page of the shortest cycles.
+
+    Args:
+        record: As ``fastest_record`` returns it.
+    """
+    sheets = curve_sheets(record)
+    drawn = pictures(sheets)
+    plots = [
+        {"title": SHOWN[name].title, "svg": inline_svg(drawn[f"{name}.svg"].decode(), prefix=f"c{place}-")}
+        for place, name in enumerate(sheets)
+    ]
+    legend = [*curves_of(record), *single_programs(record)] if sheets else []
+    programs = _programs(record)
+    return template("fastest.html").render(
+        r=record,
+        figures=_figures(programs),
+        programs=programs,
+        singles={title: each for title, each in programs.items() if title in SINGLES},
+        plots=plots,
+        legend=[(COLOURS[law], NAMES[law]) for law in legend],
+        titles=TITLES,
+        saving=saving_text,
+        binding=binding_lines,
+        caution=CAUTION,
+    )
+
+
+def _programs(record: Record) -> dict[str, Record]:
+    """Every program by its title."""
+    found = {NAMES[name]: program for name, program in record["cycles"].items()}
+    if record["demand"]:
+        found[NAMES["demand"]] = record["demand"]["program"]
+    return found
+
+
+def _figures(programs: Mapping[str, Record]) -> Entries:
+    """The cycle times at the top of the page."""
+    entries: list[dict[str, Any]] = []
+    for name, program in programs.items():
+        figures = program["figures"]
+        detail = f"{figures['parts_per_h']:.1f} parts per hour"
+        binding = binding_lines(program)
+        entries.append(
+            {
+                "label": name,
+                "value": f"{program['cycle_s']:g}",
+                "unit": "s",
+                "detail": f"{detail}; {binding[0]}" if len(binding) == 1 else detail,
+                "is_bad": program["status"] != "passed",
+            }
+        )
+    return entries
