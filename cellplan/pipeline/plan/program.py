@@ -16,6 +16,7 @@ from cellplan.model.clock import Clock
 from cellplan.model.motion import ClockTable, JointTable, Motion, Schedule
 from cellplan.model.phase import Hold, Phase
 from cellplan.model.plan import Interval, Plan, rows_of
+from cellplan.model.process_times import kept_rests
 from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import TIME_DECIMALS, retimed_schedule, schedule_tasks
@@ -174,7 +175,11 @@ def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) 
                 (phase.begin + scheduled.task.start, phase.begin + scheduled.end + scheduled.task.off_delay),
             )
             stops[name] = tuple(phase.begin + stop for stop in scheduled.stops)
-        dwells |= {(phase.begin + begin, phase.begin + end) for path in schedule.paths for begin, end in path.rests}
+        dwells |= {
+            (phase.begin + begin, phase.begin + end)
+            for path in schedule.paths
+            for begin, end in kept_rests(path.task, path.corners)
+        }
     return replace(plan, phases=tuple(phases), stops=stops, process=process, dwells=tuple(sorted(dwells)))
 
 
