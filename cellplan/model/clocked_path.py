@@ -1,7 +1,6 @@
 """Clocked path: the desired motion of one tool at any time, and the times at which it is not smooth."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -12,6 +11,7 @@ from cellplan.geometry.curves.arc_length import QuickParameters
 from cellplan.geometry.curves.curve import Interval
 from cellplan.geometry.transforms import Array, rotation_about
 from cellplan.model.approach_retract import stand_off
+from cellplan.model.process_times import kept_rests, leaves_at, ramp_shares
 from cellplan.model.task import TIME_TOLERANCE, Task, TimeLawKind
 from cellplan.model.time_law import advance, reached_at
 from cellplan.model.toolpath import TOOL_Z, Toolpath
@@ -50,41 +50,6 @@ class ClockedPath:
         return float(self.corners[-1])
 
     @property
-    def leaves(self) -> float:
-        """Time in [s] at which the tool leaves the end of its path: after the delay of a process, and a dwell."""
-        return self.end + self.task.off_delay + self.task.dwell
-
-    @property
-    def on_path(self) -> tuple[float, float]:
-        """Times in [s] between which the process is on; without one, those at which the path starts and ends."""
-        return self.task.start, self.end + self.task.off_delay
-
-    @property
-    def rests(self) -> tuple[tuple[float, float], ...]:
-        """Stretches of time in [s] that a retimed program keeps: the delays of a process, and a dwell."""
-        ends = (self.task.start, self.start), (self.end, self.on_path[1]), (self.on_path[1], self.leaves)
-        return tuple((begin, end) for begin, end in ends if end - begin > TIME_TOLERANCE)
-
-    @property
-    def demanded(self) -> tuple[tuple[float, float], ...]:
-        """Stretches of time in [s] in which the feed of a process is demanded: between its ramps."""
-        process = self.task.process
-        if process is None:
-            return ()
-        return tuple(
-            (begin + process.ramp, end - process.ramp)
-            for begin, end in pairwise(self.corners.tolist())
-            if end - begin - 2.0 * process.ramp > TIME_TOLERANCE
-        )
-
-    @property
-    def ramps(self) -> Array:
-        """Share of the time of each stretch that a ramp of its law takes, shape (corners - 1,)."""
-        duration = np.diff(self.corners)
-        process = self.task.process
-        return np.full(len(duration), self.task.time_law.ramp) if process is None else process.ramp / duration
-
-    @property
     def over(self) -> float:
         """Time in [s] from which on the tool rests: it is out of the way."""
         return self.end + self.task.leaving
@@ -112,11 +77,11 @@ class ClockedPath:
     @property
     def jumps(self) -> Array:
         """The breaks that do not come from knots of the path, in [s], increasing, shape (J,)."""
-        found = [self.corners, np.array([self.over]), np.array(self.rests).ravel()]
+        found = [self.corners, np.array([self.over]), np.array(kept_rests(self.task, self.corners)).ravel()]
         if self.task.approach is not None:
             found.append(np.array([self.task.start - self.task.approach.duration]))
         if self.task.time_law.kind in {TimeLawKind.TRAPEZOID, TimeLawKind.STEADY} and not self.toolpath.is_timed:
-            ramp = self.ramps * np.diff(self.corners)
+            ramp = ramp_shares(self.task, self.corners) * np.diff(self.corners)
             found += [self.corners[:-1] + ramp, self.corners[1:] - ramp]
         return distinct(np.concatenate(found))
 
@@ -140,19 +105,14 @@ class ClockedPath:
         else:
             X_PT, V_PT_P, _ = self._by_time_law(inside, self._stretches(middle), quick=self.quick)
         V_PT_P[(middle < self.corners[0]) | (middle > self.corners[-1])] = 0.0
-        stand_off(inside, self.task, X_PT, V_PT_P=V_PT_P, end=self.leaves)
+        stand_off(inside, self.task, X_PT, V_PT_P=V_PT_P, end=leaves_at(self.task, self.corners))
         return X_PT, V_PT_P
 
     def poses(self, times: Array) -> Array:
         """Reference poses X_PT with approach and retreat at times in [s], shape (M,), shape (M, 4, 4)."""
         X_PT, V_PT_P, _ = self.targets(times)
-        stand_off(times, self.task, X_PT, V_PT_P=V_PT_P, end=self.leaves)
+        stand_off(times, self.task, X_PT, V_PT_P=V_PT_P, end=leaves_at(self.task, self.corners))
         return X_PT
-
-    def reached_at(self, share: float) -> float:
-        """Time in [s] at which a share of all cycles is done, along a path that runs on without stops."""
-        law, duration = self.task.time_law, self.corners[-1] - self.corners[0]
-        return float(self.corners[0] + duration * reached_at(law, np.array([share]), float(self.ramps[0]))[0])
 
     def targets(self, times: Array) -> tuple[Array, Array, Array]:
         """Poses, twists and lengths behind the tool while it follows its path, without approach and retreat.
@@ -193,7 +153,7 @@ class ClockedPath:
         elapsed = np.where(
             elapsed <= TIME_TOLERANCE, 0.0, np.where(duration - elapsed <= TIME_TOLERANCE, duration, elapsed)
         )
-        law = advance(task.time_law, elapsed / duration, self.ramps[stretch])
+        law = advance(task.time_law, elapsed / duration, ramp_shares(task, self.corners)[stretch])
         if toolpath.runs_on:
             length = np.full(len(times), task.repeat * behind[-1])
             cycle = np.clip((law.share * length) // behind[-1], 0, task.repeat - 1)
@@ -210,7 +170,7 @@ class ClockedPath:
 
     def _instants(self, knots: Array) -> Array:
         """Times in [s] at which the path passes its knots, of all cycles, shape (N,)."""
-        path, law = self.toolpath, self.task.time_law
+        path, law, ramps = self.toolpath, self.task.time_law, ramp_shares(self.task, self.corners)
         cycles = np.arange(self.task.repeat)[:, None]
         if path.is_timed:
             return (self.corners[:-1, None] + knots).ravel()
@@ -222,10 +182,10 @@ class ClockedPath:
         s, piece = s[is_inside], piece[is_inside]
         if path.runs_on:
             share = (cycles + np.append(0.0, s / self.behind[-1])).ravel() / self.task.repeat
-            return self.start + (self.end - self.start) * reached_at(law, share, float(self.ramps[0]))
+            return self.start + (self.end - self.start) * reached_at(law, share, float(ramps[0]))
         stretch = cycles * pieces + piece
         done = np.broadcast_to((s - self.behind[piece]) / np.diff(self.behind)[piece], stretch.shape)
-        tau = reached_at(law, done, self.ramps[stretch])
+        tau = reached_at(law, done, ramps[stretch])
         return (self.corners[stretch] + np.diff(self.corners)[stretch] * tau).ravel()
 
 

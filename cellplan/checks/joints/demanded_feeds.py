@@ -11,8 +11,9 @@ from cellplan.checks.tools.tracking import relative_to_task_frame
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Timing
 from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.process_times import kept_rests, process_span
 from cellplan.model.report import Check
-from cellplan.model.task import TIME_TOLERANCE, Process
+from cellplan.model.task import TIME_TOLERANCE, Process, Task
 from cellplan.model.units import MM
 from cellplan.scene.scene import Scene
 
@@ -24,7 +25,7 @@ def check_feeds(scene: Scene, schedule: Schedule, q: Mapping[str, Array], X_WP: 
     """The speed of every tool with a demanded feed against it.
 
     Between the ramps of its path the speed between two rows must be within the tolerance; in the ramps it must not be
-    larger.
+    larger. The delays of a retimed program must not be longer by more than that share, and a step.
 
     Args:
         scene: The cell made computable.
@@ -39,6 +40,30 @@ def check_feeds(scene: Scene, schedule: Schedule, q: Mapping[str, Array], X_WP: 
             points = relative_to_task_frame(task, X_WT, X_WP)[:, :3, 3]
             speeds = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(schedule.times)
             yield _check(scene.cell, scheduled, task.process, times=schedule.times, speeds=speeds, q=q)
+    clock = schedule.clock
+    for path in schedule.paths if clock is not None else ():
+        process, (on, off) = path.task.process, process_span(path.task, path.corners)
+        for key, delay in (("on_delay", (on, path.start)), ("off_delay", (path.end, off))):
+            if process is not None and clock is not None and delay in kept_rests(path.task, path.corners):
+                begin, end = clock.reached_at(np.array(delay)).tolist()
+                yield _check_delay(path.task, process, key, (begin, end - begin), step=schedule.step)
+
+
+def _check_delay(task: Task, process: Process, key: str, took: tuple[float, float], *, step: float) -> Check:
+    """The begin of a delay and the time that it takes in a retimed program, in [s]: at most what its rate allows."""
+    asked = process.on_delay if key == "on_delay" else process.off_delay
+    limit = asked / (1.0 - process.tolerance) + step
+    return Check(
+        name=f"process_{key}",
+        subject=task.name,
+        passed=took[1] <= limit + TIME_TOLERANCE,
+        value=took[1],
+        limit=limit,
+        unit="s",
+        at_s=took[0],
+        message=f"{key}_s of task '{task.name}': {took[1]:.4g} s at {took[0]:.3f} s, demanded {asked:g} s within "
+        f"{PERCENT * process.tolerance:g} % and a step",
+    )
 
 
 def nearest_to_limit(cell: Cell, times: Array, q: Mapping[str, Array], step: int) -> tuple[str, str, float]:

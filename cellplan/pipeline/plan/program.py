@@ -15,6 +15,7 @@ from cellplan.model.clock import Clock
 from cellplan.model.motion import ClockTable, JointTable, Motion, Schedule
 from cellplan.model.phase import Hold, Phase
 from cellplan.model.plan import Interval, Plan, rows_of
+from cellplan.model.process_times import kept_rests
 from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import TIME_DECIMALS, retimed_schedule, schedule_tasks
@@ -186,11 +187,24 @@ def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) 
     for phase, schedule in zip(placed, schedules, strict=True):
         begin = phase.begin
         for scheduled in schedule.tasks:
+<<<<<<< HEAD
             task = scheduled.task
             own = (begin + task.start, begin + scheduled.end + task.off_delay)
             process[task.name] = (*process.get(task.name, ()), own)
             stops[task.name] = (*stops.get(task.name, ()), *(begin + stop for stop in scheduled.stops))
         dwells |= {(begin + first, begin + last) for path in schedule.paths for first, last in path.rests}
+=======
+            name = scheduled.task.name
+            process[name] = (
+                (phase.begin + scheduled.task.start, phase.begin + scheduled.end + scheduled.task.off_delay),
+            )
+            stops[name] = tuple(phase.begin + stop for stop in scheduled.stops)
+        dwells |= {
+            (phase.begin + begin, phase.begin + end)
+            for path in schedule.paths
+            for begin, end in kept_rests(path.task, path.corners)
+        }
+>>>>>>> curve
     return replace(plan, phases=tuple(phases), stops=stops, process=process, dwells=tuple(sorted(dwells)))
 
 

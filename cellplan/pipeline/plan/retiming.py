@@ -16,6 +16,7 @@ from cellplan.model.cell import Cell, Timing
 from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.joint_path import JointPath
 from cellplan.model.motion import Motion, Schedule
+from cellplan.model.process_times import kept_rests
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import Task
 from cellplan.pipeline.plan.program import ProgramClock
@@ -208,7 +209,7 @@ class RowLimits:
         within = [
             np.minimum(sigma[1:], end) - np.maximum(sigma[:-1], begin)
             for path in self.paths
-            for begin, end in path.rests
+            for begin, end in kept_rests(path.task, path.corners)
         ]
         return float(np.max(within, initial=0.0) - ROUNDING) / self.step
 
@@ -220,7 +221,7 @@ class RowLimits:
                 twists = path.targets(sigma)[1]
                 is_moving = (sigma >= path.start) & (sigma <= path.end)
                 share = np.maximum(share, is_moving * np.linalg.norm(twists[:, :3], axis=1) / path.task.feed)
-            for begin, end in path.rests:
+            for begin, end in kept_rests(path.task, path.corners):
                 share = np.maximum(share, (sigma >= begin) & (sigma <= end))
         if self.errors is not None:
             share = np.maximum(share, self.errors.steepness(sigma, self.step))
@@ -268,7 +269,7 @@ def kept_rates(paths: Sequence[ClockedPath]) -> tuple[KeptRate, ...]:
         process = path.task.process
         if process is not None:
             found.append(KeptRate(begin=path.start, end=path.end, tolerance=process.tolerance))
-        found += [KeptRate(begin=begin, end=end) for begin, end in path.rests]
+        found += [KeptRate(begin=begin, end=end) for begin, end in kept_rests(path.task, path.corners)]
     return tuple(found)
 
 

@@ -40,7 +40,7 @@ class KeptRate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AtRest:
-    """All joints rest; time passes in the stretches that are demanded only.
+    """All joints rest; time passes in the stretches that are demanded only, or in a single step.
 
     Attributes:
         begin: Nominal time in [s] at which the rest begins.
@@ -59,6 +59,8 @@ class AtRest:
 
     def rows(self, count: int) -> Array:
         """See ``Rows``."""
+        if not len(self.spans):
+            return np.linspace(self.begin, self.end, count + 1)
         passed = np.append(0.0, np.cumsum(np.diff(self.spans, axis=1).ravel()))
         wait = np.linspace(0.0, passed[-1], count + 1)
         k = np.clip(np.searchsorted(passed, wait, side="left") - 1, 0, len(self.spans) - 1)

@@ -120,10 +120,15 @@ class Retimer:
         return found
 
     def _rest(self, begin: float, end: float) -> list[tuple[int, Rows]]:
-        """What is demanded of a rest of all joints with its steps; nothing where no time has to pass."""
+        """What is demanded of a rest of all joints with its steps; nothing where no time has to pass.
+
+        Where errors between rows count, a rest takes a step at least: in a step into it or out of it the nominal time
+        would run ahead of the joints.
+        """
         spans = spans_within(self.kept, begin, end)
         waits = AtRest(begin, end, spans)
-        return [(whole_steps(waits.seconds, self.step), waits)] if len(spans) else []
+        takes_steps = len(spans) or (self.errors is not None and end - begin > MARGIN)
+        return [(whole_steps(waits.seconds, self.step), waits)] if takes_steps else []
 
     def _kept(self, piece: Stretch) -> tuple[int, Rows] | None:
         """The motion of one stretch with the demanded rates; None where nothing is demanded, or limits forbid it."""

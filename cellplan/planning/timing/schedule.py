@@ -14,8 +14,9 @@ from cellplan.model.cell import Cell
 from cellplan.model.clock import Clock
 from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.process_times import demanded_spans, leaves_at, ramp_shares
 from cellplan.model.task import TIME_TOLERANCE, Process, Task
-from cellplan.model.time_law import peak_rate
+from cellplan.model.time_law import peak_rate, reached_at
 from cellplan.model.toolpath import Toolpath
 from cellplan.model.units import MM
 from cellplan.planning.timing.sample_memory import require_memory
@@ -192,7 +193,7 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
     rests = (times < corners[0] - TIME_TOLERANCE) | (times > corners[-1] - TIME_TOLERANCE)
     V_PT_P[rests] = 0.0
     _even_out_jumps(times, corners, X_PT, V_PT_P=V_PT_P)
-    stand_off(times, task, X_PT, V_PT_P=V_PT_P, end=path.leaves)
+    stand_off(times, task, X_PT, V_PT_P=V_PT_P, end=leaves_at(task, path.corners))
     return TaskSchedule(
         task=task,
         X_PT=X_PT,
@@ -202,7 +203,7 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
         end=path.end,
         cycle_ends=_cycle_ends(path, corners),
         stops=tuple(corners.tolist()),
-        demanded=path.demanded,
+        demanded=demanded_spans(task, path.corners),
     )
 
 
@@ -215,7 +216,7 @@ def _cycle_ends(path: ClockedPath, corners: Array) -> tuple[float, ...]:
         return ()
     shares = np.arange(1, task.repeat + 1) / task.repeat
     if toolpath.runs_on and not toolpath.is_timed:
-        return tuple(path.reached_at(share) for share in shares.tolist())
+        shares = reached_at(task.time_law, shares, float(ramp_shares(task, corners)[0]))
     return tuple((corners[0] + shares * (corners[-1] - corners[0])).tolist())
 
 
