@@ -187,24 +187,12 @@ def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) 
     for phase, schedule in zip(placed, schedules, strict=True):
         begin = phase.begin
         for scheduled in schedule.tasks:
-<<<<<<< HEAD
             task = scheduled.task
             own = (begin + task.start, begin + scheduled.end + task.off_delay)
             process[task.name] = (*process.get(task.name, ()), own)
             stops[task.name] = (*stops.get(task.name, ()), *(begin + stop for stop in scheduled.stops))
-        dwells |= {(begin + first, begin + last) for path in schedule.paths for first, last in path.rests}
-=======
-            name = scheduled.task.name
-            process[name] = (
-                (phase.begin + scheduled.task.start, phase.begin + scheduled.end + scheduled.task.off_delay),
-            )
-            stops[name] = tuple(phase.begin + stop for stop in scheduled.stops)
-        dwells |= {
-            (phase.begin + begin, phase.begin + end)
-            for path in schedule.paths
-            for begin, end in kept_rests(path.task, path.corners)
-        }
->>>>>>> curve
+        rests = (rest for path in schedule.paths for rest in kept_rests(path.task, path.corners))
+        dwells |= {(begin + first, begin + last) for first, last in rests}
     return replace(plan, phases=tuple(phases), stops=stops, process=process, dwells=tuple(sorted(dwells)))
 
 

@@ -105,7 +105,8 @@ class _Retimed:
         if left < steps[is_open].sum():
             raise InputError(
                 f"{cell.origin.at('motion.timing')}: expected a cycle of at least {steps.sum() * motion.step:.6g} s, "
-                f"which the program with its transfer moves takes, got {motion.cycle:g}; make it longer, or write fastest"
+                f"which the program with its transfer moves takes, got {motion.cycle:g}; make it longer, or write "
+                "fastest"
             )
         ends = np.round(np.cumsum(steps * is_open) * (left / max(1, int(steps[is_open].sum())))).astype(int)
         own = np.diff(ends, prepend=0)

@@ -106,7 +106,7 @@ def test_verification_accepts_it_from_the_cell_file_and_each_phase_by_name(solve
 
     assert [motion.name for motion in run.motions] == list(PHASES)
     assert np.allclose(run.motion.q, solution.motion.q, atol=1e-13)
-    tables = {robot: text for robot, text in solution.program.tables.items()}
+    tables = dict(solution.program.tables.items())
     report = verify(solution.cell, tables, task="transfer-3", clock=solution.program.clock)
     assert report.passed
     assert report.conditioning is None
@@ -162,7 +162,7 @@ FORGERIES: dict[str, tuple[Callable[[Path], None], str]] = {
     ),
     "start": (
         lambda run: shift_joint(run, "holder", first_row_of(run, "work-2"), 0.01),
-        r"holder.csv:\d+: A1: expected the start posture of the cell|exceeds its tolerance|position error",
+        r"holder.csv:\d+: A1: expected the start posture of the cell",
     ),
     "swapped": (
         lambda run: edit_clock(run, lambda text: text.replace(",grip,", ",gr,").replace(",lift,", ",grip,")),
