@@ -71,7 +71,7 @@ class TimedProgram:
         values: What was set in the cell for it, by address; see ``Cell.with_values``.
         solution: The program, solved and verified at that time.
         scene: The scene of the solved cell.
-        bindings: What binds each of its phases.
+        bindings: What binds each of its phases with tasks; transfer moves go as fast as they can anyway.
         load: Share of its time in which the limits of joints, tools and part would allow the same motion.
     """
 
@@ -96,13 +96,14 @@ class TimedProgram:
             progress: Called with the stage and the fraction done.
         """
         scene, solution = solve_motion(cell.with_values(values), task=task, progress=progress)
-        rows = [_rows(scene, run) for run in solution.runs]
+        scaled = [run for run in solution.runs if _is_scaled(run, cell)]
+        rows = [_rows(run.scene or scene, run) for run in scaled]
         return cls(
             law=law,
             values=values,
             solution=solution,
             scene=scene,
-            bindings=tuple(_binding(scene, run, is_retimed=law in RETIMED) for run in solution.runs),
+            bindings=tuple(_binding(run.scene or scene, run, is_retimed=law in RETIMED) for run in scaled),
             load=max(_slower(scene, limits, q) for limits, q in rows),
         )
 
@@ -124,6 +125,12 @@ class TimedProgram:
     def phases(self) -> list[float]:
         """Time of each of its phases in [s]; there may be a step between two."""
         return [run.report.cycle_time for run in self.solution.runs]
+
+
+def _is_scaled(run: Run, cell: Cell) -> bool:
+    """Whether a phase has tasks of the cell, so that it takes longer where they do."""
+    tasks = {task.name for task in cell.tasks}
+    return bool(run.phase.tasks) and tasks.issuperset(run.phase.tasks)
 
 
 def _rows(scene: Scene, run: Run) -> tuple[RowLimits, Array]:
