@@ -56,12 +56,18 @@ def _refuse_other(written: ClockText, cell: Cell, phases: Sequence[Phase], *, fi
                 f"{file}:{written.line(place)}: sigma_s: expected more than in the row before, got {got!r}"
             )
         steps = None if cell.motion.cycle is None else round(cell.motion.cycle / cell.motion.step)
-        if steps not in (None, last - row):
+        if cell.program is None and steps not in (None, last - row):
             raise InputError(
                 f"{file}:{written.line(last)}: expected a phase of {cell.motion.cycle:g} s (motion.timing), got "
                 f"{(last - row) * cell.motion.step:g} s"
             )
         row = last + 1
+    whole = 0 if cell.program is None or cell.motion.cycle is None else cell.program.cycles * cell.motion.cycle
+    if whole and round(whole / cell.motion.step) != len(sigma) - 1:
+        raise InputError(
+            f"{file}:{written.line(len(sigma) - 1)}: expected a program of {whole:g} s (motion.timing), got "
+            f"{(len(sigma) - 1) * cell.motion.step:g} s"
+        )
     if row < len(sigma):
         raise InputError(
             f"{file}:{written.line(row)}: expected no row after the end of the last phase, got another one"

@@ -46,23 +46,78 @@ def retimed(
     Raises:
         InputError: The joints cannot go as fast as the demanded cycle asks for.
     """
-    if scenes[0].cell.motion.timing is Timing.AS_WRITTEN:
+    cell = scenes[0].cell
+    if cell.motion.timing is Timing.AS_WRITTEN:
         return clock, list(motions)
-    paths, nominal = [], []
-    for place, (phase, motion) in enumerate(zip(clock.plan.program, motions, strict=True)):
-        progress("retiming", place / len(motions))
-        paths.append(joint_path(motion))
-        own = _nominal_times(scenes[place], clock.schedules[place], paths[-1]) if phase.tasks else motion.times
-        sigma = np.round(phase.begin + own, TIME_DECIMALS)
+    phases = clock.plan.program
+    paths = [joint_path(motion) if phase.tasks else None for phase, motion in zip(phases, motions, strict=True)]
+    retimed_phases = _Retimed(scenes, clock, motions, paths)
+    if cell.program is None:
+        own = retimed_phases.nominal([cell.motion.cycle] * len(motions), progress)
+    else:
+        own = retimed_phases.nominal([None] * len(motions), progress)
+        if cell.motion.cycle is not None:
+            own = retimed_phases.nominal(retimed_phases.cycles(own), progress)
+    nominal = [phase.begin + sigma for phase, sigma in zip(phases, own, strict=True)]
+    for phase, sigma in zip(phases, nominal, strict=True):
+        np.round(sigma, TIME_DECIMALS, out=sigma)
         sigma[0], sigma[-1] = phase.begin, phase.end
-        nominal.append(sigma)
     clock = clock.retimed(clock.joined(nominal))
-    made: list[Motion] = []
-    for phase, path, motion, sigma in zip(clock.plan.program, paths, motions, nominal, strict=True):
-        own = sigma - phase.begin
-        times = clock.schedules[len(made)].times
-        made.append(replace(motion, times=times, sigma=own, q=path.at(own), iterations=None, slack=None))
-    return clock, made
+    return clock, retimed_phases.motions_at(clock, nominal)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Retimed:
+    """The phases of a program that is retimed; transfer moves and dwells keep their rows.
+
+    Attributes:
+        scenes: The scene of each phase.
+        clock: The program as its time laws have it.
+        motions: Motion of each phase, likewise.
+        paths: The joints of each phase between its rows too; None where it keeps its rows.
+    """
+
+    scenes: Sequence[Scene]
+    clock: ProgramClock
+    motions: Sequence[Motion]
+    paths: Sequence[JointPath | None]
+
+    def nominal(self, cycles: Sequence[float | None], progress: Progress) -> list[Array]:
+        """Nominal times of the rows of each phase in [s] from its begin, as fast as possible or in given times."""
+        found: dict[tuple[int, float | None], Array] = {}  # all cycles of a program have the same motions
+        for place, (motion, path, cycle) in enumerate(zip(self.motions, self.paths, cycles, strict=True)):
+            progress("retiming", place / len(cycles))
+            if (key := (id(motion), cycle)) not in found:
+                schedule = self.clock.schedules[place]
+                scene = self.scenes[place]
+                found[key] = motion.times if path is None else _nominal_times(scene, schedule, path, cycle)
+        return [found[id(motion), cycle].copy() for motion, cycle in zip(self.motions, cycles, strict=True)]
+
+    def cycles(self, fastest: Sequence[Array]) -> list[float | None]:
+        """Times in [s] of the phases in the demanded cycle of a program from home to home, all slower alike."""
+        cell = self.scenes[0].cell
+        motion, count = cell.motion, 1 if cell.program is None else cell.program.cycles
+        of_one = len(fastest) // count
+        steps = np.array([len(sigma) - 1 for sigma in fastest[:of_one]])
+        is_open = np.array([path is not None for path in self.paths[:of_one]])
+        left = round((motion.cycle or 0.0) / motion.step) - int(steps[~is_open].sum())
+        if left < steps[is_open].sum():
+            raise InputError(
+                f"{cell.origin.at('motion.timing')}: expected a cycle of at least {steps.sum() * motion.step:.6g} s, "
+                f"which the program with its transfer moves takes, got {motion.cycle:g}; make it longer, or write fastest"
+            )
+        ends = np.round(np.cumsum(steps * is_open) * (left / max(1, int(steps[is_open].sum())))).astype(int)
+        own = np.diff(ends, prepend=0)
+        return [float(each * motion.step) if free else None for each, free in zip(own, is_open, strict=True)] * count
+
+    def motions_at(self, clock: ProgramClock, nominal: Sequence[Array]) -> list[Motion]:
+        """The motion of each phase in the rows of another clock."""
+        made: list[Motion] = []
+        for place, (phase, path, motion) in enumerate(zip(clock.plan.program, self.paths, self.motions, strict=True)):
+            own, times = nominal[place] - phase.begin, clock.schedules[place].times
+            q = motion.q if path is None else path.at(own)
+            made.append(replace(motion, times=times, sigma=own, q=q, iterations=None, slack=None))
+        return made
 
 
 def joint_path(motion: Motion) -> JointPath:
@@ -222,8 +277,8 @@ def _largest_feed(task: Task) -> float:
     return (task.feed or np.inf) * (1.0 + (task.process.tolerance if task.process else 0.0))
 
 
-def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath) -> Array:
-    """Nominal times of the rows of one phase in [s], shape (N,)."""
+def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath, cycle: float | None) -> Array:
+    """Nominal times of the rows of one phase in [s], shape (N,): as fast as possible, or within a cycle in [s]."""
     errors, motion = StepErrors(scene, schedule.paths, path), scene.cell.motion
     limits = replace(row_limits(scene, schedule), path=path, errors=errors)
     retimer = Retimer(
@@ -235,20 +290,20 @@ def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath) -> Array:
         errors=errors,
     )
     fastest = retimer.fastest(path)
-    if motion.cycle is None:
+    if cycle is None:
         return fastest.sigma
-    steps = round(motion.cycle / motion.step)
+    steps = round(cycle / motion.step)
     if fastest.steps <= steps:
         sigma = fastest.lasting(steps).sigma
         if len(sigma) != steps + 1:
             raise InputError(
                 f"{scene.cell.origin.at('motion.timing')}: expected a cycle of {fastest.steps * motion.step:g} s, as "
-                f"feeds of processes, delays and dwells decide how long all motion takes, got {motion.cycle:g}"
+                f"feeds of processes, delays and dwells decide how long all motion takes, got {cycle:g}"
             )
         if limits.slower(sigma, path.at(sigma)) <= 1.0:
             return sigma
     least = max(fastest.steps, steps + (fastest.steps <= steps)) * motion.step
     raise InputError(
         f"{scene.cell.origin.at('motion.timing')}: expected a cycle of at least {least:.6g} s, in which all joints "
-        f"keep their limits along this path, got {motion.cycle:g}; make it longer, or write fastest"
+        f"keep their limits along this path, got {cycle:g}; make it longer, or write fastest"
     )

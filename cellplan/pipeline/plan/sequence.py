@@ -258,8 +258,9 @@ def _transferred(stage: Stage, scene: Scene, start: Array, goal: Array, progress
         columns = cell.columns(name)
         if np.any(np.abs(goal[columns] - start[columns]) > CLOSED):
             raise InputError(
-                f"{cell.origin.at('program')}: expected holders that begin and end at their starts, as '{name}' and the "
-                "other holders of the part cannot be moved one by one; set motion.cyclic: true, and no home of theirs"
+                f"{cell.origin.at('program')}: expected holders that begin and end at their starts, as '{name}' and "
+                "the other holders of the part cannot be moved one by one; set motion.cyclic: true, and no home of "
+                "theirs"
             )
     found = plan_transfer(
         scene_of_run(scene, ()), start, goal, retimer=transfer_retimer(scene), seed=cell.solver.seed, progress=progress

@@ -111,7 +111,8 @@ def _straight(cell: Cell, move: PartMove, place: PartPlace) -> Stage:
     robots = tuple(replace(robot, start=robot.home if robot.home is not None else robot.start) for robot in cell.robots)
     holder = cell.positioners[0]
     own = with_move(replace(cell, robots=robots), move, place, holder)
-    own = replace(own, robots=_with_start(own.robots, holder, None), motion=replace(own.motion, mode=Mode.SIMULTANEOUS))
+    motion = replace(own.motion, mode=Mode.SIMULTANEOUS, duration=None)
+    own = replace(own, robots=_with_start(own.robots, holder, None), motion=motion)
     is_lying = move in (PartMove.GRIP, PartMove.RELEASE)
     return Stage(phase=_phase(own, move.value), cell=own, move=move, place=place if is_lying else None)
 
