@@ -37,7 +37,7 @@ class PartMove(StrEnum):
 
 
 def part_lying(cell: Cell, place: PartPlace) -> Cell:
-    """The cell while its part lies in it, held by nobody."""
+    """The cell while its part lies in it, held by no robot."""
     return replace(cell, tasks=(), part=replace(cell.part, held_by=(), X_WP=place.X_WP))
 
 

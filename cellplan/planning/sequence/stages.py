@@ -126,15 +126,14 @@ def _cell_of_block(cell: Cell, block: Block, first: dict[str, str]) -> Cell:
     """The cell while a block is worked on; robots without a task in it are at their homes."""
     tasks = tuple(task for task in cell.tasks if task.name in block.tasks)
     by_robot = {task.robot: task for task in tasks}
-    posture = next((task.holder_posture for task in tasks if task.holder_posture is not None), None)
+    held_at = next((task.holder_posture for task in tasks if task.holder_posture is not None), None)
     robots = []
     for robot in cell.robots:
-        if robot.name in cell.positioners[:1]:
-            start = robot.start if posture is None else posture
-        elif robot.name in by_robot:
+        start = robot.start if robot.home is None or robot.name in cell.positioners else robot.home
+        if robot.name in by_robot:
             start = task_start(robot, by_robot[robot.name], first)
-        else:
-            start = robot.start if robot.home is None or robot.name in cell.positioners else robot.home
+        elif robot.name in cell.positioners[:1] and held_at is not None:
+            start = held_at
         robots.append(replace(robot, start=start))
     mode = Mode.PART_AT_REST if cell.motion.mode in AT_REST else Mode.SIMULTANEOUS
     return replace(cell, robots=tuple(robots), tasks=tasks, motion=replace(cell.motion, mode=mode))

@@ -252,3 +252,13 @@ def test_a_mark_after_all_tasks_is_a_rest_at_home():
     ]
     assert (stages[3].phase.idle, stages[3].phase.moving) == (("op1", "op2"), ())
     assert stages[-1].phase.roles == {"holder": Hold()} | dict.fromkeys(ROBOTS, Hold(at_home=True))
+
+
+def test_the_holder_begins_a_block_where_its_own_task_or_that_of_others_says():
+    cell = at_postures(cell_of({"op0": "a", "op1": "b", "holder": "c"}, {"b": ["a"], "c": ["b"]}), {"b": 0.5})
+    cell = replace(cell, tasks=(*cell.tasks[:2], replace(cell.tasks[2], start_posture=np.ones(3))))
+
+    starts = [stage.cell.robot("holder").start for stage in program_stages(cell) if stage.phase.tasks]
+
+    assert starts[0] is None
+    np.testing.assert_array_equal(starts[1:], [np.full(3, 0.5), np.ones(3)])
