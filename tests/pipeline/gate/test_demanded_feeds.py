@@ -94,6 +94,8 @@ def test_all_feeds_hold_where_only_the_approach_has_to_slow_down(
         assert all(check.passed for check in feed_checks(solution).values())
         for task, feed in FEEDS.items():
             assert np.abs(steady_speeds(solution, task, feed) / feed - 1.0).max() < 0.01 / 3.0  # s: whole steps
+        for errors in solution.runs[0].report.accuracy:
+            assert np.abs(errors.position_error).max() < 1e-6  # m: the tools keep their paths
     assert solved[1].passed
     approach = [solution.plan.process["ring"][0][0] for solution in (as_written, solved[1])]
     assert approach == [0.5, 0.5]  # nominal
