@@ -17,7 +17,6 @@ from cellplan.certify.run_pairs import rows_moved_by
 from cellplan.collision.bodies import BodyPoses
 from cellplan.collision.continuous.motion_bound import Pair
 from cellplan.collision.distance import APART_TOL, exact_reading, quick_reading
-from cellplan.collision.overlap.containment import is_inside
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -214,7 +213,10 @@ class MoveCheck:
         return gaps
 
     def _read(self, place: int, samples: "_Samples", sample: int, need: float) -> float:
-        """Distance of a pair at a sample in [m]: proved, exact where the proof does not reach what is needed."""
+        """Distance of a pair at a sample in [m]: proved, exact where the proof does not reach what is needed.
+
+        That a body is not inside another one is not asked: no move leads there from an end that is free.
+        """
         first, second = self._ends[place].tolist()
         poses, engine = self._at_one, self._scene.engine
         for index in (first, second):
@@ -225,8 +227,6 @@ class MoveCheck:
         reading = quick_reading(engine, (first, second), poses, sample=0)
         if reading.touches or reading.bound >= need:
             return reading.bound
-        if reading.bound <= APART_TOL and is_inside(engine, (first, second), poses, sample=0):
-            return 0.0
         return exact_reading(engine, (first, second), poses, sample=0, reading=reading).bound
 
 
