@@ -3,10 +3,10 @@
 The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
-- compute: ``solve``, ``screen``, ``sweep``, ``rehearse``
+- compute: ``solve``, ``screen``, ``sweep``, ``compare``, ``rehearse``
 - verify: ``verify``, ``open_gate``
 - write: ``write_run``, ``write_rehearsal``, ``export_program``
-- inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``
+- inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``CompareJob``
 - results: ``Solution``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``
 - errors: ``CellplanError``
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from cellplan.model.report import Check, Report
     from cellplan.model.task import Task
     from cellplan.model.toolpath import Toolpath
+    from cellplan.pipeline.compare import CompareJob, compare
     from cellplan.pipeline.export import export_program
     from cellplan.pipeline.gate.open_gate import open_gate
     from cellplan.pipeline.rehearsal.rehearse import rehearse
@@ -50,6 +51,7 @@ _HOME: Final = {
     "Cell": "model.cell",
     "CellplanError": "errors",
     "Check": "model.report",
+    "CompareJob": "pipeline.compare",
     "Motion": "model.motion",
     "Part": "model.cell",
     "Program": "model.motion",
@@ -60,6 +62,7 @@ _HOME: Final = {
     "SweepJob": "pipeline.sweep",
     "Task": "model.task",
     "Toolpath": "model.toolpath",
+    "compare": "pipeline.compare",
     "export_program": "pipeline.export",
     "load_cell": "io.cell.load",
     "load_errors": "io.cell_errors",
@@ -79,6 +82,7 @@ __all__ = [
     "Cell",
     "CellplanError",
     "Check",
+    "CompareJob",
     "Motion",
     "Part",
     "Program",
@@ -90,6 +94,7 @@ __all__ = [
     "Task",
     "Toolpath",
     "__version__",
+    "compare",
     "export_program",
     "load_cell",
     "load_errors",
