@@ -18,7 +18,7 @@ SCHEMA = "cellplan.study/1"
 Subjects = Annotated[
     list[Path],
     typer.Argument(
-        metavar="CELL|RUN…",
+        metavar="CELL_OR_RUN",
         help="One cell file, to compare its modes; or several cell files and run folders.",
         show_default=False,
     ),

@@ -178,7 +178,11 @@ def _source(job: CompareJob, path: Path) -> Cell | StoredRun:
 def _modes(source: Cell | StoredRun) -> tuple[Variant, ...]:
     """A variant for each mode, as a program from home to home where cell files can have one."""
     from_home: dict[str, object] = {}
-    if isinstance(source, Cell) and PROGRAM in CellDocument.model_fields and PROGRAM not in source.origin.document:
+    if (
+        isinstance(source, Cell)
+        and PROGRAM in CellDocument.model_fields
+        and source.origin.document.get(PROGRAM) is None
+    ):
         from_home = {PROGRAM: {}}
     return tuple(Variant(number, {MODE: str(mode), **from_home}) for number, mode in enumerate(Mode))
 
