@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -125,6 +125,8 @@ def first_name(job: CompareJob) -> str:
 def evaluate_subject(job: CompareJob, variant: Variant) -> Outcome:
     """Solve a cell or a mode of it, or read and verify a run.
 
+    A mode that has no solution from home to home is solved without these moves, and says that they are missing.
+
     Args:
         job: What is compared.
         variant: Its number and values.
@@ -133,13 +135,22 @@ def evaluate_subject(job: CompareJob, variant: Variant) -> Outcome:
     path = job.subjects[0 if is_mode else variant.number]
     if path.is_dir():
         return _stored_outcome(job, path)
-
-    def cell() -> Cell:
-        given = with_overrides(load_cell(path, allow_dirs=job.allow_dirs), job.settings)
-        return given.with_values(variant.values) if is_mode else given
-
     kept = None if job.runs is None else run_folder(job.runs, variant.number)
-    return solved_outcome(cell, _solved_figures, file=path, task=job.task, folder=kept)
+
+    def solved(values: Mapping[str, object]) -> Outcome:
+        def cell() -> Cell:
+            given = with_overrides(load_cell(path, allow_dirs=job.allow_dirs), job.settings)
+            return given.with_values(values) if values else given
+
+        return solved_outcome(cell, _solved_figures, file=path, task=job.task, folder=kept)
+
+    whole = solved(variant.values if is_mode else {})
+    if whole.status is not TrialStatus.NO_SOLUTION or PROGRAM not in variant.values:
+        return whole
+    plain = solved({MODE: variant.values[MODE]})
+    if not plain.figures:
+        return whole
+    return replace(plain, figures={**plain.figures, "not_in_program": [f"moves from and to homes: {whole.reason}"]})
 
 
 def _refuse_unfitting(job: CompareJob) -> None:
@@ -220,6 +231,9 @@ def _inputs(source: Cell | StoredRun) -> dict[str, str]:
 def _differences(job: CompareJob, sources: Sequence[Cell | StoredRun]) -> dict[str, list[Any]]:
     """Inputs that differ: keys of the cell files with every default filled in, and files of the same name."""
     found = document_differences([_document(source) for source in sources])
+    worked_on = [_tasks(job, source) for source in sources]
+    if any(tasks != worked_on[0] for tasks in worked_on):
+        found["tasks worked on"] = worked_on
     files = []
     for path, source in zip(job.subjects, sources, strict=True):
         own = path.name if isinstance(source, Cell) else source.manifest.cell_file
@@ -229,6 +243,13 @@ def _differences(job: CompareJob, sources: Sequence[Cell | StoredRun]) -> dict[s
         if len({sha for sha in digests if sha is not None}) > 1:
             found[f"inputs.{name}"] = digests
     return found
+
+
+def _tasks(job: CompareJob, source: Cell | StoredRun) -> list[str]:
+    """Names of the tasks that are worked on: of a cell file all of them, or one."""
+    if isinstance(source, Cell):
+        return [task.name for task in source.tasks if job.task in {None, task.name}]
+    return list(source.record["tasks"])
 
 
 def _document(source: Cell | StoredRun) -> Mapping[str, Any]:

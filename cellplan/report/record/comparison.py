@@ -29,7 +29,7 @@ class ComparedRecord(TypedDict):
 class DifferenceRecord(TypedDict):
     """An input that is not the same everywhere."""
 
-    key: Annotated[str, "key path in the cell file, or `inputs.` and a file of another content"]
+    key: Annotated[str, "key path in the cell file, `inputs.` and a file of another content, or `tasks worked on`"]
     values: Annotated[list[Any], "its value in each cell or run; null where there is none"]
 
 

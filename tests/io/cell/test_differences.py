@@ -40,4 +40,4 @@ def test_what_only_some_have_is_named_once_at_its_top() -> None:
 
 def test_lists_and_tuples_with_the_same_entries_are_the_same() -> None:
     assert document_differences([{"a": {"b": [1, 2]}}, {"a": {"b": (1, 2)}}]) == {}
-    assert document_differences([{"a": [1]}, {"a": (1, 2)}]) == {"a": [[1], (1, 2)]}
+    assert document_differences([{"a": [1]}, {"a": (1, 2)}]) == {"a": [[1], [1, 2]]}
