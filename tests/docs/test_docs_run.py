@@ -76,6 +76,7 @@ def assert_shown(expected: str, output: str) -> None:
 
 
 LONG = {
+    "compare.md",
     "questions.md",
     "verify-and-export.md",
     "which-method.md",

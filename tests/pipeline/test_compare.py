@@ -17,6 +17,7 @@ from cellplan.cli.main import run
 from cellplan.io.cell.changes import read_setting
 from cellplan.model.cell import Mode
 from cellplan.pipeline.compare import evaluate_subject
+from cellplan.report.page.comparison import comparison_files
 from cellplan.report.record.key_figures import key_figures
 from cellplan.report.record.study import STATUSES
 from cellplan.study.variants import Variant
@@ -150,6 +151,14 @@ def test_the_page_is_whole_and_needs_nothing_else(
     assert "://" not in page.replace("http://www.w3.org", "")
     record = modes if study == "modes" else mixed
     assert all(each["name"] in page for each in record["variants"])
+
+
+def test_the_page_and_table_of_modes_without_a_motion_give_their_reasons(modes: dict[str, Any]) -> None:
+    gone = [{**each, "status": "no_solution", "reason": "kuka: lost", "figures": {}} for each in modes["variants"]]
+    files = comparison_files({**modes, "variants": gone}, [None] * len(gone))
+    assert set(files) == {"study.json", "study.csv", "study.html"}
+    assert files["study.html"].decode().count("<li>kuka: lost</li>") == len(gone)
+    assert files["study.csv"].decode().count(",no_solution,") == len(gone)
 
 
 def test_the_table_has_a_row_for_each_variant(place: Path, modes: dict[str, Any]) -> None:
