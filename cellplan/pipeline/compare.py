@@ -40,6 +40,7 @@ from cellplan.study.trial import Outcome, TrialStatus
 from cellplan.study.variants import Variant
 
 MODE: Final = "motion.mode"
+REPORT: Final = "report.json"
 PROGRAM: Final = "program"  # key of the cell file that makes a program run from home to home
 
 
@@ -272,6 +273,16 @@ def _solved_figures(solution: Solution) -> Record:
 
 
 def _stored_outcome(job: CompareJob, path: Path) -> Outcome:
+    """The figures of a run; one whose report lacks some of them is no run of this version."""
+    try:
+        return _verified_outcome(job, path)
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+        missing = f"got none or another one for {error}" if isinstance(error, KeyError) else "got something else"
+        reason = f"{path / REPORT}: expected every figure of a run of this version, {missing}; solve the cell again"
+        return Outcome(status=TrialStatus.BAD_INPUT, reason=reason, figures={})
+
+
+def _verified_outcome(job: CompareJob, path: Path) -> Outcome:
     """The figures of a run, which is verified again where it passed."""
     stored = read_stored_run(path)
     status, proof, clearance = TrialStatus.FAILED, "it failed when it was solved", None

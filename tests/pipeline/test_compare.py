@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from html.parser import HTMLParser
@@ -15,6 +16,7 @@ from cellplan import CompareJob, compare, load_cell, solve
 from cellplan.cli.compare import exit_status
 from cellplan.cli.main import run
 from cellplan.io.cell.changes import read_setting
+from cellplan.io.input.files import digest
 from cellplan.model.cell import Mode
 from cellplan.pipeline.compare import evaluate_subject
 from cellplan.report.page.comparison import comparison_files
@@ -119,6 +121,24 @@ def test_inputs_that_differ_are_listed_with_both_values(mixed: dict[str, Any]) -
     assert len(found["robots.right.start_deg"][1]) == 3
     assert {key.partition(".")[0] for key in found} == {"robots"}
     assert {key.rpartition(".")[2] for key in found} <= {"start_deg", "home_deg"}
+
+
+def test_a_run_whose_report_lacks_a_figure_is_a_variant_with_that_reason(sound: Path, tmp_path: Path) -> None:
+    """As an older version may have written it: the manifest goes with the report."""
+    copy = shutil.copytree(sound / "run", tmp_path / "run")
+    report, manifest = copy / "report.json", json.loads((copy / "manifest.json").read_text())
+    record = json.loads(report.read_text())
+    del record["clearance"]["whole"]
+    report.write_text(json.dumps(record))
+    data = report.read_bytes()
+    manifest["files"]["report.json"] = {"bytes": len(data), "sha256": digest(data)}
+    (copy / "manifest.json").write_text(json.dumps(manifest, indent=2, ensure_ascii=False) + "\n")
+    outcome = evaluate_subject(CompareJob(subjects=(sound / "run", copy)), Variant(1, {"run": "run"}))
+    assert (outcome.status, outcome.figures) == ("bad_input", {})
+    assert outcome.reason == (
+        f"{report}: expected every figure of a run of this version, got none or another one for 'whole'; "
+        "solve the cell again"
+    )
 
 
 class Tags(HTMLParser):
