@@ -93,7 +93,10 @@ def test_figures_from_records_are_those_from_reports(place: Path, modes: dict[st
     values = dict(map(read_setting, COARSE)) | {"motion.mode": mode}
     solution = solve(load_cell(place / "pair.yaml").with_values(values))
     expected = key_figures([each.report for each in solution.runs])
-    assert {key: figures(modes, mode)[key] for key in expected} == expected
+    found = figures(modes, mode)
+    assert {key: found[key] for key in expected} == expected
+    for kind in ("velocity", "acceleration"):  # every phase works on a task
+        assert found[f"work_{kind}_ratio"] == expected[f"max_{kind}_ratio"]  # type: ignore[literal-required]
 
 
 def test_every_mode_is_a_variant_and_what_breaks_is_named(modes: dict[str, Any]) -> None:

@@ -1,7 +1,7 @@
 """Figures of a whole program for the comparison with other programs, from its records, just made or on disk."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Final, TypedDict
 
 import numpy as np
@@ -56,9 +56,20 @@ class _WorstJoints(TypedDict):
     max_acceleration_joint: str | None
 
 
+class _WorkPeaks(TypedDict):
+    work_velocity_ratio: Number
+    work_velocity_joint: str | None
+    work_acceleration_ratio: Number
+    work_acceleration_joint: str | None
+
+
 class VariantFigures(KeyFigures):
     """Figures of a program over all its phases; tool errors count once the tools have settled."""
 
+    work_velocity_ratio: Annotated[Number, "as `max_velocity_ratio`, of the phases in which a task is worked on"]
+    work_velocity_joint: Annotated[str | None, "that joint"]
+    work_acceleration_ratio: Annotated[Number, "as `max_acceleration_ratio`, of these phases"]
+    work_acceleration_joint: Annotated[str | None, "that joint"]
     min_clearance_certified: Annotated[bool, "whether that distance is proved between the rows too"]
     mean_velocity_ratio: Annotated[Number, "load of all robots divided by the cycle time and the number of joints"]
     positioner_load_s: Annotated[Number, "load of the robots that hold the part"]
@@ -100,6 +111,7 @@ def variant_figures(record: Record, phases: Mapping[str, Record], *, proof: str)
             (task["orientation_error_deg"] or 0.0 for task in tasks.values()), default=0.0
         ),
         **_worst_joints(record),
+        **_work_peaks(record, phases.values()),
         "min_clearance_mm": clearance["minimum_mm"],
         "min_clearance_pair": " - ".join(clearance["pair"]) if clearance["pair"] else None,
         "min_clearance_certified": clearance["certified"],
@@ -220,6 +232,19 @@ def _worst_joints(record: Record) -> _WorstJoints:
         "max_velocity_joint": fast,
         "max_acceleration_ratio": hard.get(hardest or ""),
         "max_acceleration_joint": hardest,
+    }
+
+
+def _work_peaks(record: Record, phases: Iterable[Record]) -> _WorkPeaks:
+    """The largest velocity and acceleration of the phases in which a task is worked on, not of moves between them."""
+    at_work = [_worst_joints(phase) for phase in phases if not record["tasks"].keys().isdisjoint(phase["tasks"])]
+    fast = max(at_work, key=lambda each: each["max_velocity_ratio"] or 0.0, default=None)
+    hard = max(at_work, key=lambda each: each["max_acceleration_ratio"] or 0.0, default=None)
+    return {
+        "work_velocity_ratio": fast["max_velocity_ratio"] if fast else None,
+        "work_velocity_joint": fast["max_velocity_joint"] if fast else None,
+        "work_acceleration_ratio": hard["max_acceleration_ratio"] if hard else None,
+        "work_acceleration_joint": hard["max_acceleration_joint"] if hard else None,
     }
 
 

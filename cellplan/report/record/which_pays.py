@@ -11,8 +11,8 @@ COSTS: Final[Mapping[str, tuple[str, float, str, bool]]] = {
     "positioner_load_s": ("load of the positioner", 1.0, " s", True),
     "positioner_phase_load_s": ("load of the positioner in its hardest phase", 1.0, " s", True),
     "operator_load_s": ("load of the operators", 1.0, " s", True),
-    "max_velocity_ratio": ("highest joint velocity", 100.0, " % of the limit", True),
-    "max_acceleration_ratio": ("highest joint acceleration", 100.0, " % of the limit", True),
+    "work_velocity_ratio": ("highest joint velocity at work", 100.0, " % of the limit", True),
+    "work_acceleration_ratio": ("highest joint acceleration at work", 100.0, " % of the limit", True),
     "min_margin_deg": ("smallest joint margin", 1.0, " deg", False),
     "min_clearance_mm": ("smallest clearance", 1.0, " mm", False),
 }  # what it is called, its scale and unit, and whether more of it is worse
@@ -95,8 +95,8 @@ def _failure(variant: Record) -> str:
     if not variant["figures"]:
         what = "has no solution" if variant["status"] == "no_solution" else "is no valid cell"
         return f"{variant['name']} {what}: {variant['reason']}."
-    count = variant["figures"]["failed_checks"]
-    return f"{variant['name']} fails {count} check{'' if count == 1 else 's'}, first: {variant['reason']}."
+    count, first = variant["figures"]["failed_checks"], next(iter(variant["figures"]["failed"]), variant["reason"])
+    return f"{variant['name']} fails {count} check{'' if count == 1 else 's'}, first: {first}."
 
 
 def _orders(solved: Sequence[Record]) -> Iterator[str]:

@@ -112,6 +112,8 @@ ROWS: Final[Sequence[Row]] = (
     ("smallest margin, deg", _of_joint("min_margin_deg", 1.0, form=_floored)),
     ("highest velocity, % of limit", _of_joint("max_velocity_ratio", 100.0)),
     ("highest acceleration, % of limit", _of_joint("max_acceleration_ratio", 100.0)),
+    ("the same at work, velocity", _of_joint("work_velocity_ratio", 100.0)),
+    ("the same at work, acceleration", _of_joint("work_acceleration_ratio", 100.0)),
     ("smallest clearance, mm", _clearance),
     ("largest position error, mm", _plain("max_position_error_mm", "{:.2g}".format)),
     ("largest orientation error, deg", _plain("max_orientation_error_deg", "{:.2g}".format)),

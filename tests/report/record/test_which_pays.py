@@ -9,11 +9,12 @@ EVEN = {
     "positioner_load_s": 1.0,
     "positioner_phase_load_s": 1.0,
     "operator_load_s": 3.0,
-    "max_velocity_ratio": 0.5,
-    "max_acceleration_ratio": 0.4,
+    "work_velocity_ratio": 0.5,
+    "work_acceleration_ratio": 0.4,
     "min_margin_deg": 20.0,
     "min_clearance_mm": 12.0,
     "failed_checks": 0,
+    "failed": [],
     "not_in_program": [],
     "proof": "solved",
 }
@@ -46,7 +47,7 @@ def test_a_variant_that_is_faster_and_nowhere_worse_costs_nothing_that_is_compar
 
 
 def test_differences_below_one_percent_are_no_costs() -> None:
-    first, *_ = sentences([variant("fast", max_velocity_ratio=0.504), variant("slow", cycle_time_s=8.0)])
+    first, *_ = sentences([variant("fast", work_velocity_ratio=0.504), variant("slow", cycle_time_s=8.0)])
     assert "costs" not in first
 
 
@@ -75,11 +76,12 @@ def test_moves_that_a_program_leaves_out_weaken_the_claim() -> None:
 
 
 def test_what_fails_is_named_with_its_first_check_and_still_has_a_load() -> None:
-    bad = variant("bad", status="failed", reason="joint B2 is beyond", failed_checks=1, operator_load_s=7.0)
+    failed = {"failed": ["work-1: joint B2 is beyond"], "failed_checks": 1}
+    bad = variant("bad", status="failed", reason="joint B2 is beyond", operator_load_s=7.0, **failed)
     found = sentences([variant("good"), bad, without_motion("none", "no_solution"), without_motion("odd", "bad_input")])
     assert found[:4] == [
         "Only good passes every check: 4 s.",
-        "bad fails 1 check, first: joint B2 is beyond.",
+        "bad fails 1 check, first: work-1: joint B2 is beyond.",
         "none has no solution: kuka: no start posture.",
         "odd is no valid cell: kuka: no start posture.",
     ]
