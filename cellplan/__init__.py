@@ -3,10 +3,10 @@
 The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
-- compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``rehearse``
+- compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``rehearse``
 - verify: ``verify``, ``open_gate``
 - write: ``write_run``, ``write_fastest``, ``write_rehearsal``, ``export_program``
-- inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``
+- inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``CompareJob``
 - results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``
 - errors: ``CellplanError``
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from cellplan.model.report import Check, Report
     from cellplan.model.task import Task
     from cellplan.model.toolpath import Toolpath
+    from cellplan.pipeline.compare import CompareJob, compare
     from cellplan.pipeline.export import export_program
     from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
     from cellplan.pipeline.fastest.write import write_fastest
@@ -52,6 +53,7 @@ _HOME: Final = {
     "Cell": "model.cell",
     "CellplanError": "errors",
     "Check": "model.report",
+    "CompareJob": "pipeline.compare",
     "Motion": "model.motion",
     "Part": "model.cell",
     "Program": "model.motion",
@@ -63,6 +65,7 @@ _HOME: Final = {
     "SweepJob": "pipeline.sweep",
     "Task": "model.task",
     "Toolpath": "model.toolpath",
+    "compare": "pipeline.compare",
     "export_program": "pipeline.export",
     "fastest": "pipeline.fastest.shortest",
     "load_cell": "io.cell.load",
@@ -84,6 +87,7 @@ __all__ = [
     "Cell",
     "CellplanError",
     "Check",
+    "CompareJob",
     "Motion",
     "Part",
     "Program",
@@ -96,6 +100,7 @@ __all__ = [
     "Task",
     "Toolpath",
     "__version__",
+    "compare",
     "export_program",
     "fastest",
     "load_cell",

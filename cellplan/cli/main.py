@@ -10,6 +10,7 @@ import typer
 
 import cellplan
 from cellplan.cli.check import check
+from cellplan.cli.compare import compare
 from cellplan.cli.errors import OutputError, report_failure
 from cellplan.cli.explain import explain
 from cellplan.cli.export import export
@@ -58,6 +59,7 @@ app.command()(solve)
 app.command()(verify)
 app.command()(export)
 app.command()(sweep)
+app.command()(compare)
 app.command()(fastest)
 app.command()(rehearse)
 app.command()(robots)

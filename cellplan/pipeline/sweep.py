@@ -6,21 +6,21 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 
-from cellplan.errors import CellplanError, InputError, NoSolutionError
+from cellplan.errors import InputError
 from cellplan.io.cell.changes import plain_values, read_setting
 from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.outcome import solved_outcome
 from cellplan.pipeline.overrides import require_task, with_overrides
-from cellplan.pipeline.solve import solve
-from cellplan.pipeline.write_run import versions, write_run
+from cellplan.pipeline.solution import Solution
+from cellplan.pipeline.write_run import versions
 from cellplan.report.page.study import study_files
-from cellplan.report.record.key_figures import key_figures
+from cellplan.report.record.key_figures import KeyFigures, key_figures
 from cellplan.report.record.study import StudyRecord, study_record
-from cellplan.study.folder import prepare_folder, run_folder, write_results
-from cellplan.study.journal import Journal
-from cellplan.study.run import run_trials
-from cellplan.study.trial import Outcome, TrialStatus
+from cellplan.study.folder import run_folder, write_results
+from cellplan.study.study import Study
+from cellplan.study.trial import Outcome
 from cellplan.study.variants import Axis, Variant, combinations
 
 
@@ -74,7 +74,6 @@ def sweep(
     variants = combinations(axes)
     for axis in axes:
         _require_a_valid_value(base, axis)
-    prepare_folder(folder, resume=resume)
     header = {
         "kind": "sweep",
         "cell": base.name,
@@ -84,14 +83,9 @@ def sweep(
         "inputs": dict(base.inputs),
         "versions": versions(),
     }
-    with Journal(folder, header, variants, resume=resume) as journal:
-        evaluate = partial(evaluate_variant, job)
-        try:
-            trials = run_trials(variants, evaluate, journal, workers=workers, progress=progress)
-        except KeyboardInterrupt:
-            done = f"{len(journal.trials)} of {len(variants)} variants are recorded"
-            raise KeyboardInterrupt(f"interrupted: {done} in {folder}; --resume goes on from there") from None
-    record = study_record(header, [trial.record for trial in trials])
+    study = Study(folder=folder, header=header, variants=variants)
+    trials = study.run(partial(evaluate_variant, job), workers=workers, resume=resume, progress=progress)
+    record = study_record(header, trials)
     write_results(folder, study_files(record))
     return record
 
@@ -103,20 +97,18 @@ def evaluate_variant(job: SweepJob, variant: Variant) -> Outcome:
         job: The cell and what is set in it for all variants.
         variant: Its number and values.
     """
-    try:
-        cell = _base_cell(job).with_values(variant.values)
-        require_task(cell, job.task)
-        solution = solve(cell, task=job.task)
-    except InputError as error:
-        return Outcome(status=TrialStatus.BAD_INPUT, reason=_reason(job, error), figures={})
-    except NoSolutionError as error:
-        return Outcome(status=TrialStatus.NO_SOLUTION, reason=_reason(job, error), figures={})
-    if job.runs is not None:
-        write_run(solution, run_folder(job.runs, variant.number))
-    reports = [run.report for run in solution.runs]
-    failed = [check.message for report in reports for check in report.checks if not check.passed]
-    status = TrialStatus.FAILED if failed else TrialStatus.PASSED
-    return Outcome(status=status, reason=failed[0] if failed else "", figures=key_figures(reports))
+    return solved_outcome(
+        lambda: _base_cell(job).with_values(variant.values),
+        _figures,
+        file=job.cell,
+        task=job.task,
+        folder=None if job.runs is None else run_folder(job.runs, variant.number),
+    )
+
+
+def _figures(solution: Solution) -> KeyFigures:
+    """Key figures of a solved variant."""
+    return key_figures([run.report for run in solution.runs])
 
 
 @lru_cache(maxsize=1)
@@ -142,8 +134,3 @@ def _require_a_valid_value(base: Cell, axis: Axis) -> None:
             return
     if first is not None:
         raise first
-
-
-def _reason(job: SweepJob, error: CellplanError) -> str:
-    """An error as one line that does not depend on where the cell file lies."""
-    return str(error).splitlines()[0].replace(str(job.cell), job.cell.name)

@@ -12,7 +12,7 @@ from cellplan.io.run.content import LEFT_ALONE, foreign_within, is_run_folder
 from cellplan.study.journal import JOURNAL, SCHEMA
 
 RUNS: Final = "runs"
-OWN: Final = re.compile(r"\.?study\.(jsonl|json|csv|html|svg|png)(\.draft)?")
+OWN: Final = re.compile(r"\.?study(-[a-z]+)?\.(jsonl|json|csv|html|svg|png)(\.draft)?")
 RUN_NAME: Final = re.compile(r"\d{4,6}")
 MARK_WITHIN: Final = 200  # [bytes]
 

@@ -18,7 +18,19 @@ from cellplan.pipeline.gate.equal_text import first_difference
 pytestmark = pytest.mark.usefixtures("kept_solutions")
 
 GOLDEN = Path(__file__).parent / "golden"
-COMMANDS = ("check", "explain", "export", "fastest", "rehearse", "robots", "schema", "solve", "sweep", "verify")
+COMMANDS = (
+    "check",
+    "compare",
+    "explain",
+    "export",
+    "fastest",
+    "rehearse",
+    "robots",
+    "schema",
+    "solve",
+    "sweep",
+    "verify",
+)
 ERRORS = """\
 cellplan_errors: 1
 seed: 3

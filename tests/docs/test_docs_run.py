@@ -76,6 +76,8 @@ def assert_shown(expected: str, output: str) -> None:
 
 
 LONG = {
+    "compare.md",
+    "questions.md",
     "verify-and-export.md",
     "which-method.md",
     "rehearse-with-errors.md",

@@ -150,6 +150,13 @@ class Sheet:
         x, y = panel.x(np.array([at_s])), panel.y(np.array([value]))
         self._line(x, y, color=colour, marker="o", markersize=3.8, linestyle="none")
 
+    def bar(self, panel: Panel, across: tuple[float, float], value: float, *, colour: str) -> None:
+        """Fill the area between the lower edge of a panel and a value."""
+        left, right = panel.x(np.array(across))
+        height = float(panel.y(np.array([value]))[0]) - panel.bottom
+        style = {"color": colour, "linewidth": 0, "zorder": 2.0}
+        self.marks.append(Rectangle((float(left), panel.bottom), float(right - left), height, style))
+
     def limit(self, panel: Panel, value: float, *, label: str = "", is_upper: bool = True) -> None:
         """Draw a limit across the panel and shade the forbidden range beyond it."""
         y = float(panel.y(np.array([value]))[0])

@@ -1,0 +1,44 @@
+"""Outcome of one variant of a study: a cell that is solved, or the reason why there is no motion."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.model.cell import Cell
+from cellplan.pipeline.overrides import require_task
+from cellplan.pipeline.solution import Solution
+from cellplan.pipeline.solve import solve
+from cellplan.pipeline.write_run import write_run
+from cellplan.study.trial import Outcome, TrialStatus
+
+
+def solved_outcome(
+    read: Callable[[], Cell],
+    figures: Callable[[Solution], Mapping[str, object]],
+    *,
+    file: Path,
+    task: str | None = None,
+    folder: Path | None = None,
+) -> Outcome:
+    """Solve one variant; what is wrong with it becomes its reason.
+
+    Args:
+        read: Gives the cell of the variant.
+        figures: Key figures of its solution.
+        file: The cell file; reasons name it without its folder.
+        task: Name of the only task to work on; None for all.
+        folder: Run folder to be written; None for none.
+    """
+    try:
+        cell = read()
+        require_task(cell, task)
+        solution = solve(cell, task=task)
+    except (InputError, NoSolutionError) as error:
+        status = TrialStatus.BAD_INPUT if isinstance(error, InputError) else TrialStatus.NO_SOLUTION
+        reason = str(error).splitlines()[0].replace(str(file), file.name)  # the same wherever the cell file lies
+        return Outcome(status=status, reason=reason, figures={})
+    if folder is not None:
+        write_run(solution, folder)
+    failed = [check.message for run in solution.runs for check in run.report.checks if not check.passed]
+    status = TrialStatus.FAILED if failed else TrialStatus.PASSED
+    return Outcome(status=status, reason=failed[0] if failed else "", figures=figures(solution))

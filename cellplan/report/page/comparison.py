@@ -1,0 +1,68 @@
+"""Files of a comparison: ``study.json``, ``study.csv``, ``study.html`` and its plots."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from cellplan.model.report import CAUTION
+from cellplan.report.page.filters import fixed, floored, small
+from cellplan.report.page.render import inline_svg, template
+from cellplan.report.page.study import STATUS_TEXTS
+from cellplan.report.plots.comparison import MAX_ROBOTS, comparison_sheets, drawn_robots
+from cellplan.report.plots.palette import ROBOTS
+from cellplan.report.plots.rendering import pictures
+from cellplan.report.record.common import Record, as_json
+from cellplan.report.record.comparison import comparison_table, robot_names
+from cellplan.report.text.comparison import short_value
+
+PLOT_TITLES: Final = {
+    "joints": "range used and highest velocity of every joint; the limit is 100 %",
+    "speeds": "highest joint velocity of each robot over time, as a percentage of its limit",
+    "clearance": "smallest distance of all bodies over time",
+}
+
+
+def comparison_files(record: Record, curves: Sequence[Record | None]) -> dict[str, bytes]:
+    """Content of the files of a comparison by name.
+
+    Args:
+        record: As ``comparison_record`` returns it.
+        curves: Curves of each variant; None for one without a motion.
+    """
+    plots = {f"study-{name}": data for name, data in pictures(comparison_sheets(record, curves)).items()}
+    drawings = {
+        name.removeprefix("study-").removesuffix(".svg"): data.decode()
+        for name, data in plots.items()
+        if name.endswith(".svg")
+    }
+    return {
+        "study.json": as_json(record).encode(),
+        "study.csv": comparison_table(record).encode(),
+        **plots,
+        "study.html": comparison_page(record, drawings).encode(),
+    }
+
+
+def comparison_page(record: Record, plots: Mapping[str, str]) -> str:
+    """The page of a comparison.
+
+    Args:
+        record: As ``comparison_record`` returns it.
+        plots: Its plots as SVG, by name.
+    """
+    solved = [each["name"] for each in record["variants"] if each["figures"]]
+    robots = robot_names(record)
+    return template("comparison.html").render(
+        r=record,
+        robots=robots,
+        tasks=list(dict.fromkeys(name for each in record["variants"] for name in each["figures"].get("tasks", {}))),
+        plots={name: inline_svg(text, prefix=f"{name}-") for name, text in plots.items()},
+        titles=PLOT_TITLES,
+        legend=list(zip(ROBOTS, solved, strict=False)) if plots else [],
+        drawn=drawn_robots(record) if len(robots) > MAX_ROBOTS else [],
+        statuses=STATUS_TEXTS,
+        short=short_value,
+        fixed=fixed,
+        floored=floored,
+        small=small,
+        caution=CAUTION,
+    )

@@ -1,0 +1,133 @@
+"""Sentences on a comparison: which variant pays and what it costs, nothing that its figures do not show."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Final
+
+from cellplan.report.record.common import Record, rounded_down
+
+EQUAL: Final = 0.01  # [-] of a figure: a smaller difference is no cost
+COMPARED: Final = "each load, peak, margin and clearance"
+COSTS: Final[Mapping[str, tuple[str, float, str, bool]]] = {
+    "positioner_load_s": ("load of the positioner", 1.0, " s", True),
+    "positioner_phase_load_s": ("load of the positioner in its hardest phase", 1.0, " s", True),
+    "operator_load_s": ("load of the operators", 1.0, " s", True),
+    "work_velocity_ratio": ("highest joint velocity at work", 100.0, " % of the limit", True),
+    "work_acceleration_ratio": ("highest joint acceleration at work", 100.0, " % of the limit", True),
+    "min_margin_deg": ("smallest joint margin", 1.0, " deg", False),
+    "min_clearance_mm": ("smallest clearance", 1.0, " mm", False),
+}  # what it is called, its scale and unit, and whether more of it is worse
+
+LOADS: Final = {
+    "the positioner": "positioner_load_s",
+    "the positioner in its hardest phase": "positioner_phase_load_s",
+    "the operators": "operator_load_s",
+}
+
+
+def sentences(variants: Sequence[Record]) -> list[str]:
+    """What the figures of the variants say together.
+
+    Args:
+        variants: Entries with ``name``, ``status``, ``reason`` and ``figures`` each; see ``ComparisonRecord``.
+    """
+    passed = sorted(
+        (each for each in variants if each["status"] == "passed"), key=lambda each: each["figures"]["cycle_time_s"]
+    )
+    return [
+        *_payment(passed),
+        *(_failure(each) for each in variants if each["status"] != "passed"),
+        *_orders([each for each in variants if each["figures"]]),
+        *_reservations([each for each in variants if each["figures"]]),
+    ]
+
+
+def _payment(passed: Sequence[Record]) -> Iterator[str]:
+    """What the fastest variant brings and costs beside each other one that passes too."""
+    if not passed:
+        yield "None of them passes every check: there is nothing to choose from."
+        return
+    best, *others = passed
+    if not others:
+        yield f"Only {best['name']} passes every check: {_time(best)}."
+    for other in others:
+        costs, gains = _worse(best, other), _worse(other, best)
+        lead = _lead(best, other)
+        if lead is None:
+            both = f"{best['name']} and {other['name']} take the same time ({_time(best)})"
+            found = [f"{each['name']} costs {'; '.join(its)}" for each, its in ((best, costs), (other, gains)) if its]
+            yield f"{both}. {'. '.join(found)}." if found else f"{both}, and {COMPARED} is the same."
+        elif costs:
+            yield f"{lead}; it costs {'; '.join(costs)}."
+        else:
+            yield f"{lead}, and {COMPARED} is no worse."
+
+
+def _lead(best: Record, other: Record) -> str | None:
+    """How much faster the first one is; None when both take the same time."""
+    ratio = other["figures"]["cycle_time_s"] / best["figures"]["cycle_time_s"]
+    times = next((text for digits in (2, 3, 4) if (text := f"{ratio:.{digits}g}") != "1"), None)
+    if times is None:
+        return None
+    short, long = best["figures"]["not_in_program"], other["figures"]["not_in_program"]
+    both = f"({_time(best)} and {_time(other)})"
+    if short:
+        return f"{best['name']} is faster than {other['name']} {both}, but its program leaves moves out"
+    least = "at least " if long else ""
+    return f"{best['name']} is {least}{times} times as fast as {other['name']} {both}"
+
+
+def _worse(one: Record, other: Record) -> list[str]:
+    """Figures in which one variant is worse than another one, with both values."""
+    found = []
+    for key, (title, scale, unit, more_is_worse) in COSTS.items():
+        own, its = one["figures"][key], other["figures"][key]
+        if own is None or its is None:
+            continue
+        room = EQUAL * max(abs(own), abs(its))
+        if (own - its if more_is_worse else its - own) > room:
+            show = _three_digits if more_is_worse else _floored
+            found.append(f"{title} {show(scale * own)} instead of {show(scale * its)}{unit}")
+    return found
+
+
+def _failure(variant: Record) -> str:
+    """What is wrong with a variant that does not pass."""
+    if not variant["figures"]:
+        what = "has no solution" if variant["status"] == "no_solution" else "is no valid cell"
+        return f"{variant['name']} {what}: {variant['reason']}."
+    count, first = variant["figures"]["failed_checks"], next(iter(variant["figures"]["failed"]), variant["reason"])
+    return f"{variant['name']} fails {count} check{'' if count == 1 else 's'}, first: {first}."
+
+
+def _orders(solved: Sequence[Record]) -> Iterator[str]:
+    """Who works hardest in which variant, also where a check fails."""
+    seen: list[dict[str, float]] = []
+    for title, key in LOADS.items():
+        loads = {each["name"]: each["figures"][key] or 0.0 for each in solved}
+        if len(loads) > 1 and any(loads.values()) and loads not in seen:
+            order = sorted(loads, key=lambda name: -loads[name])
+            shown = ", ".join(f"{name} {_three_digits(loads[name])} s" for name in order)
+            seen.append(loads)
+            yield f"Load of {title}, most first: {shown}."
+
+
+def _reservations(solved: Sequence[Record]) -> Iterator[str]:
+    """What the figures leave out or rest on."""
+    without = [each["name"] for each in solved if each["figures"]["not_in_program"]]
+    if without:
+        yield f"Without moves that no program holds, such as those to and from the homes: {', '.join(without)}."
+    for each in solved:
+        if each["status"] == "passed" and each["figures"]["proof"] not in {"solved", "verified"}:
+            yield f"{each['name']} was not verified again: {each['figures']['proof']}."
+
+
+def _time(variant: Record) -> str:
+    return f"{variant['figures']['cycle_time_s']:g} s"
+
+
+_three_digits: Callable[[float], str] = "{:.3g}".format
+
+
+def _floored(value: float) -> str:
+    """A margin or clearance, not overstated."""
+    return f"{rounded_down(value):.1f}"
