@@ -265,7 +265,8 @@ def _solved_figures(solution: Solution) -> Record:
     origin = Provenance(versions={}, digests={})
     reports = {run.name or "": run.report for run in solution.runs}
     phases: dict[str, Record] = {
-        name: run_record(report, cell=solution.cell, provenance=origin) for name, report in reports.items()
+        run.name or "": run_record(run.report, cell=run.cell_of(solution.cell), provenance=origin)
+        for run in solution.runs
     }
     record = phases.get("") or summary_record(reports, cell=solution.cell, provenance=origin)
     curves = variant_curves(record, list(map(series, reports.values())), _clearance(list(reports.values())))
