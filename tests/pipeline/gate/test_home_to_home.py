@@ -100,6 +100,7 @@ def test_rows_keep_the_limits_by_plain_differences(solved: tuple[Path, Solution]
     assert np.all(np.abs(np.diff(speeds, axis=0)) / step <= 1.05 * velocity / 0.15)
 
 
+@pytest.mark.slow
 def test_verification_accepts_it_from_the_cell_file_and_each_phase_by_name(solved: tuple[Path, Solution]) -> None:
     file, solution = solved
     run = open_gate(file.parent / "run", cell=file)
@@ -179,7 +180,12 @@ FORGERIES: dict[str, tuple[Callable[[Path], None], str]] = {
 }
 
 
-@pytest.mark.parametrize("name", FORGERIES)
+LATE = {"jump"}  # is refused by the checks of the motion only
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=pytest.mark.slow if each in LATE else ()) for each in FORGERIES]
+)
 def test_forged_programs_are_refused_with_their_place(name: str, solved: tuple[Path, Solution], tmp_path: Path) -> None:
     edit, words = FORGERIES[name]
     run = tmp_path / "run"
