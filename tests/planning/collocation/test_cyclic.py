@@ -117,7 +117,9 @@ def test_a_start_beside_the_path_spoils_the_first_cycle_only() -> None:
     assert found[1:].max() <= PERIODIC
 
 
-@pytest.mark.parametrize("since", [0.0, 1.3, 9.0])
+@pytest.mark.parametrize(
+    "since", [pytest.param(0.0, marks=pytest.mark.slow), 1.3, pytest.param(9.0, marks=pytest.mark.slow)]
+)
 def test_cycles_close_before_and_after_a_joint_fails(since: float) -> None:
     case = cyclic(triangles(CELLS["mixed"]), 3)
     lock = LockedJoint(robot="op1", joint="j1", since=since)
