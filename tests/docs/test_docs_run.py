@@ -75,7 +75,14 @@ def assert_shown(expected: str, output: str) -> None:
     assert re.search(r"\n(?:[^\n]*\n)*?".join(lines), output), f"expected:\n{expected}\ngot:\n{output}"
 
 
-LONG = {"verify-and-export.md", "which-method.md", "rehearse-with-errors.md", "limits.md"}  # half a minute each
+LONG = {  # tests of the same commands and functions are quicker, and these pages compare little that is printed
+    "verify-and-export.md",
+    "which-method.md",
+    "rehearse-with-errors.md",
+    "limits.md",
+    "secondary-goals.md",
+    "sweep-values.md",
+}
 RUNNABLE = [pytest.param(page, marks=pytest.mark.slow if page.name in LONG else ()) for page in PAGES]
 
 
