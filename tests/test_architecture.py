@@ -68,6 +68,7 @@ def is_command(path: Path, node: Function) -> bool:
     return path.parent == PACKAGE / "cli" and node.name == path.stem
 
 
+@cache
 def imported_modules(path: Path) -> set[str]:
     modules = set()
     for node in ast.walk(parsed(path)):
