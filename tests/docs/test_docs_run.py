@@ -75,7 +75,7 @@ def assert_shown(expected: str, output: str) -> None:
     assert re.search(r"\n(?:[^\n]*\n)*?".join(lines), output), f"expected:\n{expected}\ngot:\n{output}"
 
 
-LONG = {  # tests of the same commands and functions are quicker, and these pages compare little that is printed
+LONG = {  # their commands and functions have tests of their own, which are quicker
     "verify-and-export.md",
     "which-method.md",
     "rehearse-with-errors.md",
