@@ -18,6 +18,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.jacobian_changes import JacobianChanges
+from cellplan.search.kernel.memory import keep_freed_memory
 from cellplan.search.kernel.screws import Directions, TaskScrews
 
 REGULAR: Final = 1e-12  # [-] of the largest entry that keeps a matrix invertible where its rank is lost
@@ -46,35 +47,30 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
         qd: Their speeds, shape (N, nq).
         directions: The directions.
     """
+    keep_freed_memory()
     rates = _Rates(job, layout, q, qd, directions)
-    nodes, nq, count = len(job.times), q.shape[1], directions.count
-    dq, dqd = np.empty((nodes, nq, count)), np.empty((nodes, nq, count))
-    P, closed, F, forced = rates.projector, rates.closed, rates.by_joints, rates.by_layout
-    steps, h, begins = job.steps.tolist(), np.diff(job.times).tolist(), job.is_begin.tolist()
-    at = rates.start(directions.start)
-    for node in range(nodes):
-        dq[node] = at if node == 0 else P[node] @ at + closed[node]
-        dqd[node] = F[node] @ dq[node] + forced[node]
-        if node and begins[node - 1]:
-            at = dq[node - 1] + 0.5 * h[node - 1] * (dqd[node - 1] + dqd[node])
-            dq[node] = P[node] @ at + closed[node]
-            dqd[node] = F[node] @ dq[node] + forced[node]
-        if node + 1 < nodes:
-            at = dq[node] + steps[node][0] * dqd[node]
+    nq, steps, begins = q.shape[1], job.steps.tolist(), job.is_begin.tolist()
+    found, at = np.empty((len(q), 2 * nq, directions.count)), rates.start(directions.start)
+    for node, (taking, adding) in enumerate(zip(rates.by_joints, rates.by_layout, strict=True)):
+        found[node] = taking @ at + adding
+        if node and begins[node - 1]:  # as in ``run``: once more with the mean of both rates
+            at = found[node - 1, :nq] + 0.5 * (job.times[node] - job.times[node - 1]) * found[node - 1 : node + 1, nq:].sum(axis=0)
+            found[node] = taking @ at + adding
+        if node + 1 < len(q):
+            at = found[node, :nq] + steps[node][0] * found[node, nq:]
             for back, weight in enumerate(steps[node][1:], start=1):
                 if weight:
-                    at += weight * dqd[node - back]
-    return MotionDerivatives(q=dq, qd=dqd)
+                    at += weight * found[node - back, nq:]
+    return MotionDerivatives(q=found[:, :nq], qd=found[:, nq:])
 
 
 class _Rates:
     """The variational equations at all nodes.
 
     Attributes:
-        projector: Projection of a change of the joints on those that keep the tools where they are, (N, nq, nq).
-        closed: Smallest change of the joints that keeps the tools on their paths, shape (N, nq, p).
-        by_joints: Derivative of the speeds by the joints, shape (N, nq, nq).
-        by_layout: Derivative of the speeds in the directions with the joints held, shape (N, nq, p).
+        by_joints: Change of joints and speeds by a change of the joints that was predicted: what of it keeps the tools
+            where they are, and what that does to the speeds, shape (N, 2 nq, nq).
+        by_layout: Their change in the directions otherwise, shape (N, 2 nq, p).
     """
 
     def __init__(self, job: Job, layout: Layouts, q: Array, qd: Array, directions: Directions) -> None:
@@ -90,10 +86,12 @@ class _Rates:
         bent = mobility[:, None] * changes.forces(forces[..., 0])
         bent[:, :, nq:] -= (directions.weights / weights[:, None]) * qd[:, :, None]
         rates = bent - inverse @ (changes.twists() + J @ bent)
-        beside = -changes.rows @ (screws.based + screws.tooled).swapaxes(-1, -2)
+        beside = -changes.in_rows(np.swapaxes(screws.based + screws.tooled, -1, -2))
         self._beside = beside.reshape(len(q), -1, directions.count)
-        self.projector, self.closed = np.eye(nq) - inverse @ J, inverse @ self._beside
-        self.by_joints, self.by_layout = rates[:, :, :nq].copy(), rates[:, :, nq:].copy()
+        kept, closed = np.eye(nq) - inverse @ J, inverse @ self._beside
+        by_joints = rates[:, :, :nq]
+        self.by_joints = np.concatenate([kept, by_joints @ kept], axis=1)
+        self.by_layout = np.concatenate([closed, by_joints @ closed + rates[:, :, nq:]], axis=1)
 
     def start(self, start: Array) -> Array:
         """Change of the start posture, shape (nq, p), once the tools are back at the starts of their paths."""
@@ -102,7 +100,19 @@ class _Rates:
 
     def _inverse(self, J: Array, mobility: Array) -> Array:
         """Weighted pseudo-inverse ``W^-1 J^T (J W^-1 J^T)^-1``, shape (N, nq, rows)."""
-        D = (J * mobility) @ np.swapaxes(J, 1, 2)
+        half = J * np.sqrt(mobility)
+        D = half @ np.swapaxes(half, 1, 2)
         diagonal = np.einsum("nii->ni", D)
         diagonal += REGULAR * diagonal.max(axis=1, keepdims=True) + self._idle
-        return mobility[:, None] * np.swapaxes(np.linalg.solve(D, J), 1, 2)
+        lower = _lower_inverse(np.linalg.cholesky(D))
+        return mobility[:, None] * (np.swapaxes(lower @ J, 1, 2) @ lower)
+
+
+def _lower_inverse(L: Array) -> Array:
+    """Inverses of lower triangular matrices, shape (N, m, m), row by row."""
+    found = np.zeros_like(L)
+    for row in range(L.shape[1]):
+        found[:, row, row] = 1.0
+        found[:, row, :row] = -(L[:, row, None, :row] @ found[:, :row, :row])[:, 0]
+        found[:, row] /= L[:, row, row, None]
+    return found

@@ -4,7 +4,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.search.kernel.job import Job
-from cellplan.search.kernel.screws import TaskScrews, bracket, bracket_power, cross
+from cellplan.search.kernel.screws import TaskScrews, bracket, bracket_matrix, cross, power_matrix
 
 
 class JacobianChanges:
@@ -13,7 +13,6 @@ class JacobianChanges:
     Attributes:
         jacobian: Twists per unit speed of the stacked joints, the constrained components of each relation in its frame
             R, taken at the tip where a relation leaves components open, else at the origin of R; (N, 6 T, nq).
-        rows: Matrices that take these components from twists at the origin of R, shape (N or 1, T, 6, 6).
         idle: 1 for components that a relation leaves open, whose rows are 0, shape (6 T,).
     """
 
@@ -31,7 +30,9 @@ class JacobianChanges:
         self._ways = [_Way.of(job, int(robot)) for robot in found.operators]
         self._holder = None if found.carrier is None else _Way.of(job, found.carrier)
         self._is_whole = found.is_whole
-        self.rows, self.idle = _rows(job, screws.tip), (1.0 - found.kept).ravel()
+        self.idle = (1.0 - found.kept).ravel()
+        if not self._is_whole:
+            self._rows = _rows(job, screws.tip)
         own_rates = np.stack([way.axis_rates(qd) for way in self._ways], axis=1)
         self._turning = screws.own * own_rates[..., None]
         self._twist = self._turning.sum(axis=2, keepdims=True)  # of each tool seen from the base, (N, T, 1, 6)
@@ -45,13 +46,13 @@ class JacobianChanges:
         screws, twist, carried = self._screws, self._twist, self._carried
         behind = twist - np.cumsum(self._turning, axis=2)
         before = np.cumsum(carried, axis=1) - carried
+        turned, whole = bracket_matrix(twist[:, :, 0]), carried.sum(axis=1)
         own = bracket(screws.own, behind)
-        shared = bracket(twist, screws.shared[:, None]) + bracket(screws.shared, before)[:, None]
-        layout = bracket(screws.based, twist)
-        held = bracket(screws.held, carried.sum(axis=1, keepdims=True))
-        layout = layout + held[:, None] * self._is_carried[:, None, None]
+        shared = self._minus @ turned + bracket(screws.shared, before)[:, None]
+        held = screws.held @ bracket_matrix(whole)
+        layout = screws.based @ turned + held[:, None] * self._is_carried[:, None, None]
         if not self._is_whole:
-            spin = twist[..., 3:] - self._is_carried[:, None, None] * carried.sum(axis=1)[:, None, None, 3:]
+            spin = twist[..., 3:] - self._is_carried[:, None, None] * whole[:, None, None, 3:]
             for part, tips in zip((own, shared, layout), self._tips(), strict=True):
                 part[..., :3] += cross(spin, tips)
         return self._columns(own, shared, layout)
@@ -59,10 +60,12 @@ class JacobianChanges:
     def forces(self, multipliers: Array) -> Array:
         """Change of ``J^T lambda`` per unit of each joint and direction, shape (N, nq, nq + p)."""
         screws, nodes = self._screws, len(multipliers)
-        y = (np.swapaxes(self.rows, -1, -2) @ multipliers.reshape(nodes, -1, 6, 1))[..., 0]
-        power = bracket_power(y[:, :, None], screws.own)
+        y = multipliers.reshape(nodes, -1, 6)
+        if not self._is_whole:
+            y = (np.swapaxes(self._rows, -1, -2) @ y[..., None])[..., 0]
+        power = screws.own @ power_matrix(y)
         held = (y * self._is_carried[:, None]).sum(axis=1)
-        held_power = bracket_power(held[:, None], screws.shared)
+        held_power = screws.shared @ power_matrix(held)
         below = np.tril(np.ones((power.shape[2],) * 2), -1)
         by_own = (power @ np.swapaxes(screws.own, -1, -2)) * below
         by_shared, by_layout = -power @ np.swapaxes(screws.shared, -1, -2)[:, None], _products(power, screws.based)
@@ -105,9 +108,11 @@ class JacobianChanges:
             if self._is_carried[place] and self._holder is not None:
                 found[:, place, :, self._holder.columns] += np.swapaxes(shared[:, place], 1, 2) @ self._holder.to_joints
         found[..., self._nq :] += np.swapaxes(layout, 2, 3)
-        if not self._is_whole:
-            found = self.rows @ found
-        return found.reshape(nodes, -1, self._nq + count)
+        return self.in_rows(found).reshape(nodes, -1, self._nq + count)
+
+    def in_rows(self, twists: Array) -> Array:
+        """The constrained components of twists at the origin of R, shape (N, T, 6, n)."""
+        return twists if self._is_whole else self._rows @ twists
 
     def _tips(self) -> tuple[Array, Array, Array]:
         """Displacement of the tips seen from R per unit of own axes, shared axes and directions, (N, T, ..., 3)."""
@@ -137,10 +142,8 @@ class _Way:
 
 
 def _rows(job: Job, tip: Array) -> Array:
-    """See ``JacobianChanges.rows``."""
+    """Matrices that take the constrained components from twists at the origin of R, shape (N, T, 6, 6)."""
     found = job.constraints
-    if found.is_whole:
-        return np.eye(6)[None, None]
     rows = np.zeros((*tip.shape[:2], 6, 6))
     rows[..., :, :] = np.eye(6)
     rows[..., :3, 3:] = -np.cross(tip[..., None, :], np.eye(3)).swapaxes(-1, -2)

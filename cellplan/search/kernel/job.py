@@ -1,6 +1,6 @@
 """Job: the clocked tasks of one cell at the nodes that the motions of all its layouts are worked out at."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -42,6 +42,7 @@ class Job:
         is_begin: Whether a node begins a stretch on which the desired twists are continuous, shape (N,).
         steps: Weights in [s] of the rates at a node and the two before it, which predict the next one by a multistep
             rule, shape (N - 1, 3).
+        rates: Derivatives by time in [1/s] at the nodes, of what is given at them, shape (N, N).
         integral: Integrals in [s] from the first node to each, of what is given at the nodes, shape (N, N).
     """
 
@@ -57,6 +58,7 @@ class Job:
     V: Array
     is_begin: Array
     steps: Array
+    rates: Array
     integral: Array
 
     @classmethod
@@ -92,6 +94,7 @@ class Job:
             V=V,
             is_begin=is_begin,
             steps=_multistep(times, is_begin),
+            rates=_rates(times, is_begin),
             integral=_integral(times, is_begin),
         )
 
@@ -179,13 +182,31 @@ def _multistep(times: Array, is_begin: Array) -> Array:
 
 def _integral(times: Array, is_begin: Array) -> Array:
     """See ``Job``: over each step, of the cubic through the four nodes of its stretch that are nearest to it."""
-    steps, begins = np.zeros((len(times), len(times))), [*np.flatnonzero(is_begin).tolist(), len(times)]
-    for begin, end in pairwise(begins):
+    steps = np.zeros((len(times), len(times)))
+    for begin, end in _stretches(is_begin):
         for node in range(begin, end - 1):
             first = min(max(begin, node - 1), max(begin, end - ORDER - 1))
             near = slice(first, min(first + ORDER + 1, end))
             steps[node + 1, near] = _over_step(times[near] - times[node], times[node + 1] - times[node])
     return np.cumsum(steps, axis=0)
+
+
+def _rates(times: Array, is_begin: Array) -> Array:
+    """See ``Job``: of the parabola through the three nodes of its stretch that are nearest to each."""
+    rates = np.zeros((len(times), len(times)))
+    for begin, end in _stretches(is_begin):
+        for node in range(begin, end):
+            first = min(max(begin, node - 1), max(begin, end - ORDER))
+            near = slice(first, min(first + ORDER, end))
+            powers, step = np.arange(near.stop - first), times[begin + 1] - times[begin]
+            places = (times[near] - times[node]) / step
+            rates[node, near] = np.linalg.solve(places ** powers[:, None], (powers == 1) / step)
+    return rates
+
+
+def _stretches(is_begin: Array) -> Iterator[tuple[int, int]]:
+    """First node of each stretch, and the first one after it."""
+    return pairwise([*np.flatnonzero(is_begin).tolist(), len(is_begin)])
 
 
 def _over_step(places: Array, step: float) -> Array:

@@ -18,6 +18,7 @@ from cellplan.planning.collocation.batch_tasks import Desired
 from cellplan.planning.collocation.settling import settled
 from cellplan.planning.collocation.solver import repeated
 from cellplan.search.kernel.job import Job, Layouts
+from cellplan.search.kernel.memory import keep_freed_memory
 
 AT_ONCE: Final = 256  # candidates side by side: enough for NumPy, and the arrays of one node stay in the cache
 START_TOL: Final = 1e-6  # [m] and [rad] up to which a tool counts as at the start of its path
@@ -62,6 +63,7 @@ def run(job: Job, layouts: Layouts) -> Motions:
             f"layouts: expected {len(job.cell.robots)} robots with {job.cell.joint_count} joints in all, got "
             f"{layouts.X_WB.shape[1]} with {layouts.start.shape[1]}"
         )
+    keep_freed_memory()
     count, nodes = len(layouts), len(job.times)
     q, qd = (np.empty((nodes, job.cell.joint_count, count)) for _ in range(2))
     lost_at = np.empty(count)
@@ -131,7 +133,8 @@ def run_near(job: Job, layouts: Layouts, q: Array) -> Motions:
         layouts: The candidates.
         q: Joint positions at the nodes that are nearly right in [rad] or [m], shape (K, N, nq).
     """
-    count, nodes, nq = q.shape
+    keep_freed_memory()
+    count, nodes, _ = q.shape
     start, at = layouts.start.T, np.ascontiguousarray(np.moveaxis(q, 2, 0))
     with np.errstate(all="ignore"):
         first = repeated((job.X[..., :1], job.V[..., :1]), count)

@@ -75,16 +75,15 @@ class TaskScrews:
         on_part, own, turning = found.is_on_part[:, None], found.operators, chains.is_turning.T[:, :, None]
         R = np.where(on_part[:, :, None], R_WP[:, None], np.eye(3))
         p = np.where(on_part, p_WP[:, None], np.zeros(3))
-        bases = np.swapaxes(directions.base, 1, 2), layout.X_WB[0, :, :3, 3]
-        R_WF = R_WT @ np.swapaxes(layout.X_FT[0, :, :3, :3], 1, 2)
-        tools = _turned(np.swapaxes(directions.tool, 1, 2), np.swapaxes(R_WF, -1, -2)), tips
-        based = _at_origin(bases[0][own], p - bases[1][own], R)
-        tooled = _at_origin(tools[0][:, own], p - tips[:, own], R)
-        shared, held = np.zeros_like(axes[:, 0].repeat(2, axis=-1)), np.zeros_like(based[:, 0])
+        bases, tools = np.swapaxes(directions.base, 1, 2), np.swapaxes(directions.tool, 1, 2)
+        R_FW = layout.X_FT[0, :, :3, :3] @ np.swapaxes(R_WT, -1, -2)
+        based = bases[own] @ _adjoint(R, p - layout.X_WB[0, own, :3, 3])
+        tooled = tools[own] @ _adjoint(R, p - tips[:, own], R_FW[:, own])
+        shared, held = np.zeros((*axes[:, 0].shape[:2], 6)), np.zeros_like(based[:, 0])
         if (holder := found.carrier) is not None:
             shared = _screws(axes[:, holder], points[:, holder], turning[holder], R_WP, p_WP)
-            held = _at_origin(tools[0][:, holder], p_WP - tips[:, holder], R_WP)
-            moved = _at_origin(bases[0][holder], p_WP - bases[1][holder], R_WP) + held
+            held = tools[holder] @ _adjoint(R_WP, p_WP - tips[:, holder], R_FW[:, holder])
+            moved = bases[holder] @ _adjoint(R_WP, p_WP - layout.X_WB[0, holder, :3, 3]) + held
             based[:, found.carrier_signs < 0.0] -= moved[:, None]
         return cls(
             own=_screws(axes[:, own], points[:, own], turning[own], R, p),
@@ -102,15 +101,36 @@ def bracket(x: Array, y: Array) -> Array:
     return np.concatenate([cross(w, a) + cross(v, b), cross(w, b)], axis=-1)
 
 
-def bracket_power(y: Array, x: Array) -> Array:
-    """Wrenches ``g`` with ``g . z = y . [z, x]`` for any twist z: of wrenches y, force first, and twists x."""
-    f, n, v, w = y[..., :3], y[..., 3:], x[..., :3], x[..., 3:]
-    return np.concatenate([cross(w, f), cross(v, f) + cross(w, n)], axis=-1)
+def bracket_matrix(y: Array) -> Array:
+    """Matrices ``B`` with ``x B = [x, y]`` for any twist x, a row, of twists y of shape (..., 6)."""
+    matrix = np.zeros((*y.shape, 6))
+    matrix[..., :3, :3] = matrix[..., 3:, 3:] = cross_matrix(y[..., 3:])
+    matrix[..., 3:, :3] = cross_matrix(y[..., :3])
+    return matrix
+
+
+def power_matrix(y: Array) -> Array:
+    """Matrices ``B`` with ``(x B) . z = y . [z, x]`` for twists x and z, of wrenches y, force first, shape (..., 6)."""
+    matrix = np.zeros((*y.shape, 6))
+    matrix[..., :3, 3:] = matrix[..., 3:, :3] = cross_matrix(y[..., :3])
+    matrix[..., 3:, 3:] = cross_matrix(y[..., 3:])
+    return matrix
+
+
+def cross_matrix(b: Array) -> Array:
+    """Matrices ``S`` with ``a S = a x b`` for any row a, of vectors of shape (..., 3)."""
+    matrix = np.zeros((*b.shape, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        matrix[..., i, j], matrix[..., j, i] = -b[..., k], b[..., k]
+    return matrix
 
 
 def cross(a: Array, b: Array) -> Array:
     """Cross products along the last axis."""
-    return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        product[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return product
 
 
 def _part_poses(job: Job, R_WT: Array, tips: Array) -> tuple[Array, Array]:
@@ -127,12 +147,12 @@ def _screws(axes: Array, points: Array, turning: Array, R: Array, p: Array) -> A
     return np.concatenate([linear @ R, (turning * axes) @ R], axis=-1)
 
 
-def _at_origin(twists: Array, arm: Array, R: Array) -> Array:
-    """Twists of shape (..., p, 6) along the axes of W taken at other points, ``arm`` away, along the axes of R."""
-    linear, angular = twists[..., :3], twists[..., 3:]
-    return np.concatenate([(linear + cross(angular, arm[..., None, :])) @ R, angular @ R], axis=-1)
-
-
-def _turned(twists: Array, R: Array) -> Array:
-    """Twists of shape (..., p, 6) along the axes of another frame."""
-    return np.concatenate([twists[..., :3] @ R, twists[..., 3:] @ R], axis=-1)
+def _adjoint(R: Array, arm: Array, R_FW: Array | None = None) -> Array:
+    """Matrices that take twists, rows along the axes of F (or W), to the frames R ``arm`` away, shape (..., 6, 6)."""
+    matrix = np.zeros((*R.shape[:-2], 6, 6))
+    turned, lever = R, cross_matrix(arm) @ R
+    if R_FW is not None:
+        turned, lever = R_FW @ R, R_FW @ lever
+    matrix[..., :3, :3] = matrix[..., 3:, 3:] = turned
+    matrix[..., 3:, :3] = lever
+    return matrix
