@@ -5,7 +5,7 @@ proposal that ``separation`` has to prove. Poses are checked before (``bodies.ch
 and results are new for each question because FCL leaves old values in them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -62,6 +62,14 @@ class Engine:
             known = self._parts[other, whole] = Engine((self.bodies[other], *self._pieces[key]))
             known.queries, known._objects, known._pieces = self.queries, self._objects, self._pieces
         return known
+
+    def with_bodies(self, changed: Mapping[int, CollisionBody]) -> "Engine":
+        """The engine with some bodies in place of others; what FCL has built of all the rest is shared."""
+        other = Engine([changed.get(index, body) for index, body in enumerate(self.bodies)])
+        kept = {id(body) for body in other.bodies if body not in changed.values()}
+        other._objects = {key: value for key, value in self._objects.items() if key[1] in kept}
+        other._pieces = {key: value for key, value in self._pieces.items() if key in kept}
+        return other
 
     def sphere_centres(self, poses: BodyPoses, *, sample: int) -> Array:
         """Centres of the bounding spheres in the world at a sample in [m], shape (B, 3)."""
