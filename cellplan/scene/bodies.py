@@ -84,15 +84,16 @@ def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q:
         chains: The chain of each robot.
         q: Joint positions in [rad] or [m] by robot, shape (N, n) each.
     """
-    count = len(next(iter(q.values()))) if q else 1
-    D = {name: chains[name].link_displacements(positions) for name, positions in q.items()}
-    poses = []
-    for body in bodies:
-        if body.robot is None:
-            poses.append(np.broadcast_to(body.X_BS, (count, 4, 4)))
-        else:
-            poses.append(D[body.robot][:, body.link + 1] @ body.X_BS)
-    return poses
+    return carried_poses(bodies, {name: chains[name].link_displacements(positions) for name, positions in q.items()})
+
+
+def carried_poses(bodies: Sequence[SceneBody], D: Mapping[str, Array]) -> list[Array]:
+    """Poses of all bodies in the world, shape (N, 4, 4) each, from the displacements of the links by robot."""
+    count = len(next(iter(D.values()))) if D else 1
+    return [
+        np.broadcast_to(body.X_BS, (count, 4, 4)) if body.robot is None else D[body.robot][:, body.link + 1] @ body.X_BS
+        for body in bodies
+    ]
 
 
 def is_ground(body: SceneBody) -> bool:

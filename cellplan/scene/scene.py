@@ -17,11 +17,12 @@ from cellplan.geometry.shapes import HalfSpace
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOut
-from cellplan.scene.bodies import SceneBody, body_poses, is_ground, scene_bodies
+from cellplan.scene.bodies import SceneBody, body_poses, carried_poses, is_ground, scene_bodies
 from cellplan.scene.collision_pairs import CollisionPairs
 from cellplan.scene.left_out import left_out
 from cellplan.scene.mounting import MountedPair
 from cellplan.scene.moved import placed_columns, stands_by_link, with_bases
+from cellplan.scene.near import NearPairs, near_pairs
 from cellplan.scene.pairs import Excluded, ScenePair
 
 
@@ -127,10 +128,30 @@ class Scene:
             object.__setattr__(other, "engine", self.engine.with_bodies(made))
         return other
 
+    def near(self, q: Array, within: float) -> NearPairs:
+        """All watched pairs nearer than a distance in [m] at some configurations, with points, normals and gradients.
+
+        The distances are quick, not proved: a search asks them, ``certify`` judges what it finds. Bodies that never
+        move against each other and those of which the depth is judged (``mounted``) are not among the watched pairs.
+
+        Args:
+            q: Stacked joint positions in [rad] or [m], shape (K, nq).
+            within: The distance.
+        """
+        return near_pairs(self, q, within)
+
     def body_poses(self, q: Array) -> BodyPoses:
         """Poses of the engine's bodies for stacked joint positions in [rad] or [m], shape (N, nq)."""
-        own = {robot.name: q[:, self.cell.columns(robot.name)] for robot in self.cell.robots}
-        poses = body_poses([body for body in self.bodies if not is_ground(body)], self.chains, own)
+        return self.poses_at(self.link_displacements(q))
+
+    def link_displacements(self, q: Array) -> dict[str, Array]:
+        """Displacements of all links by robot, see ``ScrewChain``, at stacked joint positions of shape (N, nq)."""
+        columns = {robot.name: self.cell.columns(robot.name) for robot in self.cell.robots}
+        return {name: self.chains[name].link_displacements(q[:, own]) for name, own in columns.items()}
+
+    def poses_at(self, D: Mapping[str, Array]) -> BodyPoses:
+        """Poses of the engine's bodies for displacements of the links by robot."""
+        poses = carried_poses([body for body in self.bodies if not is_ground(body)], D)
         return checked_poses([*poses, *(poses[tool] for tool in self.cut_from)])
 
     def pair_poses(self, pair: Pair, q: Array) -> BodyPoses:
