@@ -5,15 +5,16 @@ What they find is judged afterwards by the certificate, whose engine is another 
 
 from typing import Any, Final
 
-import coal
 import numpy as np
 
 from cellplan.collision.bodies import BodyPoses, CollisionBody
+from cellplan.collision.separation import separation
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
+from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, support_point
 
 TOLERANCE: Final = 1e-9  # [m] of the iteration: far below what any clearance is stated to
 MOST_STEPS: Final = 500  # of one iteration
+FARTHEST: Final = 1e3  # [m] a deeper overlap is none: where its search fails coal returns the largest number there is
 
 
 class SignedDistances:
@@ -23,9 +24,6 @@ class SignedDistances:
         """Start without any object."""
         self._shapes: dict[int, tuple[CollisionBody, Any]] = {}  # by identity of the body, which is kept alive
         self._pairs: dict[tuple[int, int], Any] = {}
-        self._request = coal.DistanceRequest()
-        self._request.gjk_tolerance = self._request.epa_tolerance = TOLERANCE
-        self._request.gjk_max_iterations = MOST_STEPS
 
     def below(
         self, bodies: tuple[CollisionBody, ...], ends: Indices, poses: BodyPoses, samples: Indices, *, within: float
@@ -43,7 +41,11 @@ class SignedDistances:
             Places of these queries, shape (F,), their distances, negative where hulls overlap by so much, shape (F,),
             and the points of both bodies that are so far from each other, in the world in [m], shape (F, 2, 3).
         """
-        request, result, placed = self._request, coal.DistanceResult(), dict[tuple[int, int], Any]()
+        import coal  # a search needs it, a verification does not
+
+        request, result, placed = coal.DistanceRequest(), coal.DistanceResult(), dict[tuple[int, int], Any]()
+        request.gjk_tolerance = request.epa_tolerance = TOLERANCE
+        request.gjk_max_iterations = MOST_STEPS
         places, distances, points = list[int](), list[float](), list[Array]()
         for place, ((a, b), sample) in enumerate(zip(ends.tolist(), samples.tolist(), strict=True)):
             X_a, X_b = placed.get((a, sample)), placed.get((b, sample))
@@ -54,13 +56,18 @@ class SignedDistances:
             result.clear()
             distance = self._query(bodies[a], bodies[b])(X_a, X_b, request, result)
             if distance < within:
+                first, second = result.getNearestPoint1(), result.getNearestPoint2()
+                if not distance > -FARTHEST:
+                    distance, first, second = _along_centres(bodies[a], bodies[b], poses, (a, b, sample))
                 places.append(place)
                 distances.append(distance)
-                points += [result.getNearestPoint1(), result.getNearestPoint2()]
+                points += [first, second]
         return np.array(places, dtype=np.intp), np.array(distances), np.array(points).reshape(-1, 2, 3)
 
     def _query(self, first: CollisionBody, second: CollisionBody) -> Any:
         """Coal's query for two bodies."""
+        import coal
+
         key = (id(first), id(second))
         if key not in self._pairs:
             self._pairs[key] = coal.ComputeDistance(self._shape(first), self._shape(second))
@@ -73,8 +80,23 @@ class SignedDistances:
         return self._shapes[id(body)][1]
 
 
+def _along_centres(
+    first: CollisionBody, second: CollisionBody, poses: BodyPoses, where: tuple[int, int, int]
+) -> tuple[float, Array, Array]:
+    """Overlap of two hulls along the line of their centres, no less than along any other, and its two points."""
+    a, b, sample = where
+    (R_a, p_a), (R_b, p_b) = ((poses.R[body, sample], poses.p[body, sample]) for body in (a, b))
+    apart = R_b @ second.centre + p_b - R_a @ first.centre - p_a
+    n = apart / np.linalg.norm(apart) if np.any(apart) else np.array([0.0, 0.0, 1.0])
+    distance = separation(first.hull, second.hull, n, X_first=(R_a, p_a), X_second=(R_b, p_b))
+    point = R_a @ support_point(first.hull, n @ R_a) + p_a
+    return distance, point, point + distance * n
+
+
 def _geometry(hull: Solid) -> Any:
     """Coal's geometry of a convex solid."""
+    import coal
+
     match hull:
         case Box(size):
             return coal.Box(*size)

@@ -80,7 +80,9 @@ class ScrewChain:
         if not self._axes:
             return np.zeros((len(D), 0, 6))
         carriers = D[:, [axis.parent + 1 for axis in self._axes]]
-        axes, points = (np.array(part) for part in zip(*((each.axis_B, each.point_B) for each in self._axes), strict=True))
+        axes, points = (
+            np.array(part) for part in zip(*((each.axis_B, each.point_B) for each in self._axes), strict=True)
+        )
         s = (carriers[..., :3, :3] @ axes[..., None])[..., 0]
         s0 = (carriers[..., :3, :3] @ points[..., None])[..., 0] + carriers[..., :3, 3]
         is_revolute = np.array([axis.is_revolute for axis in self._axes])[:, None]

@@ -161,9 +161,7 @@ class _Screen:
         """Figures of one group of candidates; see `Candidates`."""
         placement = self._tasks.chains.placements(X_WB, X_FT)
         desired = repeated(self._at_start, len(start))
-        q, arrived = settled(
-            self._tasks, desired, placement, start.T, mobile=self._settling, accuracy=self._accuracy
-        )
+        q, arrived = settled(self._tasks, desired, placement, start.T, mobile=self._settling, accuracy=self._accuracy)
         found = Screening.unknown(q.T.copy())
         found.lost_at[arrived] = 0.0
         collocation = Collocation(self._tasks, self._desired_at, placement, self._precision)

@@ -6,6 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from cellplan.collision.bodies import BodyPoses, require_rigid
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import HalfSpace, Shape
 from cellplan.geometry.transforms import Array, inverse
@@ -76,8 +77,8 @@ def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
     return tuple(bodies)
 
 
-def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> list[Array]:
-    """Poses of all bodies in the world, shape (N, 4, 4) each.
+def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> BodyPoses:
+    """Poses of all bodies in the world.
 
     Args:
         bodies: The bodies.
@@ -87,13 +88,31 @@ def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q:
     return carried_poses(bodies, {name: chains[name].link_displacements(positions) for name, positions in q.items()})
 
 
-def carried_poses(bodies: Sequence[SceneBody], D: Mapping[str, Array]) -> list[Array]:
-    """Poses of all bodies in the world, shape (N, 4, 4) each, from the displacements of the links by robot."""
-    count = len(next(iter(D.values()))) if D else 1
-    return [
-        np.broadcast_to(body.X_BS, (count, 4, 4)) if body.robot is None else D[body.robot][:, body.link + 1] @ body.X_BS
-        for body in bodies
-    ]
+def carried_poses(bodies: Sequence[SceneBody], D: Mapping[str, Array]) -> BodyPoses:
+    """Poses of all bodies in the world, from the displacements of the links by robot, shape (N, links + 1, 4, 4).
+
+    Links are far fewer than bodies: what is checked are their displacements and where on them the bodies are.
+
+    Raises:
+        CellplanError: A displacement is not finite or not rigid.
+    """
+    count, X_BS = len(next(iter(D.values()))) if D else 1, np.array([body.X_BS for body in bodies]).reshape(-1, 4, 4)
+    for X in (*D.values(), X_BS[None]):
+        require_rigid(X[..., :3, :3], X[..., :3, 3])
+    R, p = np.empty((len(bodies), count, 3, 3)), np.empty((len(bodies), count, 3))
+    links: dict[tuple[str, int], tuple[Array, Array]] = {}
+    for index, body in enumerate(bodies):
+        if body.robot is None:
+            R[index], p[index] = body.X_BS[:3, :3], body.X_BS[:3, 3]
+            continue
+        key = (body.robot, body.link)
+        if key not in links:
+            X = D[body.robot][:, body.link + 1]
+            links[key] = np.ascontiguousarray(X[:, :3, :3]).reshape(-1, 3), X[:, :3, 3]
+        rows, p_WL = links[key]  # the rows of all rotations: one product for all samples
+        R[index] = (rows @ body.X_BS[:3, :3]).reshape(count, 3, 3)
+        p[index] = (rows @ body.X_BS[:3, 3]).reshape(count, 3) + p_WL
+    return BodyPoses(R, p)
 
 
 def is_ground(body: SceneBody) -> bool:

@@ -35,9 +35,7 @@ def stands_by_link(cell: Cell, robot: str) -> bool:
     return bool(bodies and cell.obstacles) and all(body.link != BASE for body in bodies)
 
 
-def placed_columns(
-    cell: Cell, bodies: Sequence[SceneBody], X_WB: Mapping[str, Array]
-) -> dict[int, SceneBody] | None:
+def placed_columns(cell: Cell, bodies: Sequence[SceneBody], X_WB: Mapping[str, Array]) -> dict[int, SceneBody] | None:
     """The columns below or above the bases of moved robots, by the index of their bodies; None where one comes or goes.
 
     A column whose height stays keeps its solid.

@@ -84,11 +84,13 @@ def _solids(scene: "Scene", poses: BodyPoses, within: float) -> Found:
     demands = np.array([scene.pairs[row].demand for row in rows.tolist()])
     for query in np.flatnonzero((distances <= demands) & ~_are_convex(scene)[ends[places]].all(axis=1)).tolist():
         (i, j), sample = ends[places[query]].tolist(), int(samples[query])
-        points = None if engine.touch(i, j, poses, sample=sample) else engine.surface_points(i, j, poses, sample=sample)
-        if points is not None:
-            first[query], second[query] = points
-            distances[query] = np.linalg.norm(points[1] - points[0])
-    normals = _directions(distances, first, second, centres[ends[places, 1], samples] - centres[ends[places, 0], samples])
+        is_apart = not engine.touch(i, j, poses, sample=sample)
+        if is_apart and (nearest := engine.surface_points(i, j, poses, sample=sample)) is not None:
+            first[query], second[query] = nearest
+            distances[query] = np.linalg.norm(nearest[1] - nearest[0])
+    normals = _directions(
+        distances, first, second, centres[ends[places, 1], samples] - centres[ends[places, 0], samples]
+    )
     return rows, samples, distances, normals, first, second
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cellplan.collision.bodies import BodyPoses, checked_poses, prepare
+from cellplan.collision.bodies import BodyPoses, prepare
 from cellplan.collision.continuous.motion_bound import Pair
 from cellplan.collision.engine import Engine
 from cellplan.collision.self_test import prove_engine
@@ -91,7 +91,9 @@ class Scene:
     @property
     def exclusions(self) -> tuple[tuple[str, str, str], ...]:
         """Pairs that are not watched, as (first, second, reason)."""
-        return tuple((self.bodies[each.first].name, self.bodies[each.second].name, each.reason) for each in self.excluded)
+        return tuple(
+            (self.bodies[each.first].name, self.bodies[each.second].name, each.reason) for each in self.excluded
+        )
 
     @property
     def left_out(self) -> tuple[LeftOut, ...]:
@@ -103,8 +105,8 @@ class Scene:
 
         Hulls and engine are kept; only columns whose height changes are made anew. What depends on the bases otherwise,
         a column that comes or goes and a robot without a foot that stands with its first link in the surroundings, is
-        sorted by ``from_cell``, which takes as long as that does. A column that touches a link of its own robot in every
-        configuration is not refused here; it shows as a contact.
+        sorted by ``from_cell``, which takes as long as that does. A column that touches a link of its own robot in
+        every configuration is not refused here; it shows as a contact.
 
         Args:
             X_WB: Base in the world by the name of the robot, shape (4, 4); all others stay.
@@ -151,15 +153,15 @@ class Scene:
 
     def poses_at(self, D: Mapping[str, Array]) -> BodyPoses:
         """Poses of the engine's bodies for displacements of the links by robot."""
-        poses = carried_poses([body for body in self.bodies if not is_ground(body)], D)
-        return checked_poses([*poses, *(poses[tool] for tool in self.cut_from)])
+        solids = [body for body in self.bodies if not is_ground(body)]
+        return carried_poses([*solids, *(solids[tool] for tool in self.cut_from)], D)
 
     def pair_poses(self, pair: Pair, q: Array) -> BodyPoses:
         """Poses of two of the engine's bodies only; those of the others are not numbers, so that nothing uses them."""
         carriers = [self.carrier(index) for index in pair]
         names = {body.robot or self.cell.robots[0].name for body in carriers}  # one robot at least: it counts the rows
         own = {name: q[:, self.cell.columns(name)] for name in sorted(names)}
-        found = checked_poses(body_poses(carriers, self.chains, own))
+        found = body_poses(carriers, self.chains, own)
         R, p = (np.full((len(self.engine.bodies), *part.shape[1:]), np.nan) for part in (found.R, found.p))
         R[list(pair)], p[list(pair)] = found.R, found.p
         return BodyPoses(R, p)

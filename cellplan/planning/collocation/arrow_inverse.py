@@ -32,8 +32,8 @@ class ArrowInverse:
             A: Columns of each task's own robot, shape (6, n, tasks, batch).
             C: Columns of the joints that all tasks share, shape (6, m, tasks, batch).
             mobility: Inverse weights of the own joints, 0 for those that may not move, shape (n, tasks, 1 or batch).
-            coupling_weights: Weights of the shared joints, shape (m, 1 or batch); their columns are 0 where they may not
-                move.
+            coupling_weights: Weights of the shared joints, shape (m, 1 or batch); columns of those that may not move
+                are 0.
             idle: 1 for components that a task leaves open, whose rows are 0, shape (6, tasks, 1).
         """
         self._A, self._C = A, C

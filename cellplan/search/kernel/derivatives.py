@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.jacobian_changes import JacobianChanges
+from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.memory import keep_freed_memory
 from cellplan.search.kernel.screws import Directions, TaskScrews
 
@@ -54,7 +54,9 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
     for node, (taking, adding) in enumerate(zip(rates.by_joints, rates.by_layout, strict=True)):
         found[node] = taking @ at + adding
         if node and begins[node - 1]:  # as in ``run``: once more with the mean of both rates
-            at = found[node - 1, :nq] + 0.5 * (job.times[node] - job.times[node - 1]) * found[node - 1 : node + 1, nq:].sum(axis=0)
+            at = found[node - 1, :nq] + 0.5 * (job.times[node] - job.times[node - 1]) * found[
+                node - 1 : node + 1, nq:
+            ].sum(axis=0)
             found[node] = taking @ at + adding
         if node + 1 < len(q):
             at = found[node, :nq] + steps[node][0] * found[node, nq:]
@@ -62,6 +64,17 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
                 if weight:
                     at += weight * found[node - back, nq:]
     return MotionDerivatives(q=found[:, :nq], qd=found[:, nq:])
+
+
+def equations(job: Job, layout: Layouts, q: Array, qd: Array, directions: Directions) -> tuple[Array, Array]:
+    """The variational equations at all nodes, joints first, then speeds: see ``differentiate`` for the arguments.
+
+    Returns:
+        What a change of the joints becomes once the tools are back on their paths, and what it does to the speeds,
+        shape (N, 2 nq, nq); and what the directions do, shape (N, 2 nq, p).
+    """
+    rates = _Rates(job, layout, q, qd, directions)
+    return rates.by_joints, rates.by_layout
 
 
 class _Rates:
@@ -104,7 +117,8 @@ class _Rates:
         D = half @ np.swapaxes(half, 1, 2)
         diagonal = np.einsum("nii->ni", D)
         diagonal += REGULAR * diagonal.max(axis=1, keepdims=True) + self._idle
-        lower = _lower_inverse(np.linalg.cholesky(D))
+        factor: Array = np.linalg.cholesky(D)
+        lower = _lower_inverse(factor)
         return mobility[:, None] * (np.swapaxes(lower @ J, 1, 2) @ lower)
 
 

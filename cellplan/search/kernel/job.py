@@ -72,7 +72,7 @@ class Job:
             nodes: About how many nodes there are.
         """
         grasps = closures(cell, moving)
-        relations = (*(path.task for path in schedule.paths), *grasps)
+        relations: tuple[Relation, ...] = (*(path.task for path in schedule.paths), *grasps)
         desired_at = desired_motion(schedule.paths, grasps)
         times, begins, ends = _nodes(schedule.jumps, nodes)
         X, V = desired_at(times, begins, ends)

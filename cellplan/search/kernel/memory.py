@@ -5,7 +5,9 @@ from typing import Final
 
 import numpy as np
 
-KEPT_BYTES: Final = 24_000_000  # more than all arrays of one call, less than the 32 MB beyond which glibc learns nothing
+KEPT_BYTES: Final = (
+    24_000_000  # more than all arrays of one call, less than the 32 MB beyond which glibc learns nothing
+)
 
 
 @cache

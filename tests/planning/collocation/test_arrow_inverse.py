@@ -22,7 +22,9 @@ class Drawn:
         self.b = rng.normal(size=(6, tasks, LANES))
 
     def inverse(self) -> ArrowInverse:
-        return ArrowInverse(self.A, self.C, mobility=self.mobility, coupling_weights=self.weights[:, None], idle=self.idle)
+        return ArrowInverse(
+            self.A, self.C, mobility=self.mobility, coupling_weights=self.weights[:, None], idle=self.idle
+        )
 
     def dense(self, lane: int) -> tuple[Array, Array]:
         """The matrix, shape (6 tasks, tasks own + shared), and the inverse weights of its columns."""
