@@ -88,6 +88,18 @@ def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q:
     return carried_poses(bodies, {name: chains[name].link_displacements(positions) for name, positions in q.items()})
 
 
+def link_displacements(cell: Cell, chains: Mapping[str, ScrewChain], q: Array) -> dict[str, Array]:
+    """Displacements of all links by robot, see ``ScrewChain``, at stacked joint positions of shape (N, nq)."""
+    columns = {robot.name: cell.columns(robot.name) for robot in cell.robots}
+    return {name: chains[name].link_displacements(q[:, own]) for name, own in columns.items()}
+
+
+def solid_poses(bodies: Sequence[SceneBody], cut_from: Sequence[int], D: Mapping[str, Array]) -> BodyPoses:
+    """Poses of all bodies that are no half-spaces, then of what is cut from some of them; see ``carried_poses``."""
+    solids = [body for body in bodies if not is_ground(body)]
+    return carried_poses([*solids, *(solids[index] for index in cut_from)], D)
+
+
 def carried_poses(bodies: Sequence[SceneBody], D: Mapping[str, Array]) -> BodyPoses:
     """Poses of all bodies in the world, from the displacements of the links by robot, shape (N, links + 1, 4, 4).
 

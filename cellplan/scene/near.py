@@ -11,6 +11,7 @@ from cellplan.collision.nearest_points import point_above
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.line_distances import line_distances
 from cellplan.model.robot import BASE
+from cellplan.scene.bodies import link_displacements, solid_poses
 
 if TYPE_CHECKING:
     from cellplan.scene.scene import Scene
@@ -44,8 +45,8 @@ class NearPairs:
 
 def near_pairs(scene: "Scene", q: Array, within: float) -> NearPairs:
     """See ``Scene.near``."""
-    D = scene.link_displacements(q)
-    poses = scene.poses_at(D)
+    D = link_displacements(scene.cell, scene.chains, q)
+    poses = solid_poses(scene.bodies, scene.cut_from, D)
     parts = [_solids(scene, poses, within), _grounds(scene, poses, within)]
     rows, samples, distances, normals, first, second = (np.concatenate(part) for part in zip(*parts, strict=True))
     order = np.lexsort((rows, samples))[distances[np.lexsort((rows, samples))] < within]

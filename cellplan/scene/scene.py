@@ -17,7 +17,7 @@ from cellplan.geometry.shapes import HalfSpace
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOut
-from cellplan.scene.bodies import SceneBody, body_poses, carried_poses, is_ground, scene_bodies
+from cellplan.scene.bodies import SceneBody, body_poses, is_ground, link_displacements, scene_bodies, solid_poses
 from cellplan.scene.collision_pairs import CollisionPairs
 from cellplan.scene.left_out import left_out
 from cellplan.scene.mounting import MountedPair
@@ -144,17 +144,7 @@ class Scene:
 
     def body_poses(self, q: Array) -> BodyPoses:
         """Poses of the engine's bodies for stacked joint positions in [rad] or [m], shape (N, nq)."""
-        return self.poses_at(self.link_displacements(q))
-
-    def link_displacements(self, q: Array) -> dict[str, Array]:
-        """Displacements of all links by robot, see ``ScrewChain``, at stacked joint positions of shape (N, nq)."""
-        columns = {robot.name: self.cell.columns(robot.name) for robot in self.cell.robots}
-        return {name: self.chains[name].link_displacements(q[:, own]) for name, own in columns.items()}
-
-    def poses_at(self, D: Mapping[str, Array]) -> BodyPoses:
-        """Poses of the engine's bodies for displacements of the links by robot."""
-        solids = [body for body in self.bodies if not is_ground(body)]
-        return carried_poses([*solids, *(solids[tool] for tool in self.cut_from)], D)
+        return solid_poses(self.bodies, self.cut_from, link_displacements(self.cell, self.chains, q))
 
     def pair_poses(self, pair: Pair, q: Array) -> BodyPoses:
         """Poses of two of the engine's bodies only; those of the others are not numbers, so that nothing uses them."""

@@ -20,7 +20,7 @@ QUIET: Final = 1e-3  # of the accuracy: a Newton step below this share in [rad] 
 def settling_joints(cell: Cell, tasks: Sequence[Relation]) -> Array:
     """1 for joints that may move to bring the tools to their paths, 0 for the others, shape (nq,).
 
-    Where all tasks are on the part its positioner keeps the posture that was chosen for it.
+    Where all tasks are on the part its positioner keeps the configuration that was chosen for it.
     """
     at_rest = cell.positioners[:1] if all(task.relative_to is Frame.PART for task in tasks) else ()
     return np.concatenate([np.full(len(r.model.joints), float(r.name not in at_rest)) for r in cell.robots])

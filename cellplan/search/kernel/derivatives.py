@@ -117,7 +117,7 @@ class _Rates:
         D = half @ np.swapaxes(half, 1, 2)
         diagonal = np.einsum("nii->ni", D)
         diagonal += REGULAR * diagonal.max(axis=1, keepdims=True) + self._idle
-        factor: Array = np.linalg.cholesky(D)
+        factor = np.asarray(np.linalg.cholesky(D), dtype=np.float64)
         lower = _lower_inverse(factor)
         return mobility[:, None] * (np.swapaxes(lower @ J, 1, 2) @ lower)
 
