@@ -7,6 +7,7 @@ times are medians; on a machine that others use only the ratios mean something.
 
 import json
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -235,7 +236,11 @@ def _displaced(layout: Layouts, directions: Directions) -> Layouts:
 def measure_all(rounds: int) -> list[Figure]:
     """All comparisons."""
     bench = Bench(rounds)
-    return [bench.run(), bench.run_near(), bench.differentiate(), bench.moved(), bench.near(), bench.certify()]
+    found = []
+    for compare in (bench.run, bench.run_near, bench.differentiate, bench.moved, bench.near, bench.certify):
+        found.append(compare())
+        print(f"layout kernel: {found[-1].name}", file=sys.stderr)
+    return found
 
 
 def section(figures: list[Figure], rounds: int) -> Section:
@@ -259,8 +264,10 @@ def main() -> None:
     """Measure and print."""
     options = benchmark_options("The kernel of the layout search beside what it replaces.", what="calls", rounds=5)
     figures = measure_all(options.rounds)
-    as_json = json.dumps([asdict(each) for each in figures], indent=1)
-    print(as_json if options.json else section(figures, options.rounds).text())
+    if options.json:
+        print(json.dumps([asdict(each) for each in figures], indent=1, default=bool))
+    else:
+        print(section(figures, options.rounds).text())
 
 
 if __name__ == "__main__":
