@@ -1,6 +1,7 @@
 # Every target works on a bare machine: Python 3.11 or newer with venv, make and a package index are all it takes.
 # PYTHON=/path/to/python picks the interpreter that `.venv` is made from; WORKERS=n picks the number of test processes.
 # ROUNDS=n says how often a benchmark runs; each has a number of its own otherwise.
+# pip itself is brought up to date first where that is possible: the one that comes with Python takes longer to choose versions.
 # CONSTRAINTS=constraints.txt installs the very versions that the project was last tested with.
 
 .DEFAULT_GOAL := help
@@ -51,6 +52,7 @@ $(STAMP): pyproject.toml
 	    "$$python" -m venv --clear $(VENV); \
 	fi; \
 	echo "installing cellplan and its tools into $(VENV)"; \
+	$(BIN)/python -m pip install --quiet --upgrade pip || true; \
 	$(BIN)/python -m pip install --quiet $(if $(CONSTRAINTS),--constraint '$(CONSTRAINTS)') --editable '.[dev]'; \
 	$(BIN)/python -m compileall -q cellplan; \
 	printf '%s' '$(CURDIR)' >$@

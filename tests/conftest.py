@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from unittest import mock
 
 import pytest
 from builders import picture_memo
@@ -36,6 +37,20 @@ def shared_solutions() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def one_processor() -> Iterator[None]:
+    """Commands draw their plots in this process: a child would import the plotting library for each of them."""
+    with mock.patch("cellplan.guard.background.processors", return_value=1):
+        yield
+
+
+@pytest.fixture
+def two_processors(one_processor: None) -> Iterator[None]:
+    """Plots may be drawn in a child."""
+    with mock.patch("cellplan.guard.background.processors", return_value=2):
+        yield
+
+
 @pytest.fixture(scope="session")
 def repository() -> Path:
     """The folder that holds the package, the cells and the docs."""
@@ -61,6 +76,13 @@ def shared_robots() -> Path:
 def kept_solutions() -> Iterator[None]:
     """The tests of a module share solved cells with all other modules that say so."""
     with shared_solutions():
+        yield
+
+
+@pytest.fixture
+def sketched_pictures() -> Iterator[None]:
+    """Pictures of runs are no more than the digest of what they would show; tests of plots paint them."""
+    with picture_memo.sketched():
         yield
 
 

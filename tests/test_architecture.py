@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path, PurePosixPath
 
@@ -32,6 +33,12 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 def place(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    """The tree of a file, which nobody may change."""
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def functions(tree: ast.AST) -> Iterator[Function]:
@@ -61,9 +68,10 @@ def is_command(path: Path, node: Function) -> bool:
     return path.parent == PACKAGE / "cli" and node.name == path.stem
 
 
+@cache
 def imported_modules(path: Path) -> set[str]:
     modules = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
             modules |= {alias.name.partition(".")[0] for alias in node.names}
         if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
@@ -90,7 +98,7 @@ def test_functions_and_classes_stay_small() -> None:
 
 def oversized(path: Path) -> Iterator[str]:
     """Functions and classes of a file that are too large."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, Function):
             if body_lines(node) > BODY_LINES:
                 yield f"{node.name}: {body_lines(node)} lines"
@@ -104,11 +112,7 @@ def oversized(path: Path) -> Iterator[str]:
 
 def test_no_file_is_an_empty_placeholder() -> None:
     empty = [place(path) for path in [*SOURCES, *SCRIPTS] if not path.read_text(encoding="utf-8").strip()]
-    hollow = [
-        place(path)
-        for path in SOURCES
-        if path.name != "__init__.py" and len(ast.parse(path.read_text(encoding="utf-8")).body) < 2
-    ]
+    hollow = [place(path) for path in SOURCES if path.name != "__init__.py" and len(parsed(path).body) < 2]
     packages_without_content = [
         place(path.parent) for path in SOURCES if path.name == "__init__.py" and not any_other_module(path.parent)
     ]
@@ -132,11 +136,10 @@ def test_no_import_closes_a_circle() -> None:
 
 def module_imports(path: Path) -> set[str]:
     """Modules from which a file imports names, without those that it imports for type checkers only."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            node.body = []
-    found = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module]
+    nodes = list(ast.walk(parsed(path)))
+    branches = [node for node in nodes if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
+    for_types = {child for branch in branches for statement in branch.body for child in ast.walk(statement)}
+    found = [node for node in nodes if isinstance(node, ast.ImportFrom) and node.module and node not in for_types]
     return {node.module for node in found} | {f"{node.module}.{alias.name}" for node in found for alias in node.names}
 
 
@@ -208,7 +211,7 @@ def test_every_test_asserts_something() -> None:
 def called_names(path: Path) -> dict[str, set[str]]:
     """What each function of a file calls, by the last part of the name; a statement ``assert`` counts as a call."""
     found: dict[str, set[str]] = {}
-    for node in functions(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in functions(parsed(path)):
         names = found.setdefault(node.name, set())
         for child in ast.walk(node):
             if isinstance(child, ast.Assert):

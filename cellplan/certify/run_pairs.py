@@ -19,15 +19,12 @@ def scene_of_run(scene: Scene, tasks: Collection[str]) -> Scene:
     """
     idle = idle_robots(scene.cell, tasks)
     pairs = list(scene.pairs)
-    judged = set[tuple[str, ...]]()
     for row, pair in enumerate(pairs):
         tool = _tool_at_work(scene, pair)
         if tool is not None and scene.bodies[tool].robot in idle:
             part = pair.second if tool == pair.first else pair.first
             pairs[row] = replace(pair, rule=Rule.CLEARANCE, reason="", solids=(tool, part))
-            judged.add(scene.names(pair))
-    left_out = tuple(each for each in scene.left_out if each.bodies not in judged)
-    return replace(scene, pairs=tuple(pairs), left_out=left_out)
+    return replace(scene, pairs=tuple(pairs))
 
 
 def scene_of_rows(scene: Scene, rows: Sequence[int]) -> Scene:

@@ -11,7 +11,7 @@ from cellplan.errors import CellplanError, InputError, OverrunError
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.mesh.topology import components
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, bounding_capsule, bounding_sphere
-from cellplan.geometry.transforms import Array, is_rigid, pose_from
+from cellplan.geometry.transforms import Array
 
 POINT_SIZE: Final = 1e-7  # [m] size given to a point or a line, so that the engine sees a triangle: far below 0.1 mm
 SURFACE_TOL: Final = 2e-5  # [m] a tessellated cylinder lies outside the true one by no more than this
@@ -19,6 +19,7 @@ CONVEX_TOL: Final = 2e-6  # [m] vertices of a convex mesh may stand out of a tri
 CONVEX_WORK: Final = 40_000_000  # [-] vertices times triangles up to which convexity is tested: half a second
 HULL_TOL: Final = 2e-7  # [-] of its radius by which a vertex may stick out of a mesh's hull (see convex_hull)
 RIGID_CHUNK: Final = 20_000  # [-] poses checked at once: about 10 MB
+RIGID_TOL: Final = 1e-9  # [-] by which a rotation may fail to be one
 FLAT_PADDING: Final = 1e-6  # [m] thickness given to the box round a flat surface
 
 
@@ -57,7 +58,7 @@ class CollisionBody:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPoses:
-    """Where bodies are at each of n samples; made by ``checked_poses`` only.
+    """Where bodies are at each of n samples; of poses that were checked (``checked_poses``, ``require_rigid``) only.
 
     Attributes:
         R: Rotations in the world, shape (B, n, 3, 3).
@@ -102,11 +103,32 @@ def checked_poses(poses: Sequence[Array]) -> BodyPoses:
     R, p = np.empty((len(poses), count, 3, 3)), np.empty((len(poses), count, 3))
     for body, X in enumerate(poses):
         R[body], p[body] = X[:, :3, :3], X[:, :3, 3]
-    step = max(1, RIGID_CHUNK // max(1, count))
-    for first in range(0, len(poses), step):
-        if not is_rigid(pose_from(R[first : first + step], p[first : first + step])):
-            raise CellplanError("collision: the pose of a body is not finite or not a rigid displacement")
+    require_rigid(R, p)
     return BodyPoses(R, p)
+
+
+def require_rigid(R: Array, p: Array) -> None:
+    """Refuse poses, shape (B, n, 3, 3) and (B, n, 3), that are not finite or not rigid; see ``checked_poses``.
+
+    A matrix is a rotation when its first two columns are orthonormal and their cross product is the third one.
+
+    Raises:
+        CellplanError: A pose is not a rigid displacement.
+    """
+    step = max(1, RIGID_CHUNK // max(1, R.shape[1]))
+    for first in range(0, len(R), step):
+        some, at = R[first : first + step], p[first : first + step]
+        x, y, z = (tuple(some[..., row, column] for row in range(3)) for column in range(3))
+        faults = [_dot(x, x) - 1.0, _dot(y, y) - 1.0, _dot(x, y)]
+        faults += [x[j] * y[k] - x[k] * y[j] - z[i] for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
+        is_rotation = all(bool(np.all(np.abs(fault) <= RIGID_TOL)) for fault in faults)
+        if not is_rotation or not np.all(np.isfinite(at)):
+            raise CellplanError("collision: the pose of a body is not finite or not a rigid displacement")
+
+
+def _dot(a: tuple[Array, ...], b: tuple[Array, ...]) -> Array:
+    """Scalar products of vectors given by their components."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _hull(shape: Solid) -> tuple[Solid, bool]:

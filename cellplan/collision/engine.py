@@ -5,7 +5,7 @@ proposal that ``separation`` has to prove. Poses are checked before (``bodies.ch
 and results are new for each question because FCL leaves old values in them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -13,6 +13,7 @@ import fcl
 import numpy as np
 
 from cellplan.collision.bodies import BodyPoses, CollisionBody
+from cellplan.collision.signed_distance import SignedDistances
 from cellplan.errors import CellplanError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.transforms import Array
@@ -36,6 +37,7 @@ class Engine:
         centres: Centres of their bounding spheres, each in the body's own frame in [m], shape (B, 3).
         radii: Radii of these spheres in [m], shape (B,).
         queries: Number of queries so far, those of pieces of the bodies included.
+        signed: Quick distances of their hulls, for searches.
     """
 
     def __init__(self, bodies: Sequence[CollisionBody]) -> None:
@@ -44,6 +46,7 @@ class Engine:
         self.centres = np.array([body.centre for body in self.bodies]).reshape(-1, 3)
         self.radii = np.array([body.radius for body in self.bodies])
         self.queries = QueryCounts()
+        self.signed = SignedDistances()
         self._objects: dict[tuple[str, int], Any] = {}  # by kind and identity of the body
         self._pieces: dict[int, tuple[CollisionBody, ...]] = {}  # by identity of the whole
         self._parts: dict[tuple[int, int], Engine] = {}
@@ -62,6 +65,15 @@ class Engine:
             known = self._parts[other, whole] = Engine((self.bodies[other], *self._pieces[key]))
             known.queries, known._objects, known._pieces = self.queries, self._objects, self._pieces
         return known
+
+    def with_bodies(self, changed: Mapping[int, CollisionBody]) -> "Engine":
+        """The engine with some bodies in place of others; what FCL has built of all the rest is shared."""
+        other = Engine([changed.get(index, body) for index, body in enumerate(self.bodies)])
+        kept = {id(body) for body in other.bodies if body not in changed.values()}
+        other.signed = self.signed
+        other._objects = {key: value for key, value in self._objects.items() if key[1] in kept}
+        other._pieces = {key: value for key, value in self._pieces.items() if key in kept}
+        return other
 
     def sphere_centres(self, poses: BodyPoses, *, sample: int) -> Array:
         """Centres of the bounding spheres in the world at a sample in [m], shape (B, 3)."""

@@ -125,7 +125,8 @@ class BatchChains:
         bases, tools = np.moveaxis(X_WB, 0, -1), np.moveaxis(self._X_BF @ X_FT, 0, -1)
         R_WB, R_LT = np.moveaxis(bases[:, :3, :3], 0, 2), np.moveaxis(tools[:, :3, :3], 0, 2)
         p_WB, p_LT = np.moveaxis(bases[:, :3, 3], 0, 1), np.moveaxis(tools[:, :3, 3], 0, 1)
-        return Placement(R_WB, p_WB, R_LT, p_LT - self._last_point.T[..., None])
+        parts = (R_WB, p_WB, R_LT, p_LT - self._last_point.T[..., None])
+        return Placement(*(np.ascontiguousarray(part) for part in parts))  # the batch is the axis that is worked along
 
     def state(self, q: Array, placement: Placement) -> BatchState:
         """Kinematics at stacked joint vectors, shape (nq, batch)."""

@@ -8,21 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.batched import Placement
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
-from cellplan.model.task import Frame
 from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
+from cellplan.planning.collocation.settling import settled, settling_joints
 from cellplan.planning.collocation.solver import Collocation, Indices, Precision, repeated
 from cellplan.planning.collocation.windows import Window, windows_between
 from cellplan.planning.tracking.motion_task import closures
 
 AT_ONCE: Final = 32  # candidates that are resolved together: enough for NumPy, and their arrays stay in the cache
 FIRST_DEGREE: Final = 12  # of the polynomials: enough for most windows at the accuracy of a screening
-NEWTON_STEPS: Final = 20  # to bring the tools to the starts of their paths; about six where they come there
-LARGEST_STEP: Final = 0.5  # [rad] or [m] of one of them
-QUIET: Final = 1e-3  # of the accuracy: a Newton step below this share in [rad] or [m] changes nothing any more
 ALL_WAY: Final = np.inf  # time at which a candidate is lost that does the whole job
 
 
@@ -158,14 +154,14 @@ class _Screen:
         breaks, jumps = schedule.breaks, schedule.jumps
         self._at_start = self._desired_at(breaks[:1], breaks[:1], breaks[1:2])
         self._windows = windows_between(jumps, whole=float(breaks[-1]), knots=breaks, highest=FIRST_DEGREE)
-        at_rest = cell.positioners[:1] if all(path.task.relative_to is Frame.PART for path in schedule.paths) else ()
-        self._settling = np.concatenate([np.full(len(r.model.joints), r.name not in at_rest) for r in cell.robots])
+        self._settling = settling_joints(cell, [path.task for path in schedule.paths])
         self._limits = cell.joint_limits
 
     def of(self, X_WB: Array, X_FT: Array, start: Array) -> Screening:
         """Figures of one group of candidates; see `Candidates`."""
         placement = self._tasks.chains.placements(X_WB, X_FT)
-        q, arrived = self._settled(start.T.copy(), placement)
+        desired = repeated(self._at_start, len(start))
+        q, arrived = settled(self._tasks, desired, placement, start.T, mobile=self._settling, accuracy=self._accuracy)
         found = Screening.unknown(q.T.copy())
         found.lost_at[arrived] = 0.0
         collocation = Collocation(self._tasks, self._desired_at, placement, self._precision)
@@ -182,16 +178,3 @@ class _Screen:
 
         found.lost_at[collocation.carry(self._windows, q, np.flatnonzero(arrived), record)] = ALL_WAY
         return found
-
-    def _settled(self, q: Array, placement: Placement) -> tuple[Array, NDArray[np.bool_]]:
-        """Start postures, shape (nq, cells), with the tools brought to their paths, and which of them came there."""
-        cells = q.shape[1]
-        desired, still = repeated(self._at_start, cells), np.zeros_like(q)
-        for _ in range(NEWTON_STEPS):
-            step = self._tasks.linearise(q, desired, placement, mobile=self._settling).correction(still)
-            longest = np.abs(step).max(axis=0)
-            if not np.any(longest > QUIET * self._accuracy):
-                break
-            q = q + step * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, LARGEST_STEP))
-        errors = np.abs(self._tasks.errors(q, desired[0], placement)).max(axis=(0, 1))
-        return q, errors <= self._accuracy

@@ -6,6 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from cellplan.collision.bodies import BodyPoses, require_rigid
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import HalfSpace, Shape
 from cellplan.geometry.transforms import Array, inverse
@@ -76,23 +77,54 @@ def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
     return tuple(bodies)
 
 
-def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> list[Array]:
-    """Poses of all bodies in the world, shape (N, 4, 4) each.
+def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> BodyPoses:
+    """Poses of all bodies in the world.
 
     Args:
         bodies: The bodies.
         chains: The chain of each robot.
         q: Joint positions in [rad] or [m] by robot, shape (N, n) each.
     """
-    count = len(next(iter(q.values()))) if q else 1
-    D = {name: chains[name].link_displacements(positions) for name, positions in q.items()}
-    poses = []
-    for body in bodies:
+    return carried_poses(bodies, {name: chains[name].link_displacements(positions) for name, positions in q.items()})
+
+
+def link_displacements(cell: Cell, chains: Mapping[str, ScrewChain], q: Array) -> dict[str, Array]:
+    """Displacements of all links by robot, see ``ScrewChain``, at stacked joint positions of shape (N, nq)."""
+    columns = {robot.name: cell.columns(robot.name) for robot in cell.robots}
+    return {name: chains[name].link_displacements(q[:, own]) for name, own in columns.items()}
+
+
+def solid_poses(bodies: Sequence[SceneBody], cut_from: Sequence[int], D: Mapping[str, Array]) -> BodyPoses:
+    """Poses of all bodies that are no half-spaces, then of what is cut from some of them; see ``carried_poses``."""
+    solids = [body for body in bodies if not is_ground(body)]
+    return carried_poses([*solids, *(solids[index] for index in cut_from)], D)
+
+
+def carried_poses(bodies: Sequence[SceneBody], D: Mapping[str, Array]) -> BodyPoses:
+    """Poses of all bodies in the world, from the displacements of the links by robot, shape (N, links + 1, 4, 4).
+
+    Links are far fewer than bodies: what is checked are their displacements and where on them the bodies are.
+
+    Raises:
+        CellplanError: A displacement is not finite or not rigid.
+    """
+    count, X_BS = len(next(iter(D.values()))) if D else 1, np.array([body.X_BS for body in bodies]).reshape(-1, 4, 4)
+    for X in (*D.values(), X_BS[None]):
+        require_rigid(X[..., :3, :3], X[..., :3, 3])
+    R, p = np.empty((len(bodies), count, 3, 3)), np.empty((len(bodies), count, 3))
+    links: dict[tuple[str, int], tuple[Array, Array]] = {}
+    for index, body in enumerate(bodies):
         if body.robot is None:
-            poses.append(np.broadcast_to(body.X_BS, (count, 4, 4)))
-        else:
-            poses.append(D[body.robot][:, body.link + 1] @ body.X_BS)
-    return poses
+            R[index], p[index] = body.X_BS[:3, :3], body.X_BS[:3, 3]
+            continue
+        key = (body.robot, body.link)
+        if key not in links:
+            X = D[body.robot][:, body.link + 1]
+            links[key] = np.ascontiguousarray(X[:, :3, :3]).reshape(-1, 3), X[:, :3, 3]
+        rows, p_WL = links[key]  # the rows of all rotations: one product for all samples
+        R[index] = (rows @ body.X_BS[:3, :3]).reshape(count, 3, 3)
+        p[index] = (rows @ body.X_BS[:3, 3]).reshape(count, 3) + p_WL
+    return BodyPoses(R, p)
 
 
 def is_ground(body: SceneBody) -> bool:

@@ -10,12 +10,11 @@ from cellplan.geometry.shapes import HalfSpace, Solid
 from cellplan.geometry.transforms import inverse
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
-from cellplan.model.left_out import LeftOut, LeftOutKind
+from cellplan.model.left_out import LeftOutKind
 from cellplan.model.task import Frame
 from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody
 from cellplan.scene.grips import grip_watch
-from cellplan.scene.left_out import left_out
 from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair, works_like_a_tool
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
 from cellplan.scene.permanent_contacts import apply_design
@@ -27,17 +26,15 @@ class CollisionPairs:
 
     Attributes:
         watched: Pairs that are watched.
-        exclusions: Pairs that are not, as (first, second, reason).
+        excluded: Pairs that are not, in the order of their bodies.
         mounted: Pairs that may touch and of which the depth is judged.
-        left_out: What is not judged in full, but for two links of one robot's file.
         outside: Surfaces of tools and holders outside their contact zones; the engine has them after its solids.
         cut_from: The body that each of these is cut from, by its index.
     """
 
     watched: tuple[ScenePair, ...]
-    exclusions: tuple[tuple[str, str, str], ...]
+    excluded: tuple[Excluded, ...]
     mounted: tuple[MountedPair, ...]
-    left_out: tuple[LeftOut, ...]
     outside: tuple[CollisionBody, ...]
     cut_from: tuple[int, ...]
 
@@ -61,12 +58,10 @@ class CollisionPairs:
         excluded += design.excluded
         zones = _ContactZones(cell, bodies, first_index=len(engine.bodies))
         watched = tuple(zones.watched(pair) for pair in design.kept)
-        ordered = sorted(excluded, key=lambda pair: (pair.first, pair.second))
         return cls(
             watched=watched,
-            exclusions=tuple((bodies[pair.first].name, bodies[pair.second].name, pair.reason) for pair in ordered),
+            excluded=tuple(sorted(excluded, key=lambda pair: (pair.first, pair.second))),
             mounted=(*_mounted(cell, bodies, excluded, watched), *design.mounted),
-            left_out=left_out(cell, bodies, watched, excluded, engine=engine),
             outside=tuple(zones.outside),
             cut_from=tuple(zones.cut_from),
         )

@@ -46,7 +46,7 @@ def left_out(
         bodies: All solids.
         pairs: Pairs that are watched.
         excluded: Pairs that are not.
-        engine: The solids.
+        engine: The solids first, in the order of the bodies.
     """
     standing = _Standing(cell, bodies, engine)
     entries = [*_relaxed(bodies, pairs), *(each for each in _excluded(excluded) if not standing.is_clear(*each[:3]))]
@@ -68,8 +68,8 @@ class _Standing:
         X = [body.X_BS if body.robot is None else cell.robot(body.robot).X_WB @ body.X_BS for body in bodies]
         placed: Array = np.array(X).reshape(-1, 4, 4)
         self._poses = BodyPoses(placed[:, None, :3, :3], placed[:, None, :3, 3])
-        self._centres = (placed[: len(engine.bodies), :3, :3] @ engine.centres[..., None])[..., 0]
-        self._centres += placed[: len(engine.bodies), :3, 3]
+        solids = slice(sum(not is_ground(body) for body in bodies))
+        self._centres = (placed[solids, :3, :3] @ engine.centres[solids, :, None])[..., 0] + placed[solids, :3, 3]
 
     def is_clear(self, first: int, second: int, kind: LeftOutKind) -> bool:
         """Whether two bodies are both at rest and keep the demanded clearance."""

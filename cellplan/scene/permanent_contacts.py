@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.collision.bodies import BodyPoses, checked_poses
+from cellplan.collision.bodies import BodyPoses
 from cellplan.collision.distance import measure
 from cellplan.collision.engine import Engine
 from cellplan.collision.overlap.containment import is_inside
@@ -137,7 +137,7 @@ class _Sampled:
     def poses(self, holder: str | None) -> BodyPoses:
         """Where all bodies are."""
         if holder not in self._poses:
-            self._poses[holder] = checked_poses(body_poses(self.views[holder], self._chains, self._configurations))
+            self._poses[holder] = body_poses(self.views[holder], self._chains, self._configurations)
         return self._poses[holder]
 
     def always_touch(self, pair: ScenePair, holder: str | None) -> bool:

@@ -1,11 +1,12 @@
 """Scene: a cell made computable, built once: its kinematic chains, its bodies and the pairs that must keep apart."""
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from cellplan.collision.bodies import BodyPoses, checked_poses, prepare
+from cellplan.collision.bodies import BodyPoses, prepare
 from cellplan.collision.continuous.motion_bound import Pair
 from cellplan.collision.engine import Engine
 from cellplan.collision.self_test import prove_engine
@@ -16,10 +17,13 @@ from cellplan.geometry.shapes import HalfSpace
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOut
-from cellplan.scene.bodies import SceneBody, body_poses, is_ground, scene_bodies
+from cellplan.scene.bodies import SceneBody, body_poses, is_ground, link_displacements, scene_bodies, solid_poses
 from cellplan.scene.collision_pairs import CollisionPairs
+from cellplan.scene.left_out import left_out
 from cellplan.scene.mounting import MountedPair
-from cellplan.scene.pairs import ScenePair
+from cellplan.scene.moved import placed_columns, stands_by_link, with_bases
+from cellplan.scene.near import NearPairs, near_pairs
+from cellplan.scene.pairs import Excluded, ScenePair
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,9 +35,8 @@ class Scene:
         chains: Kinematic chain of each robot, by name.
         bodies: All solids, half-spaces last.
         pairs: Pairs that are watched.
-        exclusions: Pairs that are not watched, as (first, second, reason).
+        excluded: Pairs that are not watched.
         mounted: Pairs that may touch and of which the depth is judged.
-        left_out: What is not judged in full, but for two links of one robot's file.
         engine: The solid bodies in the order of ``bodies``, then the surfaces of tools outside their contact zones.
         cut_from: The tool body that each of these last ones is cut from.
         solid_rows: Indices of the pairs that the engine watches, shape (S,), ascending.
@@ -45,9 +48,8 @@ class Scene:
     chains: Mapping[str, ScrewChain]
     bodies: tuple[SceneBody, ...]
     pairs: tuple[ScenePair, ...]
-    exclusions: tuple[tuple[str, str, str], ...]
+    excluded: tuple[Excluded, ...]
     mounted: tuple[MountedPair, ...]
-    left_out: tuple[LeftOut, ...]
     engine: Engine
     cut_from: tuple[int, ...]
     solid_rows: Indices = field(init=False)
@@ -80,25 +82,76 @@ class Scene:
             chains=chains,
             bodies=bodies,
             pairs=found.watched,
-            exclusions=found.exclusions,
+            excluded=found.excluded,
             mounted=found.mounted,
-            left_out=found.left_out,
             engine=Engine([*solids, *found.outside]),
             cut_from=found.cut_from,
         )
 
+    @property
+    def exclusions(self) -> tuple[tuple[str, str, str], ...]:
+        """Pairs that are not watched, as (first, second, reason)."""
+        return tuple(
+            (self.bodies[each.first].name, self.bodies[each.second].name, each.reason) for each in self.excluded
+        )
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What is not judged in full, but for two links of one robot's file; measures what stands, in milliseconds."""
+        return left_out(self.cell, self.bodies, self.pairs, self.excluded, engine=self.engine)
+
+    def moved(self, X_WB: Mapping[str, Array]) -> "Scene":
+        """The scene with some robots elsewhere, and what stands on or below their bases with them.
+
+        Hulls and engine are kept; only columns whose height changes are made anew. What depends on the bases otherwise,
+        a column that comes or goes and a robot without a foot that stands with its first link in the surroundings, is
+        sorted by ``from_cell``, which takes as long as that does. A column that touches a link of its own robot in
+        every configuration is not refused here; it shows as a contact.
+
+        Args:
+            X_WB: Base in the world by the name of the robot, shape (4, 4); all others stay.
+
+        Raises:
+            ValueError: There is no such robot, or a pose is not finite or not rigid.
+        """
+        cell = with_bases(self.cell, X_WB)
+        placed = None if any(stands_by_link(cell, name) for name in X_WB) else placed_columns(cell, self.bodies, X_WB)
+        if placed is None:
+            return Scene.from_cell(cell)
+        other = copy(self)
+        chains = {name: ScrewChain(cell.robot(name)) for name in X_WB}
+        bodies = tuple(placed.get(index, body) for index, body in enumerate(self.bodies)) if placed else self.bodies
+        changed = {index: body for index, body in placed.items() if body.shape is not self.bodies[index].shape}
+        object.__setattr__(other, "cell", cell)
+        object.__setattr__(other, "chains", {**self.chains, **chains})
+        object.__setattr__(other, "bodies", bodies)
+        if changed:
+            made = {index: prepare(body.name, body.shape) for index, body in changed.items()}  # type: ignore[arg-type]
+            object.__setattr__(other, "engine", self.engine.with_bodies(made))
+        return other
+
+    def near(self, q: Array, within: float) -> NearPairs:
+        """All watched pairs nearer than a distance in [m] at some configurations, with points, normals and gradients.
+
+        The distances are quick, not proved: a search asks them, ``certify`` judges what it finds. Bodies that never
+        move against each other and those of which the depth is judged (``mounted``) are not among the watched pairs.
+
+        Args:
+            q: Stacked joint positions in [rad] or [m], shape (K, nq).
+            within: The distance.
+        """
+        return near_pairs(self, q, within)
+
     def body_poses(self, q: Array) -> BodyPoses:
         """Poses of the engine's bodies for stacked joint positions in [rad] or [m], shape (N, nq)."""
-        own = {robot.name: q[:, self.cell.columns(robot.name)] for robot in self.cell.robots}
-        poses = body_poses([body for body in self.bodies if not is_ground(body)], self.chains, own)
-        return checked_poses([*poses, *(poses[tool] for tool in self.cut_from)])
+        return solid_poses(self.bodies, self.cut_from, link_displacements(self.cell, self.chains, q))
 
     def pair_poses(self, pair: Pair, q: Array) -> BodyPoses:
         """Poses of two of the engine's bodies only; those of the others are not numbers, so that nothing uses them."""
         carriers = [self.carrier(index) for index in pair]
         names = {body.robot or self.cell.robots[0].name for body in carriers}  # one robot at least: it counts the rows
         own = {name: q[:, self.cell.columns(name)] for name in sorted(names)}
-        found = checked_poses(body_poses(carriers, self.chains, own))
+        found = body_poses(carriers, self.chains, own)
         R, p = (np.full((len(self.engine.bodies), *part.shape[1:]), np.nan) for part in (found.R, found.p))
         R[list(pair)], p[list(pair)] = found.R, found.p
         return BodyPoses(R, p)
@@ -123,24 +176,25 @@ class Scene:
         """
         examined = np.ones(len(self.pairs), dtype=bool) if among is None else among
         poses = self.body_poses(q[None])
-        row = self._first_on_ground(poses, self.ground_rows[examined[self.ground_rows]])
+        row = _first_on_ground(self, poses, self.ground_rows[examined[self.ground_rows]])
         if row is None:
             solids = examined[self.solid_rows]
             place = first_touching(self.engine, self.solid_pairs[solids], poses, sample=0)
             row = None if place is None else int(self.solid_rows[solids][place])
         return None if row is None else self.names(self.pairs[row])
 
-    def _first_on_ground(self, poses: BodyPoses, rows: Indices) -> int | None:
-        """The first of some pairs of which the solid touches a half-space at the first sample, or None."""
-        centres = self.engine.sphere_centres(poses, sample=0)
-        for row in rows:
-            pair = self.pairs[row]
-            X_WS = self.bodies[pair.second].X_BS
-            is_far = (centres[pair.first] - X_WS[:3, 3]) @ X_WS[:3, 2] > self.engine.radii[pair.first]
-            if not is_far and self.ground_heights(pair, poses)[0] <= 0.0:
-                return int(row)
-        return None
-
     def names(self, pair: ScenePair) -> tuple[str, str]:
         """Names of the two bodies of a pair."""
         return self.bodies[pair.first].name, self.bodies[pair.second].name
+
+
+def _first_on_ground(scene: Scene, poses: BodyPoses, rows: Indices) -> int | None:
+    """The first of some pairs of which the solid touches a half-space at the first sample, or None."""
+    centres = scene.engine.sphere_centres(poses, sample=0)
+    for row in rows:
+        pair = scene.pairs[row]
+        X_WS = scene.bodies[pair.second].X_BS
+        is_far = (centres[pair.first] - X_WS[:3, 3]) @ X_WS[:3, 2] > scene.engine.radii[pair.first]
+        if not is_far and scene.ground_heights(pair, poses)[0] <= 0.0:
+            return int(row)
+    return None

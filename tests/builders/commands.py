@@ -5,7 +5,6 @@ import io
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
-from unittest import mock
 
 from cellplan.cli.main import run
 
@@ -34,12 +33,7 @@ def run_script(text: str, folder: Path) -> str:
 
 @contextlib.contextmanager
 def _in_folder(folder: Path) -> Iterator[tuple[io.StringIO, io.StringIO]]:
-    """Work in a folder, with streams of one's own, and draw plots in this process, which may have them already."""
+    """Work in a folder, with streams of one's own."""
     out, err = io.StringIO(), io.StringIO()
-    with (
-        contextlib.chdir(folder),
-        mock.patch("cellplan.guard.background.processors", return_value=1),
-        contextlib.redirect_stdout(out),
-        contextlib.redirect_stderr(err),
-    ):
+    with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         yield out, err

@@ -77,7 +77,11 @@ def test_a_full_disk_is_reported_in_one_line() -> None:
     assert ended.stderr == "error: standard output: the result was not shown: no space left on device\n"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGINT, signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)],
+    ids=lambda number: number.name,
+)
 def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Path, number: signal.Signals) -> None:
     folder = tmp_path / "run"
     command = [*PROGRAM, "solve", str(cells / "four_robots.yaml"), "-o", str(folder), "--duration", "60"]

@@ -9,7 +9,7 @@ import pytest
 from cellplan.cli import progress
 from cellplan.cli.main import run
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("kept_solutions", "sketched_pictures")
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from cellplan.geometry.transforms import pose
 
 EXACT = 1e-4  # [m] promised accuracy of a measured distance
 ROUNDING = 1e-9  # [m] coal's own tolerance of 1e-10 and the size of the scene
-STATES = 2000  # [-] random states of each pair of shapes
+STATES = 1000  # [-] random states of each pair of shapes
 
 SHAPES: dict[str, Solid] = {
     "box": Box((0.5, 0.2, 0.3)),

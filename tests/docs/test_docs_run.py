@@ -12,7 +12,7 @@ import pytest
 import yaml
 from builders.commands import is_plain, run_command, run_script
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("kept_solutions", "sketched_pictures")
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + sorted(
@@ -75,7 +75,7 @@ def assert_shown(expected: str, output: str) -> None:
     assert re.search(r"\n(?:[^\n]*\n)*?".join(lines), output), f"expected:\n{expected}\ngot:\n{output}"
 
 
-LONG = {
+LONG = {  # their commands and functions have tests of their own, which are quicker
     "compare.md",
     "questions.md",
     "verify-and-export.md",
@@ -83,7 +83,9 @@ LONG = {
     "rehearse-with-errors.md",
     "limits.md",
     "shortest-cycle.md",
-}  # half a minute each
+    "secondary-goals.md",
+    "sweep-values.md",
+}
 RUNNABLE = [pytest.param(page, marks=pytest.mark.slow if page.name in LONG else ()) for page in PAGES]
 
 

@@ -179,7 +179,8 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(folder: Path, *arguments: str) -> None:
     """Run a command of the copy of the package that lies in a folder."""
     command = [sys.executable, "-m", "cellplan", *arguments]
-    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    environment |= {"PYTHONPATH": str(folder)}
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 

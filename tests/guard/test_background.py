@@ -13,7 +13,10 @@ from builders import crashing_jobs
 from cellplan.guard import BackgroundProcess
 from cellplan.guard.background import processors
 
-pytestmark = pytest.mark.skipif(processors() < 2, reason="without a second processor nothing is done aside")
+pytestmark = [
+    pytest.mark.skipif(processors() < 2, reason="without a second processor nothing is done aside"),
+    pytest.mark.usefixtures("two_processors"),
+]
 
 
 @pytest.fixture

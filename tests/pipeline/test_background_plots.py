@@ -20,6 +20,8 @@ from cellplan.pipeline.write_run import write_run
 from cellplan.report.plots.run import draw_plots
 from cellplan.scene.scene import Scene
 
+pytestmark = pytest.mark.usefixtures("two_processors")
+
 
 def files(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
@@ -35,7 +37,7 @@ def solution(cell_file: Path) -> Solution:
     return solve(load_cell(cell_file))
 
 
-@pytest.mark.parametrize("mode", ["simultaneous", "pairwise"])
+@pytest.mark.parametrize("mode", [pytest.param("simultaneous", marks=pytest.mark.slow), "pairwise"])
 def test_a_run_folder_is_the_same_with_and_without_a_child(cell_file: Path, tmp_path: Path, mode: str) -> None:
     cell = with_overrides(load_cell(cell_file), mode=mode)
     write_run(solve(cell), tmp_path / "foreground")

@@ -15,6 +15,8 @@ from cellplan.planning.timing.schedule import clock_path
 
 CELL = Path(__file__).parents[2] / "cells" / "planar_pair.yaml"
 
+QUICK = {(False, Mode.SIMULTANEOUS), (True, Mode.PAIRWISE)}  # starts given and found, one phase and several
+
 
 @pytest.fixture
 def clocked(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
@@ -35,8 +37,19 @@ def coarse(mode: Mode, *, is_open: bool) -> Cell:
     return replace(cell, robots=robots, motion=replace(cell.motion, mode=mode, step=0.02))
 
 
-@pytest.mark.parametrize("mode", Mode)
-@pytest.mark.parametrize("is_open", [False, True], ids=["given starts", "found starts"])
+@pytest.mark.parametrize(
+    ("is_open", "mode"),
+    [
+        pytest.param(
+            is_open,
+            mode,
+            id=f"{'found' if is_open else 'given'} starts-{mode}",
+            marks=() if (is_open, mode) in QUICK else pytest.mark.slow,
+        )
+        for is_open in (False, True)
+        for mode in Mode
+    ],
+)
 def test_each_toolpath_is_put_on_the_clock_once(clocked: Counter[str], mode: Mode, is_open: bool) -> None:
     cell = coarse(mode, is_open=is_open)
 

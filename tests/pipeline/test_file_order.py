@@ -58,7 +58,9 @@ def by_robot(solution: Solution) -> Mapping[str, Array]:
     return {name: q for run in solution.runs for name, q in run.report.q.items()}
 
 
-@pytest.mark.parametrize("method", ["weighted_pseudo_inverse", "recursive_search"])
+@pytest.mark.parametrize(
+    "method", ["weighted_pseudo_inverse", pytest.param("recursive_search", marks=pytest.mark.slow)]
+)
 def test_starts_motion_and_verdict_are_the_same_to_the_last_digit(tmp_path: Path, method: str) -> None:
     solutions = [
         solve(three_arms(tmp_path, order, tasks, method))

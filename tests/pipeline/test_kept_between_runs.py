@@ -1,6 +1,5 @@
 """The cache saves time and changes nothing: same bytes cold, warm, damaged and off."""
 
-import os
 import shutil
 import subprocess
 import sys
@@ -9,7 +8,7 @@ from pathlib import Path
 from cellplan.io.cell.load import load_cell
 
 SOLVE = """
-import sys
+import os, sys
 from pathlib import Path
 from cellplan import load_cell, solve, write_run
 
@@ -17,36 +16,46 @@ class Blank:
     def pictures(self, report, *, cell):
         return dict
 
-write_run(solve(load_cell(sys.argv[1])), Path(sys.argv[2]), plots=Blank())
+for place in range(2, len(sys.argv), 2):
+    child = os.fork()
+    if child == 0:
+        os.environ["CELLPLAN_CACHE"] = sys.argv[place + 1]
+        write_run(solve(load_cell(sys.argv[1])), Path(sys.argv[place]), plots=Blank())
+        sys.exit()
+    if os.waitpid(child, 0)[1] != 0:
+        sys.exit(1)
 """
 
 
-def solved(cell: Path, folder: Path, *, cache: str) -> dict[str, bytes]:
-    """Files of a run that a process of its own solves; pictures show nothing that is not in the report."""
+def solve_each(cell: Path, caches: dict[Path, str]) -> None:
+    """Write runs, by folder, each with a cache and in a process that has read nothing before.
+
+    Pictures show nothing that is not in the report; the processes share the imports, which take long.
+    """
+    pairs = [text for folder, cache in caches.items() for text in (str(folder), cache)]
     subprocess.run(
-        [sys.executable, "-c", SOLVE, str(cell), str(folder)],
-        env={**os.environ, "CELLPLAN_CACHE": cache},
+        [sys.executable, "-c", SOLVE, str(cell), *pairs],
         capture_output=True,
         check=True,
         cwd=Path(__file__).resolve().parents[2],
     )
+
+
+def files(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_a_run_is_the_same_cold_warm_damaged_and_without_a_cache(sound: Path, tmp_path: Path) -> None:
     cell, cache = sound / "cell" / "small.yaml", tmp_path / "cache"
-    without = solved(cell, tmp_path / "run", cache="off")
-    assert not cache.exists()
-
-    cold = solved(cell, tmp_path / "run", cache=str(cache))
+    without, cold, warm, damaged = (tmp_path / name for name in ("without", "cold", "warm", "damaged"))
+    solve_each(cell, {without: "off", cold: str(cache), warm: str(cache)})
     kinds = {path.name.partition("-")[0] for path in cache.iterdir()}
-    warm = solved(cell, tmp_path / "run", cache=str(cache))
     for path in cache.iterdir():
         path.write_bytes(path.read_bytes()[:-1])
-    damaged = solved(cell, tmp_path / "run", cache=str(cache))
+    solve_each(cell, {damaged: str(cache)})
 
     assert "mesh" in kinds
-    assert without == cold == warm == damaged
+    assert files(without) == files(cold) == files(warm) == files(damaged)
 
 
 def test_robots_that_say_the_same_of_the_same_file_share_what_was_read(sound: Path, tmp_path: Path) -> None:

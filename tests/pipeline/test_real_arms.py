@@ -88,7 +88,7 @@ def arms(shared_robots, tmp_path_factory):
     return solved(ARMS, shared_robots, tmp_path_factory.mktemp("arms"))
 
 
-@pytest.mark.parametrize("name", ["arms", "turntable"])
+@pytest.mark.parametrize("name", [pytest.param("arms", marks=pytest.mark.slow), "turntable"])
 def test_real_arms_work_on_a_moving_part(name, request):
     solution = request.getfixturevalue(name)
     report = solution.runs[0].report
@@ -101,6 +101,7 @@ def test_real_arms_work_on_a_moving_part(name, request):
     assert report.clearance.minima["robot_robot"].minimum > 0.005
 
 
+@pytest.mark.slow
 def test_the_operators_do_all_the_work_when_the_part_is_at_rest(shared_robots, tmp_path):
     report = solved(ARMS, shared_robots, tmp_path, mode="part_at_rest").runs[0].report
     assert report.passed

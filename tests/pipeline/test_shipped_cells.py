@@ -12,6 +12,7 @@ from cellplan.pipeline.check import check
 pytestmark = pytest.mark.usefixtures("kept_solutions")
 
 CELLS = sorted((Path(__file__).resolve().parents[2] / "cells").glob("*.yaml"))
+LONG_TO_CHECK = {"load_sharing", "mesh_part_csv"}  # `test_cell_passes` finds the same starts and proves more of them
 MEANT_TO_FAIL = {"four_robots_initial"}  # the start of a layout search
 LONG = {"three_tasks_each"}  # a program of 23 s
 MEANT_TO_PASS = [
@@ -31,7 +32,10 @@ def test_cell_passes(path):
         assert all(found.certified for found in clearance.minima.values() if found.minimum is not None)
 
 
-@pytest.mark.parametrize("path", CELLS, ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(p, marks=pytest.mark.slow if p.stem in LONG_TO_CHECK else (), id=p.stem) for p in CELLS],
+)
 def test_cell_can_be_checked_without_solving(path):
     assert check(load_cell(path)).passed is (path.stem not in MEANT_TO_FAIL)
 

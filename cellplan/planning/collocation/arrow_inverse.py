@@ -32,20 +32,20 @@ class ArrowInverse:
             A: Columns of each task's own robot, shape (6, n, tasks, batch).
             C: Columns of the joints that all tasks share, shape (6, m, tasks, batch).
             mobility: Inverse weights of the own joints, 0 for those that may not move, shape (n, tasks, 1 or batch).
-            coupling_weights: Weights of the shared joints, shape (m,); their columns are 0 where they may not move.
+            coupling_weights: Weights of the shared joints, shape (m, 1 or batch); columns of those that may not move
+                are 0.
             idle: 1 for components that a task leaves open, whose rows are 0, shape (6, tasks, 1).
         """
         self._A, self._C = A, C
         self._mobile_A = A * mobility
         D = np.einsum("intb,jntb->ijtb", self._mobile_A, A)
-        scale = np.einsum("iitb->tb", D) + np.einsum("imtb,imtb,m->tb", C, C, 1.0 / coupling_weights)
+        scale = np.einsum("iitb->tb", D) + np.einsum("imtb,imtb,mb->tb", C, C, 1.0 / coupling_weights)
         diagonal = np.einsum("iitb->itb", D)
         diagonal += REGULAR * scale + idle
-        lower = eliminated(D, C)
-        self._D_factor, self._Y = lower[:, :6], lower[:, 6:]
+        self._D_factor, self._Y = eliminated(D, C)
         S = np.einsum("ijtb,iktb->jkb", self._Y, self._Y)
-        np.einsum("jjb->jb", S)[:] += coupling_weights[:, None]
-        self._S_factor = eliminated(S)
+        np.einsum("jjb->jb", S)[:] += coupling_weights
+        self._S_factor, _ = eliminated(S, S[:, :0])
 
     def speeds(self, b: Array) -> tuple[Array, Array]:
         """Smallest weighted joint speeds for twists, shape (6, tasks, batch).
@@ -65,23 +65,24 @@ class ArrowInverse:
         return np.einsum("intb,ntb->itb", self._A, own) + np.einsum("imtb,mb->itb", self._C, shared)
 
 
-def eliminated(M: Array, *beside: Array) -> Array:
-    """Inverse ``F`` of the lower Cholesky factors of symmetric positive matrices, and ``F`` times what stands beside.
+def eliminated(M: Array, B: Array) -> tuple[Array, Array]:
+    """Inverse ``F`` of the lower Cholesky factors of symmetric positive matrices, and ``F B``.
 
-    Gauss's elimination on ``[M, I, B]`` with the pivots shared between both sides: ``M^-1 = F^T F``. Matrices that are
-    not positive definite give NaN.
+    Gauss's elimination on ``[M, B, I]`` with the pivots shared between both sides: ``M^-1 = F^T F``. Of the unit matrix
+    row ``j`` has come to the columns up to ``j`` only. Matrices that are not positive definite give NaN.
 
     Args:
         M: The matrices, shape (k, k, ...).
-        beside: Further columns ``B``, shape (k, m, ...) each.
+        B: Further columns, shape (k, m, ...).
 
     Returns:
-        ``[F, F B]``, shape (k, k + m, ...).
+        ``F``, shape (k, k, ...), and ``F B``, shape (k, m, ...).
     """
-    size = len(M)
+    size, beside = len(M), B.shape[1]
     unit = np.broadcast_to(np.eye(size).reshape(size, size, *[1] * (M.ndim - 2)), M.shape)
-    rows = np.concatenate([M, unit, *beside], axis=1)
+    rows = np.concatenate([M, B, unit], axis=1)
     for j in range(size):
-        rows[j] /= np.sqrt(rows[j, j])
-        rows[j + 1 :, j + 1 :] -= rows[j, j + 1 : size, None] * rows[j, None, j + 1 :]
-    return rows[:, size:]
+        filled = slice(j + 1, size + beside + j + 1)
+        rows[j, j : filled.stop] /= np.sqrt(rows[j, j])
+        rows[j + 1 :, filled] -= rows[j, j + 1 : size, None] * rows[j, None, filled]
+    return rows[:, size + beside :], rows[:, size : size + beside]

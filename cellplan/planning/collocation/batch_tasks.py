@@ -53,10 +53,12 @@ class BatchTasks:
         joints = 0 if self._holder is None else len(cell.robots[self._holder].model.joints)
         self._own_columns = self.chains.columns[:, self._robots]
         self._shared_columns = self.chains.columns[:joints, self._holder or 0]
-        self._weights = np.concatenate([robot.weights for robot in cell.robots])
+        self._weights = np.concatenate([robot.weights for robot in cell.robots])[:, None]
         self._may_move = constraints.may_move
 
-    def linearise(self, q: Array, desired: Desired, placement: Placement, *, mobile: Array) -> "Linearisation":
+    def linearise(
+        self, q: Array, desired: Desired, placement: Placement, *, mobile: Array, weights: Array | None = None
+    ) -> "Linearisation":
         """The tasks at stacked joint vectors, shape (nq, batch), to first order.
 
         Args:
@@ -64,7 +66,9 @@ class BatchTasks:
             desired: Desired poses and twists of the tools.
             placement: Where the robots stand.
             mobile: 1 for joints that are not locked, shape (nq,).
+            weights: Joint weights, shape (nq, 1 or batch); those of the cell when None.
         """
+        weights = self._weights if weights is None else weights
         state = self.chains.state(q, placement)
         seen, (X, V) = self._seen(state), desired
         mobile = mobile * self._may_move
@@ -73,8 +77,8 @@ class BatchTasks:
         arrow = ArrowInverse(
             columns[:, :, :count],
             columns[:, : len(shared), count:] * (self._share * shared),
-            mobility=np.append(mobile / self._weights, 0.0)[self._own_columns][:, :, None] * self._own,
-            coupling_weights=self._weights[self._shared_columns],
+            mobility=_padded(mobile[:, None] / weights)[self._own_columns] * self._own,
+            coupling_weights=weights[self._shared_columns],
             idle=1.0 - self._kept,
         )
         rows = seen.R_WR if self._is_whole else None
@@ -103,8 +107,7 @@ class BatchTasks:
 
     def unstacked(self, everything: Array) -> tuple[Array, Array]:
         """The parts of stacked joint vectors, shape (nq, batch), that belong to each task and to all of them."""
-        padded = np.concatenate([everything, np.zeros((1, everything.shape[1]))])
-        return padded[self._own_columns] * self._own, padded[self._shared_columns]
+        return _padded(everything)[self._own_columns] * self._own, everything[self._shared_columns]
 
     def _seen(self, state: BatchState) -> ToolPoses:
         """The tools as the tasks see them."""
@@ -226,6 +229,11 @@ class Linearisation:
         np.einsum("ijtb,jtb->itb", self._rows, b[:3], out=turned[:3])
         np.einsum("ijtb,jtb->itb", self._rows, b[3:], out=turned[3:])
         return turned
+
+
+def _padded(everything: Array) -> Array:
+    """Stacked joint vectors with a last row of zeros, for the places of joints that a robot does not have."""
+    return np.concatenate([everything, np.zeros((1, everything.shape[1]))])
 
 
 def _rotation(sine_axis: Array, cosine: Array) -> Array:

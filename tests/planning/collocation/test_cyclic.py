@@ -101,7 +101,7 @@ def test_cycles_under_one_law_close_each_on_its_own(cycles: int) -> None:
 
 
 def test_coming_and_leaving_are_no_part_of_the_cycle() -> None:
-    case = cyclic(triangles(CELLS["mixed"]), 3, step=0.01, start=0.5, **MOVES)
+    case = cyclic(triangles(CELLS["sliding"]), 3, step=0.01, start=0.5, **MOVES)
     path = closed(case)
     assert drift(path, [0.5, 1.5, 2.5, 3.5]).max() <= PERIODIC
     assert path.end == pytest.approx(4.0)
@@ -110,16 +110,18 @@ def test_coming_and_leaving_are_no_part_of_the_cycle() -> None:
 
 
 def test_a_start_beside_the_path_spoils_the_first_cycle_only() -> None:
-    case = cyclic(triangles(CELLS["mixed"]), 3)
+    case = cyclic(triangles(CELLS["sliding"]), 3)
     path = closed(replace(case, start=case.start + 1e-5))
     found = drift(path, [0.0, 1.0, 2.0, 3.0])
     assert 1e-6 < found[0] < 1e-3
     assert found[1:].max() <= PERIODIC
 
 
-@pytest.mark.parametrize("since", [0.0, 1.3, 9.0])
+@pytest.mark.parametrize(
+    "since", [pytest.param(0.0, marks=pytest.mark.slow), 1.3, pytest.param(9.0, marks=pytest.mark.slow)]
+)
 def test_cycles_close_before_and_after_a_joint_fails(since: float) -> None:
-    case = cyclic(triangles(CELLS["mixed"]), 3)
+    case = cyclic(triangles(CELLS["sliding"]), 3)
     lock = LockedJoint(robot="op1", joint="j1", since=since)
     case = replace(case, cell=replace(case.cell, motion=replace(case.cell.motion, locked=(lock,))))
     path = closed(case)
@@ -129,7 +131,7 @@ def test_cycles_close_before_and_after_a_joint_fails(since: float) -> None:
 
 
 def test_a_coarse_accuracy_does_not_keep_cycles_from_closing() -> None:
-    case = cyclic(triangles(CELLS["mixed"]), 2)
+    case = cyclic(triangles(CELLS["sliding"]), 2)
     coarse = replace(case.cell, solver=replace(case.cell.solver, accuracy=1e-3))
     assert drift(closed(replace(case, cell=coarse)), [0.0, 1.0, 2.0]).max() <= closing_tol(case)
 

@@ -18,12 +18,32 @@ from cellplan.scene.scene import Scene
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
 METHODS = get_args(MethodName)
+LONG = {  # where the best-first search visits thousands of joint positions; the other methods are quick in them
+    "stretched arm moved across",
+    "stretched arm pulled beyond its reach",
+    "step a hundred times too long",
+    "two robots, part at rest",
+    "two robots, weights from 1e-6 to 1e6",
+}
+CASES = [
+    pytest.param(
+        name,
+        method,
+        marks=pytest.mark.slow if method == "heuristic_search" and name in LONG else (),
+        id=f"{name}-{method}",
+    )
+    for name in SITUATIONS
+    for method in METHODS
+]
 WRITTEN = 2e-9  # [m] by which written tables may differ from the motion: twelve decimals of a degree, arms of a few m
 CAUSES = ("singular", "limits", "half a turn", "from its grasp", "from task", "joint speed", "rotations", "search")
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", SITUATIONS)
+def test_every_long_search_is_a_situation():
+    assert set(SITUATIONS) >= LONG
+
+
+@pytest.mark.parametrize(("name", "method"), CASES)
 def test_finite_joints_honestly_judged_or_a_refusal_that_names_the_cause(name, method):
     situation = SITUATIONS[name]()
     cell = replace(situation.cell, solver=replace(situation.cell.solver, method=method))

@@ -31,6 +31,13 @@ from cellplan.planning.tracking.motion_task import MotionTask
 
 BIG = 2 * np.cos(np.pi / 6)  # [m] the published 1.7320: reach of the arm at its start
 BOTH = ["heuristic_search", "recursive_search"]
+CELLS = {
+    "two operators": (random_cell(31, operators=2, joints=7), "pose"),
+    "fixed part": (random_cell(32, operators=1, joints=7, held=False), "pose"),
+    "linkages": (random_cell(33, operators=2, joints=5, with_follower=True), "point"),
+    "free spin": (random_cell(34, operators=1, joints=5), "axis"),
+    "two axes": (random_cell(35, operators=1, joints=4), "two axes"),
+}  # and what of the pose of each tool is constrained
 
 
 def circle_through_shoulder(count):
@@ -156,17 +163,16 @@ def wave_schedule(cell, start, count=16):
     return Schedule(times=times, tasks=tuple(tasks))
 
 
-@pytest.mark.parametrize("method", BOTH)
 @pytest.mark.parametrize(
-    ("cell", "component"),
+    ("cell", "component", "method"),
     [
-        (random_cell(31, operators=2, joints=7), "pose"),
-        (random_cell(32, operators=1, joints=7, held=False), "pose"),
-        (random_cell(33, operators=2, joints=5, with_follower=True), "point"),
-        (random_cell(34, operators=1, joints=5), "axis"),
-        (random_cell(35, operators=1, joints=4), "two axes"),
+        pytest.param(*case, method, id=f"{name}-{method}", marks=marks)
+        for name, case in CELLS.items()
+        for method, marks in [
+            ("heuristic_search", pytest.mark.slow if name == "two operators" else ()),
+            ("recursive_search", ()),
+        ]
     ],
-    ids=["two operators", "fixed part", "linkages", "free spin", "two axes"],
 )
 def test_all_tools_of_a_cell_are_brought_to_their_place_on_the_part(cell, component, method):
     """What is constrained is reached; the relative pose is taken from the chains that the checks use."""

@@ -92,7 +92,11 @@ def found_without(cell, missing):
     return scene, found_start(scene, toolpaths_of(cell))
 
 
-@pytest.mark.parametrize("missing", [("kuka",), ("kuka", "abb", "staubli"), ("reis",)], ids="+".join)
+@pytest.mark.parametrize(
+    "missing",
+    [("kuka",), pytest.param(("kuka", "abb", "staubli"), marks=pytest.mark.slow), ("reis",)],
+    ids="+".join,
+)
 def test_found_starts_reach_their_tasks_within_limits_and_free(cell, missing):
     scene, q = found_without(cell, missing)
 

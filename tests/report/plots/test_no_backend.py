@@ -19,7 +19,12 @@ print(matplotlib.rcParams._get("backend"))
 
 @pytest.mark.parametrize(
     ("desired", "left"),
-    [("module://matplotlib_inline.backend_inline", None), ("nonsense", None), ("", None), ("svg", "svg")],
+    [
+        ("module://matplotlib_inline.backend_inline", None),
+        pytest.param("nonsense", None, marks=pytest.mark.slow),
+        pytest.param("", None, marks=pytest.mark.slow),
+        ("svg", "svg"),
+    ],
 )
 def test_plots_are_painted_whatever_display_is_desired(desired: str, left: str | None) -> None:
     environment = {**os.environ, "MPLBACKEND": desired}

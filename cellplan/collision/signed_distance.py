@@ -1,0 +1,112 @@
+"""Signed distances of convex hulls by coal, a few microseconds each: quick and unproved, for searches only.
+
+What they find is judged afterwards by the certificate, whose engine is another one.
+"""
+
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.collision.bodies import BodyPoses, CollisionBody
+from cellplan.collision.separation import separation
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, support_point
+
+TOLERANCE: Final = 1e-9  # [m] of the iteration: far below what any clearance is stated to
+MOST_STEPS: Final = 500  # of one iteration
+FARTHEST: Final = 1e3  # [m] a deeper overlap is none: where its search fails coal returns the largest number there is
+
+
+class SignedDistances:
+    """Signed distances of pairs of bodies; coal's objects are built when they are first needed."""
+
+    def __init__(self) -> None:
+        """Start without any object."""
+        self._shapes: dict[int, tuple[CollisionBody, Any]] = {}  # by identity of the body, which is kept alive
+        self._pairs: dict[tuple[int, int], Any] = {}
+
+    def below(
+        self, bodies: tuple[CollisionBody, ...], ends: Indices, poses: BodyPoses, samples: Indices, *, within: float
+    ) -> tuple[Indices, Array, Array]:
+        """Pairs of bodies nearer than a distance in [m].
+
+        Args:
+            bodies: All bodies.
+            ends: Two of them for each query, shape (M, 2).
+            poses: Where they are.
+            samples: The sample of each query, shape (M,).
+            within: The distance.
+
+        Returns:
+            Places of these queries, shape (F,), their distances, negative where hulls overlap by so much, shape (F,),
+            and the points of both bodies that are so far from each other, in the world in [m], shape (F, 2, 3).
+        """
+        import coal  # a search needs it, a verification does not
+
+        request, result, placed = coal.DistanceRequest(), coal.DistanceResult(), dict[tuple[int, int], Any]()
+        request.gjk_tolerance = request.epa_tolerance = TOLERANCE
+        request.gjk_max_iterations = MOST_STEPS
+        places, distances, points = list[int](), list[float](), list[Array]()
+        for place, ((a, b), sample) in enumerate(zip(ends.tolist(), samples.tolist(), strict=True)):
+            X_a, X_b = placed.get((a, sample)), placed.get((b, sample))
+            if X_a is None:
+                X_a = placed[a, sample] = coal.Transform3s(poses.R[a, sample], poses.p[a, sample])
+            if X_b is None:
+                X_b = placed[b, sample] = coal.Transform3s(poses.R[b, sample], poses.p[b, sample])
+            result.clear()
+            distance = self._query(bodies[a], bodies[b])(X_a, X_b, request, result)
+            if distance < within:
+                first, second = result.getNearestPoint1(), result.getNearestPoint2()
+                if not distance > -FARTHEST:
+                    distance, first, second = _along_centres(bodies[a], bodies[b], poses, (a, b, sample))
+                places.append(place)
+                distances.append(distance)
+                points += [first, second]
+        return np.array(places, dtype=np.intp), np.array(distances), np.array(points).reshape(-1, 2, 3)
+
+    def _query(self, first: CollisionBody, second: CollisionBody) -> Any:
+        """Coal's query for two bodies."""
+        import coal
+
+        key = (id(first), id(second))
+        if key not in self._pairs:
+            self._pairs[key] = coal.ComputeDistance(self._shape(first), self._shape(second))
+        return self._pairs[key]
+
+    def _shape(self, body: CollisionBody) -> Any:
+        """Coal's object for the hull of a body."""
+        if id(body) not in self._shapes:
+            self._shapes[id(body)] = body, _geometry(body.hull)
+        return self._shapes[id(body)][1]
+
+
+def _along_centres(
+    first: CollisionBody, second: CollisionBody, poses: BodyPoses, where: tuple[int, int, int]
+) -> tuple[float, Array, Array]:
+    """Overlap of two hulls along the line of their centres, no less than along any other, and its two points."""
+    a, b, sample = where
+    (R_a, p_a), (R_b, p_b) = ((poses.R[body, sample], poses.p[body, sample]) for body in (a, b))
+    apart = R_b @ second.centre + p_b - R_a @ first.centre - p_a
+    n = apart / np.linalg.norm(apart) if np.any(apart) else np.array([0.0, 0.0, 1.0])
+    distance = separation(first.hull, second.hull, n, X_first=(R_a, p_a), X_second=(R_b, p_b))
+    point = R_a @ support_point(first.hull, n @ R_a) + p_a
+    return distance, point, point + distance * n
+
+
+def _geometry(hull: Solid) -> Any:
+    """Coal's geometry of a convex solid."""
+    import coal
+
+    match hull:
+        case Box(size):
+            return coal.Box(*size)
+        case Cylinder(radius, length):
+            return coal.Cylinder(radius, length)
+        case Capsule(radius, length):
+            return coal.Capsule(radius, length)
+        case Sphere(radius):
+            return coal.Sphere(radius)
+        case Mesh(vertices):
+            points = coal.StdVec_Vec3s()
+            points.extend(list(vertices))
+            return coal.Convex.convexHull(points, True, "Qt")

@@ -1,0 +1,1 @@
+"""The motion of many candidate layouts at once, and its exact derivatives."""

@@ -1,0 +1,132 @@
+r"""Exact derivatives of a motion by its variational equations.
+
+With :math:`J \dot q = \dot x_d` and :math:`W \dot q = J^T \lambda` a change of joints and layout changes the speeds by
+
+.. math:: d\dot q = J^\# \left( -dJ \, \dot q - J k \right) + k, \qquad k = W^{-1} (dJ^T \lambda - dW \, \dot q)
+
+Both :math:`dJ \, \dot q` and :math:`dJ^T \lambda` are sums of Lie brackets of screws, so that no second derivative of
+any pose is needed. Tools stay on their paths: :math:`J \, dq = -(\beta + \tau)` for displacements of bases and tools.
+What remains is a linear differential equation along the motion, integrated by the multistep rule of ``run``; so these
+are derivatives of what ``run`` gives, not of its limit.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.search.kernel.jacobian_changes import JacobianChanges
+from cellplan.search.kernel.job import Job, Layouts
+from cellplan.search.kernel.memory import keep_freed_memory
+from cellplan.search.kernel.screws import Directions, TaskScrews
+
+REGULAR: Final = 1e-12  # [-] of the largest entry that keeps a matrix invertible where its rank is lost
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MotionDerivatives:
+    """Derivatives of one motion in p directions.
+
+    Attributes:
+        q: Of the joint positions at the nodes, shape (N, nq, p).
+        qd: Of their speeds, shape (N, nq, p).
+    """
+
+    q: Array
+    qd: Array
+
+
+def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Directions) -> MotionDerivatives:
+    """Derivatives of the motion of one layout at all nodes.
+
+    Args:
+        job: The tasks at their nodes.
+        layout: The layout, a batch of one.
+        q: Joint positions at the nodes in [rad] or [m], shape (N, nq), as ``run`` gives them.
+        qd: Their speeds, shape (N, nq).
+        directions: The directions.
+    """
+    keep_freed_memory()
+    rates = _Rates(job, layout, q, qd, directions)
+    nq, steps, begins = q.shape[1], job.steps.tolist(), job.is_begin.tolist()
+    found, at = np.empty((len(q), 2 * nq, directions.count)), rates.start(directions.start)
+    for node, (taking, adding) in enumerate(zip(rates.by_joints, rates.by_layout, strict=True)):
+        found[node] = taking @ at + adding
+        if node and begins[node - 1]:  # as in ``run``: once more with the mean of both rates
+            at = found[node - 1, :nq] + 0.5 * (job.times[node] - job.times[node - 1]) * found[
+                node - 1 : node + 1, nq:
+            ].sum(axis=0)
+            found[node] = taking @ at + adding
+        if node + 1 < len(q):
+            at = found[node, :nq] + steps[node][0] * found[node, nq:]
+            for back, weight in enumerate(steps[node][1:], start=1):
+                if weight:
+                    at += weight * found[node - back, nq:]
+    return MotionDerivatives(q=found[:, :nq], qd=found[:, nq:])
+
+
+def equations(job: Job, layout: Layouts, q: Array, qd: Array, directions: Directions) -> tuple[Array, Array]:
+    """The variational equations at all nodes, joints first, then speeds: see ``differentiate`` for the arguments.
+
+    Returns:
+        What a change of the joints becomes once the tools are back on their paths, and what it does to the speeds,
+        shape (N, 2 nq, nq); and what the directions do, shape (N, 2 nq, p).
+    """
+    rates = _Rates(job, layout, q, qd, directions)
+    return rates.by_joints, rates.by_layout
+
+
+class _Rates:
+    """The variational equations at all nodes.
+
+    Attributes:
+        by_joints: Change of joints and speeds by a change of the joints that was predicted: what of it keeps the tools
+            where they are, and what that does to the speeds, shape (N, 2 nq, nq).
+        by_layout: Their change in the directions otherwise, shape (N, 2 nq, p).
+    """
+
+    def __init__(self, job: Job, layout: Layouts, q: Array, qd: Array, directions: Directions) -> None:
+        """Work out the Jacobian, its change and the weighted pseudo-inverse."""
+        nq, weights = q.shape[1], layout.weights[0]
+        screws = TaskScrews.of(job, layout, q, directions)
+        changes = JacobianChanges(job, screws, qd)
+        J, self._idle = changes.jacobian, changes.idle
+        self._J, self._weights, self._settling = J[0], weights, job.settling * job.constraints.may_move
+        mobility = job.constraints.may_move / weights
+        inverse = self._inverse(J, mobility)
+        forces = np.swapaxes(inverse, 1, 2) @ (weights * qd)[:, :, None]  # the multipliers, as W qd = J^T lambda
+        bent = mobility[:, None] * changes.forces(forces[..., 0])
+        bent[:, :, nq:] -= (directions.weights / weights[:, None]) * qd[:, :, None]
+        rates = bent - inverse @ (changes.twists() + J @ bent)
+        beside = -changes.in_rows(np.swapaxes(screws.based + screws.tooled, -1, -2))
+        self._beside = beside.reshape(len(q), -1, directions.count)
+        kept, closed = np.eye(nq) - inverse @ J, inverse @ self._beside
+        by_joints = rates[:, :, :nq]
+        self.by_joints = np.concatenate([kept, by_joints @ kept], axis=1)
+        self.by_layout = np.concatenate([closed, by_joints @ closed + rates[:, :, nq:]], axis=1)
+
+    def start(self, start: Array) -> Array:
+        """Change of the start posture, shape (nq, p), once the tools are back at the starts of their paths."""
+        inverse = self._inverse(self._J[None], self._settling / self._weights)[0]
+        return start + inverse @ (self._beside[0] - self._J @ start)
+
+    def _inverse(self, J: Array, mobility: Array) -> Array:
+        """Weighted pseudo-inverse ``W^-1 J^T (J W^-1 J^T)^-1``, shape (N, nq, rows)."""
+        half = J * np.sqrt(mobility)
+        D = half @ np.swapaxes(half, 1, 2)
+        diagonal = np.einsum("nii->ni", D)
+        diagonal += REGULAR * diagonal.max(axis=1, keepdims=True) + self._idle
+        factor = np.asarray(np.linalg.cholesky(D), dtype=np.float64)
+        lower = _lower_inverse(factor)
+        return mobility[:, None] * (np.swapaxes(lower @ J, 1, 2) @ lower)
+
+
+def _lower_inverse(L: Array) -> Array:
+    """Inverses of lower triangular matrices, shape (N, m, m), row by row."""
+    found = np.zeros_like(L)
+    for row in range(L.shape[1]):
+        found[:, row, row] = 1.0
+        found[:, row, :row] = -(L[:, row, None, :row] @ found[:, :row, :row])[:, 0]
+        found[:, row] /= L[:, row, row, None]
+    return found

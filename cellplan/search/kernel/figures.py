@@ -1,0 +1,93 @@
+"""Figures of motions: joint margins, speeds and accelerations at their worst, and their derivatives."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.search.kernel.job import Job
+from cellplan.search.kernel.run import Motions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Peaks:
+    """Largest values of functions of time that are known at nodes: of the parabola through a node and its neighbours.
+
+    Attributes:
+        value: The largest values, shape (K, n).
+        node: The nodes in the middle, shape (K, n), from 1 to N - 2.
+        shares: Shares of the values at that node's neighbour before, itself and the one after, shape (K, n, 3); with
+            their signs where the largest magnitude was asked for.
+    """
+
+    value: Array
+    node: Indices
+    shares: Array
+
+    @classmethod
+    def of(cls, times: Array, values: Array, *, in_magnitude: bool = False) -> "Peaks":
+        """Those of values at times in [s], shapes (K, N, n) and (N,), N at least 3."""
+        seen = np.abs(values) if in_magnitude else values
+        node = np.clip(np.argmax(seen, axis=1), 1, len(times) - 2)
+        around = np.stack([node - 1, node, node + 1], axis=-1)
+        near = np.take_along_axis(seen, np.moveaxis(around, -1, 1), axis=1)
+        before, here, after = np.moveaxis(near, 1, 0)
+        back, ahead = times[node] - times[node - 1], times[node + 1] - times[node]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rise, fall = (here - before) / back, (here - after) / ahead
+            offset = np.nan_to_num((rise * ahead - fall * back) / (2.0 * (rise + fall)))
+            is_inside = (rise >= 0.0) & (fall >= 0.0) & (rise + fall > 0.0) & (back > 0.0) & (ahead > 0.0)
+            shares = _parabola(np.where(is_inside, offset, 0.0), back, ahead)
+        best = np.eye(3)[np.argmax(near, axis=1)]
+        shares = np.where(is_inside[..., None], shares, best)
+        value = np.einsum("kni,kin->kn", shares, near)
+        if in_magnitude:
+            signed = np.take_along_axis(values, np.moveaxis(around, -1, 1), axis=1)
+            shares = shares * np.moveaxis(np.sign(signed), 1, -1)
+        return cls(value=value, node=node, shares=shares)
+
+    def derivatives(self, candidate: int, of_values: Array) -> Array:
+        """Derivatives of one candidate's peaks from those of the values at the nodes, shape (N, n, p) to (n, p)."""
+        around = self.node[candidate][:, None] + np.arange(-1, 2)
+        near = of_values[around, np.arange(around.shape[0])[:, None]]
+        return np.einsum("ni,nip->np", self.shares[candidate], near)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Figures:
+    """What layouts are judged by, of each joint.
+
+    Attributes:
+        beyond_lower: How far it goes below its lower limit in [rad] or [m]; negative where room is left.
+        beyond_upper: Likewise above its upper limit.
+        speeds: Its largest speed as a share of its limit.
+        accelerations: Its largest acceleration likewise; 0 without a limit.
+    """
+
+    beyond_lower: Peaks
+    beyond_upper: Peaks
+    speeds: Peaks
+    accelerations: Peaks
+
+    @classmethod
+    def of(cls, job: Job, motions: Motions) -> "Figures":
+        """The figures of motions."""
+        limits, times = job.limits, job.times
+        return cls(
+            beyond_lower=Peaks.of(times, limits.lower - motions.q),
+            beyond_upper=Peaks.of(times, motions.q - limits.upper),
+            speeds=Peaks.of(times, motions.qd / limits.velocity, in_magnitude=True),
+            accelerations=Peaks.of(times, job.rates @ (motions.qd / limits.acceleration), in_magnitude=True),
+        )
+
+    @property
+    def margins(self) -> Array:
+        """Smallest distance of each joint from its limits in [rad] or [m], negative beyond, shape (K, nq)."""
+        return -np.maximum(self.beyond_lower.value, self.beyond_upper.value)
+
+
+def _parabola(offset: Array, back: Array, ahead: Array) -> Array:
+    """Lagrange's shares of three values ``back`` before a place, at it and ``ahead`` after it, at an offset from it."""
+    first = offset * (offset - ahead) / (back * (back + ahead))
+    last = offset * (offset + back) / (ahead * (back + ahead))
+    return np.stack([first, 1.0 - first - last, last], axis=-1)

@@ -1,0 +1,158 @@
+"""How the cooperation Jacobian changes with joints and layout, by Lie brackets of screws."""
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.search.kernel.job import Job
+from cellplan.search.kernel.screws import TaskScrews, bracket, bracket_matrix, cross, power_matrix
+
+
+class JacobianChanges:
+    """The Jacobian ``J`` of all relations at N nodes, and how ``J qd`` and ``J^T lambda`` change.
+
+    Attributes:
+        jacobian: Twists per unit speed of the stacked joints, the constrained components of each relation in its frame
+            R, taken at the tip where a relation leaves components open, else at the origin of R; (N, 6 T, nq).
+        idle: 1 for components that a relation leaves open, whose rows are 0, shape (6 T,).
+    """
+
+    def __init__(self, job: Job, screws: TaskScrews, qd: Array) -> None:
+        """Build the Jacobian.
+
+        Args:
+            job: The tasks at their nodes.
+            screws: The screws at all nodes.
+            qd: Joint speeds at the nodes, shape (N, nq).
+        """
+        self._screws, self._nq, found = screws, qd.shape[1], job.constraints
+        self._has_own = (found.operator_signs > 0.0) | (found.carrier_signs > 0.0)
+        self._is_carried = found.carrier_signs < 0.0
+        self._ways = [_Way.of(job, int(robot)) for robot in found.operators]
+        self._holder = None if found.carrier is None else _Way.of(job, found.carrier)
+        self._is_whole = found.is_whole
+        self.idle = (1.0 - found.kept).ravel()
+        if not self._is_whole:
+            self._rows = _rows(job, screws.tip)
+        own_rates = np.stack([way.axis_rates(qd) for way in self._ways], axis=1)
+        self._turning = screws.own * own_rates[..., None]
+        self._twist = self._turning.sum(axis=2, keepdims=True)  # of each tool seen from the base, (N, T, 1, 6)
+        carried = np.zeros_like(screws.shared)
+        self._carried = carried if self._holder is None else screws.shared * self._holder.axis_rates(qd)[..., None]
+        self._minus = np.broadcast_to(-screws.shared[:, None], screws.own.shape)  # the part moves, not the tool
+        self.jacobian = self._columns(screws.own, self._minus, screws.based[:, :, :0])
+
+    def twists(self) -> Array:
+        """Change of ``J qd`` per unit of each joint and direction, shape (N, 6 T, nq + p)."""
+        screws, twist, carried = self._screws, self._twist, self._carried
+        behind = twist - np.cumsum(self._turning, axis=2)
+        before = np.cumsum(carried, axis=1) - carried
+        turned, whole = bracket_matrix(twist[:, :, 0]), carried.sum(axis=1)
+        own = bracket(screws.own, behind)
+        shared = self._minus @ turned + bracket(screws.shared, before)[:, None]
+        held = screws.held @ bracket_matrix(whole)
+        layout = screws.based @ turned + held[:, None] * self._is_carried[:, None, None]
+        if not self._is_whole:
+            spin = twist[..., 3:] - self._is_carried[:, None, None] * whole[:, None, None, 3:]
+            for part, tips in zip((own, shared, layout), self._tips(), strict=True):
+                part[..., :3] += cross(spin, tips)
+        return self._columns(own, shared, layout)
+
+    def forces(self, multipliers: Array) -> Array:
+        """Change of ``J^T lambda`` per unit of each joint and direction, shape (N, nq, nq + p)."""
+        screws, nodes = self._screws, len(multipliers)
+        y = multipliers.reshape(nodes, -1, 6)
+        if not self._is_whole:
+            y = (np.swapaxes(self._rows, -1, -2) @ y[..., None])[..., 0]
+        power = screws.own @ power_matrix(y)
+        held = (y * self._is_carried[:, None]).sum(axis=1)
+        held_power = screws.shared @ power_matrix(held)
+        below = np.tril(np.ones((power.shape[2],) * 2), -1)
+        by_own = (power @ np.swapaxes(screws.own, -1, -2)) * below
+        by_shared, by_layout = -power @ np.swapaxes(screws.shared, -1, -2)[:, None], _products(power, screws.based)
+        shared = (held_power @ np.swapaxes(screws.shared, -1, -2)) * below.T, _products(held_power, screws.held)
+        found = np.zeros((nodes, self._nq, self._nq + screws.held.shape[1]))
+        tips = None if self._is_whole else self._tips()
+        for place, way in enumerate(self._ways):
+            blocks = [by_own[:, place], by_shared[:, place], by_layout[:, place]]
+            if tips is not None:
+                pull = cross(y[:, place, None, :3], screws.own[:, place, :, 3:])
+                blocks = [block + _products(pull, part[:, place]) for block, part in zip(blocks, tips, strict=True)]
+            if self._has_own[place]:
+                self._put(found, way, place, blocks)
+            if tips is not None and self._is_carried[place] and self._holder is not None:
+                pull = -cross(y[:, place, None, :3], screws.shared[..., 3:])
+                self._put(found, self._holder, place, [_products(pull, part[:, place]) for part in tips])
+        if self._holder is not None:
+            way = self._holder
+            found[:, way.columns, way.columns] += way.to_joints.T @ shared[0] @ way.to_joints
+            found[:, way.columns, self._nq :] += way.to_joints.T @ shared[1]
+        return found
+
+    def _put(self, found: Array, rows: "_Way", place: int, blocks: list[Array]) -> None:
+        """Add blocks by the own axes, the shared axes and the directions to the rows of a robot's joints."""
+        own, shared, layout = (rows.to_joints.T @ block for block in blocks)
+        if self._has_own[place]:
+            way = self._ways[place]
+            found[:, rows.columns, way.columns] += own @ way.to_joints
+        if self._is_carried[place] and self._holder is not None:
+            found[:, rows.columns, self._holder.columns] += shared @ self._holder.to_joints
+        found[:, rows.columns, self._nq :] += layout
+
+    def _columns(self, own: Array, shared: Array, layout: Array) -> Array:
+        """Twists by own axes and shared axes, (N, T, levels, 6), and directions, (N, T, p, 6), as (N, 6 T, nq + p)."""
+        nodes, count = layout.shape[0], layout.shape[2]
+        found = np.zeros((nodes, len(self._ways), 6, self._nq + count))
+        for place, way in enumerate(self._ways):
+            if self._has_own[place]:
+                found[:, place, :, way.columns] += np.swapaxes(own[:, place], 1, 2) @ way.to_joints
+            if self._is_carried[place] and self._holder is not None:
+                found[:, place, :, self._holder.columns] += np.swapaxes(shared[:, place], 1, 2) @ self._holder.to_joints
+        found[..., self._nq :] += np.swapaxes(layout, 2, 3)
+        return self.in_rows(found).reshape(nodes, -1, self._nq + count)
+
+    def in_rows(self, twists: Array) -> Array:
+        """The constrained components of twists at the origin of R, shape (N, T, 6, n)."""
+        return twists if self._is_whole else self._rows @ twists
+
+    def _tips(self) -> tuple[Array, Array, Array]:
+        """Displacement of the tips seen from R per unit of own axes, shared axes and directions, (N, T, ..., 3)."""
+        screws = self._screws
+        moved = (screws.own, self._minus, screws.based + screws.tooled)
+        own, shared, layout = (part[..., :3] + cross(part[..., 3:], screws.tip[:, :, None]) for part in moved)
+        return own, shared, layout
+
+
+class _Way:
+    """The axes on the way to the flange of one robot: its joints among all, and the share of each axis in them."""
+
+    def __init__(self, columns: slice, to_joints: Array) -> None:
+        """Store the place of the joints and the shares, shape (levels, n)."""
+        self.columns, self.to_joints = columns, to_joints
+
+    @classmethod
+    def of(cls, job: Job, robot: int) -> "_Way":
+        """That of a robot, by its place in the cell."""
+        placed = job.cell.robots[robot]
+        shares = job.tasks.chains.to_joints[:, : len(placed.model.joints), robot]
+        return cls(job.cell.columns(placed.name), shares)
+
+    def axis_rates(self, qd: Array) -> Array:
+        """Rates of the axes at joint speeds of shape (N, nq), shape (N, levels)."""
+        return qd[:, self.columns] @ self.to_joints.T
+
+
+def _rows(job: Job, tip: Array) -> Array:
+    """Matrices that take the constrained components from twists at the origin of R, shape (N, T, 6, 6)."""
+    found = job.constraints
+    rows = np.zeros((*tip.shape[:2], 6, 6))
+    rows[..., :, :] = np.eye(6)
+    rows[..., :3, 3:] = -np.cross(tip[..., None, :], np.eye(3)).swapaxes(-1, -2)
+    free = found.is_spin_free
+    R = np.moveaxis(job.X[:3, :3], (0, 1, 2, 3), (2, 3, 1, 0))[:, free]
+    rows[:, free, 3:, 3:] = np.swapaxes(R, -1, -2)
+    return rows * found.kept[:, :, None]
+
+
+def _products(first: Array, second: Array) -> Array:
+    """Scalar products of vectors along the last axes, shape (..., m, k) and (..., n, k) to (..., m, n)."""
+    return first @ np.swapaxes(second, -1, -2)

@@ -1,0 +1,215 @@
+"""Job: the clocked tasks of one cell at the nodes that the motions of all its layouts are worked out at."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.kinematics.batched import Placement
+from cellplan.model.cell import Cell, Relation
+from cellplan.model.joint_limits import JointLimits
+from cellplan.model.motion import Schedule
+from cellplan.planning.collocation.batch_targets import desired_motion
+from cellplan.planning.collocation.batch_tasks import BatchTasks
+from cellplan.planning.collocation.settling import settling_joints
+from cellplan.planning.tracking.motion_task import closures
+from cellplan.planning.tracking.task_constraints import TaskConstraints
+
+SAME_TWIST: Final = 1e-9  # [m/s] and [rad/s] by which a desired twist may differ on both sides of a time and not jump
+ORDER: Final = 3  # of the multistep rule: nodes that a prediction looks back on
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Job:
+    """What the motions of all layouts of a cell share.
+
+    Where a desired twist jumps there are two nodes at one time, which see it from either side.
+
+    Attributes:
+        cell: The cell: its robots, part, limits and the weights that layouts have unless they state their own.
+        relations: The tasks, then the grasps of further holders that move.
+        moving: Names of the robots that move.
+        tasks: Pose errors and linearisation of the relations.
+        constraints: Which components they constrain, by which joints.
+        settling: 1 for joints that bring the tools to the starts of their paths, shape (nq,).
+        limits: Limits of the stacked joints.
+        times: Times of the nodes in [s], shape (N,), from 0 to the end.
+        X: Desired tool poses in the frames of the relations, shape (4, 4, relations, N).
+        V: Their twists, linear part first, along the axes of these frames, in [m/s] and [rad/s], (6, relations, N).
+        is_begin: Whether a node begins a stretch on which the desired twists are continuous, shape (N,).
+        steps: Weights in [s] of the rates at a node and the two before it, which predict the next one by a multistep
+            rule, shape (N - 1, 3).
+        rates: Derivatives by time in [1/s] at the nodes, of what is given at them, shape (N, N).
+        integral: Integrals in [s] from the first node to each, of what is given at the nodes, shape (N, N).
+    """
+
+    cell: Cell
+    relations: tuple[Relation, ...]
+    moving: tuple[str, ...]
+    tasks: BatchTasks
+    constraints: TaskConstraints
+    settling: Array
+    limits: JointLimits
+    times: Array
+    X: Array
+    V: Array
+    is_begin: Array
+    steps: Array
+    rates: Array
+    integral: Array
+
+    @classmethod
+    def of(cls, cell: Cell, schedule: Schedule, *, moving: Sequence[str], nodes: int) -> "Job":
+        """Place nodes evenly between the times at which the desired motion is not smooth.
+
+        Args:
+            cell: The cell.
+            schedule: Its tasks on the common clock.
+            moving: Names of the robots that may move.
+            nodes: About how many nodes there are.
+        """
+        grasps = closures(cell, moving)
+        relations: tuple[Relation, ...] = (*(path.task for path in schedule.paths), *grasps)
+        desired_at = desired_motion(schedule.paths, grasps)
+        times, begins, ends = _nodes(schedule.jumps, nodes)
+        X, V = desired_at(times, begins, ends)
+        is_double = np.append(np.diff(times) == 0.0, False)
+        is_smooth = np.abs(V[..., 1:] - V[..., :-1]).max(axis=(0, 1)) <= SAME_TWIST
+        kept = ~(is_double & np.append(is_smooth, False))
+        times, X, V = times[kept], np.ascontiguousarray(X[..., kept]), np.ascontiguousarray(V[..., kept])
+        is_begin = np.append(True, np.diff(times) == 0.0)
+        return cls(
+            cell=cell,
+            relations=relations,
+            moving=tuple(moving),
+            tasks=BatchTasks(cell, relations, moving),
+            constraints=TaskConstraints.of(cell, relations, moving),
+            settling=settling_joints(cell, [path.task for path in schedule.paths]),
+            limits=cell.joint_limits,
+            times=times,
+            X=X,
+            V=V,
+            is_begin=is_begin,
+            steps=_multistep(times, is_begin),
+            rates=_rates(times, is_begin),
+            integral=_integral(times, is_begin),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layouts:
+    """Candidates for one cell: the same job with other bases, tools, start postures and joint weights.
+
+    Attributes:
+        X_WB: Bases in the world, shape (K, robots, 4, 4).
+        X_FT: Tool tips in the flange frames, shape (K, robots, 4, 4).
+        start: Start postures in [rad] or [m], shape (K, nq); the tools need only be near the starts of their paths.
+        weights: Weights of the joints in the pseudo-inverse, shape (K, nq).
+    """
+
+    X_WB: Array
+    X_FT: Array
+    start: Array
+    weights: Array
+
+    def __post_init__(self) -> None:
+        """Check at the door that all belong together and are finite, and that all weights are positive."""
+        count, robots = self.X_WB.shape[:2]
+        shapes = (self.X_WB.shape, self.X_FT.shape, self.start.shape[:1], self.weights.shape)
+        if shapes != ((count, robots, 4, 4), (count, robots, 4, 4), (count,), self.start.shape):
+            raise ValueError(
+                "layouts: expected X_WB and X_FT of shape (K, robots, 4, 4), start and weights of shape (K, nq), got "
+                f"{self.X_WB.shape}, {self.X_FT.shape}, {self.start.shape} and {self.weights.shape}"
+            )
+        if not all(np.all(np.isfinite(part)) for part in (self.X_WB, self.X_FT, self.start, self.weights)):
+            raise ValueError("layouts: a pose, a start posture or a weight is not finite")
+        if not np.all(self.weights > 0.0):
+            raise ValueError("layouts: expected positive weights of all joints")
+
+    @classmethod
+    def of(cls, cells: Sequence[Cell], start: Array) -> "Layouts":
+        """Those of given cells with start postures, shape (K, nq)."""
+        return cls(
+            X_WB=np.array([[robot.X_WB for robot in cell.robots] for cell in cells]),
+            X_FT=np.array([[robot.tool.X_FT for robot in cell.robots] for cell in cells]),
+            start=np.asarray(start, dtype=float),
+            weights=np.array([np.concatenate([robot.weights for robot in cell.robots]) for cell in cells]),
+        )
+
+    def __len__(self) -> int:
+        """Number of candidates."""
+        return len(self.start)
+
+    def of_places(self, places: slice | Indices) -> "Layouts":
+        """Some of the candidates."""
+        parts = (self.X_WB, self.X_FT, self.start, self.weights)
+        X_WB, X_FT, start, weights = (part[places] for part in parts)
+        return Layouts(X_WB=X_WB, X_FT=X_FT, start=start, weights=weights)
+
+    def placement(self, job: Job) -> Placement:
+        """Where the robots and tools of the candidates are, as a batch."""
+        return job.tasks.chains.placements(self.X_WB, self.X_FT)
+
+
+def _nodes(jumps: Array, count: int) -> tuple[Array, Array, Array]:
+    """Times of the nodes, both ends of every stretch included, and begin and end in [s] of the stretch of each."""
+    parts = []
+    for begin, end in pairwise(jumps.tolist()):
+        intervals = max(ORDER, round((count - 1) * (end - begin) / float(jumps[-1] - jumps[0])))
+        times = np.linspace(begin, end, intervals + 1)
+        parts.append(np.stack([times, np.full_like(times, begin), np.full_like(times, end)]))
+    times, begins, ends = np.concatenate(parts, axis=1)
+    return times, begins, ends
+
+
+def _multistep(times: Array, is_begin: Array) -> Array:
+    r"""Weights of the rates at a node and the ones before it: the integral of their parabola over the next step.
+
+    The Adams-Bashforth rule of third order for uneven steps; of second order after the second node of a stretch, of
+    first order after its first one.
+    """
+    weights, known = np.zeros((len(times) - 1, ORDER)), 0
+    for node in range(len(times) - 1):
+        known = 1 if is_begin[node] else min(known + 1, ORDER)
+        step = times[node + 1] - times[node]
+        back = times[node - known + 1 : node + 1][::-1] - times[node]
+        weights[node, :known] = _over_step(back, step)
+    return weights
+
+
+def _integral(times: Array, is_begin: Array) -> Array:
+    """See ``Job``: over each step, of the cubic through the four nodes of its stretch that are nearest to it."""
+    steps = np.zeros((len(times), len(times)))
+    for begin, end in _stretches(is_begin):
+        for node in range(begin, end - 1):
+            first = min(max(begin, node - 1), max(begin, end - ORDER - 1))
+            near = slice(first, min(first + ORDER + 1, end))
+            steps[node + 1, near] = _over_step(times[near] - times[node], times[node + 1] - times[node])
+    return np.cumsum(steps, axis=0)
+
+
+def _rates(times: Array, is_begin: Array) -> Array:
+    """See ``Job``: of the parabola through the three nodes of its stretch that are nearest to each."""
+    rates = np.zeros((len(times), len(times)))
+    for begin, end in _stretches(is_begin):
+        for node in range(begin, end):
+            first = min(max(begin, node - 1), max(begin, end - ORDER))
+            near = slice(first, min(first + ORDER, end))
+            powers, step = np.arange(near.stop - first), times[begin + 1] - times[begin]
+            places = (times[near] - times[node]) / step
+            rates[node, near] = np.linalg.solve(places ** powers[:, None], (powers == 1) / step)
+    return rates
+
+
+def _stretches(is_begin: Array) -> Iterator[tuple[int, int]]:
+    """First node of each stretch, and the first one after it."""
+    return pairwise([*np.flatnonzero(is_begin).tolist(), len(is_begin)])
+
+
+def _over_step(places: Array, step: float) -> Array:
+    """Weights of values at places in [s] seen from a node: the integral of their polynomial over a step from it."""
+    powers = np.arange(len(places))
+    return np.linalg.solve((places / step) ** powers[:, None], step / (powers + 1.0))

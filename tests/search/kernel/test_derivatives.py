@@ -1,0 +1,124 @@
+"""Derivatives of motions against central differences: of whole runs, and at one node of cells of every kind."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from builders.batch_cells import CELLS, configurations, everyone, relations, seen_poses
+
+from cellplan.geometry.transforms import Array, rotation_exp
+from cellplan.model.cell import Cell
+from cellplan.planning.collocation.batch_tasks import BatchTasks
+from cellplan.planning.tracking.task_constraints import TaskConstraints
+from cellplan.search.kernel.derivatives import differentiate, equations
+from cellplan.search.kernel.figures import Figures
+from cellplan.search.kernel.job import Job, Layouts
+from cellplan.search.kernel.run import run
+from cellplan.search.kernel.screws import Directions
+
+STEP = 1e-5
+FINE = 1e-4  # above what the damping of the inverse leaves where a block of it is singular
+
+
+def displaced(layout: Layouts, directions: Directions, step: float) -> Layouts:
+    """The layout moved along each direction, one candidate each."""
+    p = directions.count
+    X_WB, X_FT = np.tile(layout.X_WB, (p, 1, 1, 1)), np.tile(layout.X_FT, (p, 1, 1, 1))
+    for X, twists in ((X_WB, directions.base), (X_FT, directions.tool)):
+        moved = np.moveaxis(step * twists, 2, 0)
+        X[..., :3, :3] = rotation_exp(moved[..., 3:]) @ X[..., :3, :3]
+        X[..., :3, 3] += moved[..., :3]
+    start, weights = layout.start + step * directions.start.T, layout.weights + step * directions.weights.T
+    return Layouts(X_WB=X_WB, X_FT=X_FT, start=start, weights=weights)
+
+
+def off_by(found: Array, expected: Array) -> float:
+    """Norm of the difference as a share of the norm of what is expected."""
+    return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
+
+
+def test_derivatives_of_the_reference_cell_are_those_of_its_run(reference: SimpleNamespace) -> None:
+    job = Job.of(reference.cell, reference.schedule, moving=reference.moving, nodes=65)
+    directions = Directions.none(job, 29)
+    for robot in range(3):
+        for place, axis in enumerate((0, 1, 2, 5)):
+            directions.base[robot + 1, axis, 4 * robot + place] = 1.0
+        for place, axis in enumerate((0, 2, 4)):
+            directions.tool[robot + 1, axis, 17 + 3 * robot + place] = 1.0
+    directions.start[np.arange(1, 6), np.arange(12, 17)] = 1.0
+    directions.weights[[1, 2], [26, 26]] = 1.0
+    directions.base[0, 3, 27] = 1.0
+    directions.tool[0, 4, 28] = 1.0
+    layout = reference.layouts.of_places(slice(6, 7))
+    motion = run(job, layout)
+    assert motion.is_followed.all()
+    found = differentiate(job, layout, motion.q[0], motion.qd[0], directions)
+    ahead, behind = (run(job, displaced(layout, directions, sign * STEP)) for sign in (1.0, -1.0))
+
+    q, qd = (np.moveaxis((getattr(ahead, name) - getattr(behind, name)) / (2 * STEP), 0, -1) for name in ("q", "qd"))
+    assert off_by(found.q, q) < 0.005
+    assert off_by(found.qd, qd) < 0.005
+    for place in range(directions.count):
+        assert off_by(found.q[..., place], q[..., place]) < 0.005
+    for name, values in (("speeds", found.qd / job.limits.velocity[:, None]), ("beyond_upper", found.q)):
+        peaks = getattr(Figures.of(job, motion), name)
+        sides = [getattr(Figures.of(job, each), name).value for each in (ahead, behind)]
+        assert off_by(peaks.derivatives(0, values), ((sides[0] - sides[1]) / (2 * STEP)).T) < 0.005
+
+
+def one_node(cell: Cell, q: Array, *, seed: int) -> Job:
+    """A job of one node, at which the tools are where a configuration has them and move at random."""
+    X = np.moveaxis(seen_poses(cell, q.T), (0, 1), (3, 2))
+    moving, found = everyone(cell), relations(cell)
+    V = np.random.default_rng(seed).normal(size=(6, len(found), 1))
+    constraints = TaskConstraints.of(cell, found, moving)
+    return Job(
+        cell=cell,
+        relations=tuple(found),
+        moving=tuple(moving),
+        tasks=BatchTasks(cell, found, moving),
+        constraints=constraints,
+        settling=np.ones(cell.joint_count),
+        limits=cell.joint_limits,
+        times=np.zeros(1),
+        X=X,
+        V=V,
+        is_begin=np.ones(1, dtype=bool),
+        steps=np.zeros((0, 3)),
+        rates=np.zeros((1, 1)),
+        integral=np.zeros((1, 1)),
+    )
+
+
+def settled_speeds(job: Job, layouts: Layouts, q: Array) -> tuple[Array, Array]:
+    """Configurations near given ones, shape (nq, p), with the tools back at their poses, and the speeds there."""
+    count, still = q.shape[1], np.zeros_like(q)
+    desired, everything = (np.repeat(job.X, count, axis=3), np.repeat(job.V, count, axis=2)), np.ones(len(q))
+    placement, weights = layouts.placement(job), layouts.weights.T
+    for _ in range(4):
+        linear = job.tasks.linearise(q, desired, placement, mobile=everything, weights=weights)
+        q = q + linear.correction(still)
+    linear = job.tasks.linearise(q, desired, placement, mobile=everything, weights=weights)
+    speeds = linear.speeds()
+    return q, speeds
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_speeds_of_every_kind_of_cell_change_as_the_equations_say(name: str) -> None:
+    cell = CELLS[name]
+    q, nq, robots = configurations(cell, 1, seed=2), cell.joint_count, len(cell.robots)
+    job, rng = one_node(cell, q, seed=4), np.random.default_rng(5)
+    layout = Layouts.of([cell], q.T)
+    directions = Directions.none(job, 6)
+    directions.base[:], directions.tool[:] = rng.normal(size=(2, robots, 6, 6))
+    directions.weights[:] = rng.normal(size=(nq, 6)) * 0.1
+    _, qd = settled_speeds(job, layout, q)
+    by_joints, by_layout = equations(job, layout, q.T, qd.T, directions)
+    moved = rng.normal(size=(nq, 6))
+    expected = (by_joints[0] @ moved + by_layout[0]) * FINE
+
+    sides = [settled_speeds(job, displaced(layout, directions, s * FINE), q + s * (moved * FINE)) for s in (1.0, -1.0)]
+
+    found = np.concatenate([0.5 * (ahead - behind) for ahead, behind in zip(*sides, strict=True)])
+    scale = np.abs(expected).max(axis=1, keepdims=True) + np.abs(expected[: len(expected) // 2]).max()
+    np.testing.assert_allclose(found / scale, expected / scale, atol=5e-4)
