@@ -180,7 +180,7 @@ FORGERIES: dict[str, tuple[Callable[[Path], None], str]] = {
 }
 
 
-LATE = {"jump"}  # is refused by the checks of the motion only
+LATE = {"home", "jump", "start"}  # are refused by or after the checks of all motions
 
 
 @pytest.mark.parametrize(
