@@ -4,9 +4,10 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 from cellplan.model.idle import idle_robots
+from cellplan.model.left_out import LeftOutKind
 from cellplan.model.robot import BASE
 from cellplan.scene.bodies import Kind, SceneBody
-from cellplan.scene.pairs import Rule, ScenePair
+from cellplan.scene.pairs import Excluded, Rule, ScenePair
 from cellplan.scene.scene import Scene
 
 
@@ -42,9 +43,13 @@ def scene_with_contact(scene: Scene, is_allowed: Callable[[SceneBody, SceneBody]
     """
     ends = [(scene.bodies[pair.first], scene.bodies[pair.second]) for pair in scene.pairs]
     may_touch = [is_allowed(*both) or is_allowed(*both[::-1]) for both in ends]
-    excluded = tuple((a.name, b.name, reason) for (a, b), allowed in zip(ends, may_touch, strict=True) if allowed)
+    excluded = tuple(
+        Excluded(pair.first, pair.second, reason, LeftOutKind.PUT_DOWN)
+        for pair, allowed in zip(scene.pairs, may_touch, strict=True)
+        if allowed
+    )
     kept = [row for row, allowed in enumerate(may_touch) if not allowed]
-    return replace(scene_of_rows(scene, kept), exclusions=(*scene.exclusions, *excluded))
+    return replace(scene_of_rows(scene, kept), excluded=(*scene.excluded, *excluded))
 
 
 def rows_moved_by(scene: Scene, robot: str) -> list[int]:

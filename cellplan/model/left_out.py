@@ -14,6 +14,7 @@ class LeftOutKind(StrEnum):
     GRIP = "grip"  # the part and what holds it
     MOUNTED = "mounted"  # fixed to each other
     STANDING = "standing"  # one stands on the other
+    PUT_DOWN = "put_down"  # the part, and what grips it or what it lies on, while it is picked up or put down
     AT_WORK = "at_work"  # a tool that works on the part
     CONTACT_ONLY = "contact_only"  # no contact, but any distance
     ENVIRONMENT = "environment"  # things of the surroundings among themselves
@@ -26,6 +27,7 @@ TITLES: Final = {
     LeftOutKind.GRIP: "grip",
     LeftOutKind.MOUNTED: "mounted on each other",
     LeftOutKind.STANDING: "standing on each other",
+    LeftOutKind.PUT_DOWN: "picked up or put down",
     LeftOutKind.AT_WORK: "at work",
     LeftOutKind.CONTACT_ONLY: "contact only",
     LeftOutKind.ENVIRONMENT: "surroundings",

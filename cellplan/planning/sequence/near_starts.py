@@ -28,10 +28,12 @@ def near_start(scene: Scene, paths: Mapping[str, ClockedPath], last: Mapping[str
         last: Configuration in which each robot was before, in [rad] or [m], shape (n,), by robot.
 
     Returns:
-        The stacked start configuration, shape (nq,); None where a robot was nowhere before, or the motion from it is
-        not sound.
+        The stacked start configuration, shape (nq,); None where nothing is to be found, a robot was nowhere before, or
+        the motion from it is not sound.
     """
     cell = scene.cell
+    if all(robot.start is not None for robot in cell.robots):
+        return None
     by_robot = {task.robot: task for task in cell.tasks}
     found: list[Array] = []
     for robot in cell.robots:
@@ -43,8 +45,8 @@ def near_start(scene: Scene, paths: Mapping[str, ClockedPath], last: Mapping[str
             return None
         found.append(start)
     start = np.concatenate(found)
-    trial = StartTrials(scene, paths).judge(NameOrder.of(cell).sorted(start))
-    return NameOrder.of(cell).as_listed(trial.start) if trial.is_sound else None
+    trial = StartTrials(scene, paths).judge(NameOrder.of(cell).sorted(start), may_turn=False)
+    return start if trial.is_sound else None
 
 
 def _nearest(scene: Scene, task: Task, path: ClockedPath, last: Array) -> Array | None:

@@ -125,14 +125,19 @@ class StartTrials:
             left[self.pair_names.index(pair)] = False
         return found
 
-    def judge(self, start: Array) -> Trial:
-        """What follows from a start configuration of the whole cell in the order of names, shape (nq,)."""
+    def judge(self, start: Array, *, may_turn: bool = True) -> Trial:
+        """What follows from a start configuration of the whole cell in the order of names, shape (nq,).
+
+        Args:
+            start: The configuration.
+            may_turn: Whether joints are turned by whole turns to where they have most room.
+        """
         try:
             motions = self._motions(self._cell, start, self._phases)
         except NoSolutionError:
             lost = np.full(len(start), LOST)
             return Trial(start=start, ranges=lost, speeds=lost, is_followed=False)
-        turns = _whole_turns(self._cell, np.concatenate(motions))
+        turns = _whole_turns(self._cell, np.concatenate(motions)) if may_turn else np.zeros(len(start))
         found = [_shares_left_free(self._cell, q + turns, self._step) for q in motions]
         return Trial(
             start=start + turns,
