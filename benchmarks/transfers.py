@@ -34,6 +34,7 @@ BUNDLED: Final = ("kuka_kr6", "abb_irb1600_8_145", "staubli_rx160", "ur5e", "ur1
 OUTSIDE: Final = ("kuka_kr16_2", "kuka_kr5_arc", "abb_irb1600_8_145", "staubli_rx160")  # below ../shared/robots
 CLEARANCE: Final = 0.005  # [m]
 KEPT_OFF: Final = 0.03  # [m] that obstacles keep from what is swept on the known way
+BLOCK_OFF: Final = 0.01  # [m] that the block keeps from the arm at start and goal
 BLOCKS_TRIED: Final = 400  # places of the block for one pair of start and goal
 THINGS: Final = 10  # obstacles of a cell
 ROW_STEP: Final = 0.004  # [s]
@@ -172,29 +173,31 @@ def walled_case(model: RobotModel, rng: np.random.Generator) -> Case:
     out = np.linalg.norm([at_zero.R[k, 0, :2] @ c + at_zero.p[k, 0, :2] for k, c in enumerate(engine.centres)], axis=1)
     link = max((k for k in range(len(shapes)) if bare.carrier(k).link == 0), key=lambda k: float(out[k]))
     while True:
-        way = _known_way(bare, rng)
+        way = _known_way(bare, rng, turn=2.0)
         q = np.array([way[0], way[-1], way[0]])
         q[2, 0] = 0.5 * (way[0, 0] + way[-1, 0])
         poses = bare.body_poses(q)
         centre = poses.R[link, 2] @ engine.centres[link] + poses.p[link, 2]
         for _ in range(BLOCKS_TRIED):
             at = centre + rng.normal(scale=0.7 * engine.radii[link], size=3)
-            block = Obstacle(name="block", shape=Box((0.05, 0.05, 0.05)), X_WS=pose(tuple(at)))
+            block = Obstacle(name="block", shape=Box((0.03, 0.03, 0.03)), X_WS=pose(tuple(at)))
             touched = _distance(shapes[link], poses.R[link, 2], poses.p[link, 2], block) <= 0.0
             ends = ((k, i) for i in range(2) for k in range(len(shapes)))
-            if touched and all(_distance(shapes[k], poses.R[k, i], poses.p[k, i], block) > KEPT_OFF for k, i in ends):
-                return Case(scene_with(model, [block]), way[0], way[-1])
+            if touched and all(_distance(shapes[k], poses.R[k, i], poses.p[k, i], block) > BLOCK_OFF for k, i in ends):
+                scene = scene_with(model, [block])
+                if scene.touching(way[0]) is None and scene.touching(way[-1]) is None:  # nor is it inside a link
+                    return Case(scene, way[0], way[-1])
 
 
-def _known_way(bare: Scene, rng: np.random.Generator) -> Array:
-    """Three via points, straight between them without contact, the first joint turning by 1 rad at least."""
+def _known_way(bare: Scene, rng: np.random.Generator, *, turn: float = 1.0) -> Array:
+    """Three via points, straight between them without contact, the first joint turning by an angle at least."""
     model = bare.cell.robots[0].model
     lower, upper = np.maximum(model.lower, -2.5), np.minimum(model.upper, 2.5)
     force = BruteForce(bare)
     while True:
         way = rng.uniform(lower, upper, (3, len(lower)))
         if (
-            abs(way[2, 0] - way[0, 0]) > 1.0
+            abs(way[2, 0] - way[0, 0]) > turn
             and force.contact(finer(way, 0.3)) is None
             and (force.contact(finer(way, COARSE)) is None)
         ):

@@ -26,6 +26,7 @@ class PairState:
         demand: Distance in [m] that is to be proved before the smallest one is searched for.
         cuts: Number of steps that have been cut.
         max_cuts: Number that may be cut for the necessary distance.
+        is_verdict_only: Whether nothing is asked but whether the demand is kept: the first reading below it is enough.
         is_verdict_open: Whether the search is still after the necessary distance, not yet after the smallest one.
         spare_cuts: Number of the cuts that were made for the smallest distance.
         spare_readings: Number of readings likewise.
@@ -38,6 +39,7 @@ class PairState:
     demand: float = APART_TOL
     cuts: int = 0
     max_cuts: int = MAX_CUTS
+    is_verdict_only: bool = False
     is_verdict_open: bool = True
     spare_cuts: int = 0
     spare_readings: int = 0
@@ -53,7 +55,9 @@ class PairState:
 
     @property
     def is_spent(self) -> bool:
-        """Whether no more work is allowed for the smallest distance."""
+        """Whether no more work is allowed, or needed for the verdict."""
+        if self.is_verdict_only and (self.touches or self.distance < self.demand):
+            return True
         return not self.is_verdict_open and self.spare_readings >= MAX_READINGS
 
     @property

@@ -50,6 +50,7 @@ class StretchSearch:
         survey, lowest = self._survey, self._low().min(axis=1, initial=np.inf)
         for row in np.argsort(lowest, kind="stable").tolist():
             state = survey.states[row]
+            state.is_verdict_only = True
             if lowest[row] < state.demand and (begun := self._begin(row, state.demand)) is not None:
                 search, block = begun
                 search.run(state.demand, with_minimum=False)

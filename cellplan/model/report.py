@@ -360,6 +360,7 @@ class Report:
         phases: All phases of the program on its nominal time, those that are not part of it among them; the times of
             this report count from the begin of the phase that it is for.
         idle: Names of the robots that stand at their homes all the time.
+        phase: Name of the phase that it is for; None for the only one of a program.
     """
 
     cell: str
@@ -382,6 +383,7 @@ class Report:
     loads: tuple[LoadUse, ...] = ()
     phases: tuple[Phase, ...] = ()
     idle: tuple[str, ...] = ()
+    phase: str | None = None
 
     @property
     def passed(self) -> bool:

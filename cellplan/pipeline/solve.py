@@ -138,7 +138,7 @@ def _runs(
         schedule, own = clock.schedules[place], motions[place]
         phase, rows = clock.plan.program[place], clock.cut(tables, place)
         report = verify_motion(scenes[place], schedule, rows, moving=phase.moving, idle=phase.idle, progress=progress)
-        report = replace(report, mode=str(cell.motion.mode), phases=clock.timed_phases)
+        report = replace(report, mode=str(cell.motion.mode), phases=clock.timed_phases, phase=phase.label)
         runs.append(Run(phase=phase, schedule=schedule, motion=own, program=program, report=report))
     return motion, tuple(runs)
 

@@ -12,6 +12,7 @@ from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.line_distances import line_distances
 from cellplan.model.robot import BASE
 from cellplan.scene.bodies import link_displacements, solid_poses
+from cellplan.scene.pairs import Rule
 
 if TYPE_CHECKING:
     from cellplan.scene.scene import Scene
@@ -82,7 +83,8 @@ def _solids(scene: "Scene", poses: BodyPoses, within: float) -> Found:
     near, distances, points = engine.signed.below(engine.bodies, ends[places], poses, samples, within=within)
     places, samples, first, second = places[near], samples[near], points[:, 0].copy(), points[:, 1].copy()
     rows = scene.solid_rows[places]
-    demands = np.array([scene.pairs[row].demand for row in rows.tolist()])
+    pairs = [scene.pairs[row] for row in rows.tolist()]
+    demands = np.array([pair.demand if pair.rule is Rule.CLEARANCE else 0.0 for pair in pairs])
     for query in np.flatnonzero((distances <= demands) & ~_are_convex(scene)[ends[places]].all(axis=1)).tolist():
         (i, j), sample = ends[places[query]].tolist(), int(samples[query])
         is_apart = not engine.touch(i, j, poses, sample=sample)

@@ -135,7 +135,7 @@ def _verified(scene: Scene, rows: StoredRows, place: int, *, cell: Cell, progres
     phase, schedule = clock.plan.program[place], clock.schedules[place]
     tables = rows.of_phase(place)
     report = verify(scene, schedule, list(tables.values()), moving=phase.moving, idle=phase.idle, progress=progress)
-    report = replace(report, mode=str(mode), phases=clock.timed_phases)
+    report = replace(report, mode=str(mode), phases=clock.timed_phases, phase=phase.label)
     return VerifiedMotion(
         name=phase.label, cell=scene.cell, moving=phase.moving, schedule=schedule, tables=tables, report=report
     )

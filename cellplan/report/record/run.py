@@ -94,6 +94,7 @@ class HeadRecord(OriginRecord):
 class RunRecord(HeadRecord):
     """The record of a run."""
 
+    phase: Annotated[str | None, "name of the phase that it is for; null for the only one of a program"]
     samples: Annotated[int, "number of samples"]
     step_s: Annotated[Number, "time between two samples"]
     closure: Annotated[dict[str, RunClosureRecord], "by co-holder; empty if one robot holds the part"]
@@ -135,6 +136,7 @@ def run_record(
         "mode": report.mode,
         "cycle_time_s": number(report.cycle_time),
         "clock_from": clock_from(cell),
+        "phase": report.phase,
         "samples": len(report.times),
         "step_s": number(report.cycle_time / (len(report.times) - 1)),
         "phases": phases_record(report.phases),

@@ -73,10 +73,12 @@ def motion_share_record(report: Report, cell: Cell) -> dict[str, MotionShareReco
 
 
 def role(robot: str, report: Report, cell: Cell) -> str:
-    """``positioner``, ``operator``, or ``idle`` for a robot that neither holds the part nor has a task in this run."""
+    """``positioner``, ``operator``, or ``idle`` for a robot that neither holds the part nor has anything to do."""
     if robot in cell.positioners:
         return "positioner"
-    return "operator" if any(accuracy.robot == robot for accuracy in report.accuracy) else "idle"
+    is_transferred = not report.tasks and robot not in report.idle
+    is_at_work = any(accuracy.robot == robot for accuracy in report.accuracy)
+    return "operator" if is_at_work or is_transferred else "idle"
 
 
 def speed_record(speed: RobotSpeed) -> SpeedRecord:
