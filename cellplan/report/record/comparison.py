@@ -12,7 +12,7 @@ from cellplan.report.record.variant_figures import VariantFigures
 from cellplan.report.record.which_pays import sentences
 
 WORK: Final = tuple(f"work_{kind}_{part}" for kind in ("velocity", "acceleration") for part in ("ratio", "joint"))
-LOADS: Final = ("positioner_load_s", "positioner_phase_load_s", "operator_load_s", "load_s")
+LOADS: Final = ("positioner_load_s", "positioner_phase_load_s", "operator_load_s", "operator_work_load_s", "load_s")
 SINGLE: Final = (*KeyFigures.__annotations__, *WORK, "mean_velocity_ratio", *LOADS)
 
 

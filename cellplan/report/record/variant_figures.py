@@ -34,6 +34,7 @@ class RobotFigures(TypedDict):
     role: Annotated[str, "`positioner`, `operator` or `idle`"]
     load_s: Annotated[Number, "load: for all joints added up, the time that a joint needs for its travel at top speed"]
     phase_load_s: Annotated[Number, "its load in the phase in which that is largest; `load_s` for a single phase"]
+    work_load_s: Annotated[Number, "its load in the phases in which a task is worked on"]
     motion_share: Annotated[Number, "its load as a fraction of that of all robots"]
     joints: Annotated[dict[str, JointFigures], "by joint"]
 
@@ -75,6 +76,7 @@ class VariantFigures(KeyFigures):
     positioner_load_s: Annotated[Number, "load of the robots that hold the part"]
     positioner_phase_load_s: Annotated[Number, "the same in the phase in which it is largest"]
     operator_load_s: Annotated[Number, "load of all other robots"]
+    operator_work_load_s: Annotated[Number, "the same in the phases in which a task is worked on"]
     load_s: Annotated[Number, "load of all robots"]
     robots: Annotated[dict[str, RobotFigures], "by robot"]
     tasks: Annotated[dict[str, dict[str, Number]], "by task: `position_error_mm` and `orientation_error_deg`"]
@@ -120,6 +122,9 @@ def variant_figures(record: Record, phases: Mapping[str, Record], *, proof: str)
         "positioner_load_s": number(holding),
         "positioner_phase_load_s": number(hardest),
         "operator_load_s": number(total - holding),
+        "operator_work_load_s": number(
+            sum(robot["work_load_s"] or 0.0 for name, robot in robots.items() if name not in holders)
+        ),
         "load_s": number(total),
         "robots": robots,
         "tasks": tasks,
@@ -182,12 +187,14 @@ def _robots(record: Record, phases: Sequence[Record]) -> dict[str, RobotFigures]
         for robot, share in phase["motion_share"].items():
             roles.setdefault(robot, []).append(share["role"])
     loads, by_phase = _loads(record), [_loads(phase) for phase in phases]
+    at_work = [_loads(phase) for phase in _at_work(record, phases)]
     total = sum(loads.values())
     return {
         robot: {
             "role": min(roles.get(robot, ["idle"]), key=ROLES.index),
             "load_s": number(loads[robot]),
             "phase_load_s": number(max((each[robot] for each in by_phase), default=0.0)),
+            "work_load_s": number(sum(each[robot] for each in at_work)),
             "motion_share": number(loads[robot] / total if total else 0.0),
             "joints": {name: _joint(joint) for name, joint in joints.items()},
         }
@@ -201,6 +208,11 @@ def _loads(record: Record) -> dict[str, float]:
         robot: sum(joint["travel"] / joint["velocity_limit"] for joint in joints.values() if joint["velocity_limit"])
         for robot, joints in record["joints"].items()
     }
+
+
+def _at_work(record: Record, phases: Iterable[Record]) -> list[Record]:
+    """The phases in which a task is worked on."""
+    return [phase for phase in phases if not record["tasks"].keys().isdisjoint(phase["tasks"])]
 
 
 def _joint(joint: Record) -> JointFigures:
@@ -237,7 +249,7 @@ def _worst_joints(record: Record) -> _WorstJoints:
 
 def _work_peaks(record: Record, phases: Iterable[Record]) -> _WorkPeaks:
     """The largest velocity and acceleration of the phases in which a task is worked on, not of moves between them."""
-    at_work = [_worst_joints(phase) for phase in phases if not record["tasks"].keys().isdisjoint(phase["tasks"])]
+    at_work = [_worst_joints(phase) for phase in _at_work(record, phases)]
     fast = max(at_work, key=lambda each: each["max_velocity_ratio"] or 0.0, default=None)
     hard = max(at_work, key=lambda each: each["max_acceleration_ratio"] or 0.0, default=None)
     return {

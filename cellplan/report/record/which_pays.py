@@ -21,6 +21,7 @@ LOADS: Final = {
     "the positioner": "positioner_load_s",
     "the positioner in its hardest phase": "positioner_phase_load_s",
     "the operators": "operator_load_s",
+    "the operators at work": "operator_work_load_s",
 }
 
 

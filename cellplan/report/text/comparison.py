@@ -121,4 +121,5 @@ ROWS: Final[Sequence[Row]] = (
     ("mean velocity, % of limit", _plain("mean_velocity_ratio", lambda ratio: f"{100.0 * ratio:.2g}")),
     ("load of all robots, s", _plain("load_s", "{:.3g}".format)),
     ("positioner in its hardest phase, s", _plain("positioner_phase_load_s", "{:.3g}".format)),
+    ("operators at work, s", _plain("operator_work_load_s", "{:.3g}".format)),
 )

@@ -9,6 +9,7 @@ EVEN = {
     "positioner_load_s": 1.0,
     "positioner_phase_load_s": 1.0,
     "operator_load_s": 3.0,
+    "operator_work_load_s": 3.0,
     "work_velocity_ratio": 0.5,
     "work_acceleration_ratio": 0.4,
     "min_margin_deg": 20.0,
