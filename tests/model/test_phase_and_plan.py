@@ -29,9 +29,9 @@ def test_a_phase_among_some_robots_keeps_the_order_of_roles() -> None:
     assert FIRST.among({"further"}).tasks == ()
 
 
-def test_only_a_phase_of_all_tasks_has_no_task_of_its_own() -> None:
-    assert FIRST.task == "cut"
-    assert replace(FIRST, name=ALL_TASKS).task is None
+def test_only_the_only_phase_of_a_program_has_no_label() -> None:
+    assert FIRST.label == "cut"
+    assert replace(FIRST, name=ALL_TASKS).label is None
 
 
 def test_the_rows_of_the_phases_and_their_gaps_follow_from_the_nominal_times() -> None:
