@@ -5,11 +5,12 @@ from typing import Annotated, Final
 from pydantic import Field, Tag
 
 from cellplan.io.schema.common import Entry, Name, PoseEntry, by_kind
-from cellplan.io.schema.task import LONGEST_S, MOST_CYCLES, StandOff
-from cellplan.io.schema.units import Mm
+from cellplan.io.schema.task import FARTHEST_STAND_OFF_MM, LONGEST_S, MOST_CYCLES
+from cellplan.io.schema.units import Mm, Within
 
 MARK_LIMIT: Final = 200
 MARK_WORDS: Final = "a name or {name: m1, dwell_s: 0.5}"
+StraightMove = Annotated[Mm, Within(gt=0.0, le=FARTHEST_STAND_OFF_MM)]
 
 
 class MarkEntry(Entry):
@@ -34,12 +35,12 @@ class PartPlaceEntry(Entry):
     rests_on: Name | None = Field(
         default=None, description="Body of the environment that the part may touch there; none when absent."
     )
-    approach_mm: StandOff = Field(
+    approach_mm: StraightMove = Field(
         default=Mm(50.0),
         description="Length of the straight move of the holder to the part before it grips, or away from it after it "
         "lets go, along its tool axis.",
     )
-    lift_mm: StandOff = Field(
+    lift_mm: StraightMove = Field(
         default=Mm(50.0),
         description="Height over which the part is moved straight up from its place, or down to it.",
     )

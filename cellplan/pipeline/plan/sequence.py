@@ -10,11 +10,18 @@ from cellplan.certify.run_pairs import scene_of_run
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
+from cellplan.model.idle import idle_robots
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.phase import Hold, Phase
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import Task
-from cellplan.pipeline.plan.homes import find_homes, with_homes
+from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_homes
+from cellplan.pipeline.plan.program_faults import (
+    located,
+    refuse_crowded_homes,
+    refuse_sunk_parts,
+    refuse_unnamed_support,
+)
 from cellplan.pipeline.plan.retiming import transfer_retimer
 from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.run import PlannedRun, plan_run
@@ -87,14 +94,17 @@ def plan_program(cell: Cell, *, progress: Progress = silent) -> PlannedProgram:
         NoSolutionError: No start or home was found, a tool lost its path, or a robot finds no way.
     """
     scenes = StageScenes.of(cell)
+    refuse_sunk_parts(scenes)
     search = _Worked(cell, scenes, progress)
-    runs = [run for stage in program_stages(cell) if (run := search.run(stage)) is not None]
+    runs = search.runs()
     started = search.cell
     at_home = _everyone_at_home(started, runs[0])
     around_held = [at_home, *(run for run in runs if run.scene is None)]
     others = [run for run in runs if run.scene is not None]
     found = find_homes(replace(scenes.held, cell=started), [*around_held, *others], progress=progress)
     solved = _with_all_homes(with_homes(started, found, given=cell))
+    if depends_on_homes(started, runs):
+        runs = _Worked(solved, scenes, progress).runs()
     stages = _joined(solved, scenes, runs, progress=progress)
     return PlannedProgram(cell=solved, scenes=scenes, stages=tuple(stages), remarks=tuple(search.remarks))
 
@@ -109,8 +119,13 @@ class _Worked:
 
     def __init__(self, cell: Cell, scenes: StageScenes, progress: Progress) -> None:
         """Begin with the cell as it was written."""
-        self.cell, self.remarks = cell, list[str]()
+        self.cell, self.remarks, self._given = cell, list[str](), cell
         self._scenes, self._progress, self._last = scenes, progress, dict[str, Array]()
+        self._kept = {*cell.positioners, *idle_robots(cell, [task.name for task in cell.tasks])}
+
+    def runs(self) -> list[PlannedRun]:
+        """The motions of all stages with tasks."""
+        return [run for stage in program_stages(self.cell) if (run := self.run(stage)) is not None]
 
     def run(self, stage: Stage) -> PlannedRun | None:
         """The motion of a stage; None of one without tasks."""
@@ -125,13 +140,16 @@ class _Worked:
         examine_given_starts(own, toolpaths)
         start = near_start(scene, paths, self._last) if self._last else None
         if start is None:
-            choice = chosen_start(scene, paths, progress=self._progress)
+            with located(stage, self.cell, self._given):
+                choice = chosen_start(scene, paths, progress=self._progress)
             start = choice.start
             if choice.warning is not None:
                 self.remarks.append(f"{stage.phase.name}: {choice.warning}")
         started = _with_starts(own, start)
         self._record(stage, started)
-        planned = plan_run(started, paths, stage.phase, progress=self._progress)
+        with located(stage, self.cell, self._given):
+            planned = plan_run(started, paths, stage.phase, progress=self._progress)
+        refuse_unnamed_support(stage, scene, planned.motion.q)
         at_work = set(stage.phase.roles) - set(stage.phase.idle)
         self._last |= {name: planned.motion.q[-1, own.columns(name)] for name in sorted(at_work)}
         return planned if stage.move is None else replace(planned, scene=scene)
@@ -146,19 +164,19 @@ class _Worked:
             start = robot.start
             if is_continued and robot.name in self.cell.positioners[:1]:
                 start = self._last[robot.name]
-            elif start is None and robot.name in own.positioners and stage.move is None:
+            elif start is None and robot.name in self._kept and stage.move is None:
                 start = known.start
             robots.append(replace(robot, start=start))
         return replace(own, robots=tuple(robots))
 
     def _record(self, stage: Stage, started: Cell) -> None:
-        """Keep the starts of a block: of the holders, of each task, and of each robot in its first task."""
+        """Keep the starts of a block: of holders and robots without tasks, of each task, of each robot in its first."""
         if stage.move is not None:
             return
         at_work = {task.robot: task.name for task in started.tasks}
         robots = []
         for robot in self.cell.robots:
-            is_new = robot.start is None and (robot.name in at_work or robot.name in self.cell.positioners)
+            is_new = robot.start is None and (robot.name in at_work or robot.name in self._kept)
             robots.append(replace(robot, start=started.robot(robot.name).start) if is_new else robot)
         tasks = [_with_posture(task, started) if task.name in at_work.values() else task for task in self.cell.tasks]
         self.cell = replace(self.cell, robots=tuple(robots), tasks=tuple(tasks))
@@ -215,6 +233,8 @@ def _joined(
     stages, left = program_stages(cell), list(runs)
     home = np.concatenate([robot.home for robot in cell.robots if robot.home is not None])
     last = home
+    for stage in stages[:1] + stages[-1:]:
+        refuse_crowded_homes(scenes.of_stage(stage), home)
     for number, stage in enumerate(stages):
         scene = scenes.of_stage(stage)
         if stage.phase.tasks:

@@ -33,7 +33,7 @@ class StageScenes:
 
     def of_stage(self, stage: Stage) -> Scene:
         """The scene of one stage, with the cell of that stage."""
-        scene = self.held if stage.place is None else self._with_part_at(stage.place)
+        scene = self.held if stage.place is None else self.with_part_at(stage.place)
         scene = replace(scene, cell=stage.cell)
         if stage.move is None:
             return scene
@@ -56,7 +56,8 @@ class StageScenes:
 
         return scene_with_contact(scene, rests, "the part is taken from it here or put on it")
 
-    def _with_part_at(self, place: PartPlace) -> Scene:
+    def with_part_at(self, place: PartPlace) -> Scene:
+        """The scene with the part lying at a place."""
         key = place.X_WP.tobytes()
         if key not in self.lying:
             self.lying[key] = Scene.from_cell(part_lying(self.cell, place))

@@ -10,6 +10,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.report import ClearanceClass
 from cellplan.model.units import MM
 from cellplan.planning.transfer.query import TransferQuery
+from cellplan.scene.scene import Scene
 
 SHOWN: Final = 2  # pairs of bodies that are named
 
@@ -52,7 +53,8 @@ def require_free_ends(query: TransferQuery) -> None:
         if not certify(query.scene, at_rest, with_minimum=False).is_kept:
             raise TransferNotFoundError(
                 f"{query.place}: the {name} of the transfer move of {query.named} comes too close: "
-                f"{_nearest_words(query, at_rest)}: let approach and retract leave more room, or move one of the two"
+                f"{nearest_words(query.scene, at_rest)[0]}: let approach and retract leave more room, or move one of "
+                "the two"
             )
 
 
@@ -65,7 +67,7 @@ def not_found(query: TransferQuery, straight: Array, in_turn: Tried, in_time: Tr
         in_turn: What was tried of one robot after the other.
         in_time: What was tried of all robots at once; None where a single one moves.
     """
-    words = [f"straight, {_nearest_words(query, straight)}"]
+    words = [f"straight, {nearest_words(query.scene, straight)[0]}"]
     name = "one robot after the other" if in_time is not None else "by trees in its joint space"
     words.append(f"{name}, {_tried_words(in_turn)}")
     refused = in_turn.refused
@@ -95,12 +97,12 @@ def _tried_words(tried: Tried) -> str:
     return " ".join(words) or "a robot that stands blocks an end of the move"
 
 
-def _nearest_words(query: TransferQuery, q: Array) -> str:
-    """Which pair falls short of its demand most over some rows, shape (K, nq), and by how much."""
-    bound = certify(query.scene, q)
+def nearest_words(scene: Scene, q: Array) -> tuple[str, tuple[str, str]]:
+    """Which pair falls short of its demand most over some rows, shape (K, nq), and by how much; and its names."""
+    bound = certify(scene, q)
     pairs = [pair for kind in ClearanceClass for pair in bound.of_class(kind) if not pair.is_kept]
     worst = min(pairs, key=lambda pair: (pair.proved - pair.demand, pair.row))
     first, second = bound.names(worst)
     held = "touches" if worst.touches else f"is {worst.proved * MM:.3g} mm from"
     demand = f", {worst.demand * MM:g} mm are demanded" if worst.keeps_clearance else ""
-    return f"'{first}' {held} '{second}'{demand}"
+    return f"'{first}' {held} '{second}'{demand}", (first, second)
