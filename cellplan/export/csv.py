@@ -21,6 +21,8 @@ _NUMBER: Final = rf"-?[0-9]{{1,7}}\.[0-9]{{{DECIMALS}}}"
 def render_csv(run: VerifiedRun) -> dict[str, str]:
     """Text of every file, by its path in the folder of the export: ``<robot>.csv``, or ``<task>/<robot>.csv``.
 
+    A program from home to home is one file for each robot.
+
     Args:
         run: The verified run.
 
@@ -28,9 +30,9 @@ def render_csv(run: VerifiedRun) -> dict[str, str]:
         InputError: A joint cannot be written with the decimals of the format.
     """
     return {
-        file_name(motion.name, robot): _render(run.cell.robot(robot), table)
-        for motion in run.motions
-        for robot, table in motion.tables.items()
+        file_name(name, robot): _render(run.cell.robot(robot), table)
+        for name, tables in run.programs.items()
+        for robot, table in tables.items()
     }
 
 
@@ -44,19 +46,20 @@ def read_csv(run: VerifiedRun, files: Mapping[str, str]) -> tuple[dict[str, Join
     Raises:
         InputError: With file and line, when a text is not such a file.
     """
-    return tuple(
+    found = [
         {
-            robot: _read(run.cell.robot(robot), files[name], name)
-            for robot in motion.tables
-            for name in [file_name(motion.name, robot)]
+            robot: _read(run.cell.robot(robot), files[path], path)
+            for robot in tables
+            for path in [file_name(name, robot)]
         }
-        for motion in run.motions
-    )
+        for name, tables in run.programs.items()
+    ]
+    return run.by_phase(found)
 
 
-def file_name(motion: str | None, robot: str) -> str:
+def file_name(program: str | None, robot: str) -> str:
     """Path of the file of one robot in the folder of the export."""
-    return f"{robot}.csv" if motion is None else f"{motion}/{robot}.csv"
+    return f"{robot}.csv" if program is None else f"{program}/{robot}.csv"
 
 
 def _render(robot: Robot, table: JointTable) -> str:

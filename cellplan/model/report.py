@@ -18,10 +18,8 @@ CAUTION = (
     "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
 )
 
-
 CYCLE_TOL = 1e-9  # [-] of the whole time: cycles that differ by less are equally long
 REDUCED_SPEED = 0.25  # [m/s] of the tool tip: what ISO 10218-1 allows while people are near
-
 
 ASSUMPTION = "every joint moves linearly from each sample to the next"  # between the samples
 MARGIN = "the required clearance must cover controller deviation, calibration errors and elasticity"

@@ -1,7 +1,7 @@
 """Verified run: controller programs are made from nothing else."""
 
-from collections.abc import Mapping
-from dataclasses import InitVar, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import InitVar, dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -66,3 +66,31 @@ class VerifiedRun:
             raise TypeError("a verified run is created by cellplan.open_gate only")
         if not self.motions or not all(motion.report.passed for motion in self.motions):
             raise ValueError("a verified run has motions whose checks all passed")
+
+    @property
+    def programs(self) -> Mapping[str | None, Mapping[str, JointTable]]:
+        """What is played from begin to end, by name: every phase, or all of a program from home to home as None."""
+        if self.cell.program is None:
+            return {motion.name: motion.tables for motion in self.motions}
+        times, q = self.motion.times, self.motion.q
+        tables = self.motions[0].tables
+        return {
+            None: {name: replace(table, times=times, q=q[:, self.cell.columns(name)]) for name, table in tables.items()}
+        }
+
+    def by_phase(self, programs: Sequence[Mapping[str, JointTable]]) -> tuple[dict[str, JointTable], ...]:
+        """Tables of every motion, each on its own time.
+
+        Args:
+            programs: Tables by robot of each of the ``programs``, as they were read back.
+        """
+        if self.cell.program is None:
+            return tuple(map(dict, programs))
+        places = [self.motion.rows(phase) for phase in self.motion.plan.program[: len(self.motions)]]
+        return tuple(
+            {
+                name: replace(table, times=table.times[rows] - table.times[rows.start], q=table.q[rows])
+                for name, table in programs[0].items()
+            }
+            for rows in places
+        )

@@ -20,6 +20,7 @@ from cellplan.model.motion import JointTable
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import CAUTION
 from cellplan.model.verified_run import VerifiedMotion, VerifiedRun
+from cellplan.pipeline.plan.demanded import DemandedProgram
 from cellplan.pipeline.write_run import versions
 from cellplan.report.record.controller import zero_text
 from cellplan.scene.scene import Scene
@@ -115,13 +116,17 @@ def _verify_rounded(
     run: VerifiedRun, read: tuple[dict[str, JointTable], ...], *, decimals: int, progress: Progress
 ) -> None:
     """Make every check again on what the files hold, on the clock that they hold."""
-    scene = Scene.from_cell(run.cell)
+    demanded, scenes = None, [Scene.from_cell(run.cell)] * len(run.motions)
+    if run.cell.program is not None:
+        demanded = DemandedProgram.of(run.cell)
+        scenes = demanded.scenes(run.cell)
     findings = []
-    for motion, tables in zip(run.motions, read, strict=True):
+    for place, (motion, scene, tables) in enumerate(zip(run.motions, scenes, read, strict=True)):
         _refuse_other_clock(motion, tables, tolerance=0.5 * 10.0**-decimals)
         clock = next(iter(tables.values())).times
         schedule = replace(motion.schedule, times=clock)
-        report = verify(scene, schedule, list(tables.values()), moving=motion.moving, progress=progress)
+        idle = None if demanded is None else demanded.plan.program[place].idle
+        report = verify(scene, schedule, list(tables.values()), moving=motion.moving, idle=idle, progress=progress)
         findings += [f"rounded to {decimals} decimals: {check.message}" for check in report.checks if not check.passed]
     if findings:
         raise NotVerifiedError(findings)

@@ -9,7 +9,7 @@ import pytest
 from builders.home_to_home import PICK_AND_PLACE
 from builders.two_phases import seal_program
 
-from cellplan import Solution, load_cell, open_gate, solve, verify, write_run
+from cellplan import Solution, export_program, load_cell, open_gate, solve, verify, write_run
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.io.run.clock_table import parse_clock
@@ -117,6 +117,17 @@ def test_verification_accepts_it_from_the_cell_file_and_each_phase_by_name(solve
         InputError, match=r"clock: expected the text of tables/clock.csv, as the program goes from home"
     ):
         verify(solution.cell, tables, task="grip")
+
+
+@pytest.mark.slow
+def test_it_is_exported_as_one_program_for_each_robot(solved: tuple[Path, Solution], tmp_path: Path) -> None:
+    file, solution = solved
+    files = export_program(open_gate(file.parent / "run", cell=file), tmp_path / "programs")
+
+    assert files == ("holder.csv", "pen.csv")
+    rows = np.loadtxt(tmp_path / "programs" / "holder.csv", delimiter=",", skiprows=1)
+    assert np.allclose(rows[:, 0], solution.motion.times, atol=1e-9)
+    assert np.allclose(np.radians(rows[:, 1:]), solution.motion.q[:, solution.cell.columns("holder")], atol=1e-10)
 
 
 def test_the_record_says_how_each_transfer_was_found(solved: tuple[Path, Solution]) -> None:
