@@ -20,6 +20,7 @@ from cellplan.model.motion import JointTable
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import CAUTION
 from cellplan.model.verified_run import VerifiedMotion, VerifiedRun
+from cellplan.pipeline.plan.demanded import DemandedProgram
 from cellplan.pipeline.write_run import versions
 from cellplan.report.record.controller import zero_text
 from cellplan.scene.scene import Scene
@@ -115,9 +116,10 @@ def _verify_rounded(
     run: VerifiedRun, read: tuple[dict[str, JointTable], ...], *, decimals: int, progress: Progress
 ) -> None:
     """Make every check again on what the files hold, on the clock that they hold."""
-    scene = Scene.from_cell(run.cell)
+    in_program = DemandedProgram.of(run.cell).scenes(run.cell) if run.cell.program is not None else None
+    scenes = in_program or [Scene.from_cell(run.cell)] * len(run.motions)
     findings = []
-    for motion, tables in zip(run.motions, read, strict=True):
+    for scene, motion, tables in zip(scenes, run.motions, read, strict=True):
         _refuse_other_clock(motion, tables, tolerance=0.5 * 10.0**-decimals)
         clock = next(iter(tables.values())).times
         schedule = replace(motion.schedule, times=clock)

@@ -9,7 +9,7 @@ import pytest
 from builders.home_to_home import PICK_AND_PLACE
 from builders.two_phases import seal_program
 
-from cellplan import Solution, load_cell, open_gate, solve, verify, write_run
+from cellplan import Solution, export_program, load_cell, open_gate, solve, verify, write_run
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.io.run.clock_table import parse_clock
@@ -117,6 +117,15 @@ def test_verification_accepts_it_from_the_cell_file_and_each_phase_by_name(solve
         InputError, match=r"clock: expected the text of tables/clock.csv, as the program goes from home"
     ):
         verify(solution.cell, tables, task="grip")
+
+
+def test_an_export_is_judged_with_the_part_where_each_phase_has_it(
+    solved: tuple[Path, Solution], tmp_path: Path
+) -> None:
+    written = export_program(open_gate(solved[0].parent / "run", cell=solved[0]), tmp_path / "programs", form="csv")
+
+    assert all((tmp_path / "programs" / name).is_file() for name in written)
+    assert len(written) >= 2
 
 
 def test_the_record_says_how_each_transfer_was_found(solved: tuple[Path, Solution]) -> None:
