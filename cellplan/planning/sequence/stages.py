@@ -73,12 +73,12 @@ def _worked_on(cell: Cell) -> Iterator[Stage]:
     first = first_blocks(cell)
     for number, block in enumerate(arrange(cell), start=1):
         if not block.tasks:
-            yield Stage(phase=_at_home(cell, f"dwell-{number}"), cell=replace(cell, tasks=()), dwell=block.dwell)
+            yield Stage(phase=_at_home(cell, f"dwell-{number}"), cell=_without_tasks(cell), dwell=block.dwell)
             continue
         own = _cell_of_block(cell, block, first)
         work = _phase(own, f"work-{number}")
         if block.dwell > 0.0:
-            yield Stage(phase=_dwell(work, f"dwell-{number}"), cell=replace(own, tasks=()), dwell=block.dwell)
+            yield Stage(phase=_dwell(work, f"dwell-{number}"), cell=_without_tasks(own), dwell=block.dwell)
         yield Stage(phase=work, cell=own)
 
 
@@ -92,6 +92,11 @@ def _at_home(cell: Cell, name: str) -> Phase:
     return Phase(
         name=name, roles={robot.name: Hold(at_home=robot.name not in cell.positioners) for robot in cell.robots}
     )
+
+
+def _without_tasks(cell: Cell) -> Cell:
+    """The cell while no task is worked on: no cycle is closed meanwhile."""
+    return replace(cell, tasks=(), motion=replace(cell.motion, cyclic=False))
 
 
 def _picked_up(cell: Cell, program: ProgramSettings) -> Iterator[Stage]:
@@ -111,7 +116,7 @@ def _straight(cell: Cell, move: PartMove, place: PartPlace) -> Stage:
     robots = tuple(replace(robot, start=robot.home if robot.home is not None else robot.start) for robot in cell.robots)
     holder = cell.positioners[0]
     own = with_move(replace(cell, robots=robots), move, place, holder)
-    motion = replace(own.motion, mode=Mode.SIMULTANEOUS, duration=None)
+    motion = replace(own.motion, mode=Mode.SIMULTANEOUS, duration=None, cyclic=False)
     own = replace(own, robots=_with_start(own.robots, holder, None), motion=motion)
     is_lying = move in (PartMove.GRIP, PartMove.RELEASE)
     return Stage(phase=_phase(own, move.value), cell=own, move=move, place=place if is_lying else None)
@@ -172,7 +177,7 @@ def _transfer(cell: Cell, before: Stage | None, after: Stage | None, *, name: st
     for robot in cell.robots:
         is_moving = len(held_by) == 1 if robot.name in held_by else robot.name in at_work
         roles[robot.name] = Transfer(to) if is_moving else Hold(at_home=robot.name not in held_by)
-    own = replace(cell, tasks=()) if place is None else part_lying(cell, place)
+    own = _without_tasks(cell if place is None else part_lying(cell, place))
     return Stage(phase=Phase(name=name, roles=roles), cell=own, place=place)
 
 

@@ -121,3 +121,12 @@ def test_errors_of_later_tasks_say_that_the_holder_begins_as_found(moves: tuple[
         raise StartNotFoundError("beyond")
     with pytest.raises(StartNotFoundError, match=r"^beyond$"), located(stages["work-2"], cell, cell):
         raise StartNotFoundError("beyond")
+
+
+def test_only_tasks_of_the_cell_are_to_close_their_cycle(moves: tuple[Cell, dict[str, Stage]]) -> None:
+    cell = moves[0]
+    cyclic = replace(cell, motion=replace(cell.motion, cyclic=True))
+
+    closing = [stage.phase.name for stage in program_stages(cyclic) if stage.cell.motion.cyclic]
+
+    assert closing == ["work-1", "work-2"]
