@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import PurePath
 
+from cellplan.checks.joints.joins import with_joins
 from cellplan.checks.verify import verify_motion, with_clearance
 from cellplan.geometry.transforms import Array
 from cellplan.io.run.clock_table import render_clock
@@ -108,6 +109,7 @@ def _solve_program(cell: Cell, *, progress: Progress) -> tuple[Scene, Solution]:
 def certified(solution: Solution, scene: Scene, *, progress: Progress) -> Solution:
     """The solution with the clearance of every phase checked and the verdict in the headers of its tables."""
     reports = [with_clearance(run.report, run.scene or scene, run.schedule, progress=progress) for run in solution.runs]
+    reports = with_joins(solution.cell, reports)
     program = with_verdict(solution.cell, solution.program, [run.phase for run in solution.runs], reports)
     runs = zip(solution.runs, reports, strict=True)
     return replace(solution, runs=tuple(replace(run, report=report, program=program) for run, report in runs))

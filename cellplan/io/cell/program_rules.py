@@ -163,11 +163,14 @@ def _places(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     if valid.program is None:
         return
     places: dict[str, PartPlaceEntry | None] = {"attach": valid.program.attach, "detach": valid.program.detach}
-    is_fixed = not any(True for _ in holders_as_written(document))
+    holders = [robot for _, robot in holders_as_written(document)]
     for key, place in places.items():
         if place is None:
             continue
-        if is_fixed:
+        if len(holders) > 1:
+            text = "unexpected key, several robots hold the part and only one could grip it: remove it"
+            yield document.key_finding(("program", key), text)
+        if not holders:
             text = "unexpected key, no robot holds the part (part.held_by): remove it, or let a robot hold the part"
             yield document.key_finding(("program", key), text)
         if place.rests_on is not None and place.rests_on not in valid.names["environment"]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.cache import nothing_kept
+from cellplan.checks.joints.joins import with_joins
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.io.input.findings import listed, shown
@@ -68,6 +69,8 @@ def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], prog
     motions = tuple(
         _verified(scene, rows, place, cell=source.cell, progress=progress) for place, scene in enumerate(scenes)
     )
+    reports = with_joins(source.cell, [motion.report for motion in motions])
+    motions = tuple(replace(motion, report=report) for motion, report in zip(motions, reports, strict=True))
     _refuse_failing(stored, motions)
     rows.refuse_other_starts(source.cell)
     _refuse_other_headers(stored, source.cell, rows.clock, motions)

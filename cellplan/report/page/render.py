@@ -27,6 +27,7 @@ CHECKS: Final = {
     "joint_velocity": "joint velocities within their limits",
     "joint_acceleration": "joint accelerations within their limits",
     "joint_acceleration_assumed": "joint accelerations within assumed limits",
+    "joint_acceleration_between_phases": "joint accelerations where phases meet within their limits",
     "joint_jerk": "joint jerk within its limits",
     "part_acceleration": "acceleration of the part within its limit",
     "tool_speed": "speed of the tools within its limit",

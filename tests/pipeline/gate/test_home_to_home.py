@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from builders.home_to_home import PICK_AND_PLACE
 from builders.two_phases import seal_program
 
 from cellplan import Solution, export_program, load_cell, open_gate, solve, verify, write_run
+from cellplan.checks.joints.joins import check_joins
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.io.run.clock_table import parse_clock
@@ -98,6 +100,24 @@ def test_rows_keep_the_limits_by_plain_differences(solved: tuple[Path, Solution]
 
     assert np.all(np.abs(speeds) <= velocity * (1.0 + 1e-9))
     assert np.all(np.abs(np.diff(speeds, axis=0)) / step <= 1.05 * velocity / 0.15)
+
+
+@pytest.mark.slow
+def test_the_rows_in_which_phases_meet_are_judged_by_the_steps_on_both_sides(solved: tuple[Path, Solution]) -> None:
+    cell, reports = solved[1].cell, [run.report for run in solved[1].runs]
+    step, q = cell.motion.step, solved[1].motion.q
+    joins = [solved[1].motion.rows(phase).start for phase in solved[1].plan.phases[1:]]
+    bends = np.abs(q[[row + 1 for row in joins]] - 2.0 * q[joins] + q[[row - 1 for row in joins]]) / step**2
+    limits = np.concatenate([robot.model.velocity for robot in cell.robots]) / 0.25
+
+    (check,) = [each for each in reports[0].checks if each.name == "joint_acceleration_between_phases"]
+    assert check.passed
+    assert check.value / check.limit <= (bends / limits).max() * (1.0 + 1e-6) * 0.25 / 0.15
+
+    turned = {**reports[3].q, "pen": reports[3].q["pen"] + np.array([[0.5]] + [[0.0]] * (len(reports[3].times) - 1))}
+    broken = check_joins(cell, [*reports[:3], replace(reports[3], q=turned), *reports[4:]])
+    assert not broken.passed
+    assert "at the begin of transfer-2 exceeds its acceleration limit" in broken.message
 
 
 @pytest.mark.slow

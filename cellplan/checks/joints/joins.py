@@ -1,0 +1,63 @@
+"""Rows in which phases of a program meet: each phase is judged as if joints rested beside it; here both sides count."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from cellplan.checks.joints.acceleration_limits import acceleration_limit
+from cellplan.model.cell import Cell
+from cellplan.model.report import Check, Report
+
+
+def check_joins(cell: Cell, reports: Sequence[Report]) -> Check:
+    """The largest acceleration of a joint at a row that two phases share, against its limit.
+
+    At such a row the acceleration is the change of velocity from the step before it to the step after it, over a step.
+
+    Args:
+        cell: The cell.
+        reports: Reports of the phases of one cycle in their order, each of which begins in the last row of the one
+            before; the last is followed by the first.
+
+    Returns:
+        One check for the whole program; its time counts from the begin of the phase that it names.
+    """
+    worst = (-1.0, "", 0.0, 0.0, "")
+    for before, after in pairwise([*reports, reports[0]]):
+        step = float(after.times[1] - after.times[0])
+        for robot in cell.robots:
+            one, other = before.q[robot.name], after.q[robot.name]
+            found = np.abs((other[1] - other[0]) - (one[-1] - one[-2])) / step**2
+            for index, joint in enumerate(robot.model.joints):
+                limit, (unit, scale) = acceleration_limit(robot, index)[0], joint.display_unit
+                if limit is not None and float(found[index]) / limit > worst[0]:
+                    name = f"{robot.name}/{joint.name} at the begin of {after.phase}"
+                    worst = (float(found[index]) / limit, name, scale * float(found[index]), scale * limit, unit)
+    share, name, value, allowed, unit = worst
+    verdict = "keeps its acceleration limit" if share <= 1.0 else "exceeds its acceleration limit"
+    message = f"where phases meet: joint {name} {verdict}: {value:.4g} {unit}/s2, limit {allowed:.5g} {unit}/s2"
+    return Check(
+        name="joint_acceleration_between_phases",
+        subject=name,
+        passed=share <= 1.0,
+        value=value,
+        limit=allowed,
+        unit=f"{unit}/s2",
+        at_s=0.0,
+        message=message if name else "where phases meet: no joint has an acceleration limit",
+    )
+
+
+def with_joins(cell: Cell, reports: Sequence[Report]) -> list[Report]:
+    """The reports of the phases of a program from home to home, the first with the check of the rows that they share.
+
+    Args:
+        cell: The cell of the whole program; reports of any other program stay as they are.
+        reports: Reports of the phases of one cycle in their order.
+    """
+    if cell.program is None:
+        return list(reports)
+    first = reports[0]
+    return [replace(first, checks=(*first.checks, check_joins(cell, reports))), *reports[1:]]
