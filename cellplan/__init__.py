@@ -3,10 +3,11 @@
 The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
-- compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``rehearse``
+- compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``base_map``, ``rehearse``
 - verify: ``verify``, ``open_gate``
-- write: ``write_run``, ``write_fastest``, ``write_rehearsal``, ``export_program``
-- inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``CompareJob``
+- write: ``write_run``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``, ``export_program``
+- inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``BaseGrid``,
+  ``CompareJob``
 - results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``
 - errors: ``CellplanError``
 
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from cellplan.model.report import Check, Report
     from cellplan.model.task import Task
     from cellplan.model.toolpath import Toolpath
+    from cellplan.pipeline.base_map.grid import BaseGrid
+    from cellplan.pipeline.base_map.judged import base_map, write_base_map
     from cellplan.pipeline.compare import CompareJob, compare
     from cellplan.pipeline.export import export_program
     from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
@@ -49,6 +52,7 @@ if TYPE_CHECKING:
 
 _HOME: Final = {
     "Axis": "study.variants",
+    "BaseGrid": "pipeline.base_map.grid",
     "Candidates": "planning.layout_screening",
     "Cell": "model.cell",
     "CellplanError": "errors",
@@ -65,6 +69,7 @@ _HOME: Final = {
     "SweepJob": "pipeline.sweep",
     "Task": "model.task",
     "Toolpath": "model.toolpath",
+    "base_map": "pipeline.base_map.judged",
     "compare": "pipeline.compare",
     "export_program": "pipeline.export",
     "fastest": "pipeline.fastest.shortest",
@@ -76,6 +81,7 @@ _HOME: Final = {
     "solve": "pipeline.solve",
     "sweep": "pipeline.sweep",
     "verify": "pipeline.verify",
+    "write_base_map": "pipeline.base_map.judged",
     "write_fastest": "pipeline.fastest.write",
     "write_rehearsal": "pipeline.rehearsal.write",
     "write_run": "pipeline.write_run",
@@ -83,6 +89,7 @@ _HOME: Final = {
 
 __all__ = [
     "Axis",
+    "BaseGrid",
     "Candidates",
     "Cell",
     "CellplanError",
@@ -100,6 +107,7 @@ __all__ = [
     "Task",
     "Toolpath",
     "__version__",
+    "base_map",
     "compare",
     "export_program",
     "fastest",
@@ -111,6 +119,7 @@ __all__ = [
     "solve",
     "sweep",
     "verify",
+    "write_base_map",
     "write_fastest",
     "write_rehearsal",
     "write_run",

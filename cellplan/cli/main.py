@@ -9,6 +9,7 @@ from typing import Annotated, Final, NoReturn
 import typer
 
 import cellplan
+from cellplan.cli.base_map import base_map
 from cellplan.cli.check import check
 from cellplan.cli.compare import compare
 from cellplan.cli.errors import OutputError, report_failure
@@ -61,6 +62,7 @@ app.command()(export)
 app.command()(sweep)
 app.command()(compare)
 app.command()(fastest)
+app.command("map")(base_map)
 app.command()(rehearse)
 app.command()(robots)
 app.command()(schema)

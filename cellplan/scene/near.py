@@ -135,7 +135,8 @@ def _by_joints(
     It is the same at both points, as the normal goes through both.
     """
     wrenches = np.concatenate([normals, np.cross(points, normals)], axis=1)
-    ends = np.array([(scene.pairs[row].first, scene.pairs[row].second) for row in rows.tolist()]).reshape(-1, 2)
+    ends = np.array([(scene.pairs[row].first, scene.pairs[row].second) for row in rows.tolist()], dtype=np.intp)
+    ends = ends.reshape(-1, 2)
     found = np.zeros((len(rows), scene.cell.joint_count))
     for robot in scene.cell.robots:
         columns, model = scene.cell.columns(robot.name), robot.model

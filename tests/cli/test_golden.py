@@ -24,6 +24,7 @@ COMMANDS = (
     "explain",
     "export",
     "fastest",
+    "map",
     "rehearse",
     "robots",
     "schema",

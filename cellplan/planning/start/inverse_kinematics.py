@@ -4,7 +4,8 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.transforms import Array, inverse, skew
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.geometry.transforms import inverse, skew
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Relation
 from cellplan.model.robot import RobotModel
@@ -47,21 +48,35 @@ def reaching_configurations(chain: ScrewChain, task: Relation, X_PT: Array, *, X
     Returns:
         Configurations with the tool within ``CLOSED`` of the goal, shape (K, n).
     """
+    placed = np.broadcast_to(X_WP, (len(seeds), 4, 4))
+    return reached_by_rows(chain, task, X_PT, X_WP=placed, seeds=seeds)[0]
+
+
+def reached_by_rows(
+    chain: ScrewChain, task: Relation, X_PT: Array, *, X_WP: Array, seeds: Array
+) -> tuple[Array, Indices]:
+    """As ``reaching_configurations``, with the part elsewhere for each seed, X_WP of shape (B, 4, 4).
+
+    Returns:
+        Configurations with the tool within ``CLOSED`` of the goal, shape (K, n), and the seeds they come from, (K,).
+    """
     rows = constraint_rows(task, X_PT[None])[0]
-    R_PW = X_WP[:3, :3].T
-    q, arrived = seeds, [seeds[:0]]
+    X_PW, q, at = inverse(X_WP), seeds, np.arange(len(seeds))
+    arrived, places = [seeds[:0]], [at[:0]]
     for iteration in range(ITERATIONS):
         X_WT, screws_W = chain.tool_motion(q)
         goals = np.broadcast_to(X_PT, (len(q), 4, 4))
-        error = pose_errors(goals, inverse(X_WP) @ X_WT, [task.is_spin_free] * len(q)) @ rows.T
+        error = pose_errors(goals, X_PW[at] @ X_WT, [task.is_spin_free] * len(q)) @ rows.T
         largest = np.abs(error).max(axis=1)
         arrived.append(q[largest < CLOSED])
+        places.append(at[largest < CLOSED])
         going_on = (largest >= CLOSED) & ((largest < FAR) | (iteration < TRIAL))
         if not going_on.any():
             break
-        J = rows @ tip_jacobian(screws_W[going_on], X_WT[going_on, :3, 3], R_PW)
+        at = at[going_on]
+        J = rows @ tip_jacobian(screws_W[going_on], X_WT[going_on, :3, 3], X_PW[at, :3, :3])
         q = q[going_on] + _damped_move(J, error[going_on])
-    return np.concatenate(arrived)
+    return np.concatenate(arrived), np.concatenate(places)
 
 
 def _damped_move(J: Array, error: Array) -> Array:

@@ -102,7 +102,6 @@ def test_rows_keep_the_limits_by_plain_differences(solved: tuple[Path, Solution]
     assert np.all(np.abs(np.diff(speeds, axis=0)) / step <= 1.05 * velocity / 0.15)
 
 
-@pytest.mark.slow
 def test_the_rows_in_which_phases_meet_are_judged_by_the_steps_on_both_sides(solved: tuple[Path, Solution]) -> None:
     cell, reports = solved[1].cell, [run.report for run in solved[1].runs]
     step, q = cell.motion.step, solved[1].motion.q

@@ -1,0 +1,47 @@
+"""Files of a map: ``map.json``, ``map.html``, ``map.svg`` and ``map.png``."""
+
+from typing import Any
+
+from cellplan.model.report import CAUTION
+from cellplan.report.page.render import inline_svg, template
+from cellplan.report.plots.base_map import COLOURS, TITLES, cycle_classes, map_sheet
+from cellplan.report.plots.rendering import pictures
+from cellplan.report.record.common import Record, as_json
+
+
+def map_files(record: Record) -> dict[str, bytes]:
+    """Content of the files of a map by name.
+
+    Args:
+        record: As ``base_map`` returns it.
+    """
+    plots = pictures({"map": map_sheet(record)})
+    return {
+        "map.json": as_json(record).encode(),
+        **plots,
+        "map.html": map_page(record, plots["map.svg"]).encode(),
+    }
+
+
+def map_page(record: Record, plot: bytes) -> str:
+    """The page of a map.
+
+    Args:
+        record: As ``base_map`` returns it.
+        plot: Its picture as SVG.
+    """
+    best: list[dict[str, Any]] = [{**each, **record["places"][each["place"]]} for each in record["best"]]
+    examples = {
+        verdict: next((place["reason"] for place in record["places"] if place["verdict"] == verdict), "")
+        for verdict in COLOURS
+    }
+    return template("base_map.html").render(
+        r=record,
+        best=best,
+        plot=inline_svg(plot.decode(), prefix="m-"),
+        classes=cycle_classes(record),
+        colours=COLOURS,
+        titles=TITLES,
+        examples=examples,
+        caution=CAUTION,
+    )

@@ -1,0 +1,196 @@
+"""Picture of a map: the plane from above, to scale, each place in the colour of its verdict."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.report.plots.palette import GREY, INK, LIMIT, ROBOTS
+from cellplan.report.plots.sheet import Label, Line, Panel, Rectangle, Sheet, nice_ticks
+from cellplan.report.record.common import Record
+
+COLOURS: Final = {
+    "collision": "#e6a7a0",
+    "speed": "#eccb85",
+    "limit": "#b9c0ca",
+    "out_of_reach": "#f1f3f6",
+}
+SHADES: Final = ("#12492f", "#1e6b45", "#2f8d5d", "#55ad7c", "#86c9a1", "#b6e0c5")  # of places that pass, fastest first
+TITLES: Final = {
+    "passes": "passes",
+    "collision": "collision or too near",
+    "speed": "too fast",
+    "limit": "beyond a joint limit",
+    "out_of_reach": "out of reach",
+}
+LONGEST: Final = 6.6  # [inch] of the longer side of the plane
+LEFT, TOP, FOOT, LEGEND = 0.75, 0.5, 0.65, 2.2  # [inch]
+TICK: Final = 0.06  # [inch]
+
+
+def map_sheet(record: Record) -> Sheet:
+    """The sheet of a map.
+
+    Args:
+        record: As ``base_map`` returns it.
+    """
+    x, y, step = np.array(record["x_mm"]), np.array(record["y_mm"]), _step(record)
+    spans = (float(np.ptp(x)) + step, float(np.ptp(y)) + step)
+    scale = LONGEST / max(spans)
+    sheet = Sheet("", rows=1, columns=1, times=np.array([0.0, 1.0]), width=LEFT + scale * spans[0] + LEGEND)
+    sheet.height = TOP + scale * spans[1] + FOOT
+    title = f"{record['cell']}: base of {record['robot']} from above"
+    sheet.write(0.12, sheet.height - 0.24, title, size=10.5, weight="bold", va="center")
+    panel = Panel(
+        left=LEFT,
+        bottom=FOOT,
+        width=scale * spans[0],
+        height=scale * spans[1],
+        first=float(x[0]) - 0.5 * step,
+        last=float(x[-1]) + 0.5 * step,
+        low=float(y[0]) - 0.5 * step,
+        high=float(y[-1]) + 0.5 * step,
+    )
+    _fill(sheet, panel, record, step)
+    _draw_things(sheet, panel, record)
+    _draw_axes(sheet, panel)
+    _draw_legend(sheet, panel, record)
+    return sheet
+
+
+def cycle_classes(record: Record) -> list[tuple[str, float, float]]:
+    """Colour, shortest and longest cycle in [s] of each class of places that pass, fastest first."""
+    cycles = [place["figures"]["cycle_s"] for place in record["places"] if place["verdict"] == "passes"]
+    if not cycles:
+        return []
+    edges = np.linspace(min(cycles), max(cycles), len(SHADES) + 1).tolist()
+    if edges[0] == edges[-1]:
+        return [(SHADES[0], edges[0], edges[0])]
+    return [(colour, edges[i], edges[i + 1]) for i, colour in enumerate(SHADES)]
+
+
+def _step(record: Record) -> float:
+    """Distance of neighbouring places in [mm]."""
+    gaps = [values[1] - values[0] for values in (record["x_mm"], record["y_mm"]) if len(values) > 1]
+    return float(gaps[0]) if gaps else 100.0
+
+
+def _colour(place: Record, classes: list[tuple[str, float, float]]) -> str:
+    """Colour of a place."""
+    if place["verdict"] != "passes":
+        return COLOURS[place["verdict"]]
+    return next((c for c, _, last in classes if place["figures"]["cycle_s"] <= last), classes[-1][0])
+
+
+def _fill(sheet: Sheet, panel: Panel, record: Record, step: float) -> None:
+    """Every place as a square; neighbours of one colour in a row as one rectangle."""
+    classes, columns = cycle_classes(record), len(record["x_mm"])
+    for row, y in enumerate(record["y_mm"]):
+        colours = [_colour(each, classes) for each in record["places"][row * columns : (row + 1) * columns]]
+        for first, last, colour in _stretches(colours):
+            left, right = panel.x(np.array([record["x_mm"][first] - 0.5 * step, record["x_mm"][last] + 0.5 * step]))
+            low, high = panel.y(np.array([y - 0.5 * step, y + 0.5 * step]))
+            style = {"color": colour, "linewidth": 0, "zorder": 0.5, "antialiased": False}
+            size = (float(right - left), float(high - low))
+            sheet.marks.append(Rectangle((float(left), float(low)), *size, style))
+
+
+def _stretches(colours: list[str]) -> Iterator[tuple[int, int, str]]:
+    """First and last place of each stretch of one colour."""
+    first = 0
+    for place in range(1, len(colours) + 1):
+        if place == len(colours) or colours[place] != colours[first]:
+            yield first, place - 1, colours[first]
+            first = place
+
+
+def _line(sheet: Sheet, panel: Panel, points: Any, *, is_closed: bool = False, **style: Any) -> None:
+    """A line in the plane, cut off at the edges of the panel."""
+    found = np.array(points, dtype=float)
+    found = np.vstack([found, found[:1]]) if is_closed else found
+    pieces = [_clipped(panel, one, other) for one, other in pairwise(found)]
+    drawn = np.array([row for piece in pieces for row in (*piece, (np.nan, np.nan))]).reshape(-1, 2)
+    if len(drawn):
+        sheet.marks.append(Line(panel.x(drawn[:, 0]), panel.y(drawn[:, 1]), style))
+
+
+def _clipped(panel: Panel, one: Any, other: Any) -> tuple[Any, ...]:
+    """What of a line lies in the panel: both ends, or nothing."""
+    low, high = np.array([panel.first, panel.low]), np.array([panel.last, panel.high])
+    along, begin, end = other - one, 0.0, 1.0
+    for axis in range(2):
+        if along[axis] == 0.0:
+            if not low[axis] <= one[axis] <= high[axis]:
+                return ()
+            continue
+        shares = sorted(((low[axis] - one[axis]) / along[axis], (high[axis] - one[axis]) / along[axis]))
+        begin, end = max(begin, shares[0]), min(end, shares[1])
+    return (one + begin * along, one + end * along) if begin < end else ()
+
+
+def _draw_things(sheet: Sheet, panel: Panel, record: Record) -> None:
+    """Robots at the start, part, surroundings, paths, the present base and the best places."""
+    drawn = record["drawing"]
+    for each in drawn["outlines"]:
+        is_own = each["robot"] == record["robot"]
+        colour = LIMIT if is_own else INK
+        width = 1.1 if each["is_at_rest"] or each["kind"] == "part" else 0.45
+        _line(sheet, panel, each["outline_mm"], is_closed=True, color=colour, linewidth=width, zorder=2.0)
+    for index, each in enumerate(drawn["paths"]):
+        _line(sheet, panel, each["points_mm"], color=ROBOTS[index % len(ROBOTS)], linewidth=1.6, zorder=2.5)
+    for each in drawn["robots"]:
+        if panel.first < each["x_mm"] < panel.last and panel.low < each["y_mm"] < panel.high:
+            is_own = each["name"] == record["robot"]
+            style = {"color": LIMIT if is_own else INK, "ha": "center", "va": "center", "size": 8.5, "zorder": 4.0}
+            at = (float(panel.x(np.array(each["x_mm"]))), float(panel.y(np.array(each["y_mm"]))))
+            sheet.marks.append(Label(*at, each["name"], {**style, "weight": "bold"}))
+    for rank, each in enumerate(record["best"]):
+        place = record["places"][each["place"]]
+        x, y = panel.x(np.array([place["x_mm"]])), panel.y(np.array([place["y_mm"]]))
+        passed = (each["certified"] or {}).get("status")
+        colour = {"passed": "#ffffff", None: INK}.get(passed, LIMIT)
+        size = 6.5 if rank == 0 else 3.5
+        style = {"marker": "*" if rank == 0 else "o", "markersize": size, "linestyle": "none", "color": colour}
+        sheet.marks.append(Line(x, y, {**style, "markeredgecolor": INK, "markeredgewidth": 0.6, "zorder": 5.0}))
+
+
+def _draw_axes(sheet: Sheet, panel: Panel) -> None:
+    """The frame with round numbers."""
+    right, top = panel.left + panel.width, panel.bottom + panel.height
+    corners = [(panel.left, panel.bottom), (right, panel.bottom), (right, top), (panel.left, top)]
+    xs, ys = np.array([*corners, corners[0]]).T
+    sheet.marks.append(Line(xs, ys, {"color": GREY, "linewidth": 0.8, "zorder": 3.0}))
+    for value in nice_ticks(panel.first, panel.last, 6):
+        at = float(panel.x(np.array(value)))
+        sheet.marks.append(
+            Line(np.array([at, at]), np.array([panel.bottom - TICK, panel.bottom]), {"color": GREY, "linewidth": 0.8})
+        )
+        sheet.write(at, panel.bottom - 2 * TICK, f"{value:g}", color=GREY, ha="center", va="top")
+    for value in nice_ticks(panel.low, panel.high, 6):
+        at = float(panel.y(np.array(value)))
+        sheet.marks.append(
+            Line(np.array([panel.left - TICK, panel.left]), np.array([at, at]), {"color": GREY, "linewidth": 0.8})
+        )
+        sheet.write(panel.left - 1.5 * TICK, at, f"{value:g}", color=GREY, ha="right", va="center_baseline")
+    sheet.write(right, 0.12, "base x in mm", color=GREY, ha="right")
+    sheet.write(0.12, 0.12, "base y in mm, upward", color=GREY)
+
+
+def _draw_legend(sheet: Sheet, panel: Panel, record: Record) -> None:
+    """What the colours mean, with the number of places of each."""
+    left, y = panel.left + panel.width + 0.2, panel.bottom + panel.height - 0.15
+    classes = cycle_classes(record)
+    entries = [(colour, f"cycle {first:.2f} to {last:.2f} s") for colour, first, last in classes]
+    lines = [(None, f"passes: {record['counts']['passes']}"), *entries]
+    lines += [(colour, f"{TITLES[verdict]}: {record['counts'][verdict]}") for verdict, colour in COLOURS.items()]
+    for colour, text in lines:
+        if colour is None:
+            sheet.write(left, y, text, va="center", weight="bold")
+        else:
+            style = {"color": colour, "linewidth": 0, "zorder": 2.0}
+            sheet.marks.append(Rectangle((left, y - 0.06), 0.18, 0.12, style))
+            sheet.write(left + 0.26, y, text, va="center")
+        y -= 0.2
+    sheet.write(left, y - 0.1, f"red: {record['robot']} as it stands", color=LIMIT, va="center")
+    sheet.write(left, y - 0.3, "star: best place, dots: next best", va="center")

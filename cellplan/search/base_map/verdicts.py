@@ -1,0 +1,223 @@
+"""What becomes of the whole job at each place of one base: of the first start that passes, or the best one."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.depths import mounted_depths
+from cellplan.checks.joints.acceleration_limits import acceleration_limit
+from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.model.cell import joint_at
+from cellplan.scene.scene import Scene
+from cellplan.search.base_map.places import Places
+from cellplan.search.kernel.figures import Figures, Peaks
+from cellplan.search.kernel.job import Job, Layouts
+from cellplan.search.kernel.run import run
+
+AT_ONCE: Final = 256  # [-] motions worked out together
+KEYS: Final = (3, 9, 33)  # [-] nodes at which distances are asked, more and more while nothing is too near
+
+
+class Verdict(StrEnum):
+    """What becomes of a place, the nearer to passing the later."""
+
+    OUT_OF_REACH = "out_of_reach"
+    LIMIT = "limit"
+    SPEED = "speed"
+    COLLISION = "collision"
+    PASSES = "passes"
+
+
+RANK: Final = {verdict: rank for rank, verdict in enumerate(Verdict)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlaceVerdict:
+    """One place.
+
+    Attributes:
+        verdict: What becomes of it.
+        start: Start posture of the robot in [rad] or [m], shape (n,); None where there is none.
+        lost_at: Time in [s] at which a tool could not follow; None where all did.
+        joint: Robot and joint that is beyond a limit, or that leaves least.
+        margin: Its smallest distance from a limit of a turning joint in [rad], of a sliding one in [m].
+        fast: Robot and joint that is fastest against its limits of speed and acceleration.
+        speed: Largest speed of any joint as a share of its limit; None where there is no motion.
+        acceleration: Largest acceleration likewise.
+        cycle: Shortest time in [s] of the same motion, faster or slower as a whole, that keeps both.
+        pair: Bodies that are too near each other, and their distance in [m]; None where none are.
+        distance: That distance.
+        at: Time in [s] at which they are.
+    """
+
+    verdict: Verdict
+    start: Array | None = None
+    lost_at: float | None = None
+    joint: tuple[str, str] | None = None
+    margin: float | None = None
+    fast: tuple[str, str] | None = None
+    speed: float | None = None
+    acceleration: float | None = None
+    cycle: float | None = None
+    pair: tuple[str, str] | None = None
+    distance: float | None = None
+    at: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MapJob:
+    """The job of one cell with one robot at many places.
+
+    Attributes:
+        job: The tasks at their nodes.
+        scene: The cell made computable; of its mounted pairs those that depend on its place.
+        robot: Name of the robot.
+        start: Start configuration of the whole cell in [rad] or [m], shape (nq,).
+        places: The places.
+    """
+
+    job: Job
+    scene: Scene
+    robot: str
+    start: Array
+    places: Places
+
+
+def judge(asked: MapJob, q: Array, at: Indices, tell: Callable[[float], None]) -> list[PlaceVerdict]:
+    """The verdict of every place.
+
+    Args:
+        asked: The job and the places.
+        q: Starts of the robot, shape (S, n), as ``starts_at`` returns them.
+        at: Their places, shape (S,).
+        tell: Called with the fraction done.
+    """
+    model = asked.scene.cell.robot(asked.robot).model
+    room = np.minimum(q - model.lower, model.upper - q)
+    found = [PlaceVerdict(verdict=Verdict.OUT_OF_REACH) for _ in range(len(asked.places))]
+    for start, place, rooms in zip(q, at.tolist(), room, strict=True):
+        tight = int(np.argmin(rooms))
+        worst = found[place].margin
+        if rooms[tight] < 0.0 and (worst is None or rooms[tight] > worst):
+            joint = (asked.robot, model.joint_names[tight])
+            margin = float(rooms[tight])
+            found[place] = PlaceVerdict(verdict=Verdict.LIMIT, start=start, joint=joint, margin=margin, at=0.0)
+    inside = np.flatnonzero(room.min(axis=1) >= 0.0)
+    first = np.searchsorted(at[inside], at[inside], side="left")
+    turn = np.arange(len(inside)) - first  # 0 for the start of a place that is nearest to the present one
+    done = 0
+    for number in range(int(turn.max(initial=-1)) + 1):
+        rows = inside[turn == number]
+        rows = rows[[found[place].verdict is not Verdict.PASSES for place in at[rows].tolist()]]
+        for begin in range(0, len(rows), AT_ONCE):
+            group = rows[begin : begin + AT_ONCE]
+            for place, verdict in zip(at[group].tolist(), _judged(asked, q[group], at[group]), strict=True):
+                if _is_better(verdict, found[place]):
+                    found[place] = verdict
+            done += len(group)
+            tell(done / len(inside))
+    return found
+
+
+def _is_better(one: PlaceVerdict, other: PlaceVerdict) -> bool:
+    """Whether one start of a place came nearer to passing than another."""
+    return RANK[one.verdict] > RANK[other.verdict] or other.start is None
+
+
+def _judged(asked: MapJob, q: Array, at: Indices) -> Iterator[PlaceVerdict]:
+    """Verdicts of some starts, their motions worked out together."""
+    job, cell = asked.job, asked.scene.cell
+    X_WB = np.tile(np.array([robot.X_WB for robot in cell.robots]), (len(q), 1, 1, 1))
+    X_WB[:, cell.index(asked.robot)] = asked.places.X_WB[at]
+    start = np.tile(asked.start, (len(q), 1))
+    start[:, cell.columns(asked.robot)] = q
+    weights = np.concatenate([robot.weights for robot in cell.robots])
+    tools = np.array([robot.tool.X_FT for robot in cell.robots])
+    layouts = Layouts(
+        X_WB=X_WB, X_FT=np.tile(tools, (len(q), 1, 1, 1)), start=start, weights=np.tile(weights, (len(q), 1))
+    )
+    motions = run(job, layouts)
+    with np.errstate(all="ignore"):  # what lost its path is no number
+        figures = Figures.of(job, motions)
+        allowed = acceleration_limits(asked.scene)
+        rates = Peaks.of(job.times, job.rates @ (motions.qd / allowed), in_magnitude=True).value
+    for k in range(len(q)):
+        if not motions.is_followed[k]:
+            lost_at = float(max(motions.lost_at[k], 0.0))
+            yield PlaceVerdict(verdict=Verdict.OUT_OF_REACH, start=q[k], lost_at=lost_at)
+            continue
+        known = _known(asked, q[k], figures.margins[k], figures.speeds.value[k], rates[k])
+        if known.verdict is Verdict.PASSES:
+            moved = asked.scene.moved({asked.robot: asked.places.X_WB[at[k]]})
+            known = _of_distances(asked, known, motions.q[k], moved)
+        yield known
+
+
+def acceleration_limits(scene: Scene) -> Array:
+    """Largest accelerations that the joints of a cell are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,)."""
+    found = [acceleration_limit(robot, i)[0] for robot in scene.cell.robots for i in range(len(robot.model.joints))]
+    return np.array([np.inf if limit is None else limit for limit in found])
+
+
+def _known(asked: MapJob, start: Array, margins: Array, speeds: Array, rates: Array) -> PlaceVerdict:
+    """What is known of a motion that all tools follow, without the bodies: figures of its joints, shape (nq,) each."""
+    cell = asked.scene.cell
+    tight, times = int(np.argmin(margins)), np.maximum(speeds, np.sqrt(rates))
+    fastest = int(np.argmax(times))
+    known = PlaceVerdict(
+        verdict=Verdict.PASSES,
+        start=start,
+        joint=joint_at(cell, tight),
+        margin=float(margins[tight]),
+        fast=joint_at(cell, fastest),
+        speed=float(speeds.max()),
+        acceleration=float(rates.max()),
+        cycle=float(asked.job.times[-1] * times[fastest]),
+    )
+    if margins[tight] < 0.0:
+        return replace(known, verdict=Verdict.LIMIT)
+    if times[fastest] > 1.0:
+        return replace(known, verdict=Verdict.SPEED)
+    return known
+
+
+def _of_distances(asked: MapJob, known: PlaceVerdict, q: Array, scene: Scene) -> PlaceVerdict:
+    """The same, or a collision where two bodies are too near at a node, or one stands too deep in another."""
+    demands, seen = np.array([pair.demand for pair in scene.pairs]), np.zeros(len(q), dtype=bool)
+    for count in KEYS:
+        nodes = np.unique(np.linspace(0, len(q) - 1, count).round().astype(np.intp))
+        nodes = nodes[~seen[nodes]]
+        seen[nodes] = True
+        near = scene.near(q[nodes], float(demands.max()))
+        short = near.distances - demands[near.rows]
+        if len(short) and short.min() < 0.0:
+            worst = int(np.argmin(short))
+            return replace(
+                known,
+                verdict=Verdict.COLLISION,
+                pair=scene.names(scene.pairs[near.rows[worst]]),
+                distance=float(near.distances[worst]),
+                at=float(asked.job.times[nodes[near.samples[worst]]]),
+            )
+    for found in mounted_depths(scene, q[:1]):
+        if found.depth > found.pair.limit:
+            names = (scene.bodies[found.pair.first].name, scene.bodies[found.pair.second].name)
+            return replace(known, verdict=Verdict.COLLISION, pair=names, distance=-found.depth, at=0.0)
+    return known
+
+
+def best_first(found: Sequence[PlaceVerdict]) -> list[int]:
+    """Places that pass: the shortest cycle first, of equal ones the widest margin, then the first one."""
+    passing = [place for place, each in enumerate(found) if each.verdict is Verdict.PASSES]
+    return sorted(
+        passing, key=lambda place: (round(found[place].cycle or 0.0, 6), -round(found[place].margin or 0.0, 6))
+    )
+
+
+def counts(found: Sequence[PlaceVerdict]) -> dict[Verdict, int]:
+    """How many places each verdict has, the best verdict first."""
+    flags: dict[Verdict, Flags] = {each: np.array([one.verdict is each for one in found]) for each in Verdict}
+    return {each: int(flags[each].sum()) for each in reversed(Verdict)}
