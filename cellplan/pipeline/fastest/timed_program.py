@@ -123,7 +123,10 @@ class TimedProgram:
 
     @property
     def phases(self) -> list[float]:
-        """Time of each of its phases in [s]; there may be a step between two."""
+        """Times in [s] that a demanded ``cycle_s`` stands for: of its phases, or of its cycles from home to home."""
+        program = self.solution.cell.program
+        if program is not None:
+            return [self.cycle / program.cycles] * program.cycles
         return [run.report.cycle_time for run in self.solution.runs]
 
 
