@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from cellplan.model.cell import Cell
@@ -10,6 +10,10 @@ if TYPE_CHECKING:
 
 class CellSource(Protocol):
     """The document that a cell was read from; a reader of files provides it, so that the model needs none."""
+
+    @property
+    def written(self) -> Mapping[str, Any]:
+        """The values of the document as they stand in it, no default filled in."""
 
     def with_values(self, cell: "Cell", values: Mapping[str, object]) -> "Cell":
         """The cell of the document with other values; see ``Cell.with_values``."""

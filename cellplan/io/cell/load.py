@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.load import require_enclosing, require_solid
@@ -75,6 +75,11 @@ class CellFile:
     folder: Path
     allow_dirs: tuple[Path, ...]
     parts: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def written(self) -> Mapping[str, Any]:
+        """The values of the document as they stand in it, no default filled in."""
+        return self.document.root
 
     def with_values(self, cell: Cell, values: Mapping[str, object]) -> Cell:
         """The cell of the document with other values; see ``Cell.with_values``."""

@@ -10,18 +10,19 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.io.cell.write import written_document
 from cellplan.io.run.folder import RunFolder
-from cellplan.model.cell import Cell, Mode, Timing
+from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import Frame
 from cellplan.model.units import DEG, MM
-from cellplan.pipeline.base_map.drawing import drawing
 from cellplan.pipeline.base_map.grid import BaseGrid
 from cellplan.pipeline.base_map.record import map_record
+from cellplan.pipeline.drawing import drawing
 from cellplan.pipeline.outcome import solved_outcome
 from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.solution import Solution
+from cellplan.pipeline.synchronous import refuse_other_jobs
 from cellplan.pipeline.write_run import versions
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
@@ -83,7 +84,7 @@ def base_map(
         found,
         best=list(zip(best, settings, strict=True)),
         certified=certified,
-        drawn=drawing(asked, schedule),
+        drawn=drawing(asked.scene, asked.start, schedule),
         versions=versions(),
     )
 
@@ -132,28 +133,7 @@ def _refuse_other_jobs(cell: Cell, name: str) -> None:
             f"--robot: expected a robot with a task that does not hold the part "
             f"({', '.join(dict.fromkeys(operators)) or 'there is none'}), got '{name}'"
         )
-    motion, solver = cell.motion, cell.solver
-    at = cell.origin.at
-    if cell.program is not None:
-        raise InputError(f"{at('program')}: expected a cell without a program from home to home for a map of bases")
-    if motion.mode not in {Mode.SIMULTANEOUS, Mode.PART_AT_REST}:
-        raise InputError(
-            f"{at('motion.mode')}: expected simultaneous or part_at_rest for a map of bases, got '{motion.mode}'"
-        )
-    if motion.timing is not Timing.AS_WRITTEN:
-        raise InputError(
-            f"{at('motion.timing')}: expected as_written for a map of bases, got '{motion.timing}': the map states the "
-            "shortest cycle of every place by the time laws"
-        )
-    if motion.locked:
-        raise InputError(f"{at('motion.locked_joints')}: expected no failed joints for a map of bases")
-    if motion.cyclic:
-        raise InputError(f"{at('motion.cyclic')}: expected false for a map of bases, got true")
-    for key in solver.against_accurate:
-        raise InputError(
-            f"{at(f'solver.{key}')}: expected the weighted pseudo-inverse without goals, with constant weights, for "
-            "a map of bases"
-        )
+    refuse_other_jobs(cell, "a map of bases")
 
 
 def _prepared(cell: Cell, robot: str, grid: BaseGrid, progress: Progress) -> tuple[MapJob, Schedule]:

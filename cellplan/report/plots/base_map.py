@@ -1,13 +1,13 @@
 """Picture of a map: the plane from above, to scale, each place in the colour of its verdict."""
 
 from collections.abc import Iterator
-from itertools import pairwise
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from cellplan.report.plots.palette import GREY, INK, LIMIT, ROBOTS
-from cellplan.report.plots.sheet import Label, Line, Panel, Rectangle, Sheet, nice_ticks
+from cellplan.report.plots.palette import INK, LIMIT, ROBOTS
+from cellplan.report.plots.plane import draw_axes, draw_line
+from cellplan.report.plots.sheet import Label, Line, Panel, Rectangle, Sheet
 from cellplan.report.record.common import Record
 
 COLOURS: Final = {
@@ -26,7 +26,6 @@ TITLES: Final = {
 }
 LONGEST: Final = 6.6  # [inch] of the longer side of the plane
 LEFT, TOP, FOOT, LEGEND = 0.75, 0.5, 0.65, 2.2  # [inch]
-TICK: Final = 0.06  # [inch]
 
 
 def map_sheet(record: Record) -> Sheet:
@@ -54,7 +53,7 @@ def map_sheet(record: Record) -> Sheet:
     )
     _fill(sheet, panel, record, step)
     _draw_things(sheet, panel, record)
-    _draw_axes(sheet, panel)
+    draw_axes(sheet, panel)
     _draw_legend(sheet, panel, record)
     return sheet
 
@@ -105,30 +104,6 @@ def _stretches(colours: list[str]) -> Iterator[tuple[int, int, str]]:
             first = place
 
 
-def _line(sheet: Sheet, panel: Panel, points: Any, *, is_closed: bool = False, **style: Any) -> None:
-    """A line in the plane, cut off at the edges of the panel."""
-    found = np.array(points, dtype=float)
-    found = np.vstack([found, found[:1]]) if is_closed else found
-    pieces = [_clipped(panel, one, other) for one, other in pairwise(found)]
-    drawn = np.array([row for piece in pieces for row in (*piece, (np.nan, np.nan))]).reshape(-1, 2)
-    if len(drawn):
-        sheet.marks.append(Line(panel.x(drawn[:, 0]), panel.y(drawn[:, 1]), style))
-
-
-def _clipped(panel: Panel, one: Any, other: Any) -> tuple[Any, ...]:
-    """What of a line lies in the panel: both ends, or nothing."""
-    low, high = np.array([panel.first, panel.low]), np.array([panel.last, panel.high])
-    along, begin, end = other - one, 0.0, 1.0
-    for axis in range(2):
-        if along[axis] == 0.0:
-            if not low[axis] <= one[axis] <= high[axis]:
-                return ()
-            continue
-        shares = sorted(((low[axis] - one[axis]) / along[axis], (high[axis] - one[axis]) / along[axis]))
-        begin, end = max(begin, shares[0]), min(end, shares[1])
-    return (one + begin * along, one + end * along) if begin < end else ()
-
-
 def _draw_things(sheet: Sheet, panel: Panel, record: Record) -> None:
     """Robots at the start, part, surroundings, paths, the present base and the best places."""
     drawn = record["drawing"]
@@ -136,9 +111,9 @@ def _draw_things(sheet: Sheet, panel: Panel, record: Record) -> None:
         is_own = each["robot"] == record["robot"]
         colour = LIMIT if is_own else INK
         width = 1.1 if each["is_at_rest"] or each["kind"] == "part" else 0.45
-        _line(sheet, panel, each["outline_mm"], is_closed=True, color=colour, linewidth=width, zorder=2.0)
+        draw_line(sheet, panel, each["outline_mm"], is_closed=True, color=colour, linewidth=width, zorder=2.0)
     for index, each in enumerate(drawn["paths"]):
-        _line(sheet, panel, each["points_mm"], color=ROBOTS[index % len(ROBOTS)], linewidth=1.6, zorder=2.5)
+        draw_line(sheet, panel, each["points_mm"], color=ROBOTS[index % len(ROBOTS)], linewidth=1.6, zorder=2.5)
     for each in drawn["robots"]:
         if panel.first < each["x_mm"] < panel.last and panel.low < each["y_mm"] < panel.high:
             is_own = each["name"] == record["robot"]
@@ -153,28 +128,6 @@ def _draw_things(sheet: Sheet, panel: Panel, record: Record) -> None:
         size = 6.5 if rank == 0 else 3.5
         style = {"marker": "*" if rank == 0 else "o", "markersize": size, "linestyle": "none", "color": colour}
         sheet.marks.append(Line(x, y, {**style, "markeredgecolor": INK, "markeredgewidth": 0.6, "zorder": 5.0}))
-
-
-def _draw_axes(sheet: Sheet, panel: Panel) -> None:
-    """The frame with round numbers."""
-    right, top = panel.left + panel.width, panel.bottom + panel.height
-    corners = [(panel.left, panel.bottom), (right, panel.bottom), (right, top), (panel.left, top)]
-    xs, ys = np.array([*corners, corners[0]]).T
-    sheet.marks.append(Line(xs, ys, {"color": GREY, "linewidth": 0.8, "zorder": 3.0}))
-    for value in nice_ticks(panel.first, panel.last, 6):
-        at = float(panel.x(np.array(value)))
-        sheet.marks.append(
-            Line(np.array([at, at]), np.array([panel.bottom - TICK, panel.bottom]), {"color": GREY, "linewidth": 0.8})
-        )
-        sheet.write(at, panel.bottom - 2 * TICK, f"{value:g}", color=GREY, ha="center", va="top")
-    for value in nice_ticks(panel.low, panel.high, 6):
-        at = float(panel.y(np.array(value)))
-        sheet.marks.append(
-            Line(np.array([panel.left - TICK, panel.left]), np.array([at, at]), {"color": GREY, "linewidth": 0.8})
-        )
-        sheet.write(panel.left - 1.5 * TICK, at, f"{value:g}", color=GREY, ha="right", va="center_baseline")
-    sheet.write(right, 0.12, "base x in mm", color=GREY, ha="right")
-    sheet.write(0.12, 0.12, "base y in mm, upward", color=GREY)
 
 
 def _draw_legend(sheet: Sheet, panel: Panel, record: Record) -> None:

@@ -1,0 +1,127 @@
+"""A cell from above: outlines of robots, part and surroundings, the paths, and what the links sweep."""
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.geometry.shapes import support_point
+from cellplan.model.motion import Schedule
+from cellplan.model.task import Frame
+from cellplan.model.units import MM
+from cellplan.planning.start.given import part_pose
+from cellplan.scene.scene import Scene
+
+CORNERS: Final = 24  # [-] of an outline
+ANGLES: Final = 2.0 * np.pi * (np.arange(CORNERS) + 0.5) / CORNERS
+AROUND: Final = np.stack([np.cos(ANGLES), np.sin(ANGLES), np.zeros(CORNERS)], axis=1)  # horizontal directions
+ALL_ROUND: Final = np.concatenate(
+    [
+        np.cos(tilt) * AROUND + np.sin(tilt) * np.array([0.0, 0.0, 1.0])
+        for tilt in np.radians((-75, -45, -15, 15, 45, 75))
+    ]
+)  # directions all round a body, of which its corners are sought once
+PATH_POINTS: Final = 121  # [-]
+SQUARE: Final = 40.0  # [mm]
+NEAR: Final = 1e-9  # of rounding
+
+
+def drawing(scene: Scene, start: Array, schedule: Schedule) -> dict[str, Any]:
+    """Outlines and paths in [mm] in the plane, with all robots at the start.
+
+    Args:
+        scene: The cell made computable.
+        start: Start configuration in [rad] or [m], shape (nq,).
+        schedule: The tasks on the common clock.
+    """
+    cell = scene.cell
+    poses = scene.body_poses(start[None])
+    outlines = [
+        {
+            "name": body.name,
+            "kind": str(body.kind),
+            "robot": body.robot,
+            "is_at_rest": body.is_at_rest,
+            "outline_mm": _rounded(_outline(scene.engine.bodies[index].hull, poses.R[index, 0], poses.p[index, 0])),
+        }
+        for index, body in ((index, scene.bodies[index]) for index in _solids(scene))
+    ]
+    paths = []
+    X_WP = part_pose(cell, None if cell.carrier is None else start[cell.columns(cell.robots[cell.carrier].name)])
+    for each in schedule.tasks:
+        rows = np.unique(np.linspace(0, len(each.X_PT) - 1, PATH_POINTS).round().astype(np.intp))
+        X_WR = np.eye(4) if each.task.relative_to is not Frame.PART or X_WP is None else X_WP
+        points = each.X_PT[rows, :3, 3] @ X_WR[:3, :3].T + X_WR[:3, 3]
+        paths.append({"task": each.task.name, "robot": each.task.robot, "points_mm": _rounded(points[:, :2])})
+    robots = [
+        {"name": robot.name, "x_mm": _rounded(robot.X_WB[0, 3]), "y_mm": _rounded(robot.X_WB[1, 3])}
+        for robot in cell.robots
+    ]
+    return {"robots": robots, "outlines": outlines, "paths": paths}
+
+
+def swept_area(scene: Scene, q: Array) -> dict[str, Any]:
+    """What the links and tools of each robot cover from above, as rows of squares.
+
+    Args:
+        scene: The cell made computable.
+        q: Configurations of its motion in [rad] or [m], shape (N, nq).
+
+    Returns:
+        The size of a square in [mm], and by robot rows ``[y, first x, last x]`` of the middles of covered squares in
+        [mm].
+    """
+    poses = scene.body_poses(q)
+    found: dict[str, Any] = {}
+    for robot in scene.cell.robots:
+        covered = set[tuple[int, int]]()
+        for index in _solids(scene):
+            if scene.bodies[index].robot == robot.name and not scene.bodies[index].is_at_rest:
+                hull = scene.engine.bodies[index].hull
+                points = np.array([support_point(hull, n) for n in ALL_ROUND])
+                placed = (points @ np.swapaxes(poses.R[index], -1, -2) + poses.p[index][:, None])[..., :2]
+                extreme = (placed @ AROUND[:, :2].T).argmax(axis=1)  # of each configuration and direction
+                for corners in np.take_along_axis(placed, extreme[..., None], axis=1):
+                    covered |= _squares(corners)
+        found[robot.name] = [[y * SQUARE, first * SQUARE, last * SQUARE] for y, first, last in _stretches(covered)]
+    return {"square_mm": SQUARE, "robots": found}
+
+
+def _solids(scene: Scene) -> list[int]:
+    """Bodies of the cell that are solids, by their place in the scene and in its engine."""
+    names = [body.name for body in scene.engine.bodies]
+    return [index for index, body in enumerate(scene.bodies) if index < len(names) and body.name == names[index]]
+
+
+def _squares(outline: Array) -> set[tuple[int, int]]:
+    """Squares whose middles lie in a convex outline in [m], by their row and column."""
+    corners = MM / SQUARE * outline
+    low, high = np.ceil(corners.min(axis=0)).astype(int), np.floor(corners.max(axis=0)).astype(int)
+    xs, ys = np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1)
+    middles = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
+    sides = np.roll(corners, -1, axis=0) - corners
+    apart = middles[:, None] - corners
+    inside = (sides[:, 0] * apart[..., 1] - sides[:, 1] * apart[..., 0] >= -NEAR).all(axis=1)
+    return {(int(y), int(x)) for x, y in middles[inside]}
+
+
+def _stretches(covered: set[tuple[int, int]]) -> Iterator[tuple[int, int, int]]:
+    """Row, first and last column of each stretch of covered squares."""
+    squares = sorted(covered)
+    first = 0
+    for place in range(1, len(squares) + 1):
+        row, column = squares[place - 1]
+        if place == len(squares) or squares[place] != (row, column + 1):
+            yield row, squares[first][1], column
+            first = place
+
+
+def _outline(shape: Any, R: Array, p: Array) -> Array:
+    """Corners of a convex solid's outline from above in [m], shape (C, 2)."""
+    return np.array([(R @ support_point(shape, R.T @ n) + p)[:2] for n in AROUND])
+
+
+def _rounded(lengths: Any) -> Any:
+    """Lengths in [m] as plain numbers in [mm], to a hundredth."""
+    return (np.round(MM * np.asarray(lengths), 2) + 0.0).tolist()

@@ -1,0 +1,36 @@
+"""Jobs that a search can judge: one synchronous motion by the weighted pseudo-inverse."""
+
+from cellplan.errors import InputError
+from cellplan.model.cell import Cell, Mode, Timing
+
+
+def refuse_other_jobs(cell: Cell, what: str) -> None:
+    """Refuse jobs whose motion is not one synchronous pseudo-inverse motion on the clock of the cell.
+
+    Args:
+        cell: The cell.
+        what: What the job is needed for, as messages name it.
+
+    Raises:
+        InputError: The job is another one.
+    """
+    motion, solver = cell.motion, cell.solver
+    at = cell.origin.at
+    if cell.program is not None:
+        raise InputError(f"{at('program')}: expected a cell without a program from home to home for {what}")
+    if motion.mode not in {Mode.SIMULTANEOUS, Mode.PART_AT_REST}:
+        raise InputError(f"{at('motion.mode')}: expected simultaneous or part_at_rest for {what}, got '{motion.mode}'")
+    if motion.timing is not Timing.AS_WRITTEN:
+        raise InputError(
+            f"{at('motion.timing')}: expected as_written for {what}, got '{motion.timing}': it states the shortest "
+            "cycle by the time laws"
+        )
+    if motion.locked:
+        raise InputError(f"{at('motion.locked_joints')}: expected no failed joints for {what}")
+    if motion.cyclic:
+        raise InputError(f"{at('motion.cyclic')}: expected false for {what}, got true")
+    for key in solver.against_accurate:
+        raise InputError(
+            f"{at(f'solver.{key}')}: expected the weighted pseudo-inverse without goals, with constant weights, for "
+            f"{what}"
+        )

@@ -1,0 +1,36 @@
+"""Files of a layout search: ``study.json`` and ``study.html``."""
+
+from cellplan.model.report import CAUTION
+from cellplan.report.page.render import inline_svg, template
+from cellplan.report.plots.layout import convergence_sheet, floor_plan, front_sheet
+from cellplan.report.plots.svg import svg_text
+from cellplan.report.record.common import Record, as_json
+from cellplan.report.text.layout import changed_variables, verdict_line
+
+
+def layout_files(record: Record) -> dict[str, bytes]:
+    """Content of the files of a layout search by name.
+
+    Args:
+        record: As ``layout_record`` returns it.
+    """
+    return {"study.json": as_json(record).encode(), "study.html": layout_page(record).encode()}
+
+
+def layout_page(record: Record) -> str:
+    """The page of a layout search.
+
+    Args:
+        record: As ``layout_record`` returns it.
+    """
+    sheets = {"plan": floor_plan(record), "front": front_sheet(record), "convergence": convergence_sheet(record)}
+    plots = {
+        name: inline_svg(svg_text(sheet), prefix=f"{name}-") for name, sheet in sheets.items() if sheet is not None
+    }
+    return template("layout.html").render(
+        r=record,
+        plots=plots,
+        verdict=verdict_line(record),
+        changed=changed_variables(record),
+        caution=CAUTION,
+    )

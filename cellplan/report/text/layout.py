@@ -1,0 +1,85 @@
+"""A layout search as text: the verdict, the best layout, what changed, what holds it back, and the line to type."""
+
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from cellplan.report.record.common import Entries, Record, rounded_down
+
+MOST: Final = 6  # [-] lines of what binds, of what the given layout breaks, and of reasons
+SAME: Final = 1e-3  # [mm] or [deg] by which a variable may differ and count as unchanged
+
+
+def layout_lines(record: Record, folder: Path) -> list[str]:
+    """All lines about a layout search.
+
+    Args:
+        record: As ``layout_record`` returns it.
+        folder: Its folder.
+    """
+    lines = [f"{record['cell']}: {verdict_line(record)}", f"  {_given(record)}"]
+    lines += [f"    {each['text']}" for each in record["given"]["violations"][:MOST]]
+    if record["best"] is not None:
+        lines.append("  what changed")
+        lines += [f"    {line}" for line in _changes(record)]
+        if record["binding"]:
+            lines.append("  what holds it back")
+            lines += [f"    {each['text']}" for each in record["binding"][:MOST]]
+    else:
+        lines += [f"  {each['reason']} ({_trials(each['count'])})" for each in record["dropped"][:MOST]]
+    lines += [f"  {remark}" for remark in record["remarks"]]
+    lines.append(f"  {_trials(record['trials'])} in {record['rounds']} rounds, {record['solves']} solved in full")
+    if record["best"] is not None:
+        lines.append(f"next: cellplan solve {shlex.quote(str(folder / 'best.yaml'))}")
+    return [*lines, f"report: {folder / 'study.html'}"]
+
+
+def verdict_line(record: Record) -> str:
+    """What came of the search, in one line."""
+    best = record["best"]
+    if best is None and record["status"] == "no_start":
+        return "NO START: no layout was found in which all tools reach the starts of their paths"
+    if best is None:
+        return "NO LAYOUT CERTIFIED"
+    figures = [f"cycle {best['cycle_s']:.4g} s"]
+    if best["margin_deg"] is not None:
+        figures.append(f"smallest margin {rounded_down(best['margin_deg']):g} deg")
+    if best["clearance_mm"] is not None:
+        figures.append(f"smallest clearance {rounded_down(best['clearance_mm']):g} mm")
+    return f"CERTIFIED: {', '.join(figures)}"
+
+
+def changed_variables(record: Record) -> Entries:
+    """Variables whose value in the best layout is another one than in the given one."""
+    return [
+        dict(each)
+        for each in record["variables"]
+        if None not in (each["given"], each["best"]) and abs(each["best"] - each["given"]) > SAME
+    ]
+
+
+def _given(record: Record) -> str:
+    """The given layout in one line."""
+    given = record["given"]
+    if given["cycle_s"] is None:
+        return "as given: a tool cannot follow its path"
+    state = "conforms" if given["status"] == "conforming" else "does not conform"
+    return f"as given: {state}; shortest cycle of its motion {given['cycle_s']:.4g} s"
+
+
+def _changes(record: Record) -> Iterator[str]:
+    """Changed variables, those of one entry of the cell file on one line."""
+    groups: dict[str, list[str]] = {}
+    for each in changed_variables(record):
+        entry, _, name = each["name"].removeprefix("robots.").rpartition(".")
+        unit = f" {each['unit']}" if each["unit"] else ""
+        groups.setdefault(entry, []).append(
+            f"{name.removesuffix('_mm').removesuffix('_deg')} {each['given']:.5g} -> {each['best']:.5g}{unit}"
+        )
+    yield from (f"{entry}: {', '.join(texts)}" for entry, texts in groups.items())
+
+
+def _trials(count: int) -> str:
+    """A number of trials in words."""
+    return f"{count} trial" if count == 1 else f"{count} trials"
