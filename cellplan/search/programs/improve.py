@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.search.programs.measures import Measures
+from cellplan.search.programs.measures import Measures, Missed
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point, Problem
-from cellplan.search.programs.program import SLACK, Program
+from cellplan.search.programs.program import Program
 from cellplan.search.programs.rows import Linear
 
 WIDEST: Final = 1.5  # [-] usual steps
@@ -80,8 +80,13 @@ class _State:
     """A point and how it stands."""
 
     measures: Measures
-    violation: float
+    missed: Missed
     objective: float
+
+    @property
+    def violation(self) -> float:
+        """What is missed."""
+        return self.missed.violation
 
     @property
     def rank(self) -> tuple[float, float]:
@@ -175,14 +180,14 @@ class _Climb:
         objective = here.objective - there.objective
         if self._demands.objective is Objective.CYCLE:
             objective /= here.objective
-        return objective + SLACK * (here.violation - there.violation)
+        return objective + here.missed.cost - there.missed.cost
 
     def _state(self, point: Point) -> _State:
         """How a point stands."""
         measures = Measures.of(self._problem, point, self._demands, self._effort)
         return _State(
             measures=measures,
-            violation=measures.violation(self._problem, self._demands, self._effort.room),
+            missed=measures.missed(self._problem, self._demands, self._effort.room),
             objective=self._objective(measures),
         )
 

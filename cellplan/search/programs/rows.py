@@ -22,6 +22,7 @@ class Rows:
         nodes: Nodes of the motion, shape (M,).
         lacks: By how much the demand and the room are missed now, in usual units, negative where kept, shape (M,).
         gradients: Derivatives of the lacks by z, shape (M, n).
+        allowed: What of the lacks counts as kept at a point, (M,).
         aim: 1 where the row bounds the objective, 0 where it must be kept.
     """
 
@@ -30,6 +31,7 @@ class Rows:
     nodes: Indices
     lacks: Array
     gradients: Array
+    allowed: Array
     aim: float = 0.0
 
     def that_can_bind(self, box: Array) -> "Rows":
@@ -46,6 +48,7 @@ class Rows:
             nodes=self.nodes[kept],
             lacks=self.lacks[kept],
             gradients=self.gradients[kept],
+            allowed=self.allowed[kept],
             aim=self.aim,
         )
 
@@ -101,6 +104,7 @@ class Linear:
                 nodes=nodes,
                 lacks=(at / whole - 1.0) / unit,
                 gradients=gradients * problem.scale / (whole * unit),
+                allowed=np.full(len(at), 0.0 if is_aim else 0.5 * room.time / unit),
                 aim=1.0 if is_aim else 0.0,
             )
 
@@ -122,6 +126,7 @@ class Linear:
                 nodes=nodes,
                 lacks=(crests.value[nodes, columns] + room.margin) / units[columns],
                 gradients=gradients * problem.scale,
+                allowed=0.5 * room.margin / units[columns],
             )
 
     def _apart(self, room: Room) -> Rows:
@@ -133,4 +138,5 @@ class Linear:
             nodes=distances.nodes,
             lacks=(self.measures.lacks + rooms(distances, room)) / LENGTH,
             gradients=-self.distances * self.problem.scale / LENGTH,
+            allowed=0.5 * rooms(distances, room) / LENGTH,
         )
