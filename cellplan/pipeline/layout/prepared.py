@@ -11,6 +11,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.layout.bodies import LayoutBodies
 from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.planning.modes import plan_phases
@@ -18,7 +19,6 @@ from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.verdicts import acceleration_limits
-from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Job
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Objective
@@ -45,7 +45,7 @@ class Prepared:
     cell: Cell
     variables: Variables
     scene: Scene
-    bodies: CellDistances
+    bodies: LayoutBodies
     schedule: Schedule
     moving: tuple[str, ...]
 
@@ -69,7 +69,7 @@ class Prepared:
             cell=cell,
             variables=variables,
             scene=scene,
-            bodies=CellDistances.of(scene, variables),
+            bodies=LayoutBodies(scene, variables),
             schedule=schedule_paths(variables.base, [paths[name] for name in phase.tasks]),
             moving=tuple(phase.moving),
         )
