@@ -24,6 +24,8 @@ BORNE_OUT: Final = 0.1  # [-] share of what a program expects that the true moti
 GOOD: Final = 0.7  # [-] share from which the next region is wider
 GROWS: Final = 1.6  # [-] factor of the region after a good step
 SHRINKS: Final = 0.4  # [-] and after one that is refused
+LEAST: Final = 1e-6  # [-] that a step must gain
+CORRECTIONS: Final = 1  # programs with the bends of the rows that a refused step has shown
 LOOKS_BACK: Final = 8  # [-] iterations over which the gain is judged
 GAINED: Final = 3e-3  # [-] share of the objective that so many must gain
 
@@ -155,25 +157,34 @@ class _Climb:
         lower = np.minimum(np.maximum((problem.lower - point.x) / problem.scale, -self._trust), 0.0)
         upper = np.maximum(np.minimum((problem.upper - point.x) / problem.scale, self._trust), 0.0)
         rows = linear.rows(self._demands, self._effort.room, np.maximum(-lower, upper))
-        weight = problem.cost * problem.scale
-        changed = ((point.x - problem.given) * problem.cost, weight)
+        changed = ((point.x - problem.given) * problem.cost, problem.cost * problem.scale)
         program = Program(rows=rows, box=(lower, upper), demands=self._demands, changed=changed)
-        found = program.solve()
-        if found is None:
-            self._trust *= SHRINKS
-            return None
-        z, expected, _ = found
+        bends: Array | None = None
+        for _ in range(1 + CORRECTIONS):
+            found = program.solve(bends)
+            if found is None:
+                break
+            z, expected, _ = found
+            there = self._at(here, linear, z)
+            gain = -np.inf if there is None else self._gain(here, there)
+            if there is None:
+                break
+            if gain > max(BORNE_OUT * expected, LEAST):
+                if gain > GOOD * expected:
+                    self._trust = min(WIDEST, GROWS * self._trust)
+                return there
+            bends = np.concatenate([each.bends(here.measures, there.measures, z) for each in rows])
+        reach = self._trust if found is None else float(np.abs(found[0]).max(initial=0.0))
+        self._trust = SHRINKS * min(self._trust, reach)
+        return None
+
+    def _at(self, here: _State, linear: Linear, z: Array) -> _State | None:
+        """The state after a step, in usual steps; None where a tool cannot follow."""
+        problem, point = self._problem, here.measures.point
         dx = np.clip(point.x + z * problem.scale, problem.lower, problem.upper) - point.x
         near = replace(point, q=point.q + linear.derivatives.q @ dx)
         motion = problem.evaluate(point.x + dx, point.start, near)
-        there = None if motion is None else self._state(motion)
-        gain = -np.inf if there is None else self._gain(here, there)
-        if there is None or gain < max(BORNE_OUT * expected, 1e-6):
-            self._trust = SHRINKS * min(self._trust, float(np.abs(z).max(initial=0.0)))
-            return None
-        if gain > GOOD * expected:
-            self._trust = min(WIDEST, GROWS * self._trust)
-        return there
+        return None if motion is None else self._state(motion)
 
     def _gain(self, here: _State, there: _State) -> float:
         """What a step gains: the merit of the program, true."""

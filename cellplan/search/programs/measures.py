@@ -97,6 +97,24 @@ class Measures:
             allowed.append(np.full(len(loads), 0.5 * room.time / SHARE))
         return Missed(lacks=np.concatenate(lacks), allowed=np.concatenate(allowed))
 
+    def values(self, kind: Kind, subjects: Indices, nodes: Indices) -> Array:
+        """What rows of a kind are about: lacks of margins and distances, shares of speeds; NaN where not measured."""
+        match kind:
+            case Kind.LOWER_LIMIT:
+                return self.lower.value[nodes, subjects]
+            case Kind.UPPER_LIMIT:
+                return self.upper.value[nodes, subjects]
+            case Kind.SPEED:
+                return self.speeds.value[nodes, subjects]
+            case Kind.ACCELERATION:
+                return np.sqrt(self.accelerations.value[nodes, subjects])
+            case Kind.DISTANCE:
+                found = self.distances
+                places = zip(found.pairs.tolist(), found.nodes.tolist(), strict=True)
+                known = dict(zip(places, self.lacks.tolist(), strict=True))
+                asked = zip(subjects.tolist(), nodes.tolist(), strict=True)
+                return np.array([known.get(key, np.nan) for key in asked])
+
     @property
     def span(self) -> float:
         """Time in [s] from the first node to the last."""

@@ -22,7 +22,8 @@ class Rows:
         nodes: Nodes of the motion, shape (M,).
         lacks: By how much the demand and the room are missed now, in usual units, negative where kept, shape (M,).
         gradients: Derivatives of the lacks by z, shape (M, n).
-        allowed: What of the lacks counts as kept at a point, (M,).
+        allowed: What of the lacks counts as kept at a point, shape (M,).
+        units: Usual units of what is measured, see ``Measures.values``, shape (M,).
         aim: 1 where the row bounds the objective, 0 where it must be kept.
     """
 
@@ -32,6 +33,7 @@ class Rows:
     lacks: Array
     gradients: Array
     allowed: Array
+    units: Array
     aim: float = 0.0
 
     def that_can_bind(self, box: Array) -> "Rows":
@@ -39,6 +41,11 @@ class Rows:
         reach = np.abs(self.gradients) @ box
         highest = self.lacks + reach
         return self.of(highest > (float((self.lacks - reach).max(initial=-np.inf)) if self.aim else 0.0))
+
+    def bends(self, here: Measures, there: Measures, z: Array) -> Array:
+        """By how much more than the rows say a step z was seen to change the lacks, shape (M,); 0 where not seen."""
+        before, after = (each.values(self.kind, self.subjects, self.nodes) for each in (here, there))
+        return np.nan_to_num((after - before) / self.units - self.gradients @ z)
 
     def of(self, kept: Flags) -> "Rows":
         """Some of them."""
@@ -49,6 +56,7 @@ class Rows:
             lacks=self.lacks[kept],
             gradients=self.gradients[kept],
             allowed=self.allowed[kept],
+            units=self.units[kept],
             aim=self.aim,
         )
 
@@ -105,6 +113,7 @@ class Linear:
                 lacks=(at / whole - 1.0) / unit,
                 gradients=gradients * problem.scale / (whole * unit),
                 allowed=np.full(len(at), 0.0 if is_aim else 0.5 * room.time / unit),
+                units=np.full(len(at), whole * unit),
                 aim=1.0 if is_aim else 0.0,
             )
 
@@ -127,6 +136,7 @@ class Linear:
                 lacks=(crests.value[nodes, columns] + room.margin) / units[columns],
                 gradients=gradients * problem.scale,
                 allowed=0.5 * room.margin / units[columns],
+                units=units[columns],
             )
 
     def _apart(self, room: Room) -> Rows:
@@ -139,4 +149,5 @@ class Linear:
             lacks=(self.measures.lacks + rooms(distances, room)) / LENGTH,
             gradients=-self.distances * self.problem.scale / LENGTH,
             allowed=0.5 * rooms(distances, room) / LENGTH,
+            units=np.full(len(distances.pairs), LENGTH),
         )
