@@ -78,6 +78,16 @@ class BodyTable:
         moved = R @ self.X_LS[:, None, :3]
         return BodyPoses(np.ascontiguousarray(moved[..., :3]), moved[..., 3] + D[self.links, :, :3, 3])
 
+    def bounds(self, poses: BodyPoses) -> tuple[Array, Array]:
+        """Centres of the bounding spheres and ends of the bounding lines in the world in [m].
+
+        Returns:
+            Shape (B, K, 3), and (B, K, 2, 3).
+        """
+        points = np.concatenate([self.centres[:, None], self.ends], axis=1)
+        placed = points[:, None] @ np.swapaxes(poses.R, 2, 3) + poses.p[:, :, None]
+        return placed[:, :, 0], placed[:, :, 1:]
+
 
 def placed_points(poses: BodyPoses, bodies: Indices, samples: Indices, points: Array) -> Array:
     """Points of some bodies in the world.
