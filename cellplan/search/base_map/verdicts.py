@@ -11,6 +11,7 @@ from cellplan.certify.depths import mounted_depths
 from cellplan.checks.joints.acceleration_limits import acceleration_limit
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.cell import joint_at
+from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.places import Places
 from cellplan.search.kernel.figures import Figures, Peaks
@@ -186,7 +187,8 @@ def _known(asked: MapJob, start: Array, margins: Array, speeds: Array, rates: Ar
 
 def _of_distances(asked: MapJob, known: PlaceVerdict, q: Array, scene: Scene) -> PlaceVerdict:
     """The same, or a collision where two bodies are too near at a node, or one stands too deep in another."""
-    demands, seen = np.array([pair.demand for pair in scene.pairs]), np.zeros(len(q), dtype=bool)
+    demands = np.array([pair.demand if pair.rule is Rule.CLEARANCE else 0.0 for pair in scene.pairs])
+    seen = np.zeros(len(q), dtype=bool)
     for count in KEYS:
         nodes = np.unique(np.linspace(0, len(q) - 1, count).round().astype(np.intp))
         nodes = nodes[~seen[nodes]]
