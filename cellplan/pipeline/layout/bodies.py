@@ -86,5 +86,3 @@ class _Placed:
     def part(self, x: Array) -> Part:
         """The part with its grasps."""
         return self._variables.part(x)
-
-

@@ -1,7 +1,7 @@
 """Finish: a layout of the search improved at more nodes, then solved and verified until it passes or is given up."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np

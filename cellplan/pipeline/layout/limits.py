@@ -82,7 +82,9 @@ class Standing:
                 share = (value[column] / measures.factor) if self.demands.duration is None else value[column] / factor
                 at = times[int(crests.value[:, column].argmax())] / times[-1]
                 name = " ".join(self.problem.joint_names(column))
-                text = f"{name} at {100.0 * share**order:.4g} % of its {kind} limit, at {100.0 * at:.0f} % of the motion"
+                text = (
+                    f"{name} at {100.0 * share**order:.4g} % of its {kind} limit, at {100.0 * at:.0f} % of the motion"
+                )
                 yield 100.0 * (float(share) - 1.0), {"kind": kind, "subject": name, "text": text}
 
     def _margins(self, angle: float, length: float) -> Iterator[tuple[float, LimitRecord]]:

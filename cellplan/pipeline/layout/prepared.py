@@ -22,6 +22,8 @@ from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.kernel.job import Job
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Objective
+from cellplan.search.starts.generator import StartGenerator
+from cellplan.search.starts.problem import StartProblem
 from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
@@ -102,6 +104,12 @@ class Prepared:
         scene = self.scene if cell is self.variables.base else Scene.from_cell(cell)
         paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
         return chosen_start(scene, paths, progress=progress).start
+
+    @cached_property
+    def starts(self) -> StartGenerator:
+        """Starts of the search: the given layout with other branches, then sampled ones."""
+        problem = StartProblem.of(self.variables.base, self.variables, margin=self.variables.margin)
+        return StartGenerator(problem, seed=self.request.seed)
 
     @property
     def duration(self) -> float:

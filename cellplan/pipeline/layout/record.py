@@ -15,9 +15,9 @@ from cellplan.pipeline.drawing import drawing, swept_area
 from cellplan.pipeline.layout.finish import Certified, certified_cell
 from cellplan.pipeline.layout.limits import Standing, effects, standing_of
 from cellplan.pipeline.layout.prepared import Prepared
-from cellplan.pipeline.layout.proposals import BESTS, SIZE, origin_text
+from cellplan.pipeline.layout.proposals import BESTS, origin_text
 from cellplan.pipeline.layout.request import LayoutRequest
-from cellplan.pipeline.layout.trial import EFFORT, NO_START
+from cellplan.pipeline.layout.trial import EFFORT
 from cellplan.pipeline.write_run import versions
 from cellplan.report.record.common import number
 from cellplan.report.record.layout import (
@@ -236,7 +236,9 @@ def _in_file_units(value: float, unit: str) -> float | None:
     """A value in the unit of the file; None where it is infinite."""
     if not np.isfinite(value):
         return None
-    return number(round({"mm": MM * value, "deg": DEG * value, "": float(np.exp(value)) if not unit else 0.0}[unit], FINE))
+    return number(
+        round({"mm": MM * value, "deg": DEG * value, "": float(np.exp(value)) if not unit else 0.0}[unit], FINE)
+    )
 
 
 def _convergence(finished: Finished, figure: str) -> list[ProgressRecord]:

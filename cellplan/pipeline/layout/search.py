@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -86,9 +86,7 @@ class _Search:
             "versions": versions(),
         }
         best = BESTS[self.request.objective]
-        return Study(
-            folder=self.folder, header=header, size=SIZE, propose=proposals, best=best, enough=is_enough
-        )
+        return Study(folder=self.folder, header=header, size=SIZE, propose=proposals, best=best, enough=is_enough)
 
     def _best(self, finished: Finished) -> Certified | None:
         """The first candidate that passes, best first."""
@@ -97,7 +95,9 @@ class _Search:
             if number not in self.tried:
                 self.progress(f"certifying trial {number}", 1.0)
                 choice = trial["values"].get("choice") or {}
-                self.finish.ready = Prepared.of(self.request, self.ready.cell.with_values(choice)) if choice else self.ready
+                self.finish.ready = (
+                    Prepared.of(self.request, self.ready.cell.with_values(choice)) if choice else self.ready
+                )
                 self.tried[number] = self.finish.certified(number, trial["figures"])
             if self.tried[number].passed:
                 return self.tried[number]

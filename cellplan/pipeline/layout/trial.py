@@ -13,12 +13,12 @@ from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Effort
+from cellplan.search.starts.generator import Starts
 from cellplan.study.trial import Outcome, TrialStatus
 from cellplan.study.variants import Variant
 
 DRAWS: Final = 12  # [-] perturbations until the tools can follow their paths
 EFFORT: Final = Effort()
-NO_START: Final = "no layout was found in which all tools reach the starts of their paths"
 NOT_FOLLOWED: Final = "a tool cannot follow its path"
 
 Begin = tuple[Array, Array]  # variables, shape (n,), and start posture, shape (nq,)
@@ -49,16 +49,18 @@ def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
 
 def _begin(ready: Prepared, variant: Variant) -> Begin | None:
     """Where a trial begins; None where the tools cannot follow their paths."""
-    values, variables = variant.values, ready.variables
+    values = variant.values
     kind = values["kind"]
     if kind == "given":
-        return variables.given, ready.given_start
+        return _given(ready)
     if kind == "attempt":
         return _attempt(ready, int(str(values["index"])))
     if kind == "sampled":
         return _sampled(ready, int(str(values["index"])))
-    x = variables.given if values.get("x") is None else np.array(values["x"], dtype=float)
-    start = ready.given_start if values.get("start") is None else np.array(values["start"], dtype=float)
+    if values.get("of") is None:
+        x, start = _given(ready)
+    else:
+        x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
     if kind == "improved":
         return x, start
     rng = np.random.default_rng([ready.request.seed, variant.number])
@@ -81,12 +83,42 @@ def _attempt(ready: Prepared, index: int) -> Begin:
     """The layout of a cell file of the user's."""
     path = ready.request.attempts[index]
     cell = load_cell(path, allow_dirs=ready.request.allow_dirs)
-    return ready.variables.values_of(cell), ready.start_of(cell)
+    return ready.variables.read_from(cell), ready.start_of(cell)
 
 
-def _sampled(ready: Prepared, index: int) -> Begin | None:
-    """A start that was sampled over all that may change."""
-    raise NotImplementedError
+def _sampled(ready: Prepared, index: int) -> Begin:
+    """A start that was sampled over all that may change.
+
+    Raises:
+        NoSolutionError: There is none.
+    """
+    return _first_of(ready.starts.at(1 + index))
+
+
+def _given(ready: Prepared) -> Begin:
+    """The given layout, or with other branches of its inverse kinematics where its start leads nowhere.
+
+    Raises:
+        NoSolutionError: There is none.
+    """
+    try:
+        start = ready.given_start
+    except NoSolutionError:
+        return _first_of(ready.starts.at(0))
+    if ready.coarse.evaluate(ready.variables.given, start) is None:
+        return _first_of(ready.starts.at(0))
+    return ready.variables.given, start
+
+
+def _first_of(starts: Starts) -> Begin:
+    """The best of some starts.
+
+    Raises:
+        NoSolutionError: There is none.
+    """
+    for start in starts:
+        return start.x, start.start
+    raise NoSolutionError(starts.reason)
 
 
 def _outcome(ready: Prepared, found: Improved) -> Outcome:
