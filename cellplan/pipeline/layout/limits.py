@@ -63,15 +63,21 @@ class Standing:
         """What it breaks, the worst first."""
         found = [*self._margins(0.0, 0.0), *self._distances(0.0)]
         if self.demands.duration is not None:
-            factor = self.demands.duration / float(self.problem.times[-1] - self.problem.times[0])
-            found += self._loads(factor)
+            found += self._loads(self._whole)
         return [record for _, record in sorted(found, key=lambda each: -each[0])]
 
     def binding(self) -> list[LimitRecord]:
         """What holds it back: loads on the clock, margins, distances, bounds of variables."""
-        loads = self._loads(BINDS * self.measures.factor) if self.measures.factor > 0.0 else iter(())
+        loads = self._loads(BINDS * self._whole) if self._whole > 0.0 else iter(())
         found = [*loads, *self._margins(NEAR_ANGLE, NEAR_LENGTH), *self._distances(NEAR_LENGTH)]
         return [record for _, record in found] + list(self._bounds())
+
+    @property
+    def _whole(self) -> float:
+        """How many times as long as the nodes the motion lasts: as demanded, or as short as possible."""
+        if self.demands.duration is None:
+            return self.measures.factor
+        return self.demands.duration / float(self.problem.times[-1] - self.problem.times[0])
 
     def _loads(self, factor: float) -> Iterator[tuple[float, LimitRecord]]:
         """Joints whose speed or acceleration asks for a time of at least ``factor`` times that of the nodes."""
@@ -79,7 +85,7 @@ class Standing:
         for kind, crests, order in (("velocity", measures.speeds, 1.0), ("acceleration", measures.accelerations, 2.0)):
             value = crests.value.max(axis=0) ** (1.0 / order)
             for column in np.flatnonzero(value > factor).tolist():
-                share = (value[column] / measures.factor) if self.demands.duration is None else value[column] / factor
+                share = value[column] / self._whole
                 at = times[int(crests.value[:, column].argmax())] / times[-1]
                 name = " ".join(self.problem.joint_names(column))
                 text = (

@@ -15,7 +15,7 @@ from cellplan.pipeline.drawing import drawing, swept_area
 from cellplan.pipeline.layout.finish import Certified, certified_cell
 from cellplan.pipeline.layout.limits import Standing, effects, standing_of
 from cellplan.pipeline.layout.prepared import Prepared
-from cellplan.pipeline.layout.proposals import BESTS, origin_text
+from cellplan.pipeline.layout.proposals import BESTS, SIZE, origin_text
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.trial import EFFORT
 from cellplan.pipeline.write_run import versions
@@ -30,12 +30,12 @@ from cellplan.report.record.layout import (
     VariableRecord,
 )
 from cellplan.report.text.layout import verdict_line
-from cellplan.scene.scene import Scene
 from cellplan.study.study import Finished
 from cellplan.study.trial import TrialStatus
 
 TOP: Final = 10  # [-] layouts that are listed
 SAME: Final = 1e-4  # [-] share by which figures of two layouts differ that are not one
+REACH: Final = 5  # [-] rounds that the reach of an arm is sought in: to some millimetres
 SWEPT: Final = 33  # [-] configurations that the swept area is made of
 FINE: Final = 6  # decimals of figures of the search: far above rounding
 LENGTH_STEP: Final = 0.1  # [m] that effects are stated for
@@ -73,7 +73,7 @@ def layout_record(
         "has_accelerations": ready.has_accelerations,
         "seed": request.seed,
         "trials": len(finished.trials),
-        "rounds": finished.rounds,
+        "rounds": -(-len(finished.trials) // SIZE),
         "solves": solves,
         "given": _given(given, ready),
         "best": next((each for each in listed if best and each["trial"] == best.trial), None),
@@ -82,7 +82,7 @@ def layout_record(
         "front": _front(listed),
         "binding": best.standing.binding() if best else [],
         "variables": _variables(ready, standing, best),
-        "convergence": _convergence(finished, BESTS[request.objective].figure),
+        "convergence": _convergence(finished),
         "dropped": _dropped(finished),
         "remarks": list(ready.variables.remarks),
         "drawing": _drawing(ready, best) if best else {},
@@ -241,7 +241,7 @@ def _in_file_units(value: float, unit: str) -> float | None:
     )
 
 
-def _convergence(finished: Finished, figure: str) -> list[ProgressRecord]:
+def _convergence(finished: Finished) -> list[ProgressRecord]:
     """The cycle of every trial and the best so far, in the order of the trials."""
     best: float | None = None
     found: list[ProgressRecord] = []
@@ -282,13 +282,12 @@ def _drawing(ready: Prepared, best: Certified) -> dict[str, Any]:
     scene, solution = best.program.scene, best.program.solution
     rows = np.unique(np.linspace(0, len(solution.motion.q) - 1, SWEPT).round().astype(np.intp))
     q = solution.motion.q[rows]
-    given = Scene.from_cell(ready.cell)
     return {
-        "given": drawing(given, _shown_start(ready), ready.schedule),
+        "given": drawing(ready.scene, _shown_start(ready), ready.schedule),
         "best": drawing(scene, q[0], solution.runs[0].schedule),
         "swept": swept_area(scene, q),
         "reach_mm": {
-            robot.name: number(round(MM * float(arm_reach(robot.model) + np.linalg.norm(robot.tool.X_FT[:3, 3])), 3))
+            robot.name: number(round(MM * float(arm_reach(robot.model, rounds=REACH) + np.linalg.norm(robot.tool.X_FT[:3, 3])), 3))
             for robot in cell.robots
         },
         "keep_out": {},
