@@ -95,8 +95,8 @@ def test_what_stands_beside_the_ranges(load: Load) -> None:
         ),
         (
             "{vary: {worker.base: {xx_mm: [0, 1]}}}",
-            "vary.worker.base.xx_mm: unknown key, did you mean 'x_mm'?; allowed: x_mm, y_mm, z_mm, roll_deg, pitch_deg, "
-            "yaw_deg",
+            "vary.worker.base.xx_mm: unknown key, did you mean 'x_mm'?; allowed: x_mm, y_mm, z_mm, roll_deg, "
+            "pitch_deg, yaw_deg",
         ),
         ("{vary: {worker.base: true}}", None),
         (
@@ -123,7 +123,7 @@ def test_what_stands_beside_the_ranges(load: Load) -> None:
         ),
         (
             "{vary: {'holder.start_deg[0]': [0, 190]}}",
-            "vary.holder.start_deg[0]: expected a range within the limits of the joint 'A1', -185 to 185 deg",
+            "vary.holder.start_deg[0]: expected a range within the limits of the joint 'A2', -185 to 185 deg",
         ),
         (
             "{vary: {holder.start: true}}",
@@ -201,8 +201,8 @@ def test_a_pedestal_keeps_its_robot_upright(refuse: Refuse) -> None:
 
 
 HAND = (
-    "tool: {xyz_mm: [0, -100, 173.205080757], rpy_deg: [0, 30, -90], bodies: [{cylinder: {radius_mm: 40, length_mm: 60}, "
-    "at: {xyz_mm: [0, 0, 30]}}, {capsule: {radius_mm: 12, length_mm: 146.0}, "
+    "tool: {xyz_mm: [0, -100, 173.205080757], rpy_deg: [0, 30, -90], bodies: [{cylinder: {radius_mm: 40, "
+    "length_mm: 60}, at: {xyz_mm: [0, 0, 30]}}, {capsule: {radius_mm: 12, length_mm: 146.0}, "
     "at: {xyz_mm: [0.0, -57.5, 99.592921435], rpy_deg: [0, 30, -90]}}]}"
 )
 
