@@ -7,6 +7,8 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
+from cellplan.scene.bodies import Kind, is_ground
+from cellplan.scene.mounting import MountedPair
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.layout_pairs import among, demands_of, layout_pairs
@@ -45,7 +47,9 @@ class Contacts:
         own = set(robots)
         known, anyone = {*own, *against, None}, {body.name: body.robot for body in scene.bodies}
         self._pairs, watched = layout_pairs(scene)
-        is_design = [pair.rule is Rule.CONTACT for pair in scene.pairs] + [False] * len(scene.mounted)
+        is_design = [pair.rule is Rule.CONTACT for pair in scene.pairs] + [
+            _is_column(scene, pair) for pair in scene.mounted
+        ]
         owners = [{anyone[name] for name in pair.names} for pair in self._pairs]
         kept = [
             not design and not (pair.is_own and pair.is_fixed) and known >= each and bool(own & each)
@@ -84,3 +88,8 @@ class Contacts:
             worst[sample] = short[place]
             names[sample] = self._pairs[found.rows[place]].names if short[place] > 0.0 else None
         return worst, names
+
+
+def _is_column(scene: Scene, pair: MountedPair) -> bool:
+    """Whether a pair is a column and the ground that it stands on: its height follows from that."""
+    return scene.bodies[pair.first].kind is Kind.PEDESTAL and is_ground(scene.bodies[pair.second])

@@ -8,51 +8,34 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell import Cell
-from cellplan.search.kernel.job import Layouts
+from cellplan.search.distances.moving_bodies import LayoutVariables
 
 PROBE: Final = 0.1  # of a variable's range or usual step: far above rounding
 COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "yaw_deg")  # of a base that a start chooses so that its tool comes there
 FIXED: Final = -1  # in place of a column
 
 
-class LayoutVariables(Protocol):
-    """What starts need to know of the variables of a search; see ``search.variables``.
-
-    Attributes:
-        names: Address of each variable.
-        lower: Lower bounds in [m] or [rad], shape (n,).
-        upper: Upper bounds, shape (n,).
-        scale: A usual step of each, shape (n,).
-        given: Values of the given cell, shape (n,).
-    """
+class StartVariables(LayoutVariables, Protocol):
+    """Variables as starts need them; n of them, see ``search.variables``."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Address of each variable."""
+        """Address of each."""
         ...
 
     @property
     def lower(self) -> Array:
-        """Lower bounds."""
+        """Lower bounds in [m] or [rad], shape (n,)."""
         ...
 
     @property
     def upper(self) -> Array:
-        """Upper bounds."""
+        """Upper bounds, shape (n,)."""
         ...
 
     @property
     def scale(self) -> Array:
-        """Usual steps."""
-        ...
-
-    @property
-    def given(self) -> Array:
-        """Values of the given cell."""
-        ...
-
-    def layouts(self, x: Array, start: Array) -> Layouts:
-        """The layouts of values, shape (K, n), with start postures near which the robots start, shape (K, nq)."""
+        """A usual step of each, shape (n,)."""
         ...
 
 
@@ -74,7 +57,7 @@ class Freedom:
     shared: Indices
 
     @classmethod
-    def of(cls, cell: Cell, variables: LayoutVariables, start: Array) -> "Freedom":
+    def of(cls, cell: Cell, variables: StartVariables, start: Array) -> "Freedom":
         """Sort the variables by what changes when each of them does.
 
         Args:
@@ -111,7 +94,7 @@ def _base_columns(robot: str, names: Sequence[str], own: Indices) -> list[int]:
     return [places.get(f"robots.{robot}.base.{component}", FIXED) for component in COMPONENTS]
 
 
-def drawn_within(variables: LayoutVariables, columns: Indices, count: int, rng: np.random.Generator) -> Array:
+def drawn_within(variables: StartVariables, columns: Indices, count: int, rng: np.random.Generator) -> Array:
     """Values of some variables drawn evenly within their bounds, shape (count, n); ten steps where these are infinite.
 
     Args:

@@ -17,7 +17,7 @@ from cellplan.scene.scene import Scene
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.starts.contacts import Contacts
-from cellplan.search.starts.freedom import FIXED, Freedom, LayoutVariables
+from cellplan.search.starts.freedom import FIXED, Freedom, StartVariables
 from cellplan.search.starts.reaching import BaseBounds, FreeArm, Goal
 
 NODES: Final = 65  # [-] of a motion: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
@@ -44,7 +44,7 @@ class StartProblem:
     """
 
     cell: Cell
-    variables: LayoutVariables
+    variables: StartVariables
     freedom: Freedom
     start: Array
     margin: Array
@@ -57,7 +57,7 @@ class StartProblem:
     contacts: tuple[Contacts, ...]
 
     @classmethod
-    def of(cls, cell: Cell, variables: LayoutVariables, *, margin: Array | float = 0.0) -> "StartProblem":
+    def of(cls, cell: Cell, variables: StartVariables, *, margin: Array | float = 0.0) -> "StartProblem":
         """Prepare a cell.
 
         Args:

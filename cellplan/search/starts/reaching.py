@@ -25,8 +25,8 @@ TRIAL: Final = 10  # iterations after which draws that are still far away are gi
 FAR: Final = 0.05  # [m, rad] far away
 LONGEST_MOVE: Final = 0.5  # [rad, m] largest change in one iteration
 DAMPING: Final = 1e-3  # keeps steps finite at singular configurations
-STEPS: Final = 2  # of Newton's method from node to node
-NEARLY: Final = 5e-3  # [m, rad] an error that one step more leaves nothing of
+STEPS: Final = 5  # of Newton's method from node to node at most; one or two but at corners
+NEARLY: Final = 2e-3  # [m, rad] an error that one step more leaves nothing of
 LOST: Final = 0.6  # [rad, m] a joint that moves more than this from one node to the next has jumped
 
 
@@ -183,22 +183,33 @@ def followed(arm: FreeArm, goal: Goal, draws: Placed) -> tuple[Array, Flags]:
     """
     count, nodes = len(draws.q), len(goal.X_RT)
     q = np.full((count, nodes, draws.q.shape[1]), np.nan)
-    q[:, 0], at, fixed = draws.q, np.arange(count), np.zeros(4, dtype=bool)
+    q[:, 0], at = draws.q, np.arange(count)
     for node in range(1, nodes):
         here = q[at, node - 1].copy()
         if node > 1:
             here += q[at, node - 1] - q[at, node - 2]
-        placed = draws.of_places(at)
-        for _ in range(STEPS):
-            error, J = _linearised(arm, goal, node, replace(placed, q=here), fixed)
-            here = here + _damped(J, error)
-        is_near = np.abs(error).max(axis=1, initial=0.0) < NEARLY  # before the last step, which squares it
+        here, is_near = _corrected(arm, goal, node, replace(draws.of_places(at), q=here))
         kept = is_near & (np.abs(here - q[at, node - 1]).max(axis=1) < LOST)
         at = at[kept]
         q[at, node] = here[kept]
     has_followed = np.zeros(count, dtype=bool)
     has_followed[at] = True
     return q, has_followed
+
+
+def _corrected(arm: FreeArm, goal: Goal, node: int, draws: Placed) -> tuple[Array, Flags]:
+    """Configurations with the tools brought to a node of their path, and which came there, shapes (B, n) and (B,)."""
+    q, at, is_near = draws.q.copy(), np.arange(len(draws.q)), np.zeros(len(draws.q), dtype=bool)
+    fixed = np.zeros(4, dtype=bool)
+    for _ in range(STEPS):
+        error, J = _linearised(arm, goal, node, replace(draws, q=q).of_places(at), fixed)
+        q[at] += _damped(J, error)
+        arrived = np.abs(error).max(axis=1, initial=0.0) < NEARLY  # before this step, which squares it
+        is_near[at[arrived]] = True
+        at = at[~arrived]
+        if not len(at):
+            break
+    return q, is_near
 
 
 def _linearised(arm: FreeArm, goal: Goal, node: int, draws: Placed, is_free: Flags) -> tuple[Array, Array]:
