@@ -22,8 +22,8 @@ Goal = Annotated[
     typer.Option(
         "--objective",
         metavar="NAME",
-        help="conforming: the first layout that passes; cycle: the shortest cycle; clearance: the largest distances, or "
-        "change: the least change from the given layout, at the duration of the cell.",
+        help="conforming: the first layout that passes; cycle: the shortest cycle; clearance: the largest distances; "
+        "change: the least change from the given layout. All but cycle are at the duration of the cell.",
     ),
 ]
 HowTimed = Annotated[
@@ -104,11 +104,11 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     """Search for the best layout: bases, start postures, tools and whatever the key layout of the cell says may change.
 
     The best layout is a new cell file, best.yaml, that passed every check of solve. Limits of acceleration count: a
-    layout that is the fastest by velocity alone may be slow. Exit status: 0 a certified layout was found, 1 none passed,
-    2 bad input, 3 no start at all, 130 interrupted (--resume goes on).
+    layout that is the fastest by velocity alone may be slow. Exit status: 0 a certified layout was found, 1 none
+    passed, 2 bad input, 3 no start at all, 130 interrupted (--resume goes on).
     """
     with json_failure(SCHEMA, desired=as_json):
-        from cellplan.cli.layout_options import read_request, run_search, status_lines
+        from cellplan.cli.layout_options import read_request, read_stop, run_search, status_lines
 
         if status:
             say("\n".join(status_lines(cell, output)))
@@ -127,10 +127,11 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
             seed=seed,
             allow_dirs=tuple(allow_dir or ()),
         )
+        stop = read_stop(budget, trials)
         with progress_listener(quiet=quiet) as progress:
             try:
                 record, folder = run_search(
-                    request, output, budget=budget, trials=trials, workers=workers, resume=resume, progress=progress
+                    request, output, stop=stop, workers=workers, resume=resume, progress=progress
                 )
             except KeyboardInterrupt as error:
                 raise InterruptedWorkError(str(error) or "interrupted") from None

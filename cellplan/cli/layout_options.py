@@ -15,6 +15,7 @@ from cellplan.pipeline.layout.search import search_layout
 from cellplan.report.record.common import Record
 from cellplan.search.programs.objective import Objective, Timing
 from cellplan.study.status import read_status
+from cellplan.study.study import Stop
 
 Choice = TypeVar("Choice", bound=StrEnum)
 
@@ -37,23 +38,30 @@ def read_request(
     )
 
 
+def read_stop(budget: str | None, trials: int | None) -> Stop | None:
+    """Where the search ends; None where no option says it.
+
+    Raises:
+        InputError: The budget is no time.
+    """
+    if budget is None and trials is None:
+        return None
+    return Stop(trials=trials, seconds=None if budget is None else read_time("--budget", budget))
+
+
 def run_search(
     request: LayoutRequest,
     output: Path | None,
     *,
-    budget: str | None,
-    trials: int | None,
+    stop: Stop | None,
     workers: int | None,
     resume: bool,
     progress: Progress,
 ) -> tuple[Record, Path]:
     """The record of the search and its folder; arguments as the options give them."""
-    seconds = None if budget is None else read_time("--budget", budget)
     folder = output or default_folder(request.cell, request.allow_dirs)
     count = workers or processors()
-    found = search_layout(
-        request, folder, trials=trials, budget=seconds, workers=count, resume=resume, progress=progress
-    )
+    found = search_layout(request, folder, stop=stop, workers=count, resume=resume, progress=progress)
     return found.record, folder
 
 

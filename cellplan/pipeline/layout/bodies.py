@@ -1,88 +1,80 @@
-"""Distances of the bodies of layouts, for a layout problem: pairs with what is demanded of each."""
+"""Variables of a layout as the parts of a search see them that know no cell files."""
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell, Part, Tool
-from cellplan.scene.scene import Scene
-from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
 from cellplan.search.variables.variables import Variables
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NearBodies:
-    """Pairs of one layout that are near what is demanded of them, M of them; see ``LayoutDistances``."""
+@dataclass(frozen=True, slots=True)
+class SearchedVariables:
+    """Variables as starts see them: candidates are what the kernel needs for the motion.
 
-    pairs: Indices
-    keys: Indices
-    distances: Array
-    demands: Array
-    is_own: Flags
-    rows: Indices
-    every: LayoutDistances
+    Attributes:
+        variables: The variables.
+    """
 
+    variables: Variables
 
-class LayoutBodies:
-    """The bodies of a cell, wherever a layout puts them."""
+    @property
+    def cell(self) -> Cell:
+        """The cell that is searched."""
+        return self.variables.base
 
-    def __init__(self, scene: Scene, variables: Variables) -> None:
-        """Find the pairs that layouts keep apart."""
-        self._placed = _Placed(variables)
-        self._distances = CellDistances.of(scene, self._placed)
-        self._highest = max((pair.demand for pair in self._distances.pairs), default=0.0)
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Address of each variable."""
+        return self.variables.names
 
-    def near(self, x: Array, q: Array, within: float) -> NearBodies:
-        """Pairs less than ``within`` in [m] beyond what is demanded of them, at configurations of shape (k, nq)."""
-        layout = self._placed.layouts(x[None], q[:1])
-        found = self._distances.near(x, layout, q, max(0.0, self._highest) + within)
-        rows = np.flatnonzero(found.distances - found.demands < within)
-        return NearBodies(
-            pairs=found.pairs[rows],
-            keys=found.keys[rows],
-            distances=found.distances[rows],
-            demands=found.demands[rows],
-            is_own=found.is_own[rows],
-            rows=rows,
-            every=found,
-        )
+    @property
+    def lower(self) -> Array:
+        """Lower bounds, shape (n,)."""
+        return self.variables.lower
 
-    def derivatives(self, near: NearBodies, x: Array, dq: Array) -> Array:
-        """Derivatives of their distances, shape (M, n), from those of the joints, shape (k, nq, n)."""
-        return self._distances.derivatives(near.every, x, dq)[near.rows]
+    @property
+    def upper(self) -> Array:
+        """Upper bounds, shape (n,)."""
+        return self.variables.upper
 
-    def names(self, pair: int) -> tuple[str, str]:
-        """Names of the bodies of a pair."""
-        return self._distances.pairs[pair].names
+    @property
+    def scale(self) -> Array:
+        """Usual steps, shape (n,)."""
+        return self.variables.scale
 
-
-class _Placed:
-    """Variables as bodies see them: bases, tools and the part where they stand, not where the kernel needs them."""
-
-    def __init__(self, variables: Variables) -> None:
-        """Keep the variables."""
-        self._variables = variables
-        self.cell: Cell = variables.base
-        self.given: Array = variables.given
+    @property
+    def given(self) -> Array:
+        """Values of the given cell, shape (n,)."""
+        return self.variables.given
 
     def layouts(self, x: Array, start: Array) -> Layouts:
-        """Layouts, shape (K, n), with start postures, shape (K, nq)."""
-        return Layouts.of([self._variables.placed(each) for each in x], start)
+        """Candidates at values of shape (K, n), with start postures of shape (K, nq)."""
+        return self.variables.layouts(x, start)
 
     def directions(self, x: Array) -> Directions:
-        """What each variable does."""
-        found = self._variables.directions(x)
-        return Directions(
-            base=self._variables.base_twists(x), tool=found.tool, start=found.start, weights=found.weights
-        )
+        """What each variable does to a candidate."""
+        return self.variables.directions(x)
 
     def tools(self, x: Array) -> dict[str, Tool]:
         """Tools of the robots whose tools vary."""
-        return self._variables.tools(x)
+        return self.variables.tools(x)
 
     def part(self, x: Array) -> Part:
         """The part with its grasps."""
-        return self._variables.part(x)
+        return self.variables.part(x)
+
+
+class PlacedVariables(SearchedVariables):
+    """Variables as bodies see them: bases and tools where they stand, not where the kernel needs them."""
+
+    def layouts(self, x: Array, start: Array) -> Layouts:
+        """Layouts at values of shape (K, n), with start postures of shape (K, nq)."""
+        return Layouts.of([self.variables.placed(each) for each in x], start)
+
+    def directions(self, x: Array) -> Directions:
+        """What each variable does to bases, tools, start and weights."""
+        found = self.variables.directions(x)
+        base = self.variables.base_twists(x)
+        return Directions(base=base, tool=found.tool, start=found.start, weights=found.weights)

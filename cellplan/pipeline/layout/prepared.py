@@ -11,7 +11,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.pipeline.layout.bodies import LayoutBodies
+from cellplan.pipeline.layout.bodies import PlacedVariables, SearchedVariables
 from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.planning.modes import plan_phases
@@ -19,6 +19,7 @@ from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.verdicts import acceleration_limits
+from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Job
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Objective
@@ -47,7 +48,7 @@ class Prepared:
     cell: Cell
     variables: Variables
     scene: Scene
-    bodies: LayoutBodies
+    bodies: CellDistances
     schedule: Schedule
     moving: tuple[str, ...]
 
@@ -71,7 +72,7 @@ class Prepared:
             cell=cell,
             variables=variables,
             scene=scene,
-            bodies=LayoutBodies(scene, variables),
+            bodies=CellDistances.of(scene, PlacedVariables(variables)),
             schedule=schedule_paths(variables.base, [paths[name] for name in phase.tasks]),
             moving=tuple(phase.moving),
         )
@@ -108,7 +109,7 @@ class Prepared:
     @cached_property
     def starts(self) -> StartGenerator:
         """Starts of the search: the given layout with other branches, then sampled ones."""
-        problem = StartProblem.of(self.variables.base, self.variables, margin=self.variables.margin)
+        problem = StartProblem.of(self.variables.base, SearchedVariables(self.variables), margin=self.variables.margin)
         return StartGenerator(problem, seed=self.request.seed)
 
     @property

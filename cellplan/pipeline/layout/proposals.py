@@ -1,4 +1,4 @@
-"""Where the trials of a layout search begin: the given layout, those of the user, samples, and the best found so far."""
+"""Where trials of a layout search begin: the given layout, those of the user, samples, and the best found so far."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -61,7 +61,10 @@ class Proposals:
 
     def _first(self) -> list[dict[str, Any]]:
         """The given layout and those of the user, then perturbations of the given one and samples."""
-        listed = [{"kind": "given"}, *({"kind": "attempt", "index": k} for k in range(len(self.request.attempts)))]
+        listed: list[dict[str, Any]] = [
+            {"kind": "given"},
+            *({"kind": "attempt", "index": k} for k in range(len(self.request.attempts))),
+        ]
         options: list[dict[str, Any]] = [{**each, "choice": choice} for choice in self.combinations for each in listed]
         rest = [self._perturbed(None, SPREADS[0], 0), self._sampled(0, 0), self._perturbed(None, SPREADS[1], 1)]
         return [*options, *rest[: -len(options) % SIZE]]

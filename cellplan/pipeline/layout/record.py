@@ -287,7 +287,9 @@ def _drawing(ready: Prepared, best: Certified) -> dict[str, Any]:
         "best": drawing(scene, q[0], solution.runs[0].schedule),
         "swept": swept_area(scene, q),
         "reach_mm": {
-            robot.name: number(round(MM * float(arm_reach(robot.model, rounds=REACH) + np.linalg.norm(robot.tool.X_FT[:3, 3])), 3))
+            robot.name: number(
+                round(MM * float(arm_reach(robot.model, rounds=REACH) + np.linalg.norm(robot.tool.X_FT[:3, 3])), 3)
+            )
             for robot in cell.robots
         },
         "keep_out": {},

@@ -25,7 +25,7 @@ from cellplan.study.study import Finished, Stop, Study
 from cellplan.study.trial import Trial, TrialStatus
 from cellplan.study.workers import Limits, Workers
 
-BUDGET: Final = 60.0  # [s] of a search that is given neither a budget nor a number of trials
+BUDGET: Final = 60.0  # [s] of a search that does not say where to end
 CANDIDATES: Final = 4  # [-] layouts that are finished until one passes
 TRIAL_LIMIT: Final = 900.0  # [s] of the processor for one trial
 MODULES: Final = ("cellplan.pipeline.layout.trial",)
@@ -123,8 +123,7 @@ def search_layout(
     request: LayoutRequest,
     folder: Path,
     *,
-    trials: int | None = None,
-    budget: float | None = None,
+    stop: Stop | None = None,
     workers: int | Executor = 1,
     resume: bool = False,
     progress: Progress = silent,
@@ -133,14 +132,13 @@ def search_layout(
 
     The folder holds ``study.jsonl``, a line for each trial that grows while the search runs, and at the end
     ``best.yaml``, the given cell file with the values of the best layout, ``study.json`` and ``study.html``. Only a
-    layout that passed every check of ``solve`` is written as the best one. For equal ``trials`` the files are the same,
+    layout that passed every check of ``solve`` is written as the best one. For an equal number of trials the files are the same,
     for any number of workers.
 
     Args:
         request: What is searched for.
         folder: Folder of the study; an earlier one is replaced, or continued with ``resume``.
-        trials: Number of trials; None for no limit.
-        budget: Time in [s] after which no round is begun; None for 60 s where there is no number of trials either.
+        stop: Where it ends: a number of trials, or a budget of seconds; None for 60 s.
         workers: Number of processes that search; or an executor, which stays open.
         resume: Whether trials that the folder holds already are not repeated.
         progress: Called with the stage and the fraction done.
@@ -154,13 +152,12 @@ def search_layout(
         if isinstance(workers, int):
             pool = opened.enter_context(Workers(workers, modules=MODULES))
         ready = Prepared.of(request, searched_cell(request))
-        stop = Stop(trials=trials, seconds=budget if budget is not None or trials is not None else BUDGET)
         search = _Search(
             request=request,
             folder=folder,
             ready=ready,
             workers=pool,
-            stop=stop,
+            stop=stop or Stop(seconds=BUDGET),
             progress=progress,
             finish=Finish(ready=ready, progress=progress),
         )

@@ -8,16 +8,17 @@ import numpy as np
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.io.cell.load import load_cell
+from cellplan.model.seeds import generator
 from cellplan.pipeline.layout.limits import reason, standing_of
 from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Effort
+from cellplan.search.programs.perturb import perturbed
 from cellplan.search.starts.generator import Starts
 from cellplan.study.trial import Outcome, TrialStatus
 from cellplan.study.variants import Variant
 
-DRAWS: Final = 12  # [-] perturbations until the tools can follow their paths
 EFFORT: Final = Effort()
 NOT_FOLLOWED: Final = "a tool cannot follow its path"
 
@@ -63,20 +64,9 @@ def _begin(ready: Prepared, variant: Variant) -> Begin | None:
         x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
     if kind == "improved":
         return x, start
-    rng = np.random.default_rng([ready.request.seed, variant.number])
-    return _perturbed(ready, (x, start), float(str(values["spread"])), rng)
-
-
-def _perturbed(ready: Prepared, begin: Begin, spread: float, rng: np.random.Generator) -> Begin | None:
-    """A layout nearby in which the tools can follow their paths, each draw nearer than the one before; None else."""
-    variables = ready.variables
-    for draw in range(DRAWS):
-        step = spread * 0.85**draw * variables.scale * rng.standard_normal(len(variables.names))
-        x = np.clip(begin[0] + step, variables.lower, variables.upper)
-        point = ready.coarse.evaluate(x, begin[1])
-        if point is not None:
-            return x, point.start
-    return None
+    rng = generator(f"layout/{variant.number}", ready.request.seed)
+    point = perturbed(ready.coarse, x, start, rng, size=float(str(values["spread"])))
+    return None if point is None else (point.x, point.start)
 
 
 def _attempt(ready: Prepared, index: int) -> Begin:
