@@ -135,9 +135,9 @@ def _ends(obstacle: Obstacle) -> tuple[float, float] | None:
 def _column(robot: Robot, obstacle: Obstacle) -> dict[str, Any] | None:
     """The pedestal as a cell file writes it; None where it would not be the same body."""
     ends, shape = _ends(obstacle), obstacle.shape
-    aside = robot.X_WB[:2, 3] - obstacle.X_WS[:2, 3]
+    beside = robot.X_WB[:2, 3] - obstacle.X_WS[:2, 3]
     leans = math.acos(min(1.0, max(-1.0, float(robot.X_WB[2, 2])))) > MOST_LEAN
-    if ends is None or leans or float(np.hypot(*aside)) > CENTRED:
+    if ends is None or leans or float(np.hypot(*beside)) > CENTRED:
         return None
     floor = {"floor_z_mm": written_quantity(ends[0], is_angle=False)}
     if isinstance(shape, Cylinder):

@@ -96,8 +96,8 @@ class Variables:
     def placed(self, x: Array) -> Cell:
         """The cell at values of the variables, shape (n,), neither rounded nor validated: quick, for scenes.
 
-        Bases, tools with their solids, grasps, the part at rest, spins and weights are those of the layout, and start
-        postures as far as they are among the variables.
+        Bases, tools with their solids, grasps, the part at rest, spins and weights are those of the layout, and so are
+        start postures as far as they are among the variables.
         """
         return self.state(x).cell(self.base)
 
