@@ -14,8 +14,8 @@ from cellplan.search.programs.problem import Distances, Point, Problem
 ANGLE: Final = 0.01  # [rad] of a lack that weighs as much as
 LENGTH: Final = 0.003  # [m] and as
 SHARE: Final = 0.01  # [-] of the duration
-SLACK: Final = 10.0  # [-] share of the objective that one unit costs: feasibility first
-IN_ROOM: Final = 0.1  # [-] likewise where only the room is missed that counts as kept
+SLACK: Final = 1.0  # [-] share of the objective that one unit costs: feasibility first
+IN_ROOM: Final = 0.02  # [-] likewise where only the room is missed that counts as kept
 OWN_ROOM: Final = 0.1  # [-] share of the room that is asked of a robot's own bodies
 
 
