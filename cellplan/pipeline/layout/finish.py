@@ -24,6 +24,14 @@ KEYS: Final = 25  # [-] configurations at which distances are asked there
 ITERATIONS: Final = 25
 ROUNDS: Final = 4  # [-] times that a layout is improved and solved before it is given up
 DURATIONS: Final = 4  # [-] durations tried until the limits hold
+SLOWED: Final = {
+    "position_error_between_rows": 0.5,
+    "orientation_error_between_rows": 0.5,
+    "closure_position_error_between_rows": 0.5,
+    "closure_orientation_error_between_rows": 0.5,
+    "part_acceleration": 0.5,
+    "tool_speed": 1.0,
+}  # checks that pass when the motion is slow enough: how the time that they ask for grows with their value
 MORE_ANGLE: Final = np.radians(0.05)  # [rad] asked for beyond what was missed
 MORE_LENGTH: Final = 0.0005  # [m] likewise
 MORE_TIME: Final = 0.002  # [-] likewise
@@ -181,7 +189,13 @@ class Finish:
             if following == factor:
                 break
             factor = following
-        return program if program.load <= 1.0 else self._at(cell, whole_steps(cell, factor, longer_than=factor))
+        for _ in range(DURATIONS):
+            asked = max(program.load, _time_asked(program))
+            if asked <= 1.0:
+                break
+            factor = whole_steps(cell, factor * asked, longer_than=factor)
+            program = self._at(cell, factor)
+        return program
 
     def _at(self, cell: Cell, factor: float) -> TimedProgram:
         """The program slower or faster by a factor, verified but for its clearance."""
@@ -196,6 +210,13 @@ class Finish:
         if margin is not None and margin < demanded - ROUNDING:
             return f"smallest margin {margin:.4g} deg, {demanded:.4g} deg demanded"
         return ""
+
+
+def _time_asked(program: TimedProgram) -> float:
+    """How many times as long the motion must last for what is no limit of a joint but gets less when it is slower."""
+    checks = [check for run in program.solution.runs for check in run.report.checks if not check.passed]
+    asked = [(check.value / check.limit) ** SLOWED[check.name] for check in checks if check.name in SLOWED]
+    return max(asked, default=1.0)
 
 
 def certified_cell(found: Certified) -> Cell:
