@@ -132,8 +132,8 @@ def search_layout(
 
     The folder holds ``study.jsonl``, a line for each trial that grows while the search runs, and at the end
     ``best.yaml``, the given cell file with the values of the best layout, ``study.json`` and ``study.html``. Only a
-    layout that passed every check of ``solve`` is written as the best one. For an equal number of trials the files are the same,
-    for any number of workers.
+    layout that passed every check of ``solve`` is written as the best one. For an equal number of trials the files are
+    the same, for any number of workers.
 
     Args:
         request: What is searched for.
