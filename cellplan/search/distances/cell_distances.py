@@ -19,9 +19,11 @@ from cellplan.geometry.transforms import pose
 from cellplan.kinematics.link_forest import WORLD
 from cellplan.model.cell import Cell
 from cellplan.model.mounting import Bracket
+from cellplan.scene.body_table import BodyTable
 from cellplan.scene.near_table import Found, NearTable, wrenches
 from cellplan.scene.scene import Scene
-from cellplan.search.distances.layout_pairs import LayoutPair, among, are_own, demands_of, layout_pairs
+from cellplan.search.distances.keep_out import keep_out_bodies
+from cellplan.search.distances.layout_pairs import LayoutPair, among, are_own, demands_of, layout_pairs, with_areas
 from cellplan.search.distances.moving_bodies import LayoutVariables, MovingBodies, Placed, far_away, supports
 from cellplan.search.kernel.job import Layouts
 
@@ -79,7 +81,8 @@ class CellDistances:
     """The pairs of a cell that its layouts keep apart.
 
     Attributes:
-        pairs: The pairs: those that the checks watch, then those of which they judge the depth.
+        pairs: The pairs: those that the checks watch, those of which they judge the depth, then areas of the floor with
+            the bases and columns that keep out of them.
     """
 
     def __init__(self, scene: Scene, variables: LayoutVariables) -> None:
@@ -87,10 +90,27 @@ class CellDistances:
         self._scene, self._variables, self._cell = scene, variables, scene.cell
         self._moving = MovingBodies(scene)
         self.pairs, watched = layout_pairs(scene)
+        areas, origins = keep_out_bodies(scene.cell)
+        carriers = [scene.carrier(index) for index in range(len(scene.engine.bodies))] + [*areas, *origins]
+        added = [prepare(each.name, each.shape) for each in (*areas, *origins)]  # type: ignore[arg-type] # no half-space
+        first = len(scene.engine.bodies)
+        at_base = {each.robot: first + len(areas) + place for place, each in enumerate(origins)}
+        ends = [
+            (first + area, body)
+            for area in range(len(areas))
+            for robot, origin in at_base.items()
+            for body in (origin, *([self._moving.columns[robot]] if robot in self._moving.columns else []))
+        ]
+        self.pairs, watched = with_areas(self.pairs, watched, ends, [each.name for each in carriers])
+        self._engine = Engine([*scene.engine.bodies, *added]) if added else scene.engine
         changed = {index for index, _ in self._moving.of_tools(variables.placed(variables.given))}
-        self._table = replace(scene.near_table, pairs=among(watched, _concerned(self.pairs, changed)))
+        self._table = replace(
+            scene.near_table,
+            bodies=BodyTable.of(scene.near_table.forest, carriers, self._engine.bodies),
+            pairs=among(watched, _concerned(self.pairs, changed)),
+            is_hull=np.append(scene.near_table.is_hull, [True] * len(added)).astype(bool),
+        )
         self._demands, self._own = demands_of(self.pairs), are_own(self.pairs)
-        carriers = [scene.carrier(index) for index in range(len(scene.engine.bodies))]
         index = {robot.name: place for place, robot in enumerate(self._cell.robots)}
         self._robots = np.array([-1 if each.robot is None else index[each.robot] for each in carriers], dtype=np.intp)
 
@@ -152,13 +172,13 @@ class CellDistances:
     def _placed(self, cell: Cell) -> tuple[NearTable, Engine]:
         """The bodies as a layout has them."""
         placed = {**dict(self._moving.of_bases(_bases(cell))), **dict(self._moving.of_tools(cell))}
-        bodies = self._scene.engine.bodies
+        bodies = self._engine.bodies
         other = dict[int, CollisionBody]()
         for index, each in placed.items():
             if each.shape is not None and each.shape is not bodies[index].shape and each.shape != bodies[index].shape:
                 other[index] = prepare(bodies[index].name, each.shape)
         poses = {index: each.X_LS if each.shape is not None else far_away(index) for index, each in placed.items()}
-        return self._table.moved(poses, other), self._scene.engine.with_bodies(other) if other else self._scene.engine
+        return self._table.moved(poses, other), self._engine.with_bodies(other) if other else self._engine
 
     def _by_bases(self, near: LayoutDistances, x: Array) -> Array:
         """Derivatives while joints stand still, of what moves as a whole with the bases, shape (M, n)."""

@@ -11,6 +11,7 @@ from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.geometry.shapes import Box, Shape
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell import Cell, Part, Robot
+from cellplan.model.layout import KeepOut, LayoutSettings
 from cellplan.model.mounting import Pedestal
 from cellplan.model.robot import BASE
 from cellplan.scene.scene import Scene
@@ -145,6 +146,30 @@ def test_what_stands_in_another_thing_fails_the_checks_and_falls_short_of_its_di
         failing = [set(distances.pairs[row].names) for row in near.pairs[short].tolist()]
         assert verdict(variables.placed(x)) is (deep < 0.0)
         assert failing == ([names] if deep > 0.0 else [])
+
+
+@pytest.mark.parametrize(("height", "reach"), [(0.0, 0.0), (0.5, 0.3)])
+def test_bases_and_columns_keep_out_of_areas_by_their_footprints(height: float, reach: float) -> None:
+    area = KeepOut(name="aisle", shape=Box((0.4, 2.0, 1.0)), X_WS=pose((1.0, 0.0, 0.5)))
+    cell = cell_of(arm("a", LOW), arm("b", facing(pose((0.0, 0.0, height)), 2.0), pedestal=COLUMN))
+    cell = replace(cell, layout=LayoutSettings(ranges=(), keep_out=(area,)))
+    variables = BaseOfB(cell)
+    distances = CellDistances.of(Scene.from_cell(cell), variables)
+    for apart in (0.05, -0.04):
+        near = near_at(distances, variables, np.array([apart + reach - 0.8, 0.0, 0.0]), 0.1)
+        found = {
+            distances.pairs[pair].names[1]: (float(d), slope)
+            for pair, d, slope in zip(
+                near.pairs.tolist(),
+                near.distances,
+                distances.derivatives(near, np.zeros(3), np.zeros((1, 12, 3))),
+                strict=True,
+            )
+            if distances.pairs[pair].names[0] == "keep_out.aisle"
+        }
+        distance, slope = found["b/pedestal" if reach else "b/base"]
+        assert distance == pytest.approx(apart, abs=1e-5)
+        np.testing.assert_allclose(slope, (1.0, 0.0, 0.0), atol=1e-4)
 
 
 @pytest.mark.parametrize("kind", KINDS)
