@@ -14,8 +14,7 @@ from cellplan.search.programs.problem import Distances, Point, Problem
 ANGLE: Final = 0.01  # [rad] of a lack that weighs as much as
 LENGTH: Final = 0.003  # [m] and as
 SHARE: Final = 0.01  # [-] of the duration
-SLACK: Final = 1.0  # [-] share of the objective that one unit costs: feasibility first
-IN_ROOM: Final = 0.02  # [-] likewise where only the room is missed that counts as kept
+IN_ROOM: Final = 0.02  # [-] of the price of a lack where only the room is missed that counts as kept
 OWN_ROOM: Final = 0.1  # [-] share of the room that is asked of a robot's own bodies
 
 
@@ -157,10 +156,9 @@ class Missed:
         """Sum of what does not count as kept."""
         return float(np.maximum(self.lacks - self.allowed, 0.0).sum())
 
-    @property
-    def cost(self) -> float:
-        """What it costs in the merit of a point: feasibility first, then some of the room."""
-        return SLACK * self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum())
+    def cost(self, price: float) -> float:
+        """What it costs in the merit of a point, at the price of one unit: little where it counts as kept."""
+        return price * (self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum()))
 
 
 def rooms(distances: Distances, room: Room) -> Array:
