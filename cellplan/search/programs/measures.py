@@ -15,6 +15,7 @@ ANGLE: Final = 0.01  # [rad] of a lack that weighs as much as
 LENGTH: Final = 0.003  # [m] and as
 SHARE: Final = 0.01  # [-] of the duration
 IN_ROOM: Final = 0.02  # [-] of the price of a lack where only the room is missed that counts as kept
+ROUNDING: Final = 1e-6  # [-] usual units: 3 nm
 OWN_ROOM: Final = 0.1  # [-] share of the room that is asked of a robot's own bodies
 
 
@@ -153,8 +154,9 @@ class Missed:
 
     @property
     def violation(self) -> float:
-        """Sum of what does not count as kept."""
-        return float(np.maximum(self.lacks - self.allowed, 0.0).sum())
+        """Sum of what does not count as kept; what is left of rounding does."""
+        total = float(np.maximum(self.lacks - self.allowed, 0.0).sum())
+        return total if total > ROUNDING else 0.0
 
     def cost(self, price: float) -> float:
         """What it costs in the merit of a point, at the price of one unit: little where it counts as kept."""
