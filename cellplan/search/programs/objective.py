@@ -81,6 +81,7 @@ class Effort:
         within: Distance in [m] above what is demanded, within which pairs become rows.
         trust: First radius of the trust region, in usual steps of the variables.
         room: What the rows ask for beyond the demands.
+        least_gain: Share of the objective that ``LOOKS_BACK`` programs must gain to go on.
         give_up_above: Objective above which it is given up after ``GIVE_UP_AFTER`` programs; None for never.
     """
 
@@ -90,4 +91,5 @@ class Effort:
     within: float = 0.06
     trust: float = 0.5
     room: Room = field(default_factory=Room)
+    least_gain: float = 3e-3
     give_up_above: float | None = None
