@@ -140,7 +140,7 @@ def test_without_dask_the_message_says_what_to_install(monkeypatch: pytest.Monke
     with pytest.raises(InputError) as raised:
         Cluster("tcp://127.0.0.1:1")
     assert str(raised.value) == (
-        "--scheduler: expected Dask, got no package 'distributed': pip install cellplan[cluster]"
+        '--scheduler: expected Dask, got no package distributed: pip install "cellplan[cluster]"'
     )
 
 
