@@ -172,7 +172,7 @@ def _connected(address: str) -> Any:
         from distributed import Client
     except ImportError:
         raise InputError(
-            "--scheduler: expected Dask, got no package 'distributed': pip install cellplan[cluster]"
+            '--scheduler: expected Dask, got no package distributed: pip install "cellplan[cluster]"'
         ) from None
     try:
         return Client(address, timeout=CONNECT_S, set_as_default=False)
