@@ -149,6 +149,11 @@ def _refuse_other_jobs(cell: Cell, name: str) -> None:
         raise InputError(f"{at('motion.locked_joints')}: expected no failed joints for a map of bases")
     if motion.cyclic:
         raise InputError(f"{at('motion.cyclic')}: expected false for a map of bases, got true")
+    for robot in cell.robots:
+        if robot.path is not None:
+            raise InputError(
+                f"{at(f'robots.{robot.name}.path')}: expected no given joint path for a map of bases: remove it"
+            )
     for key in solver.against_accurate:
         raise InputError(
             f"{at(f'solver.{key}')}: expected the weighted pseudo-inverse without goals, with constant weights, for "

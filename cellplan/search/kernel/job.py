@@ -70,7 +70,12 @@ class Job:
             schedule: Its tasks on the common clock.
             moving: Names of the robots that may move.
             nodes: About how many nodes there are.
+
+        Raises:
+            ValueError: The cell gives a path of joints.
         """
+        if any(robot.path is not None for robot in cell.robots):
+            raise ValueError("job: expected joints that follow from the tasks, got a given path of the positioner's")
         grasps = closures(cell, moving)
         relations: tuple[Relation, ...] = (*(path.task for path in schedule.paths), *grasps)
         desired_at = desired_motion(schedule.paths, grasps)
