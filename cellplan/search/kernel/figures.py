@@ -54,6 +54,49 @@ class Peaks:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Crests:
+    """Values of functions of time at their nodes; where one is highest among its neighbours, that of the parabola.
+
+    Attributes:
+        value: The values, shape (N, n).
+        shares: Shares of the values at the node before, the node and the one after, shape (N, n, 3); with their signs
+            where magnitudes were asked for.
+    """
+
+    value: Array
+    shares: Array
+
+    @classmethod
+    def of(cls, times: Array, values: Array, *, in_magnitude: bool = False) -> "Crests":
+        """Those of values at times in [s], shapes (N, n) and (N,)."""
+        seen = np.abs(values) if in_magnitude else values
+        shares = np.zeros((*values.shape, 3))
+        shares[..., 1] = 1.0
+        near = np.stack([np.roll(seen, 1, axis=0), seen, np.roll(seen, -1, axis=0)], axis=-1)
+        back, ahead = (np.diff(times)[part, None] for part in (slice(None, -1), slice(1, None)))
+        before, here, after = np.moveaxis(near[1:-1], -1, 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rise, fall = (here - before) / back, (here - after) / ahead
+            offset = (rise * ahead - fall * back) / (2.0 * (rise + fall))
+            is_inside = (rise >= 0.0) & (fall >= 0.0) & (rise + fall > 0.0) & (back > 0.0) & (ahead > 0.0)
+            curved = _parabola(np.where(is_inside, offset, 0.0), back, ahead)
+        shares[1:-1] = np.where(is_inside[..., None], curved, shares[1:-1])
+        value = np.einsum("kni,kni->kn", shares, near)
+        if in_magnitude:
+            signs = np.sign(values)
+            shares *= np.stack([np.roll(signs, 1, axis=0), signs, np.roll(signs, -1, axis=0)], axis=-1)
+        return cls(value=value, shares=shares)
+
+    def derivatives(self, nodes: Indices, columns: Indices, of_values: Array) -> Array:
+        """Derivatives of some of them from those of the values at the nodes, shape (N, n, p) to (M, p)."""
+        last = len(self.value) - 1
+        shares = self.shares[nodes, columns]
+        found = shares[:, 1, None] * of_values[nodes, columns]
+        found += shares[:, 0, None] * of_values[np.maximum(nodes - 1, 0), columns]
+        return found + shares[:, 2, None] * of_values[np.minimum(nodes + 1, last), columns]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Figures:
     """What layouts are judged by, of each joint.
 

@@ -23,7 +23,7 @@ from cellplan.search.kernel.memory import keep_freed_memory
 AT_ONCE: Final = 256  # candidates side by side: enough for NumPy, and the arrays of one node stay in the cache
 START_TOL: Final = 1e-6  # [m] and [rad] up to which a tool counts as at the start of its path
 LOST: Final = 0.05  # [m] or [rad] beside its path a predicted tool has lost it: Newton's step is no small one any more
-MOST_PASSES: Final = 12  # over all nodes
+MOST_PASSES: Final = 20  # over all nodes
 PASSED: Final = 1e-7  # [rad] and [m] that a pass may still change
 
 

@@ -1,0 +1,239 @@
+"""Improve: sequential linear programs with a trust region, from a point to a local optimum.
+
+Each program is linear in a step of all variables, with exact derivatives. Demands that are violated have a slack, which
+costs more than anything the objective can gain. A step is taken where the true motion bears it out; it is then the
+point of the next program, so every iteration works out one motion, one set of distances and one set of derivatives. A
+step that is refused costs a smaller program and one more motion.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.search.programs.measures import Measures, Missed
+from cellplan.search.programs.objective import Demands, Effort, Objective
+from cellplan.search.programs.problem import Point, Problem
+from cellplan.search.programs.program import Program
+from cellplan.search.programs.rows import Linear
+
+WIDEST: Final = 1.5  # [-] usual steps
+SMALLEST: Final = 0.004  # [-] usual steps: below, nothing more is gained
+BORNE_OUT: Final = 0.1  # [-] share of what a program expects that the true motion must gain
+GOOD: Final = 0.7  # [-] share from which the next region is wider
+GROWS: Final = 1.6  # [-] factor of the region after a good step
+SHRINKS: Final = 0.4  # [-] and after one that is refused
+LEAST: Final = 1e-6  # [-] that a step must gain
+CORRECTIONS: Final = 1  # programs with the bends of the rows that a refused step has shown
+LOOKS_BACK: Final = 8  # [-] iterations over which the gain is judged
+GAINED: Final = 3e-3  # [-] share of the objective that so many must gain
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Iteration:
+    """One program.
+
+    Attributes:
+        cycle: Shortest cycle in [s] after it.
+        violation: What is missed after it, in usual units; 0 where all demands are kept.
+        objective: The objective after it.
+        trust: Radius of the trust region in usual steps.
+        is_taken: Whether its step was taken.
+    """
+
+    cycle: float
+    violation: float
+    objective: float
+    trust: float
+    is_taken: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Improved:
+    """What a local optimisation comes to: the best conforming point, else the one that misses least.
+
+    Attributes:
+        x: The variables, shape (n,).
+        start: Start posture of all joints in [rad] or [m], shape (nq,).
+        point: The motion.
+        cycle: Shortest cycle in [s].
+        objective: The objective: the cycle in [s], the smallest clearance beyond demand in [m], or the cost.
+        violation: What is missed, in usual units; 0 where all demands are kept at the nodes and keys.
+        history: All programs.
+    """
+
+    x: Array
+    start: Array
+    point: Point
+    cycle: float
+    objective: float
+    violation: float
+    history: tuple[Iteration, ...]
+
+    @property
+    def is_conforming(self) -> bool:
+        """Whether all demands are kept at the nodes and keys."""
+        return self.violation <= 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _State:
+    """A point and how it stands."""
+
+    measures: Measures
+    missed: Missed
+    objective: float
+
+    @property
+    def violation(self) -> float:
+        """What is missed."""
+        return self.missed.violation
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """What makes one point better than another: what is missed, then the objective."""
+        return self.violation, self.objective
+
+
+def improve(
+    problem: Problem, x: Array, start: Array, demands: Demands, effort: Effort | None = None
+) -> Improved | None:
+    """The local optimum that programs reach from a point.
+
+    Args:
+        problem: What is improved.
+        x: Variables to begin with, shape (n,).
+        start: Start posture near the right one in [rad] or [m], shape (nq,).
+        demands: The objective and what must be kept.
+        effort: How much work it may do.
+
+    Returns:
+        The best point; None where there is no motion at the first one.
+    """
+    given = effort or Effort()
+    first = problem.evaluate(x, start)
+    return None if first is None else _Climb(problem, demands, given).from_point(first)
+
+
+class _Climb:
+    """The iterations."""
+
+    def __init__(self, problem: Problem, demands: Demands, effort: Effort) -> None:
+        """Note what is improved."""
+        self._problem, self._demands, self._effort = problem, demands, effort
+        self._trust = effort.trust
+        self._history: list[Iteration] = []
+
+    def from_point(self, first: Point) -> Improved:
+        """Iterate from a point until nothing more is gained."""
+        here = best = self._state(first)
+        linear: Linear | None = None
+        for _ in range(self._effort.iterations):
+            if self._is_done(here):
+                break
+            linear = linear or Linear.of(self._problem, here.measures)
+            there = self._step(here, linear)
+            self._note(there or here, is_taken=there is not None)
+            if there is not None:
+                here, linear = there, None
+                best = min(best, here, key=lambda each: each.rank)
+        return self._result(best)
+
+    def _is_done(self, here: _State) -> bool:
+        """Whether the objective is reached, the region is too small, or too little is gained."""
+        if self._demands.objective is Objective.CONFORMING and here.violation <= 0.0:
+            return True
+        if self._trust < SMALLEST:
+            return True
+        if len(self._history) <= LOOKS_BACK:
+            return False
+        before, now = self._history[-1 - LOOKS_BACK], self._history[-1]
+        return before.violation <= 0.0 and before.objective - now.objective < GAINED * abs(before.objective)
+
+    def _step(self, here: _State, linear: Linear) -> _State | None:
+        """The state after one program; None where its step is refused. Sets the next region."""
+        problem, point = self._problem, here.measures.point
+        lower = np.minimum(np.maximum((problem.lower - point.x) / problem.scale, -self._trust), 0.0)
+        upper = np.maximum(np.minimum((problem.upper - point.x) / problem.scale, self._trust), 0.0)
+        rows = linear.rows(self._demands, self._effort.room, np.maximum(-lower, upper))
+        changed = ((point.x - problem.given) * problem.cost, problem.cost * problem.scale)
+        program = Program(rows=rows, box=(lower, upper), demands=self._demands, changed=changed)
+        bends: Array | None = None
+        for _ in range(1 + CORRECTIONS):
+            found = program.solve(bends)
+            if found is None:
+                break
+            z, expected, _ = found
+            there = self._at(here, linear, z)
+            gain = -np.inf if there is None else self._gain(here, there)
+            if there is None:
+                break
+            if gain > max(BORNE_OUT * expected, LEAST):
+                if gain > GOOD * expected:
+                    self._trust = min(WIDEST, GROWS * self._trust)
+                return there
+            bends = np.concatenate([each.bends(here.measures, there.measures, z) for each in rows])
+        reach = self._trust if found is None else float(np.abs(found[0]).max(initial=0.0))
+        self._trust = SHRINKS * min(self._trust, reach)
+        return None
+
+    def _at(self, here: _State, linear: Linear, z: Array) -> _State | None:
+        """The state after a step, in usual steps; None where a tool cannot follow."""
+        problem, point = self._problem, here.measures.point
+        dx = np.clip(point.x + z * problem.scale, problem.lower, problem.upper) - point.x
+        near = replace(point, q=point.q + linear.derivatives.q @ dx)
+        motion = problem.evaluate(point.x + dx, point.start, near)
+        return None if motion is None else self._state(motion)
+
+    def _gain(self, here: _State, there: _State) -> float:
+        """What a step gains: the merit of the program, true."""
+        objective = here.objective - there.objective
+        if self._demands.objective is Objective.CYCLE:
+            objective /= here.objective
+        return objective + here.missed.cost - there.missed.cost
+
+    def _state(self, point: Point) -> _State:
+        """How a point stands."""
+        measures = Measures.of(self._problem, point, self._demands, self._effort)
+        return _State(
+            measures=measures,
+            missed=measures.missed(self._problem, self._demands, self._effort.room),
+            objective=self._objective(measures),
+        )
+
+    def _objective(self, measures: Measures) -> float:
+        """What is to be small."""
+        match self._demands.objective:
+            case Objective.CYCLE:
+                return measures.cycle
+            case Objective.CHANGE:
+                problem = self._problem
+                return float((np.abs(measures.point.x - problem.given) * problem.cost).sum())
+            case _:
+                return 0.0
+
+    def _note(self, state: _State, *, is_taken: bool) -> None:
+        """Keep a line of the history."""
+        self._history.append(
+            Iteration(
+                cycle=state.measures.cycle,
+                violation=state.violation,
+                objective=state.objective,
+                trust=self._trust,
+                is_taken=is_taken,
+            )
+        )
+
+    def _result(self, best: _State) -> Improved:
+        """The best point."""
+        point = best.measures.point
+        return Improved(
+            x=point.x,
+            start=point.start,
+            point=point,
+            cycle=best.measures.cycle,
+            objective=best.objective,
+            violation=best.violation,
+            history=tuple(self._history),
+        )

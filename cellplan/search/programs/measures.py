@@ -1,0 +1,157 @@
+"""Measures: how a point stands to all demands, without any derivative."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.search.kernel.figures import Crests
+from cellplan.search.programs.objective import Demands, Effort, Objective, Room
+from cellplan.search.programs.problem import Distances, Point, Problem
+
+ANGLE: Final = 0.01  # [rad] of a lack that weighs as much as
+LENGTH: Final = 0.003  # [m] and as
+SHARE: Final = 0.01  # [-] of the duration
+SLACK: Final = 10.0  # [-] share of the objective that one unit costs: feasibility first
+IN_ROOM: Final = 0.1  # [-] likewise where only the room is missed that counts as kept
+OWN_ROOM: Final = 0.1  # [-] share of the room that is asked of a robot's own bodies
+
+
+class Kind(StrEnum):
+    """What a demand is about."""
+
+    LOWER_LIMIT = "lower_limit"
+    UPPER_LIMIT = "upper_limit"
+    SPEED = "speed"
+    ACCELERATION = "acceleration"
+    DISTANCE = "distance"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Measures:
+    """Figures of one point; each is that of the parabola where it is an extreme between nodes.
+
+    Attributes:
+        point: The point.
+        lower: Distances of the joints from their lower limits, the demanded margin off, negative, shape (N, nq).
+        upper: Likewise from their upper limits.
+        speeds: Speeds as shares of their limits, shape (N, nq).
+        accelerations: Roots of the accelerations as shares of their limits, shape (N, nq): the motion must last so many
+            times as long as the nodes do.
+        distances: Near pairs at the keys.
+        lacks: By how much pairs miss what is demanded of them, in [m], negative where they keep it, shape (M,).
+        factor: How many times as long as the nodes the motion must last for all speeds and accelerations.
+        cycle: Shortest cycle in [s].
+    """
+
+    point: Point
+    lower: Crests
+    upper: Crests
+    speeds: Crests
+    accelerations: Crests
+    distances: Distances
+    lacks: Array
+    factor: float
+    cycle: float
+
+    @classmethod
+    def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":
+        """Measure a point."""
+        times, limits = problem.times, problem.limits
+        speeds = Crests.of(times, point.qd / limits.velocity, in_magnitude=True)
+        accelerations = Crests.of(times, point.qdd / problem.acceleration, in_magnitude=True)
+        factor = max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
+        within = effort.within + demands.clearance
+        distances = problem.distances(point, key_nodes(problem, effort), within)
+        added = np.where(distances.is_own, 0.0, demands.clearance)
+        return cls(
+            point=point,
+            lower=Crests.of(times, limits.lower + demands.margin - point.q),
+            upper=Crests.of(times, point.q - limits.upper + demands.margin),
+            speeds=speeds,
+            accelerations=accelerations,
+            distances=distances,
+            lacks=distances.demands + added - distances.values,
+            factor=factor,
+            cycle=factor * float(times[-1] - times[0]),
+        )
+
+    def missed(self, problem: Problem, demands: Demands, room: Room) -> "Missed":
+        """What every joint and pair misses at its worst."""
+        units = np.where(problem.limits.is_revolute, ANGLE, LENGTH)
+        joints = (np.stack([self.lower.value.max(axis=0), self.upper.value.max(axis=0)]) + room.margin) / units
+        lacks, allowed = [joints.ravel()], [np.tile(0.5 * room.margin / units, 2)]
+        worst = np.full(int(self.distances.pairs.max(initial=-1)) + 1, -np.inf)
+        asked = rooms(self.distances, room)
+        np.maximum.at(worst, self.distances.pairs, (self.lacks + asked) / LENGTH)
+        most = np.zeros_like(worst)
+        most[self.distances.pairs] = 0.5 * asked / LENGTH
+        lacks.append(worst)
+        allowed.append(most)
+        if demands.duration is not None and demands.objective is not Objective.CYCLE:
+            whole = demands.duration / self.span / (1.0 + room.time)
+            loads = np.concatenate([self.speeds.value.max(axis=0), np.sqrt(self.accelerations.value.max(axis=0))])
+            lacks.append((loads / whole - 1.0) / SHARE)
+            allowed.append(np.full(len(loads), 0.5 * room.time / SHARE))
+        return Missed(lacks=np.concatenate(lacks), allowed=np.concatenate(allowed))
+
+    def values(self, kind: Kind, subjects: Indices, nodes: Indices) -> Array:
+        """What rows of a kind are about: lacks of margins and distances, shares of speeds; NaN where not measured."""
+        match kind:
+            case Kind.LOWER_LIMIT:
+                return self.lower.value[nodes, subjects]
+            case Kind.UPPER_LIMIT:
+                return self.upper.value[nodes, subjects]
+            case Kind.SPEED:
+                return self.speeds.value[nodes, subjects]
+            case Kind.ACCELERATION:
+                return np.sqrt(self.accelerations.value[nodes, subjects])
+            case Kind.DISTANCE:
+                found = self.distances
+                places = zip(found.pairs.tolist(), found.nodes.tolist(), strict=True)
+                known = dict(zip(places, self.lacks.tolist(), strict=True))
+                asked = zip(subjects.tolist(), nodes.tolist(), strict=True)
+                return np.array([known.get(key, np.nan) for key in asked])
+
+    @property
+    def span(self) -> float:
+        """Time in [s] from the first node to the last."""
+        return self.cycle / self.factor if self.factor > 0.0 else 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Missed:
+    """What joints and pairs miss at their worst, in usual units.
+
+    Attributes:
+        lacks: With the whole room, negative where kept, shape (F,).
+        allowed: What of it counts as kept, shape (F,).
+    """
+
+    lacks: Array
+    allowed: Array
+
+    @property
+    def violation(self) -> float:
+        """Sum of what does not count as kept."""
+        return float(np.maximum(self.lacks - self.allowed, 0.0).sum())
+
+    @property
+    def cost(self) -> float:
+        """What it costs in the merit of a point: feasibility first, then some of the room."""
+        return SLACK * self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum())
+
+
+def rooms(distances: Distances, room: Room) -> Array:
+    """What is asked of near pairs beyond their demands in [m], shape (M,)."""
+    return np.where(distances.is_own, OWN_ROOM, 1.0) * room.distance
+
+
+def key_nodes(problem: Problem, effort: Effort) -> Indices:
+    """Nodes at which distances are asked: the ones nearest to even times, and the extra ones."""
+    times = problem.times
+    even = np.linspace(times[0], times[-1], effort.keys)
+    nearest = np.abs(times[:, None] - even).argmin(axis=0)
+    return np.unique(np.concatenate([nearest, np.array(effort.extra_keys, dtype=np.intp)])).astype(np.intp)

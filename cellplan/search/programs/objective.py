@@ -1,0 +1,91 @@
+"""What a local optimisation improves, what it must keep, and how much work it may do."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+
+
+class Objective(StrEnum):
+    """What is improved while all demands are kept."""
+
+    CONFORMING = "conforming"  # nothing else: the first point at which all demands are kept
+    CYCLE = "cycle"  # shortest cycle
+    CLEARANCE = "clearance"  # largest smallest distance at a given duration
+    CHANGE = "change"  # least change from the given values at a given duration
+
+
+class Timing(StrEnum):
+    """How the motion is made as fast as the limits allow."""
+
+    LAWS = "laws"  # the cell's time laws, slower or faster as a whole
+    RETIMED = "retimed"  # the speed along the common path, as fast as possible everywhere
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Demands:
+    """What is demanded of a point.
+
+    Attributes:
+        objective: What is improved.
+        margin: Smallest distances of the joints from their limits in [rad] or [m], shape (nq,).
+        duration: Cycle in [s] that the limits of speed and acceleration must allow; None where any will do. The
+            objectives clearance and change need one.
+        timing: How the motion is timed.
+        clearance: Added to what the cell demands of every pair but those of one robot's own bodies, in [m].
+        smallest_singular_value: Of the cooperation Jacobian, in its units; None for no bound.
+    """
+
+    objective: Objective
+    margin: Array
+    duration: float | None = None
+    timing: Timing = Timing.LAWS
+    clearance: float = 0.0
+    smallest_singular_value: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check at the door what the objective needs."""
+        if self.objective in (Objective.CLEARANCE, Objective.CHANGE) and self.duration is None:
+            raise ValueError(f"demands: the objective '{self.objective}' needs a duration")
+        if not np.all(self.margin >= 0.0):
+            raise ValueError(f"demands: expected margins of at least 0, got {self.margin}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Room:
+    """By how much more than demanded the rows of a program ask for, so that what a step bends does not break a demand.
+
+    Half of it counts as kept at a point.
+
+    Attributes:
+        margin: In [rad] or [m].
+        distance: In [m]; of a robot's own bodies a tenth, as their distances are often its design.
+        time: Share of the duration.
+    """
+
+    margin: float = float(np.radians(0.15))
+    distance: float = 0.0025
+    time: float = 0.002
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How much work a local optimisation may do: counts only, so that equal inputs give equal answers.
+
+    Attributes:
+        iterations: Linear programs at most.
+        keys: Configurations at which distances are asked, evenly over the motion.
+        extra_keys: Nodes at which they are asked as well.
+        within: Distance in [m] above what is demanded, within which pairs become rows.
+        trust: First radius of the trust region, in usual steps of the variables.
+        room: What the rows ask for beyond the demands.
+    """
+
+    iterations: int = 60
+    keys: int = 9
+    extra_keys: tuple[int, ...] = ()
+    within: float = 0.06
+    trust: float = 0.5
+    room: Room = field(default_factory=Room)

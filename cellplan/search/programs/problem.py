@@ -1,0 +1,138 @@
+"""Problem: what sequential programs know of what they improve; a whole layout, the path of a positioner, or both."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.model.joint_limits import JointLimits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Point:
+    """Values of the variables and the motion that comes of them.
+
+    Attributes:
+        x: The variables, shape (n,).
+        start: Start posture of all joints in [rad] or [m], shape (nq,).
+        q: Joint positions at the nodes in [rad] or [m], shape (N, nq).
+        qd: Their speeds, shape (N, nq).
+        qdd: Their accelerations, shape (N, nq).
+    """
+
+    x: Array
+    start: Array
+    q: Array
+    qd: Array
+    qdd: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PointDerivatives:
+    """Derivatives of a motion by the n variables.
+
+    Attributes:
+        q: Of the joint positions at the nodes, shape (N, nq, n).
+        qd: Of their speeds, shape (N, nq, n).
+        qdd: Of their accelerations, shape (N, nq, n); None where no joint has a limit of acceleration.
+    """
+
+    q: Array
+    qd: Array
+    qdd: Array | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Distances:
+    """Distances of near pairs of bodies at some nodes, M of them.
+
+    Attributes:
+        pairs: Numbers of the pairs, the same at every point, shape (M,).
+        nodes: Nodes of the motion, shape (M,).
+        values: Signed distances in [m], shape (M,).
+        demands: What the cell demands of them in [m], shape (M,).
+        is_own: Whether both bodies belong to one robot, so that its design may set the distance, shape (M,).
+        found: What the problem needs for their derivatives.
+    """
+
+    pairs: Indices
+    nodes: Indices
+    values: Array
+    demands: Array
+    is_own: Flags
+    found: object
+
+
+class Problem(Protocol):
+    """What sequential programs improve.
+
+    Attributes:
+        names: Names of the variables.
+        lower: Their lower bounds, shape (n,).
+        upper: Their upper bounds, shape (n,).
+        scale: A usual step of each, shape (n,).
+        cost: Cost of a change by one unit of each, shape (n,).
+        given: Values from which a change is counted, shape (n,).
+        times: Times of the nodes in [s], from 0 to the end, shape (N,); two nodes may share one where speeds jump.
+        limits: Limits of the joints.
+        acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,).
+    """
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """See the class."""
+
+    @property
+    def lower(self) -> Array:
+        """See the class."""
+
+    @property
+    def upper(self) -> Array:
+        """See the class."""
+
+    @property
+    def scale(self) -> Array:
+        """See the class."""
+
+    @property
+    def cost(self) -> Array:
+        """See the class."""
+
+    @property
+    def given(self) -> Array:
+        """See the class."""
+
+    @property
+    def times(self) -> Array:
+        """See the class."""
+
+    @property
+    def limits(self) -> JointLimits:
+        """See the class."""
+
+    @property
+    def acceleration(self) -> Array:
+        """See the class."""
+
+    def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:
+        """The motion at some values; None where a tool does not come to the start of its path, or loses it.
+
+        Args:
+            x: The values, shape (n,).
+            start: A start posture near the right one, shape (nq,); what variables set of it counts for nothing.
+            near: A point nearby, which makes it quicker.
+        """
+
+    def derivatives(self, point: Point) -> PointDerivatives:
+        """Derivatives of the motion at a point."""
+
+    def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
+        """Pairs of bodies that are less than ``within`` in [m] beyond what is demanded of them, at some nodes."""
+
+    def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:
+        """Derivatives of distances by the variables, shape (M, n)."""
+
+    def pair_names(self, pair: int) -> tuple[str, str]:
+        """Names of the bodies of a pair."""
+
+    def joint_names(self, column: int) -> tuple[str, str]:
+        """Names of the robot and the joint at a place of the stacked joints."""
