@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.search.programs.measures import Measures, Missed
+from cellplan.search.programs.measures import LENGTH, Measures, Missed
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point, Problem
 from cellplan.search.programs.program import Program
@@ -58,7 +58,7 @@ class Improved:
         start: Start posture of all joints in [rad] or [m], shape (nq,).
         point: The motion.
         cycle: Shortest cycle in [s].
-        objective: The objective: the cycle in [s], the smallest clearance beyond demand in [m], or the cost.
+        objective: What was to be small, see ``Measures.objective``.
         violation: What is missed, in usual units; 0 where all demands are kept at the nodes and keys.
         history: All programs.
     """
@@ -149,7 +149,7 @@ class _Climb:
         if len(self._history) <= LOOKS_BACK:
             return False
         before, now = self._history[-1 - LOOKS_BACK], self._history[-1]
-        return before.violation <= 0.0 and before.objective - now.objective < GAINED * abs(before.objective)
+        return before.violation <= 0.0 and before.objective - now.objective < GAINED * self._unit(before.objective)
 
     def _step(self, here: _State, linear: Linear) -> _State | None:
         """The state after one program; None where its step is refused. Sets the next region."""
@@ -188,10 +188,18 @@ class _Climb:
 
     def _gain(self, here: _State, there: _State) -> float:
         """What a step gains: the merit of the program, true."""
-        objective = here.objective - there.objective
-        if self._demands.objective is Objective.CYCLE:
-            objective /= here.objective
+        objective = (here.objective - there.objective) / self._unit(here.objective)
         return objective + here.missed.cost - there.missed.cost
+
+    def _unit(self, objective: float) -> float:
+        """What counts as one in the objective of a program."""
+        match self._demands.objective:
+            case Objective.CYCLE:
+                return objective
+            case Objective.CLEARANCE:
+                return LENGTH
+            case _:
+                return 1.0
 
     def _state(self, point: Point) -> _State:
         """How a point stands."""
@@ -199,19 +207,8 @@ class _Climb:
         return _State(
             measures=measures,
             missed=measures.missed(self._problem, self._demands, self._effort.room),
-            objective=self._objective(measures),
+            objective=measures.objective(self._problem, self._demands),
         )
-
-    def _objective(self, measures: Measures) -> float:
-        """What is to be small."""
-        match self._demands.objective:
-            case Objective.CYCLE:
-                return measures.cycle
-            case Objective.CHANGE:
-                problem = self._problem
-                return float((np.abs(measures.point.x - problem.given) * problem.cost).sum())
-            case _:
-                return 0.0
 
     def _note(self, state: _State, *, is_taken: bool) -> None:
         """Keep a line of the history."""

@@ -42,6 +42,7 @@ class Measures:
             times as long as the nodes do.
         distances: Near pairs at the keys.
         lacks: By how much pairs miss what is demanded of them, in [m], negative where they keep it, shape (M,).
+        within: Distance in [m] beyond what is demanded, from which on pairs are not near.
         factor: How many times as long as the nodes the motion must last for all speeds and accelerations.
         cycle: Shortest cycle in [s].
     """
@@ -53,6 +54,7 @@ class Measures:
     accelerations: Crests
     distances: Distances
     lacks: Array
+    within: float
     factor: float
     cycle: float
 
@@ -63,8 +65,7 @@ class Measures:
         speeds = Crests.of(times, point.qd / limits.velocity, in_magnitude=True)
         accelerations = Crests.of(times, point.qdd / problem.acceleration, in_magnitude=True)
         factor = max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
-        within = effort.within + demands.clearance
-        distances = problem.distances(point, key_nodes(problem, effort), within)
+        distances = problem.distances(point, key_nodes(problem, effort), effort.within + demands.clearance)
         added = np.where(distances.is_own, 0.0, demands.clearance)
         return cls(
             point=point,
@@ -74,6 +75,7 @@ class Measures:
             accelerations=accelerations,
             distances=distances,
             lacks=distances.demands + added - distances.values,
+            within=effort.within,
             factor=factor,
             cycle=factor * float(times[-1] - times[0]),
         )
@@ -114,6 +116,23 @@ class Measures:
                 known = dict(zip(places, self.lacks.tolist(), strict=True))
                 asked = zip(subjects.tolist(), nodes.tolist(), strict=True)
                 return np.array([known.get(key, np.nan) for key in asked])
+
+    def objective(self, problem: Problem, demands: Demands) -> float:
+        """What is to be small: the cycle in [s], the cost of the change, or the least room between bodies, negative."""
+        match demands.objective:
+            case Objective.CYCLE:
+                return self.cycle
+            case Objective.CHANGE:
+                return float((np.abs(self.point.x - problem.given) * problem.cost).sum())
+            case Objective.CLEARANCE:
+                return self.nearest
+            case Objective.CONFORMING:
+                return 0.0
+
+    @property
+    def nearest(self) -> float:
+        """The largest of ``lacks`` but those of a robot's own bodies in [m]: bodies are so much too near each other."""
+        return float(self.lacks[~self.distances.is_own].max(initial=-self.within))
 
     @property
     def span(self) -> float:

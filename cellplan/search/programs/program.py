@@ -13,7 +13,7 @@ from cellplan.search.programs.rows import Rows
 from cellplan.search.programs.solver import Solved, least
 
 PROXIMAL: Final = 1e-3  # [-] weight of a step: of equal ones the shortest
-FARTHEST: Final = 1e3  # [-] by which the objective of one step may change
+FARTHEST: Final = 1e6  # [-] by which the objective of one step may change
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

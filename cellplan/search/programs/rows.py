@@ -1,7 +1,7 @@
 """Rows: the demands on a point, linear in a step of the variables; only those that a step of the region could bind."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -85,6 +85,8 @@ class Linear:
     def rows(self, demands: Demands, room: Room, box: Array) -> list[Rows]:
         """All rows that a step within a box can bind; the ones that bound the objective first."""
         parts = [*self._timing(demands, room), *self._margins(room, box), self._apart(room)]
+        if demands.objective is Objective.CLEARANCE:
+            parts.append(self._aimed_apart())
         return [rows.that_can_bind(box) for rows in parts if len(rows.lacks)]
 
     def _timing(self, demands: Demands, room: Room) -> Iterator[Rows]:
@@ -151,3 +153,8 @@ class Linear:
             allowed=0.5 * rooms(distances, room) / LENGTH,
             units=np.full(len(distances.pairs), LENGTH),
         )
+
+    def _aimed_apart(self) -> Rows:
+        """Distances of near pairs but those of a robot's own bodies, as bounds of the objective."""
+        rows = self._apart(Room(distance=0.0)).of(~self.measures.distances.is_own)
+        return replace(rows, lacks=rows.lacks - self.measures.nearest / LENGTH, aim=1.0)
