@@ -39,8 +39,8 @@ def path_derivatives(
     blocks = J.reshape(len(q), -1, 6, nq)
     own = [blocks[:, task][..., columns] for task, columns in enumerate(nodes.operators)]
     inverses = np.linalg.inv(np.stack(own, axis=1)) if own else np.zeros((len(q), 0, 6, 6))
-    beside = -changes.in_rows(np.swapaxes(screws.based + screws.tooled, -1, -2)).reshape(len(q), -1, directions.count)
-    twists = changes.twists().reshape(len(q), -1, nq + directions.count)
+    moved = changes.in_rows(np.swapaxes(screws.based + screws.tooled, -1, -2))
+    beside, twists = -moved.reshape(len(q), J.shape[1], directions.count), changes.twists()
     coefficients = nodes.count * (c.stop - c.start)
     found = np.zeros((3 if is_accelerating else 2, len(q), nq, coefficients + directions.count))
     for order, shares in enumerate(nodes.shares[: len(found)]):

@@ -134,6 +134,8 @@ class PathProblem:
         near, own, (_, others) = found.found.near, len(self.path.names), self._split(point.x)
         dq = by_joints.q[found.found.nodes]
         by_path = (near.by_joints[:, None] @ dq[near.keys][..., :own])[:, 0]
+        if not len(others):
+            return by_path
         return np.concatenate([by_path, self.bodies.derivatives(near, others, dq[..., own:])], axis=1)
 
     def pair_names(self, pair: int) -> tuple[str, str]:
