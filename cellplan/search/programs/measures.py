@@ -169,8 +169,7 @@ def rooms(distances: Distances, room: Room) -> Array:
 
 
 def key_nodes(problem: Problem, effort: Effort) -> Indices:
-    """Nodes at which distances are asked: the ones nearest to even times, and the extra ones."""
+    """Nodes at which distances are asked: the ones nearest to even times, and to the instants given."""
     times = problem.times
-    even = np.linspace(times[0], times[-1], effort.keys)
-    nearest = np.abs(times[:, None] - even).argmin(axis=0)
-    return np.unique(np.concatenate([nearest, np.array(effort.extra_keys, dtype=np.intp)])).astype(np.intp)
+    asked = np.append(np.linspace(times[0], times[-1], effort.keys), effort.instants)
+    return np.unique(np.abs(times[:, None] - asked).argmin(axis=0)).astype(np.intp)

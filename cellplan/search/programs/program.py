@@ -8,8 +8,8 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.search.programs.measures import IN_ROOM, SLACK
-from cellplan.search.programs.objective import Demands, Objective
-from cellplan.search.programs.rows import Rows
+from cellplan.search.programs.objective import Demands, Objective, Room
+from cellplan.search.programs.rows import Linear, Rows
 from cellplan.search.programs.solver import Solved, least
 
 PROXIMAL: Final = 1e-3  # [-] weight of a step: of equal ones the shortest
@@ -32,6 +32,19 @@ class Program:
     demands: Demands
     changed: tuple[Array, Array]
 
+    @classmethod
+    def of(cls, linear: Linear, demands: Demands, room: Room, trust: float) -> "Program":
+        """The program of a point, for a trust region of some radius in usual steps."""
+        problem, x = linear.problem, linear.measures.point.x
+        lower = np.minimum(np.maximum((problem.lower - x) / problem.scale, -trust), 0.0)
+        upper = np.maximum(np.minimum((problem.upper - x) / problem.scale, trust), 0.0)
+        return cls(
+            rows=linear.rows(demands, room, np.maximum(-lower, upper)),
+            box=(lower, upper),
+            demands=demands,
+            changed=((x - problem.given) * problem.cost, problem.cost * problem.scale),
+        )
+
     def solve(self, corrections: Array | None = None) -> tuple[Array, float, Solved] | None:
         """The step in usual steps, what it is expected to gain, and the solution; None where the solver finds none.
 
@@ -50,8 +63,8 @@ class Program:
             A[is_loose, first + family[is_loose]] = -1.0
         asked = lacks if corrections is None else lacks + corrections
         top = np.concatenate([-asked, *self._changes(A[len(lacks) :], count + 1 + 2 * slacks)])
-        weights = [np.zeros(count), [self._weight], np.full(slacks, IN_ROOM), np.full(slacks, SLACK), np.ones(costs)]
-        cost = np.concatenate(weights)
+        prices = np.repeat([IN_ROOM, SLACK, 1.0], [slacks, slacks, costs])
+        cost = np.concatenate([np.zeros(count), [self._weight], prices])
         lower = np.concatenate([self.box[0], [-FARTHEST], np.zeros(2 * slacks + costs)])
         upper = np.concatenate([self.box[1], [FARTHEST], free, most - free, np.full(costs, FARTHEST)])
         solved = least(cost, np.full(len(cost), PROXIMAL), A, top, (lower, upper))
