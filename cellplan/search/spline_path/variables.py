@@ -76,5 +76,7 @@ class PathVariables:
         values = [[round(float(value), DECIMALS) + 0.0 for value in row] for row in rows]
         if all(joint.is_revolute for joint in cell.robot(self.robot).model.joints):
             return {"degree": self.given.degree, "coefficients_deg": values}
-        keys = [f"{joint.name}_{unit.name}" for joint, unit in zip(cell.robot(self.robot).model.joints, units, strict=True)]
+        keys = [
+            f"{joint.name}_{unit.name}" for joint, unit in zip(cell.robot(self.robot).model.joints, units, strict=True)
+        ]
         return {"degree": self.given.degree, "coefficients": [dict(zip(keys, row, strict=True)) for row in values]}
