@@ -77,7 +77,7 @@ class Effort:
     Attributes:
         iterations: Linear programs at most.
         keys: Configurations at which distances are asked, evenly over the motion.
-        instants: Times in [s] along the nodes at which they are asked as well.
+        also_at: Times in [s] along the nodes at which they are asked as well.
         within: Distance in [m] above what is demanded, within which pairs become rows.
         trust: First radius of the trust region, in usual steps of the variables.
         room: What the rows ask for beyond the demands.
@@ -87,7 +87,7 @@ class Effort:
 
     iterations: int = 60
     keys: int = 9
-    instants: tuple[float, ...] = ()
+    also_at: tuple[float, ...] = ()
     within: float = 0.06
     trust: float = 0.5
     room: Room = field(default_factory=Room)
