@@ -35,7 +35,6 @@ class Demands:
             objectives clearance and change need one.
         timing: How the motion is timed.
         clearance: Added to what the cell demands of every pair but those of one robot's own bodies, in [m].
-        smallest_singular_value: Of the cooperation Jacobian, in its units; None for no bound.
     """
 
     objective: Objective
@@ -43,10 +42,11 @@ class Demands:
     duration: float | None = None
     timing: Timing = Timing.LAWS
     clearance: float = 0.0
-    smallest_singular_value: float | None = None
 
     def __post_init__(self) -> None:
-        """Check at the door what the objective needs."""
+        """Check at the door what the objective needs, and what the programs know."""
+        if self.timing is Timing.RETIMED:
+            raise ValueError("demands: programs know the time laws of the cell only, not a retimed motion")
         if self.objective in (Objective.CLEARANCE, Objective.CHANGE) and self.duration is None:
             raise ValueError(f"demands: the objective '{self.objective}' needs a duration")
         if not np.all(self.margin >= 0.0):
