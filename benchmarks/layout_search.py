@@ -173,8 +173,8 @@ def section(options: argparse.Namespace) -> Section:
             print(f"layout search: {name}, seed {seed}: {cycle} s, {count} points", file=sys.stderr)
             points.append(count)
             cycles += [] if cycle is None else [cycle]
-        told = (f"{min(cycles):.3f}", f"{statistics.median(cycles):.3f}") if cycles else ("none", "none")
-        rows.append((name, f"{len(cycles)} of {options.rounds}", *told, f"{statistics.median(points):g}"))
+        figures = (f"{min(cycles):.3f}", f"{statistics.median(cycles):.3f}") if cycles else ("none", "none")
+        rows.append((name, f"{len(cycles)} of {options.rounds}", *figures, f"{statistics.median(points):g}"))
     tools, limits = "as given" if options.fixed else "free", "with" if options.accelerations else "no"
     kinds = f"tools {tools}, {limits} acceleration limits"
     return Section(

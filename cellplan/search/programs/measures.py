@@ -169,7 +169,7 @@ def rooms(distances: Distances, room: Room) -> Array:
 
 
 def key_nodes(problem: Problem, effort: Effort) -> Indices:
-    """Nodes at which distances are asked: the ones nearest to even times, and to the instants given."""
+    """Nodes at which distances are asked: the ones nearest to even times, and to the times given."""
     times = problem.times
-    asked = np.append(np.linspace(times[0], times[-1], effort.keys), effort.instants)
+    asked = np.append(np.linspace(times[0], times[-1], effort.keys), effort.also_at)
     return np.unique(np.abs(times[:, None] - asked).argmin(axis=0)).astype(np.intp)

@@ -85,8 +85,8 @@ def _keeps(initial: SimpleNamespace, point: object, demands: Demands) -> bool:
     )
 
 
-def test_more_nodes_about_instants_give_the_same_motion(initial: SimpleNamespace) -> None:
-    finer = initial.problem.finer(initial.schedule, nodes=112, instants=(1.0, 2.5))
+def test_more_nodes_about_some_times_give_the_same_motion(initial: SimpleNamespace) -> None:
+    finer = initial.problem.finer(initial.schedule, nodes=112, denser=(1.0, 2.5))
     near = np.diff(finer.times)[np.searchsorted(finer.times, [1.0, 2.5]) - 1]
     assert near.max() < 0.4 * np.diff(finer.times).max()
     point = finer.evaluate(finer.given, initial.start)
