@@ -111,17 +111,17 @@ class Bench:
 
     def _passes(self, start: Start) -> bool:
         """Whether a start, improved where it has to be, passes the product's solve."""
-        x, posture = start.x, start.start
+        x, q = start.x, start.start
         if start.violation > 0.0 or start.cycle > (self._demands.duration or 0.0):
             self._counts["improved"] += 1
-            better = improve(self._problem, x, posture, self._demands, Effort(iterations=PROGRAMS))
+            better = improve(self._problem, x, q, self._demands, Effort(iterations=PROGRAMS))
             if better is None or not better.is_conforming:
                 return False
-            x, posture = better.point.x, better.point.start
+            x, q = better.point.x, better.point.start
         self._counts["solved"] += 1
         began = time.process_time()
         try:
-            return bool(solve(self._variables.cell(x, posture)).passed)
+            return bool(solve(self._variables.cell(x, q)).passed)
         except CellplanError:
             return False
         finally:

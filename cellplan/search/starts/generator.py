@@ -117,7 +117,7 @@ class StartGenerator:
         problem, reasons = self._problem, list[str]()
         places, drops = settings(problem, rng, SETTINGS_TRIED)
         if not places:
-            return Starts(found=(), reason=f"no posture of the holder can be used: {_words(drops)}")
+            return Starts(found=(), reason=f"no configuration of the holder can be used: {_words(drops)}")
         for setting in places:
             pools = self._pools(setting, rng, reasons)
             if pools is None:
