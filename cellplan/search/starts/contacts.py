@@ -9,8 +9,8 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.scene.bodies import Kind, is_ground
 from cellplan.scene.mounting import MountedPair
-from cellplan.scene.pairs import Rule
 from cellplan.scene.near import near_table
+from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.layout_pairs import among, demands_of, layout_pairs
 
