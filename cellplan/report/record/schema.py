@@ -50,8 +50,6 @@ def layout_schema() -> dict[str, Any]:
 
 def _schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) -> dict[str, Any]:
     """The schema of one type; records are added to the definitions."""
-    if form is Any:
-        return {}
     if is_typeddict(form):
         name = form.__name__.strip("_")
         if name not in definitions:
@@ -67,7 +65,7 @@ def _schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) 
         return {"type": "array", "items": _schema(arguments[0], definitions, closed=closed)}
     if origin is dict:
         return {"type": "object", "additionalProperties": _schema(arguments[1], definitions, closed=closed)}
-    return {"type": TYPES[form]}
+    return {} if form is Any else {"type": TYPES[form]}
 
 
 def _record_schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) -> dict[str, Any]:
