@@ -116,11 +116,11 @@ def _usual(context: Context) -> dict[str, Any]:
             ranges["z_mm"] = (min(0.0, z), max(HIGHEST_MM, z))
         yaw = entry.base.rpy_deg[2]
         ranges["yaw_deg"] = (yaw - 180.0, yaw + 180.0)
-        usual[f"{name}.base"] = ranges
+        usual[f"robots.{name}.base"] = ranges
     for name in holders[:1]:
         if name in context.models:
             turns = all(joint.is_revolute for joint in context.models[name].joints)
-            usual[f"{name}.{'start_deg' if turns else 'start'}"] = True
+            usual[f"robots.{name}.{'start_deg' if turns else 'start'}"] = True
     return usual
 
 
