@@ -1,5 +1,6 @@
 """Where trials of a layout search begin: the given layout, those of the user, samples, and the best found so far."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -57,7 +58,7 @@ class Proposals:
         ]
         if not following or self.request.objective is not Objective.CYCLE:
             return proposed
-        limit = GIVEN_UP * following[0].outcome.figures["cycle_s"]
+        limit = GIVEN_UP * (BESTS[Objective.CYCLE].value(following[0]) or math.inf)
         return [each if "clearance_m" in each else each | {"give_up_above_s": limit} for each in proposed]
 
     @property

@@ -19,7 +19,7 @@ from cellplan.search.programs.perturb import perturbed
 from cellplan.search.starts.generator import Starts
 from cellplan.study.trial import Outcome, TrialStatus, Variant
 
-EFFORT: Final = Effort()
+EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to
 NOT_FOLLOWED: Final = "a tool cannot follow its path"
 
 Begin = tuple[Array, Array]  # variables, shape (n,), and start posture, shape (nq,)
