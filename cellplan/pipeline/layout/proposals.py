@@ -1,5 +1,6 @@
 """Where trials of a layout search begin: the given layout, those of the user, samples, and the best found so far."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -11,7 +12,9 @@ from cellplan.study.status import Best
 from cellplan.study.trial import Trial
 
 SIZE: Final = 4  # [-] trials of a round
-SPREADS: Final = (0.6, 1.2, 0.3, 2.0)  # [-] usual steps of a perturbation, in turn
+WIDE: Final = (1.0, 1.0, 1.5)  # [-] usual steps of perturbations of the given layout, in turn
+NARROW: Final = (0.7, 1.0, 0.4)  # [-] and of the best ones
+GIVEN_UP: Final = 1.25  # [-] cycle as a multiple of the best one above which a trial is given up on its way
 ADDED: Final = (0.010, 0.025, 0.005, 0.050)  # [m] clearance beyond the demand of trials for the front, in turn
 SAME: Final = 5e-3  # [-] share by which the objectives of two layouts differ that are not one
 BESTS: Final[Mapping[Objective, Best]] = {
@@ -42,17 +45,21 @@ class Proposals:
         if first:
             return first
         number, following = len(finished) // SIZE, [*self._leading(finished)]
-        spreads = [SPREADS[(2 * number + k) % len(SPREADS)] for k in range(2)]
         known = [trial for trial in finished if "x" in trial.outcome.figures]
         nearest = min(known, key=lambda trial: trial.outcome.figures["violation"], default=None)  # type: ignore[arg-type,return-value]
         best = following[0] if following else nearest
         second = following[number % min(3, len(following))] if following else best
-        return [
-            self._perturbed(best, spreads[0], number),
-            self._sampled(number, number),
-            self._perturbed(second, spreads[1], number),
-            self._fourth(best, number),
+        size, wide = NARROW[number % len(NARROW)], WIDE[number % len(WIDE)]
+        proposed = [
+            self._perturbed(best, size, number),
+            self._perturbed(None, wide, number),
+            self._perturbed(second, NARROW[(number + 1) % len(NARROW)], number),
+            self._fourth(best, number, is_conforming=bool(following)),
         ]
+        if not following or self.request.objective is not Objective.CYCLE:
+            return proposed
+        limit = GIVEN_UP * (BESTS[Objective.CYCLE].value(following[0]) or math.inf)
+        return [each if "clearance_m" in each else each | {"give_up_above_s": limit} for each in proposed]
 
     @property
     def combinations(self) -> list[dict[str, object]]:
@@ -66,7 +73,7 @@ class Proposals:
             *({"kind": "attempt", "index": k} for k in range(len(self.request.attempts))),
         ]
         options: list[dict[str, Any]] = [{**each, "choice": choice} for choice in self.combinations for each in listed]
-        rest = [self._perturbed(None, SPREADS[0], 0), self._sampled(0, 0), self._perturbed(None, SPREADS[1], 1)]
+        rest = [self._perturbed(None, WIDE[0], 0), self._perturbed(None, WIDE[1], 1), self._sampled(0, 0)]
         return [*options, *rest[: -len(options) % SIZE]]
 
     def _leading(self, finished: Sequence[Trial]) -> Iterator[Trial]:
@@ -104,12 +111,18 @@ class Proposals:
         choices = self.combinations
         return {"kind": "sampled", "index": index, "choice": choices[number % len(choices)]}
 
-    def _fourth(self, best: Trial | None, number: int) -> dict[str, Any]:
-        """In turn the given layout perturbed, and the best one asked for more clearance than is demanded."""
-        if number % 2 or best is None or self.request.objective is not Objective.CYCLE:
-            return self._perturbed(None, SPREADS[number % len(SPREADS)], number)
+    def _fourth(self, best: Trial | None, number: int, *, is_conforming: bool) -> dict[str, Any]:
+        """In turn a sample, the given layout perturbed, and the best one asked for more clearance than is demanded.
+
+        While nothing conforms, a sample in every round.
+        """
+        turn = number % 4
+        if turn == 0 or not is_conforming:
+            return self._sampled(number, number)
+        if turn != 2 or best is None or self.request.objective is not Objective.CYCLE:
+            return self._perturbed(None, WIDE[(number + 1) % len(WIDE)], number)
         more = self._perturbed(best, 0.0, number) | {"kind": "improved"}
-        return more | {"clearance_m": ADDED[number // 2 % len(ADDED)]}
+        return more | {"clearance_m": ADDED[number // 4 % len(ADDED)]}
 
 
 def origin_text(values: Mapping[str, Any]) -> str:

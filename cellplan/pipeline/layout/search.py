@@ -62,7 +62,7 @@ class _Search:
         """Rounds and finish; a search for any conforming layout goes on where the first one is rejected."""
         while True:
             finished = self._study().run(
-                partial(evaluate, self.request),
+                partial(evaluate, self.request.anywhere),
                 workers=self.workers,
                 stop=self.stop,
                 limits=Limits(seconds=TRIAL_LIMIT),
