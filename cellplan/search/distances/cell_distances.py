@@ -6,7 +6,7 @@ of the support functions at a fixed normal: for a body that moves as a whole, th
 the normal; for one whose shape changes, the change of its reach in that direction.
 """
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -15,7 +15,7 @@ import numpy as np
 from cellplan.collision.bodies import CollisionBody, prepare
 from cellplan.collision.engine import Engine
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.geometry.transforms import pose
+from cellplan.geometry.transforms import pose, rotation_about
 from cellplan.kinematics.link_forest import WORLD
 from cellplan.model.cell import Cell
 from cellplan.model.mounting import Bracket
@@ -25,12 +25,13 @@ from cellplan.scene.near_table import Found, NearTable, wrenches
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.keep_out import keep_out_bodies
 from cellplan.search.distances.layout_pairs import LayoutPair, among, are_own, demands_of, layout_pairs, with_areas
-from cellplan.search.distances.moving_bodies import LayoutVariables, MovingBodies, Placed, far_away, supports
+from cellplan.search.distances.moving_bodies import LayoutVariables, MovingBodies, Placed, far_away, reaches
 from cellplan.search.kernel.job import Layouts
 
 STEP: Final = (
     1e-6  # [m] and [rad] to either side, by which the reach of a body that changes its shape is differentiated
 )
+TURNS: Final = 3  # place of the first of the rotations among the components of a twist
 RAISED: Final = 0.1  # [m] by which a base on the floor is raised so that its column exists
 
 
@@ -200,42 +201,56 @@ class CellDistances:
 
     def _by_shapes(self, near: LayoutDistances, x: Array) -> Array:
         """Derivatives while links stand still, of what moves on its link or changes its shape, shape (M, n)."""
-        found = np.zeros((len(near.pairs), len(x)))
-        for variable, index, sides in self._changes(x):
-            for side, sign in ((0, 1.0), (1, -1.0)):
-                rows = np.flatnonzero(near.bodies[:, side] == index)
-                if not len(rows):
-                    continue
-                link = self._link(index)
-                L = near.D[link, near.keys[rows]]
-                reach = [supports(each, L[:, :3, :3], L[:, :3, 3], sign * near.normals[rows]) for each in sides]
-                found[rows, variable] -= (reach[0] - reach[1]) / (2.0 * STEP)
+        found, directions = np.zeros((len(near.pairs), len(x))), dict[int, tuple[Indices, Array]]()
+        for index, by, forward, back in self._changes(near, x):
+            if index not in directions:
+                directions[index] = self._directions(near, index)
+            rows, n = directions[index]
+            if len(rows):
+                change = (reaches(back, n) - reaches(forward, n)) / (2.0 * STEP)
+                found[rows] += change[:, None] * by
         return found
 
-    def _link(self, index: int) -> int:
-        """The link that a body is seen from: a column from the world, all others from what carries them."""
-        return WORLD if index in self._moving.columns.values() else int(self._table.bodies.links[index])
+    def _column(self, name: str, X_WB: Array) -> Placed:
+        """The column of a robot at its base, as seen from the world."""
+        column = self._moving.of_base(name, X_WB)
+        return Placed(column.shape, X_WB @ column.X_LS)
 
-    def _changes(self, x: Array) -> Iterator[tuple[int, int, tuple[Placed, Placed]]]:
-        """Variable, body and the body a step forward and back, for all that moves on its link or changes its shape."""
-        for variable, unit in enumerate(np.eye(len(x))):
-            sides = [self._shapes(self._variables.placed(x + step * unit)) for step in (STEP, -STEP)]
-            yield from _changed(variable, sides)
+    def _directions(self, near: LayoutDistances, index: int) -> tuple[Indices, Array]:
+        """The pairs of a body, and where the others are, seen from its link: unit directions of shape (M, 3).
 
-    def _shapes(self, cell: Cell) -> dict[int, Placed]:
-        """What a layout moves on its link or gives another shape; columns as seen from the world."""
-        X_WB, found = _bases(cell), dict(self._moving.of_tools(cell))
-        for index, placed in self._moving.of_bases(X_WB):
-            found[index] = Placed(placed.shape, X_WB[self._robots[index]] @ placed.X_LS)
-        return found
+        A column is seen from the world, all other bodies from what carries them. No body is in a pair with itself.
+        """
+        link = WORLD if index in self._moving.columns.values() else int(self._table.bodies.links[index])
+        rows, sides = np.nonzero(near.bodies == index)
+        n = near.normals[rows] * np.where(sides == 0, 1.0, -1.0)[:, None]
+        return rows, (n[:, None] @ near.D[link, near.keys[rows], :3, :3])[:, 0]
+
+    def _changes(self, near: LayoutDistances, x: Array) -> Iterator[tuple[int, Array, Placed, Placed]]:
+        """Bodies a step forward and back of one number, and by how much that grows with each variable, (n,)."""
+        base, forest = self._variables.base_twists(x), near_table(self._scene).forest
+        for name, index in self._moving.columns.items():
+            X_WB, by = near.D[forest.place(name), 0], base[self._cell.index(name)]
+            for component in np.flatnonzero(by.any(axis=1)).tolist():
+                forward, back = (self._column(name, _displaced(X_WB, component, step)) for step in (STEP, -STEP))
+                yield index, by[component], forward, back
+        for each in self._variables.beside(x, STEP):
+            moved = (self._moving.of_part(cell) for cell in each.sides)
+            if (name := each.robot) is not None:
+                moved = (self._moving.of_tool(cell, name) for cell in each.sides)
+            for (index, forward), (_, back) in zip(*moved, strict=True):
+                if forward.shape != back.shape or not np.array_equal(forward.X_LS, back.X_LS):
+                    yield index, each.by, forward, back
 
 
-def _changed(variable: int, sides: Sequence[Mapping[int, Placed]]) -> Iterator[tuple[int, int, tuple[Placed, Placed]]]:
-    """The bodies that are not the same on both sides."""
-    for index, forward in sides[0].items():
-        back = sides[1][index]
-        if forward.shape != back.shape or not np.array_equal(forward.X_LS, back.X_LS):
-            yield variable, index, (forward, back)
+def _displaced(X: Array, component: int, step: float) -> Array:
+    """A frame moved along an axis of the world, or turned about one through its origin."""
+    found = X.copy()
+    if component < TURNS:
+        found[component, 3] += step
+    else:
+        found[:3, :3] = rotation_about(np.eye(3)[component - TURNS], step) @ X[:3, :3]
+    return found
 
 
 def _concerned(pairs: Sequence[LayoutPair], changed: Set[int]) -> Flags:
