@@ -168,8 +168,13 @@ class CellDistances:
             x: The variables, shape (n,).
             dq: Derivatives of the joints at the keys by the variables, shape (K, nq, n).
         """
-        found = (near.by_joints[:, None] @ dq[near.keys])[:, 0]
-        return found + self._by_bases(near, x) + self._by_shapes(near, x)
+        found, base = np.empty((len(near.pairs), dq.shape[2])), self._variables.base_twists(x)
+        for key in range(len(dq)):
+            rows = near.keys == key
+            found[rows] = near.by_joints[rows] @ dq[key]
+        self._add_by_bases(found, near, base)
+        self._add_by_shapes(found, near, x, base)
+        return found
 
     def _placed(self, cell: Cell) -> tuple[NearTable, Engine]:
         """The bodies as a layout has them."""
@@ -182,9 +187,8 @@ class CellDistances:
         poses = {index: each.X_LS if each.shape is not None else far_away(index) for index, each in placed.items()}
         return self._table.moved(poses, other), self._engine.with_bodies(other) if other else self._engine
 
-    def _by_bases(self, near: LayoutDistances, x: Array) -> Array:
-        """Derivatives while joints stand still, of what moves as a whole with the bases, shape (M, n)."""
-        base = self._variables.base_twists(x)
+    def _add_by_bases(self, found: Array, near: LayoutDistances, base: Array) -> None:
+        """Add derivatives while joints stand still, of what moves as a whole with the bases, shape (M, n)."""
         X_WB = near.D[[near_table(self._scene).forest.place(robot.name) for robot in self._cell.robots], 0]
         twists = np.zeros((len(base) + 1, 6, base.shape[2]))  # at the world's origin; the last one for the world
         turns = np.swapaxes(base[:, 3:], 1, 2)
@@ -193,23 +197,23 @@ class CellDistances:
         robots = np.append(self._robots, -1)  # -1 for a half-space as well
         robots[list(self._moving.columns.values())] = -1  # they do not lean with their bases
         ends = robots[near.bodies]
-        concerned = np.flatnonzero(ends[:, 0] != ends[:, 1])
-        found = np.zeros((len(near.pairs), base.shape[2]))
-        relative = twists[ends[concerned, 1]] - twists[ends[concerned, 0]]
-        found[concerned] = (wrenches(near.found)[concerned, None] @ relative)[:, 0]
-        return found
+        forces = wrenches(near.found)
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            for robot in range(len(base)):
+                rows = (ends[:, side] == robot) & (ends[:, 1 - side] != robot)
+                found[rows] += sign * forces[rows] @ twists[robot]
 
-    def _by_shapes(self, near: LayoutDistances, x: Array) -> Array:
-        """Derivatives while links stand still, of what moves on its link or changes its shape, shape (M, n)."""
-        found, directions = np.zeros((len(near.pairs), len(x))), dict[int, tuple[Indices, Array]]()
-        for index, by, forward, back in self._changes(near, x):
+    def _add_by_shapes(self, found: Array, near: LayoutDistances, x: Array, base: Array) -> None:
+        """Add derivatives while links stand still, of what moves on its link or changes its shape, shape (M, n)."""
+        directions = dict[int, tuple[Indices, Array]]()
+        for index, by, forward, back in self._changes(near, x, base):
             if index not in directions:
                 directions[index] = self._directions(near, index)
             rows, n = directions[index]
             if len(rows):
                 change = (reaches(back, n) - reaches(forward, n)) / (2.0 * STEP)
-                found[rows] += change[:, None] * by
-        return found
+                columns = np.flatnonzero(by)
+                found[rows[:, None], columns] += change[:, None] * by[columns]
 
     def _column(self, name: str, X_WB: Array) -> Placed:
         """The column of a robot at its base, as seen from the world."""
@@ -226,10 +230,12 @@ class CellDistances:
         n = near.normals[rows] * np.where(sides == 0, 1.0, -1.0)[:, None]
         return rows, (n[:, None] @ near.D[link, near.keys[rows], :3, :3])[:, 0]
 
-    def _changes(self, near: LayoutDistances, x: Array) -> Iterator[tuple[int, Array, Placed, Placed]]:
+    def _changes(self, near: LayoutDistances, x: Array, base: Array) -> Iterator[tuple[int, Array, Placed, Placed]]:
         """Bodies a step forward and back of one number, and by how much that grows with each variable, (n,)."""
-        base, forest = self._variables.base_twists(x), near_table(self._scene).forest
+        forest = near_table(self._scene).forest
         for name, index in self._moving.columns.items():
+            if index not in near.bodies:
+                continue
             X_WB, by = near.D[forest.place(name), 0], base[self._cell.index(name)]
             for component in np.flatnonzero(by.any(axis=1)).tolist():
                 forward, back = (self._column(name, _displaced(X_WB, component, step)) for step in (STEP, -STEP))

@@ -3,8 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
-
 from cellplan.model.cell import Cell
 from cellplan.model.layout import VariableKind
 from cellplan.search.distances.moving_bodies import Beside

@@ -9,9 +9,9 @@ from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell, Part, Tool
 from cellplan.model.layout import LayoutSettings, VariableKind
+from cellplan.search.distances.moving_bodies import Beside
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
-from cellplan.search.distances.moving_bodies import Beside
 from cellplan.search.variables.beside import cells_beside
 from cellplan.search.variables.directions import base_twists, effective_base_twists, tip_twists
 from cellplan.search.variables.pedestals import with_pedestals, with_room_below

@@ -45,7 +45,7 @@ class BaseOfB:
         base[1, :3] = np.eye(3)
         return base
 
-    def beside(self, x: Array, step: float) -> Iterator[Beside]:  # noqa: ARG002
+    def beside(self, x: Array, step: float) -> Iterator[Beside]:
         return iter(())
 
     def placed(self, x: Array) -> Cell:
