@@ -14,6 +14,7 @@ from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 
 TOLERANCE: Final = 1e-9  # [m] of the iteration: far below what any clearance is stated to
 MOST_STEPS: Final = 500  # of one iteration
+MOST_KEPT: Final = 8  # [-] objects kept for each body
 FARTHEST: Final = 1e3  # [m] a deeper overlap is none: where its search fails coal returns the largest number there is
 
 
@@ -24,6 +25,7 @@ class SignedDistances:
         """Start without any object."""
         self._shapes: dict[int, tuple[CollisionBody, Any]] = {}  # by identity of the body, which is kept alive
         self._pairs: dict[tuple[int, int], Any] = {}
+        self._placed: list[Any] = []
 
     def below(
         self, bodies: tuple[CollisionBody, ...], ends: Indices, poses: BodyPoses, samples: Indices, *, within: float
@@ -43,26 +45,43 @@ class SignedDistances:
         """
         import coal  # a search needs it, a verification does not
 
-        request, result, placed = coal.DistanceRequest(), coal.DistanceResult(), dict[tuple[int, int], Any]()
+        if len(self._shapes) > MOST_KEPT * len(bodies):  # of a search that gives bodies other shapes again and again
+            self._shapes.clear()
+            self._pairs.clear()
+        request, result = coal.DistanceRequest(), coal.DistanceResult()
         request.gjk_tolerance = request.epa_tolerance = TOLERANCE
         request.gjk_max_iterations = MOST_STEPS
+        count = poses.p.shape[1]
+        kinds, kind = np.unique(ends[:, 0] * len(bodies) + ends[:, 1], return_inverse=True)
+        queries = [self._query(bodies[key // len(bodies)], bodies[key % len(bodies)]) for key in kinds.tolist()]
+        spots, spot = np.unique(ends * count + samples[:, None], return_inverse=True)
+        body, at = np.divmod(spots, count)
+        placed = self._poses(poses.R[body, at], poses.p[body, at])
         places, distances, points = list[int](), list[float](), list[Array]()
-        for place, ((a, b), sample) in enumerate(zip(ends.tolist(), samples.tolist(), strict=True)):
-            X_a, X_b = placed.get((a, sample)), placed.get((b, sample))
-            if X_a is None:
-                X_a = placed[a, sample] = coal.Transform3s(poses.R[a, sample], poses.p[a, sample])
-            if X_b is None:
-                X_b = placed[b, sample] = coal.Transform3s(poses.R[b, sample], poses.p[b, sample])
+        asked = zip(kind.tolist(), spot.reshape(-1, 2).tolist(), strict=True)
+        for place, (query, (a, b)) in enumerate(asked):
             result.clear()
-            distance = self._query(bodies[a], bodies[b])(X_a, X_b, request, result)
+            distance = queries[query](placed[a], placed[b], request, result)
             if distance < within:
                 first, second = result.getNearestPoint1(), result.getNearestPoint2()
                 if not distance > -FARTHEST:
-                    distance, first, second = _along_centres(bodies[a], bodies[b], poses, (a, b, sample))
+                    one, other = ends[place].tolist()
+                    where = (one, other, int(samples[place]))
+                    distance, first, second = _along_centres(bodies[one], bodies[other], poses, where)
                 places.append(place)
                 distances.append(distance)
                 points += [first, second]
         return np.array(places, dtype=np.intp), np.array(distances), np.array(points).reshape(-1, 2, 3)
+
+    def _poses(self, R: Array, p: Array) -> list[Any]:
+        """Coal's poses, shape (N, 3, 3) and (N, 3); the objects are used again, as making them takes twice as long."""
+        import coal
+
+        self._placed += [coal.Transform3s() for _ in range(len(p) - len(self._placed))]
+        for pose, rotation, position in zip(self._placed, R, p, strict=False):
+            pose.setRotation(rotation)
+            pose.setTranslation(position)
+        return self._placed
 
     def _query(self, first: CollisionBody, second: CollisionBody) -> Any:
         """Coal's query for two bodies."""

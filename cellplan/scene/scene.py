@@ -22,7 +22,8 @@ from cellplan.scene.collision_pairs import CollisionPairs
 from cellplan.scene.left_out import left_out
 from cellplan.scene.mounting import MountedPair
 from cellplan.scene.moved import placed_columns, stands_by_link, with_bases
-from cellplan.scene.near import NearPairs, near_pairs
+from cellplan.scene.near import NearPairs, near_pairs, near_table
+from cellplan.scene.near_table import NearTable
 from cellplan.scene.pairs import Excluded, ScenePair
 
 
@@ -42,6 +43,7 @@ class Scene:
         solid_rows: Indices of the pairs that the engine watches, shape (S,), ascending.
         solid_pairs: ``ScenePair.solids`` of each of them, shape (S, 2).
         ground_rows: Indices of the pairs of a solid and a half-space, shape (G,).
+        near_table: Links, bodies and watched pairs as arrays.
     """
 
     cell: Cell
@@ -55,6 +57,7 @@ class Scene:
     solid_rows: Indices = field(init=False)
     solid_pairs: Indices = field(init=False)
     ground_rows: Indices = field(init=False)
+    near_table: NearTable = field(init=False)
 
     def __post_init__(self) -> None:
         """Collect the indices of solids and half-spaces once: whole batches of pairs are bounded by them."""
@@ -63,6 +66,8 @@ class Scene:
         object.__setattr__(self, "solid_rows", np.array([row for row, _ in solids], dtype=np.intp))
         object.__setattr__(self, "solid_pairs", np.array([ends for _, ends in solids], dtype=np.intp).reshape(-1, 2))
         object.__setattr__(self, "ground_rows", np.array(ground, dtype=np.intp))
+        table = near_table(self.cell, self.bodies, self.pairs, self.engine, self.cut_from)
+        object.__setattr__(self, "near_table", table)
 
     @classmethod
     def from_cell(cls, cell: Cell) -> "Scene":
@@ -125,9 +130,12 @@ class Scene:
         object.__setattr__(other, "cell", cell)
         object.__setattr__(other, "chains", {**self.chains, **chains})
         object.__setattr__(other, "bodies", bodies)
-        if changed:
-            made = {index: prepare(body.name, body.shape) for index, body in changed.items()}  # type: ignore[arg-type]
+        made = {index: prepare(body.name, body.shape) for index, body in changed.items()}  # type: ignore[arg-type]
+        if made:
             object.__setattr__(other, "engine", self.engine.with_bodies(made))
+        if placed:
+            poses = {index: body.X_BS for index, body in placed.items()}
+            object.__setattr__(other, "near_table", self.near_table.moved(poses, made))
         return other
 
     def near(self, q: Array, within: float) -> NearPairs:

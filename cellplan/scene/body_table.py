@@ -1,0 +1,105 @@
+"""Bodies of a scene as arrays: where on which link they are and what bounds them, so that all are placed at once."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cellplan.collision.bodies import BodyPoses, CollisionBody
+from cellplan.collision.hull_supports import HullSupports
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.kinematics.link_forest import LinkForest
+from cellplan.scene.bodies import SceneBody
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BodyTable:
+    """Bodies of the engine and the links that carry them.
+
+    Attributes:
+        links: Place in the forest of the link that carries each body, shape (B,).
+        X_LS: Pose on that link as ``SceneBody.X_BS``, shape (B, 4, 4).
+        centres: Centres of the bounding spheres in the bodies' own frames in [m], shape (B, 3).
+        radii: Their radii in [m], shape (B,).
+        ends: Ends of the bounding lines in the bodies' own frames in [m], shape (B, 2, 3).
+        girths: How far the bodies reach from these lines in [m], shape (B,).
+        supports: Farthest points of their hulls.
+    """
+
+    links: Indices
+    X_LS: Array
+    centres: Array
+    radii: Array
+    ends: Array
+    girths: Array
+    supports: HullSupports
+
+    @classmethod
+    def of(cls, forest: LinkForest, carriers: Sequence[SceneBody], bodies: Sequence[CollisionBody]) -> "BodyTable":
+        """The arrays of some bodies.
+
+        Args:
+            forest: Where links are.
+            carriers: The body of the scene that each body is, or is cut from.
+            bodies: The bodies.
+        """
+        return cls(
+            links=np.array([forest.place(each.robot, each.link) for each in carriers], dtype=np.intp),
+            X_LS=np.array([each.X_BS for each in carriers]).reshape(-1, 4, 4),
+            centres=np.array([body.centre for body in bodies]).reshape(-1, 3),
+            radii=np.array([body.radius for body in bodies]),
+            ends=np.array([body.ends for body in bodies]).reshape(-1, 2, 3),
+            girths=np.array([body.girth for body in bodies]),
+            supports=HullSupports(bodies),
+        )
+
+    def replaced(self, poses: Mapping[int, Array], bodies: Mapping[int, CollisionBody]) -> "BodyTable":
+        """The same with some bodies elsewhere on their links, shape (4, 4) each, and others in place of some."""
+        X_LS, centres, radii = self.X_LS, self.centres, self.radii
+        ends, girths, supports = self.ends, self.girths, self.supports
+        if poses:
+            X_LS = X_LS.copy()
+            X_LS[list(poses)] = list(poses.values())
+        if bodies:
+            centres, radii, ends, girths = centres.copy(), radii.copy(), ends.copy(), girths.copy()
+            for index, body in bodies.items():
+                centres[index], radii[index], ends[index], girths[index] = (
+                    body.centre,
+                    body.radius,
+                    body.ends,
+                    body.girth,
+                )
+            supports = supports.replaced(bodies)
+        return replace(self, X_LS=X_LS, centres=centres, radii=radii, ends=ends, girths=girths, supports=supports)
+
+    def poses(self, D: Array) -> BodyPoses:
+        """Poses of all bodies from the displacements of the links, shape (links, K, 4, 4); see ``LinkForest``."""
+        R = D[self.links, :, :3, :3]
+        moved = R @ self.X_LS[:, None, :3]
+        return BodyPoses(np.ascontiguousarray(moved[..., :3]), moved[..., 3] + D[self.links, :, :3, 3])
+
+
+    def bounds(self, poses: BodyPoses) -> tuple[Array, Array]:
+        """Centres of the bounding spheres and ends of the bounding lines in the world in [m].
+
+        Returns:
+            Shape (B, K, 3), and (B, K, 2, 3).
+        """
+        points = np.concatenate([self.centres[:, None], self.ends], axis=1)
+        placed = points[:, None] @ np.swapaxes(poses.R, 2, 3) + poses.p[:, :, None]
+        return placed[:, :, 0], placed[:, :, 1:]
+
+
+def placed_points(poses: BodyPoses, bodies: Indices, samples: Indices, points: Array) -> Array:
+    """Points of some bodies in the world.
+
+    Args:
+        poses: Where the bodies are.
+        bodies: Which bodies, shape (M,).
+        samples: At which samples, shape (M,).
+        points: In their own frames in [m], shape (M, 3).
+
+    Returns:
+        Shape (M, 3).
+    """
+    return (poses.R[bodies, samples] @ points[..., None])[..., 0] + poses.p[bodies, samples]

@@ -1,0 +1,217 @@
+"""Links, bodies and pairs of a scene as arrays, in which near pairs are looked for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.collision.bodies import BodyPoses, CollisionBody
+from cellplan.collision.engine import Engine
+from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.geometry.line_distances import line_distances
+from cellplan.kinematics.link_forest import WORLD, LinkForest
+from cellplan.scene.body_table import BodyTable, placed_points
+
+CLEAR_OF_TIP: Final = 1e-3  # [m] by which the hull of a cut tool keeps clear of the tip where it stands for the tool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WatchedPairs:
+    """Pairs of bodies as arrays; P of two solids, then G of a solid and a half-space.
+
+    Attributes:
+        rows: What each pair is called, shape (P + G,).
+        solids: Bodies of the engine of the first ones, shape (P, 2).
+        above: Solids of the others, shape (G,).
+        planes: Poses of their half-spaces in the world, everything below the xy plane is solid, shape (G, 4, 4).
+        demands: Distance in [m] down to which the hulls of a pair are enough, shape (P,).
+        once: Whether a pair is looked at in the first configuration only, shape (P + G,).
+    """
+
+    rows: Indices
+    solids: Indices
+    above: Indices
+    planes: Array
+    demands: Array
+    once: Flags
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """Near pairs; M of them, ordered by sample and row.
+
+    Attributes:
+        rows: What each pair is called, shape (M,).
+        samples: At which configuration, shape (M,).
+        distances: Signed distances in [m], shape (M,).
+        normals: Unit directions from the first body to the second, shape (M, 3).
+        first: Points of the first bodies in the world in [m], shape (M, 3).
+        second: Points of the second bodies, shape (M, 3).
+        bodies: The bodies by their places in the engine, -1 for a half-space, shape (M, 2).
+    """
+
+    rows: Indices
+    samples: Indices
+    distances: Array
+    normals: Array
+    first: Array
+    second: Array
+    bodies: Indices
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NearTable:
+    """Links, bodies and pairs.
+
+    Attributes:
+        forest: The links.
+        bodies: The bodies of the engine.
+        pairs: The pairs.
+        is_hull: Whether the hull of a body is what counts of it, shape (B,).
+    """
+
+    forest: LinkForest
+    bodies: BodyTable
+    pairs: WatchedPairs
+    is_hull: Flags
+
+    def moved(self, poses: Mapping[int, Array], bodies: Mapping[int, CollisionBody]) -> "NearTable":
+        """The same with some bodies elsewhere on their links, and others in place of some; see ``BodyTable``."""
+        return replace(self, bodies=self.bodies.replaced(poses, bodies))
+
+    def find(self, engine: Engine, D: Array, within: float) -> Found:
+        """All pairs nearer than a distance in [m].
+
+        Args:
+            engine: The bodies.
+            D: Displacements of the links, shape (links, K, 4, 4).
+            within: The distance.
+        """
+        poses = self.bodies.poses(D)
+        parts = [self._solids(engine, poses, within), self._grounds(poses, within)]
+        rows, samples, distances, normals, first, second, bodies = (
+            np.concatenate(part) for part in zip(*parts, strict=True)
+        )
+        order = np.lexsort((rows, samples))
+        order = order[distances[order] < within]
+        return Found(
+            rows=rows[order],
+            samples=samples[order],
+            distances=distances[order],
+            normals=normals[order],
+            first=first[order],
+            second=second[order],
+            bodies=bodies[order],
+        )
+
+    def by_joints(self, D: Array, found: Found) -> Array:
+        """Derivatives of the distances by the stacked joints in [m/rad] or [m/m], shape (M, nq)."""
+        return self.by_axes(found, self.forest.screws(D)) @ self.forest.shares
+
+    def by_axes(self, found: Found, screws: Array) -> Array:
+        """The work of a unit force along each normal on every axis, shape (M, axes).
+
+        It is the same at both points, as the normal goes through both.
+
+        Args:
+            found: The pairs.
+            screws: Of all axes, shape (axes, K, 6).
+        """
+        links = self.links_of(found)
+        moved = self.forest.carries[links[:, 1]] - self.forest.carries[links[:, 0]]
+        work = np.swapaxes(screws, 0, 1)[found.samples] @ wrenches(found)[:, :, None]
+        return work[..., 0] * moved
+
+    def links_of(self, found: Found) -> Indices:
+        """Links that carry the bodies of pairs, shape (M, 2)."""
+        return np.where(found.bodies < 0, WORLD, self.bodies.links[found.bodies])
+
+    def _solids(self, engine: Engine, poses: BodyPoses, within: float) -> "Parts":
+        """Pairs of solids: bounding spheres, bounding lines, hulls, then surfaces where the hull is not what counts."""
+        table, ends = self.bodies, self.pairs.solids
+        centres, lines = table.bounds(poses)
+        places, samples = self._near_spheres(centres, within)
+        a, b = ends[places].T
+        slim = line_distances(lines[a, samples], lines[b, samples]) < table.girths[a] + table.girths[b] + within
+        places, samples = places[slim], samples[slim]
+        near, distances, points = engine.signed.below(engine.bodies, ends[places], poses, samples, within=within)
+        places, samples, first, second = places[near], samples[near], points[:, 0].copy(), points[:, 1].copy()
+        bodies = ends[places]
+        is_open = (distances <= self.pairs.demands[places]) & ~self.is_hull[bodies].all(axis=1)
+        for query in np.flatnonzero(is_open).tolist():
+            (i, j), sample = bodies[query].tolist(), int(samples[query])
+            is_apart = not engine.touch(i, j, poses, sample=sample)
+            if is_apart and (nearest := engine.surface_points(i, j, poses, sample=sample)) is not None:
+                first[query], second[query] = nearest
+                distances[query] = np.linalg.norm(nearest[1] - nearest[0])
+        apart = centres[bodies[:, 1], samples] - centres[bodies[:, 0], samples]
+        normals = _directions(distances, first, second, apart)
+        return self.pairs.rows[places], samples, distances, normals, first, second, bodies
+
+    def _near_spheres(self, centres: Array, within: float) -> tuple[Indices, Indices]:
+        """Pairs of solids whose bounding spheres, centres of shape (B, K, 3), are near enough, and at which samples."""
+        radii, (a, b) = self.bodies.radii, self.pairs.solids.T
+        squares = np.zeros((len(a), centres.shape[1]))
+        for component in np.moveaxis(centres, 2, 0):
+            along = np.ascontiguousarray(component)
+            apart = along.take(b, axis=0)
+            apart -= along.take(a, axis=0)
+            apart *= apart
+            squares += apart
+        reach = radii[a] + radii[b] + within
+        is_near = squares < (reach * reach)[:, None]
+        is_near[self.pairs.once[: len(a)], 1:] = False
+        places, samples = np.nonzero(is_near)
+        return places, samples
+
+    def _grounds(self, poses: BodyPoses, within: float) -> "Parts":
+        """Pairs of a solid and a half-space."""
+        table, above, planes = self.bodies, self.pairs.above, self.pairs.planes
+        up, origin = planes[:, :3, 2], planes[:, :3, 3]
+        centres = (poses.R[above] @ table.centres[above, None, :, None])[..., 0] + poses.p[above]
+        lowest = np.einsum("gki,gi->gk", centres - origin[:, None], up) - table.radii[above, None]
+        is_near = lowest < within
+        is_near[self.pairs.once[len(self.pairs.solids) :], 1:] = False
+        places, samples = np.nonzero(is_near)
+        bodies, up = above[places], up[places]
+        local = (np.swapaxes(poses.R[bodies, samples], 1, 2) @ -up[:, :, None])[..., 0]
+        first = placed_points(poses, bodies, samples, table.supports.points(bodies, local))
+        heights = np.einsum("mi,mi->m", first - origin[places], up)
+        rows = self.pairs.rows[len(self.pairs.solids) :][places]
+        ends = np.stack([bodies, np.full(len(bodies), -1)], axis=1)
+        return rows, samples, heights, -up, first, first - heights[:, None] * up, ends
+
+
+Parts = tuple[Indices, Indices, Array, Array, Array, Array, Indices]  # the attributes of ``Found``
+
+
+def wrenches(found: Found) -> Array:
+    """Unit forces along the normals with their moments about the world's origin, shape (M, 6)."""
+    return np.concatenate([found.normals, np.cross(found.second, found.normals)], axis=1)
+
+
+def counts_by_hull(body: CollisionBody, tip: Array | None) -> bool:
+    """Whether the hull of a body may stand for it in a search: it is convex, or a tool that is cut off before its tip.
+
+    The surface of such a tool differs from its hull by the hollow that the contact zone leaves at its end. Where the
+    hull keeps clear of the tip only what bulges into that hollow is taken for a contact.
+
+    Args:
+        body: The body.
+        tip: The tip that it is cut off before, in its own frame in [m], shape (3,); None for a body that is not cut.
+    """
+    if body.is_convex or tip is None:
+        return body.is_convex
+    corners = body.core.vertices
+    toward = tip - corners.mean(axis=0)
+    length = float(np.linalg.norm(toward))
+    return length > 0.0 and float(((corners - tip) @ (toward / length)).max()) < -CLEAR_OF_TIP
+
+
+def _directions(distances: Array, first: Array, second: Array, centres: Array) -> Array:
+    """Unit directions from the first points to the second ones; between centres where bodies just touch."""
+    lengths = np.linalg.norm(second - first, axis=1)
+    along = np.where((lengths > 0.0)[:, None], second - first, centres) * np.where(distances < 0.0, -1.0, 1.0)[:, None]
+    norms = np.linalg.norm(along, axis=1, keepdims=True)
+    return along / np.where(norms > 0.0, norms, 1.0)

@@ -1,0 +1,235 @@
+r"""Distances between the bodies of a layout at some configurations of its motion, and their exact derivatives.
+
+The distance of two convex bodies along their common normal :math:`n` is :math:`-h_A(n) - h_B(-n)` with the support
+functions of both. At the nearest points it does not change with the normal, so its derivative by any variable is that
+of the support functions at a fixed normal: for a body that moves as a whole, the velocity of the nearest point along
+the normal; for one whose shape changes, the change of its reach in that direction.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.collision.bodies import CollisionBody, prepare
+from cellplan.collision.engine import Engine
+from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.geometry.transforms import pose
+from cellplan.kinematics.link_forest import WORLD
+from cellplan.model.mounting import Bracket
+from cellplan.scene.near_table import Found, NearTable, wrenches
+from cellplan.scene.scene import Scene
+from cellplan.search.distances.layout_pairs import LayoutPair, among, are_own, demands_of, layout_pairs
+from cellplan.search.distances.moving_bodies import LayoutVariables, MovingBodies, Placed, far_away, supports
+from cellplan.search.kernel.job import Layouts
+
+STEP: Final = (
+    1e-6  # [m] and [rad] to either side, by which the reach of a body that changes its shape is differentiated
+)
+RAISED: Final = 0.1  # [m] by which a base on the floor is raised so that its column exists
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LayoutDistances:
+    """Pairs that are nearer than a distance in one layout; M of them, ordered by configuration and pair.
+
+    Attributes:
+        pairs: Their places in ``CellDistances.pairs``, shape (M,).
+        keys: At which configuration, shape (M,); the first one for bodies without a joint between them.
+        distances: Signed distances in [m], negative where bodies overlap by so much, shape (M,).
+        demands: What is demanded of them in [m], shape (M,).
+        is_own: Whether both bodies belong to one robot, shape (M,).
+        normals: Unit directions from the first body to the second in W, shape (M, 3).
+        first: Nearest points of the first bodies in W in [m], shape (M, 3).
+        second: Nearest points of the second bodies, shape (M, 3).
+        by_joints: Derivatives by the stacked joints in [m/rad] or [m/m], shape (M, nq).
+        bodies: The bodies by their places in the engine, -1 for a half-space, shape (M, 2).
+        D: Displacements of the links, shape (links, K, 4, 4).
+    """
+
+    pairs: Indices
+    keys: Indices
+    distances: Array
+    demands: Array
+    is_own: Flags
+    normals: Array
+    first: Array
+    second: Array
+    by_joints: Array
+    bodies: Indices
+    D: Array
+
+    @property
+    def found(self) -> Found:
+        """The same as the table of bodies has them."""
+        return Found(
+            rows=self.pairs,
+            samples=self.keys,
+            distances=self.distances,
+            normals=self.normals,
+            first=self.first,
+            second=self.second,
+            bodies=self.bodies,
+        )
+
+
+class CellDistances:
+    """The pairs of a cell that its layouts keep apart.
+
+    Attributes:
+        pairs: The pairs: those that the checks watch, then those of which they judge the depth.
+    """
+
+    def __init__(self, scene: Scene, variables: LayoutVariables) -> None:
+        """Use ``of``."""
+        self._scene, self._variables, self._cell = scene, variables, scene.cell
+        self._moving = MovingBodies(scene, variables)
+        self.pairs, watched = layout_pairs(scene)
+        changed = {index for index, _ in self._moving.of_tools(variables.given)}
+        self._table = replace(scene.near_table, pairs=among(watched, _concerned(self.pairs, changed)))
+        self._demands, self._own = demands_of(self.pairs), are_own(self.pairs)
+        carriers = [scene.carrier(index) for index in range(len(scene.engine.bodies))]
+        index = {robot.name: place for place, robot in enumerate(self._cell.robots)}
+        self._robots = np.array([-1 if each.robot is None else index[each.robot] for each in carriers], dtype=np.intp)
+
+    @classmethod
+    def of(cls, scene: Scene, variables: LayoutVariables) -> "CellDistances":
+        """The pairs of a scene, which is that of the cell of the variables.
+
+        Pairs do not depend on where bases are, but for columns: a robot that stands on the floor without one is raised,
+        so that a layout may have it.
+        """
+        bare = {
+            robot.name: _raised(robot.X_WB)
+            for robot in scene.cell.robots
+            if robot.pedestal is not None
+            and not isinstance(robot.pedestal, Bracket)
+            and robot.pedestal.solid(robot.X_WB) is None
+        }
+        return cls(scene.moved(bare) if bare else scene, variables)
+
+    def near(self, x: Array, layout: Layouts, q: Array, within: float) -> LayoutDistances:
+        """All pairs of one layout that are nearer than a distance.
+
+        Args:
+            x: The variables, shape (n,).
+            layout: The layout, a batch of one.
+            q: Stacked joint positions at the keys in [rad] or [m], shape (K, nq).
+            within: The distance in [m].
+        """
+        table, engine = self._placed(x, layout)
+        D = table.forest.displacements(q, layout.X_WB[0])
+        found = table.find(engine, D, within)
+        return LayoutDistances(
+            pairs=found.rows,
+            keys=found.samples,
+            distances=found.distances,
+            demands=self._demands[found.rows],
+            is_own=self._own[found.rows],
+            normals=found.normals,
+            first=found.first,
+            second=found.second,
+            by_joints=table.by_joints(D, found),
+            bodies=found.bodies,
+            D=D,
+        )
+
+    def derivatives(self, near: LayoutDistances, x: Array, dq: Array) -> Array:
+        """Derivatives of near distances by the variables, shape (M, n).
+
+        Args:
+            near: The pairs, as ``near`` found them at x.
+            x: The variables, shape (n,).
+            dq: Derivatives of the joints at the keys by the variables, shape (K, nq, n).
+        """
+        found = (near.by_joints[:, None] @ dq[near.keys])[:, 0]
+        return found + self._by_bases(near, x) + self._by_shapes(near, x)
+
+    def _placed(self, x: Array, layout: Layouts) -> tuple[NearTable, Engine]:
+        """The bodies as a layout has them."""
+        placed = {**dict(self._moving.of_bases(layout.X_WB[0])), **dict(self._moving.of_tools(x))}
+        bodies = self._scene.engine.bodies
+        other = dict[int, CollisionBody]()
+        for index, each in placed.items():
+            if each.shape is not None and each.shape is not bodies[index].shape and each.shape != bodies[index].shape:
+                other[index] = prepare(bodies[index].name, each.shape)
+        poses = {index: each.X_LS if each.shape is not None else far_away(index) for index, each in placed.items()}
+        return self._table.moved(poses, other), self._scene.engine.with_bodies(other) if other else self._scene.engine
+
+    def _by_bases(self, near: LayoutDistances, x: Array) -> Array:
+        """Derivatives while joints stand still, of what moves as a whole with the bases, shape (M, n)."""
+        base = self._variables.directions(x).base
+        X_WB = near.D[[self._scene.near_table.forest.place(robot.name) for robot in self._cell.robots], 0]
+        twists = np.zeros((len(base) + 1, 6, base.shape[2]))  # at the world's origin; the last one for the world
+        turns = np.swapaxes(base[:, 3:], 1, 2)
+        twists[:-1, :3] = base[:, :3] + np.swapaxes(np.cross(X_WB[:, None, :3, 3], turns), 1, 2)
+        twists[:-1, 3:] = base[:, 3:]
+        robots = np.append(self._robots, -1)  # -1 for a half-space as well
+        robots[list(self._moving.columns.values())] = -1  # they do not lean with their bases
+        ends = robots[near.bodies]
+        concerned = np.flatnonzero(ends[:, 0] != ends[:, 1])
+        found = np.zeros((len(near.pairs), base.shape[2]))
+        relative = twists[ends[concerned, 1]] - twists[ends[concerned, 0]]
+        found[concerned] = (wrenches(near.found)[concerned, None] @ relative)[:, 0]
+        return found
+
+    def _by_shapes(self, near: LayoutDistances, x: Array) -> Array:
+        """Derivatives while links stand still, of what moves on its link or changes its shape, shape (M, n)."""
+        found = np.zeros((len(near.pairs), len(x)))
+        for variable, index, sides in self._changes(x):
+            for side, sign in ((0, 1.0), (1, -1.0)):
+                rows = np.flatnonzero(near.bodies[:, side] == index)
+                if not len(rows):
+                    continue
+                link = self._link(index)
+                L = near.D[link, near.keys[rows]]
+                reach = [supports(each, L[:, :3, :3], L[:, :3, 3], sign * near.normals[rows]) for each in sides]
+                found[rows, variable] -= (reach[0] - reach[1]) / (2.0 * STEP)
+        return found
+
+    def _link(self, index: int) -> int:
+        """The link that a body is seen from: a column from the world, all others from what carries them."""
+        return WORLD if index in self._moving.columns.values() else int(self._table.bodies.links[index])
+
+    def _changes(self, x: Array) -> Iterator[tuple[int, int, tuple[Placed, Placed]]]:
+        """Variable, body and the body a step forward and back, for all that moves on its link or changes its shape."""
+        directions = self._variables.directions(x)
+        start = np.zeros((2 * len(x), self._cell.joint_count))
+        steps = STEP * np.concatenate([np.eye(len(x)), -np.eye(len(x))])
+        X_WB = self._variables.layouts(x + steps, start).X_WB
+        by_base = np.asarray(directions.base.any(axis=(0, 1)))
+        by_tool = np.asarray(directions.tool.any(axis=(0, 1)))
+        otherwise = by_base | by_tool | directions.start.any(axis=0) | directions.weights.any(axis=0)
+        for variable in range(len(x)):
+            if by_base[variable]:
+                sides = [dict(self._on_world(X_WB[place])) for place in (variable, variable + len(x))]
+                yield from _changed(variable, sides)
+            if by_tool[variable] or not otherwise[variable]:
+                sides = [dict(self._moving.of_tools(x + steps[place])) for place in (variable, variable + len(x))]
+                yield from _changed(variable, sides)
+
+    def _on_world(self, X_WB: Array) -> Iterator[tuple[int, Placed]]:
+        """Columns and their poses in the world."""
+        for index, placed in self._moving.of_bases(X_WB):
+            robot = self._robots[index]
+            yield index, Placed(placed.shape, X_WB[robot] @ placed.X_LS)
+
+
+def _changed(variable: int, sides: Sequence[Mapping[int, Placed]]) -> Iterator[tuple[int, int, tuple[Placed, Placed]]]:
+    """The bodies that are not the same on both sides."""
+    for index, forward in sides[0].items():
+        back = sides[1][index]
+        if forward.shape != back.shape or not np.array_equal(forward.X_LS, back.X_LS):
+            yield variable, index, (forward, back)
+
+
+def _concerned(pairs: Sequence[LayoutPair], changed: Set[int]) -> Flags:
+    """Which pairs a layout can change: not those of one robot without a joint between them, unless it changes one."""
+    is_free = [not (pair.is_own and pair.is_fixed) or not changed.isdisjoint(pair.ends) for pair in pairs]
+    return np.array(is_free, dtype=bool)
+
+
+def _raised(X_WB: Array) -> Array:
+    """A base a little higher."""
+    return pose((0.0, 0.0, RAISED)) @ X_WB

@@ -1,0 +1,105 @@
+"""Which pairs of bodies a layout search keeps apart: those of the scene, those that stand, and keep-out zones."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Flags
+from cellplan.scene.bodies import is_ground
+from cellplan.scene.near_table import WatchedPairs
+from cellplan.scene.pairs import Rule
+from cellplan.scene.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LayoutPair:
+    """Two bodies that a layout keeps apart.
+
+    Attributes:
+        names: Their names.
+        ends: Their places in ``Scene.bodies``.
+        demand: Distance in [m] that is demanded; negative where they may reach into each other by so much.
+        is_own: Whether both belong to one robot: no layout gives them more room than the robot's design has.
+        is_fixed: Whether no joint is between them.
+    """
+
+    names: tuple[str, str]
+    ends: tuple[int, int]
+    demand: float
+    is_own: bool
+    is_fixed: bool
+
+
+def layout_pairs(scene: Scene) -> tuple[tuple[LayoutPair, ...], WatchedPairs]:
+    """All pairs of a scene, then those of which the depth is judged; and the same as arrays."""
+    bodies, known = scene.bodies, scene.near_table.pairs
+    found = [
+        _pair(scene, (each.first, each.second), each.demand if each.rule is Rule.CLEARANCE else 0.0)
+        for each in scene.pairs
+    ]
+    found += [_pair(scene, (each.first, each.second), -each.limit) for each in scene.mounted]
+    first = len(scene.pairs)
+    solids = [(first + k, each) for k, each in enumerate(scene.mounted) if not is_ground(bodies[each.second])]
+    grounds = [(first + k, each) for k, each in enumerate(scene.mounted) if is_ground(bodies[each.second])]
+    count = len(known.solids)
+    rows = [*known.rows[:count], *(row for row, _ in solids), *known.rows[count:], *(row for row, _ in grounds)]
+    pairs = WatchedPairs(
+        rows=np.array(rows, dtype=np.intp),
+        solids=np.concatenate([known.solids, _ends([(each.first, each.second) for _, each in solids])]),
+        above=np.array([*known.above, *(each.first for _, each in grounds)], dtype=np.intp),
+        planes=np.concatenate([known.planes, _poses([bodies[each.second].X_BS for _, each in grounds])]),
+        demands=np.append(known.demands, [-each.limit for _, each in solids]),
+        once=np.array([found[row].is_fixed for row in rows], dtype=bool),
+    )
+    return tuple(found), pairs
+
+
+def demands_of(pairs: Sequence[LayoutPair]) -> Array:
+    """Demanded distances in [m], shape (P,)."""
+    return np.array([pair.demand for pair in pairs])
+
+
+def are_own(pairs: Sequence[LayoutPair]) -> Flags:
+    """Which pairs belong to one robot, shape (P,)."""
+    return np.array([pair.is_own for pair in pairs], dtype=bool)
+
+
+def among(pairs: WatchedPairs, kept: Flags) -> WatchedPairs:
+    """Some of the pairs, by what they are called: ``kept`` has an entry for each row."""
+    count = len(pairs.solids)
+    is_kept = kept[pairs.rows]
+    solids, above = is_kept[:count], is_kept[count:]
+    return replace(
+        pairs,
+        rows=pairs.rows[is_kept],
+        solids=pairs.solids[solids],
+        above=pairs.above[above],
+        planes=pairs.planes[above],
+        demands=pairs.demands[solids],
+        once=pairs.once[is_kept],
+    )
+
+
+def _pair(scene: Scene, ends: tuple[int, int], demand: float) -> LayoutPair:
+    """A pair of two bodies of the scene."""
+    a, b = (scene.bodies[end] for end in ends)
+    forest = scene.near_table.forest
+    links = [forest.place(body.robot, body.link) for body in (a, b)]
+    return LayoutPair(
+        names=(a.name, b.name),
+        ends=ends,
+        demand=demand,
+        is_own=a.robot is not None and a.robot == b.robot,
+        is_fixed=bool(np.array_equal(*forest.carries[links])),
+    )
+
+
+def _ends(ends: Sequence[tuple[int, int]]) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
+    """Pairs of bodies, shape (P, 2)."""
+    return np.array(ends, dtype=np.intp).reshape(-1, 2)
+
+
+def _poses(X: Sequence[Array]) -> Array:
+    """Poses, shape (P, 4, 4)."""
+    return np.array(X).reshape(-1, 4, 4)

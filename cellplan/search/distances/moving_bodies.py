@@ -1,0 +1,147 @@
+"""Bodies that a layout moves on their links or gives another shape: columns, tools and the part."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.geometry.shapes import Capsule, Cylinder, Solid, support
+from cellplan.geometry.transforms import inverse, pose
+from cellplan.model.cell import Cell, Part, Tool
+from cellplan.scene.bodies import Kind, part_body
+from cellplan.scene.scene import Scene
+from cellplan.search.kernel.job import Layouts
+from cellplan.search.kernel.screws import Directions
+
+FAR: Final = 1e5  # [m] height at which a body is put that a layout does not have
+ON_AXIS: Final = 1e-6  # [m] by which a tool tip may lie beside the axis of a round body
+
+
+class LayoutVariables(Protocol):
+    """Variables of a layout, as far as distances depend on them; n of them."""
+
+    @property
+    def cell(self) -> Cell:
+        """The cell that is searched."""
+        ...
+
+    @property
+    def given(self) -> Array:
+        """Values of the cell as it is, shape (n,)."""
+        ...
+
+    def layouts(self, x: Array, start: Array) -> Layouts:
+        """Bases, tool tips, start postures and weights of candidates, shape (K, n) and (K, nq)."""
+        ...
+
+    def directions(self, x: Array) -> Directions:
+        """Displacements of bases and tool tips, and changes of start and weights, by each variable."""
+        ...
+
+    def tools(self, x: Array) -> Mapping[str, Tool]:
+        """Tools of the robots whose tools vary, by the name of the robot."""
+        ...
+
+    def part(self, x: Array) -> Part:
+        """The part and its grasps; the very part of the cell where nothing of it varies."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A body as a layout has it: its solid, None where it has none, and its pose on its link; see ``SceneBody``."""
+
+    shape: Solid | None
+    X_LS: Array
+
+
+class MovingBodies:
+    """The bodies that a layout moves on their links or gives another shape, by their places in the engine."""
+
+    def __init__(self, scene: Scene, variables: LayoutVariables) -> None:
+        """Find out which bodies these are."""
+        self._variables, self._cell, self._bodies = variables, scene.cell, scene.bodies
+        self._solids = len(scene.engine.bodies) - len(scene.cut_from)
+        self.columns = {str(body.robot): index for index, body in enumerate(scene.bodies) if body.kind is Kind.PEDESTAL}
+        self._tools: dict[str, list[int]] = {}
+        for index, body in enumerate(scene.bodies):
+            if body.kind is Kind.TOOL:
+                self._tools.setdefault(str(body.robot), []).append(index)
+        self._cuts = {body: self._solids + place for place, body in enumerate(scene.cut_from)}
+        self._part = next(index for index, body in enumerate(scene.bodies) if body.kind is Kind.PART)
+
+    def of_bases(self, X_WB: Array) -> Iterator[tuple[int, Placed]]:
+        """Columns below or above bases in the world, shape (robots, 4, 4)."""
+        for name, index in self.columns.items():
+            robot = self._cell.robot(name)
+            solid = None if robot.pedestal is None else robot.pedestal.solid(X_WB[self._cell.index(name)])
+            yield index, Placed(None, far_away(index)) if solid is None else Placed(*solid)
+
+    def of_tools(self, x: Array) -> Iterator[tuple[int, Placed]]:
+        """Bodies of tools that vary, what of them lies outside the contact zone, and the part where it varies."""
+        tools = self._variables.tools(x)
+        for name, tool in tools.items():
+            model = self._cell.robot(name).model
+            for index, body in zip(self._tools.get(name, []), tool.bodies, strict=True):
+                placed = Placed(body.shape, model.X_BF @ body.X_BS)
+                yield index, placed
+                if index in self._cuts:
+                    tip = (inverse(body.X_BS) @ tool.X_FT)[:3, 3]
+                    yield self._cuts[index], _before(placed, tip, self._cell.checks.contact_zone, self._cuts[index])
+        part = self._variables.part(x)
+        holder = part.held_by[0].robot if part.held_by else None
+        if part is not self._cell.part or holder in tools:
+            cell = self._cell
+            if holder in tools:
+                robots = [
+                    replace(robot, tool=tools[robot.name]) if robot.name == holder else robot for robot in cell.robots
+                ]
+                cell = replace(cell, robots=tuple(robots))
+            yield self._part, Placed(part.shape, part_body(cell, part, *part.held_by[:1]).X_BS)
+
+    def names(self) -> Sequence[str]:
+        """Names of the engine's bodies."""
+        cut_from = {cut: body for body, cut in self._cuts.items()}
+        return [self._bodies[cut_from.get(index, index)].name for index in range(self._solids + len(self._cuts))]
+
+
+def far_away(index: int) -> Array:
+    """A pose at which a body is near nothing, not even another one of these."""
+    return pose((0.0, 0.0, FAR * (index + 1)))
+
+
+def supports(placed: Placed, R: Array, p: Array, n: Array) -> Array:
+    """How far a body reaches along directions in the world in [m], shape (M,).
+
+    Args:
+        placed: The body on its link.
+        R: Rotations of the link, shape (M, 3, 3).
+        p: Its positions in [m], shape (M, 3).
+        n: Unit directions, shape (M, 3).
+    """
+    if placed.shape is None:
+        return np.zeros(len(n))
+    on_link = (np.swapaxes(R, 1, 2) @ n[:, :, None])[..., 0]
+    reach = support(placed.shape, on_link @ placed.X_LS[:3, :3])
+    return reach + on_link @ placed.X_LS[:3, 3] + np.einsum("mi,mi->m", n, p)
+
+
+def _before(placed: Placed, tip: Array, zone: float, index: int) -> Placed:
+    """A cylinder round what of a round body lies outside a zone round a tip on its axis; any other body as it is."""
+    shape = placed.shape
+    if not isinstance(shape, Capsule | Cylinder) or float(np.hypot(tip[0], tip[1])) > ON_AXIS or tip[2] < 0.0:
+        return placed
+    half, r, ahead = 0.5 * shape.length, shape.radius, float(tip[2]) - 0.5 * shape.length
+    low, high = -half, float(tip[2]) - float(np.sqrt(max(zone**2 - r**2, 0.0)))
+    if isinstance(shape, Capsule):
+        low -= r
+        if high > half:  # the zone ends on the round end
+            high = half + (ahead**2 + r**2 - zone**2) / (2.0 * ahead)
+            half += r
+    if high >= half:
+        return placed
+    if high <= low:
+        return Placed(None, far_away(index))
+    return Placed(Cylinder(shape.radius, high - low), placed.X_LS @ pose((0.0, 0.0, 0.5 * (low + high))))

@@ -1,0 +1,84 @@
+"""Distances of layouts against scenes built from the changed cells, and their derivatives against differences."""
+
+import numpy as np
+import pytest
+from search.distances.conftest import SomeVariables
+
+from cellplan.geometry.transforms import Array
+from cellplan.scene.pairs import Rule
+from cellplan.scene.scene import Scene
+from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
+
+WITHIN = 0.08
+STEP = 1e-5
+DEEP = 0.03
+
+
+@pytest.fixture(scope="module")
+def distances(scene: Scene, variables: SomeVariables) -> CellDistances:
+    return CellDistances.of(scene, variables)
+
+
+@pytest.fixture(scope="module")
+def x(variables: SomeVariables) -> Array:
+    return variables.given + np.random.default_rng(3).uniform(-0.03, 0.03, len(variables.given))
+
+
+@pytest.fixture(scope="module")
+def q(variables: SomeVariables) -> Array:
+    start = np.concatenate([robot.start for robot in variables.cell.robots if robot.start is not None])
+    return start + np.random.default_rng(0).uniform(-0.1, 0.1, (3, len(start)))
+
+
+def near_at(distances: CellDistances, variables: SomeVariables, x: Array, q: Array, within: float) -> LayoutDistances:
+    return distances.near(x, variables.layouts(x[None], q[:1]), q, within)
+
+
+def test_distances_are_those_of_a_scene_built_from_the_changed_cell(
+    distances: CellDistances, variables: SomeVariables, x: Array, q: Array
+) -> None:
+    near = near_at(distances, variables, x, q, WITHIN)
+    built = Scene.from_cell(variables.at(x))
+    found = built.near(q, WITHIN)
+    rules = {built.names(pair): pair.rule for pair in built.pairs}
+    expected = {
+        (built.names(built.pairs[row]), k): d
+        for row, k, d in zip(found.rows.tolist(), found.samples.tolist(), found.distances, strict=True)
+    }
+    known = {
+        (distances.pairs[row].names, k): d
+        for row, k, d in zip(near.pairs.tolist(), near.keys.tolist(), near.distances, strict=True)
+        if row < len(built.pairs)
+    }
+    assert len(known) > 30
+    for key, distance in known.items():
+        if distance > -DEEP:  # a deeper overlap has no one way out
+            assert expected[key] == pytest.approx(distance, abs=2.5e-3 if rules[key[0]] is Rule.PROCESS else 1e-6)
+    once = {pair.names for pair in distances.pairs if pair.is_fixed}
+    own = {pair.names for pair in distances.pairs if pair.is_own and pair.is_fixed}
+    missed = {key for key in expected if key not in known and key[0] not in own and not (key[1] and key[0] in once)}
+    assert {rules[names] for names, _ in missed} <= {Rule.PROCESS}
+
+
+def test_derivatives_are_those_of_differences(
+    distances: CellDistances, variables: SomeVariables, x: Array, q: Array
+) -> None:
+    n, nq = len(x), q.shape[1]
+    dq = np.random.default_rng(5).normal(size=(len(q), nq, n))
+    near = near_at(distances, variables, x, q, WITHIN)
+    exact = distances.derivatives(near, x, dq)
+    found = np.full_like(exact, np.nan)
+    keys = list(zip(near.pairs.tolist(), near.keys.tolist(), strict=True))
+    for j, unit in enumerate(np.eye(n)):
+        sides = []
+        for sign in (1.0, -1.0):
+            side = near_at(distances, variables, x + sign * STEP * unit, q + sign * STEP * dq[..., j], 2.0 * WITHIN)
+            sides.append(
+                dict(zip(zip(side.pairs.tolist(), side.keys.tolist(), strict=True), side.distances, strict=True))
+            )
+        found[:, j] = [(sides[0][key] - sides[1][key]) / (2.0 * STEP) for key in keys]
+    is_close = np.abs(found - exact) < 1e-3 * (1.0 + np.abs(found))
+    assert is_close.mean() > 0.95  # where faces or edges are parallel any of their nearest points may count
+    shapes = is_close[:, -4:]
+    assert shapes.mean() > 0.95
+    assert np.abs(exact[:, -4:]).max() > 0.1
