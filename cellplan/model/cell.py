@@ -13,10 +13,12 @@ from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
 from cellplan.model.joint_limits import JointLimits
+from cellplan.model.layout import LayoutSettings
 from cellplan.model.mounting import Mount
 from cellplan.model.origin import Origin
 from cellplan.model.program import ProgramSettings
 from cellplan.model.robot import Body, RobotModel
+from cellplan.model.rod import Rod
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Frame, Task
 
@@ -39,12 +41,14 @@ class Tool:
         bodies: Solids, their poses ``X_BS`` given in F, ``link`` unused.
         mass: Mass in [kg]; None when it is not stated.
         centre: Centre of mass in F in [m], shape (3,); None to think of the mass at the tip.
+        rod: The rod that tip and first bodies follow from; None for a tool without one.
     """
 
     X_FT: Array
     bodies: tuple[Body, ...]
     mass: float | None = None
     centre: Array | None = None
+    rod: Rod | None = None
 
     @property
     def is_bare(self) -> bool:
@@ -287,6 +291,7 @@ class Cell:
         inputs: SHA-256 of every file that was read, by the path as written.
         remarks: Key of the cell file, and what was not read of the file that it names.
         program: What is done from home to home; None for tasks that begin and end where they are worked on.
+        layout: What a layout search may change; None for a cell that was built in Python.
     """
 
     name: str
@@ -301,6 +306,7 @@ class Cell:
     inputs: Mapping[str, str]
     remarks: tuple[tuple[str, str], ...] = ()
     program: ProgramSettings | None = None
+    layout: LayoutSettings | None = None
 
     def with_values(self, values: Mapping[str, object]) -> "Cell":
         """The cell of the same document with other values, validated like those of the file.

@@ -227,6 +227,8 @@ class Task:
         plane_offset: Position of an unprojected planar path along the plane's normal axis in [m].
         tool_axis: ``None`` for the inward surface normal (or the axes of the file), else a unit direction in P.
         tool_x: Direction in P that the tool's x axis leans to, shape (3,).
+        spin: Angle in [rad] by which the tool is turned about its own z axis all along the path, from where ``tool_x``
+            leads it.
         turn: Angle in [rad] by which the tool turns about its own z axis, uniformly over the path's length; every
             further cycle turns it on.
         axes: Constrained components of the tool's motion in P, in the order x, y, z, rx, ry, rz.
@@ -281,6 +283,7 @@ class Task:
     relative_to: Frame = Frame.PART
     tool_depth: float = 1e-3
     after: tuple[str, ...] = ()
+    spin: float = 0.0
     start_posture: Array | None = None
     holder_posture: Array | None = None
     origin: Origin = field(default_factory=Origin, compare=False, repr=False)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.curves.curve import BezierCurve, Interval, spans_at, tangents
 from cellplan.geometry.curves.surface_patch import Patch
-from cellplan.geometry.transforms import Array, cross, frame_from_axes, rotation_exp, rotation_vector
+from cellplan.geometry.transforms import Array, cross, frame_from_axes, rotation_about, rotation_exp, rotation_vector
 
 THIRD: Final = 1.0 / 3.0  # [-] share of an end slope in the first and last factor of a cubic
 
@@ -49,6 +49,24 @@ class FixedFrame:
     def frames(self, u: Array, interval: Interval, *, p: Array, dp: Array) -> tuple[Array, Array]:  # noqa: ARG002
         """Tool frames and their turning rate, see `Orientation`."""
         return np.broadcast_to(self.R, (len(u), 3, 3)), np.zeros((len(u), 3))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SpunFrame:
+    """Another orientation, turned by a constant ``angle`` in [rad] about its own z axis."""
+
+    frame: Orientation
+    angle: float
+
+    @property
+    def knots(self) -> Array:
+        """Those of the other one, see `Orientation`."""
+        return self.frame.knots
+
+    def frames(self, u: Array, interval: Interval, *, p: Array, dp: Array) -> tuple[Array, Array]:
+        """Tool frames and their turning rate, see `Orientation`."""
+        R, w = self.frame.frames(u, interval, p=p, dp=dp)
+        return R @ rotation_about(np.array([0.0, 0.0, 1.0]), self.angle), w
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

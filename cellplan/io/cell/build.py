@@ -11,25 +11,25 @@ from cellplan.io.cell.build_accelerations import acceleration_rule, controller_c
 from cellplan.io.cell.build_grips import grip_bodies, gripper_bodies
 from cellplan.io.cell.build_mounting import build_attachments, build_mount, rail_bodies, with_floor_height
 from cellplan.io.cell.build_program import build_order, written_program
+from cellplan.io.cell.build_tool import build_tool
 from cellplan.io.cell.rules import needs_surface
 from cellplan.io.robots.build_controller import build_controller
 from cellplan.io.robots.rules import Given, configuration_in_si, home_configuration, start_posture
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.cell import ChecksEntry, CycleEntry, MotionEntry
 from cellplan.io.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
-from cellplan.io.schema.robot import ToolEntry
+from cellplan.io.schema.path import PathEntry, PolylineEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.task import (
     BlendEntry,
-    PathEntry,
-    PolylineEntry,
     ProcessEntry,
     TaskEntry,
     ToleranceEntry,
     TrapezoidEntry,
 )
+from cellplan.io.schema.tool import OF_ROD
 from cellplan.io.schema.units import Mm, in_si, si_or_none
-from cellplan.io.shapes import MeshReader, centred_solid, direction, obstacle_shape, pose_from_entry, tool_solid
+from cellplan.io.shapes import MeshReader, centred_solid, direction, obstacle_shape, pose_from_entry
 from cellplan.model.cell import (
     CheckSettings,
     Exclusion,
@@ -41,10 +41,9 @@ from cellplan.model.cell import (
     Part,
     Robot,
     Timing,
-    Tool,
 )
 from cellplan.model.origin import Origin
-from cellplan.model.robot import BASE, Body, RobotModel
+from cellplan.model.robot import RobotModel
 from cellplan.model.task import (
     CirclePath,
     Frame,
@@ -85,7 +84,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         name=name,
         model=replace(model, controller=controller, bodies=(*rail_bodies(entry, read_mesh), *model.bodies)),
         X_WB=pose_from_entry(entry.base),
-        tool=_tool(entry.tool, read_mesh),
+        tool=build_tool(entry.tool, read_mesh),
         start=start,
         weights=weights,
         home=home,
@@ -95,25 +94,6 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         pedestal=build_mount(entry, document.environment),
         gripper=gripper_bodies(entry, model),
         order=build_order(name, document),
-    )
-
-
-def _tool(entry: ToolEntry, read_mesh: MeshReader) -> Tool:
-    """A tool; its bodies are named ``tool``, ``tool_2``, …."""
-    X_FT = pose_from_entry(entry)
-    placed = [] if entry.geometry is None else [tool_solid(entry.geometry, X_FT, read_mesh)]
-    for body in entry.bodies:
-        solid, X_AS = centred_solid(body, read_mesh)
-        placed.append((solid, pose_from_entry(body.at) @ X_AS))
-    bodies = [
-        Body(name="tool" if number == 1 else f"tool_{number}", link=BASE, shape=solid, X_BS=X_FS)
-        for number, (solid, X_FS) in enumerate(placed, start=1)
-    ]
-    return Tool(
-        X_FT=X_FT,
-        bodies=tuple(bodies),
-        mass=entry.mass_kg,
-        centre=None if entry.centre_mm is None else in_si(entry.centre_mm),
     )
 
 
@@ -164,6 +144,7 @@ def build_task(
         plane_offset=(entry.path.offset_mm or Mm(0.0)).si,
         tool_axis=None if tool_axis is None else direction(tool_axis),
         tool_x=direction(tool_x),
+        spin=entry.spin_deg.si,
         turn=entry.tool_turn_deg.si,
         axes=_axis_numbers(entry.axes),
         is_spin_free="spin" in entry.free,
@@ -272,7 +253,10 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
             entry["path"].setdefault("offset_mm", 0.0)
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}
     for name, robot in document.robots.items():
-        values["robots"][name] = with_floor_height(values["robots"][name], robot, document.environment)
+        written = with_floor_height(values["robots"][name], robot, document.environment)
+        if robot.tool.rod is not None:
+            written["tool"] = {key: value for key, value in written["tool"].items() if key not in OF_ROD}
+        values["robots"][name] = written
     for grasp in values["part"]["held_by"][:1]:
         del grasp["axes"]  # the first holder has no choice
     return values

@@ -1,7 +1,6 @@
 """Which bodies of a robot grip the part, and which of a gripper work on it: names in a cell file become bodies."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Final
 
 from cellplan.geometry.shapes import Mesh
 from cellplan.io.cell.build_mounting import attachment_names
@@ -10,14 +9,15 @@ from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import Body, RobotModel
-
-TOOL: Final = "tool"
+from cellplan.model.rod import tool_body_name
 
 
 def tool_names(entry: RobotEntry) -> tuple[str, ...]:
     """Names of the bodies of a robot's tool: ``tool``, ``tool_2``, …."""
+    rod = entry.tool.rod
     count = len(entry.tool.bodies) + (entry.tool.geometry is not None)
-    return tuple(TOOL if number == 1 else f"{TOOL}_{number}" for number in range(1, count + 1))
+    count += 0 if rod is None else 1 + (rod.holder is not None)
+    return tuple(tool_body_name(number) for number in range(1, count + 1))
 
 
 def gripper_bodies(entry: RobotEntry, model: RobotModel) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from cellplan.io.cell.build import (
 )
 from cellplan.io.cell.build_accelerations import acceleration_findings
 from cellplan.io.cell.build_grips import grip_findings, tool_names
+from cellplan.io.cell.build_layout import read_layout
 from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings, on_mount, rail_entries
 from cellplan.io.cell.build_program import build_program
 from cellplan.io.cell.build_solver import build_solver
@@ -53,6 +54,7 @@ PARTS: Final = (
     "solver",
     "checks",
     "program",
+    "layout",
 )  # of a cell, from its document
 
 
@@ -138,12 +140,15 @@ def _read(source: CellFile) -> Cell:
     findings += solver_findings(valid, models, document)
     findings += _part_extent(valid, document)
     _read_meshes(valid, sources)
+    layout, wrong = read_layout(valid, models, document)
+    findings += wrong
     targets = _targets(valid, sources)
     findings += target_findings(valid, targets, document)
     raise_findings(file, [*findings, *sources.findings], sources.errors)
     if valid.whole is None:
         raise InputError(f"{file}: the cell cannot be understood")
-    return _cell(valid.whole, models, targets, source=source, sources=sources)
+    cell = _cell(valid.whole, models, targets, source=source, sources=sources)
+    return _with_source(replace(cell, layout=layout), source)
 
 
 def _models(valid: ValidEntries, document: YamlDocument, sources: Sources) -> dict[str, RobotModel]:
@@ -248,7 +253,7 @@ def _cell(
         changes=source.changes,
         changed={key_text(path): text for path, text in document.changes.items()},
     )
-    cell = Cell(
+    return Cell(
         name=whole.name,
         robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
         part=build_part(whole, models, mesh),
@@ -262,5 +267,9 @@ def _cell(
         remarks=tuple(sources.remarks),
         program=build_program(whole.program),
     )
+
+
+def _with_source(cell: Cell, source: CellFile) -> Cell:
+    """The cell with the document that it was read from."""
     parts = {key: getattr(cell, key) for key in PARTS}
     return replace(cell, origin=replace(cell.origin, source=replace(source, parts=parts)))

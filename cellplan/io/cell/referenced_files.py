@@ -23,8 +23,8 @@ from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot, load_urdf
 from cellplan.io.robots.urdf.srdf import Srdf, read_srdf
 from cellplan.io.robots.urdf.xacro import XACRO_SUFFIX
 from cellplan.io.schema.gripper import GripperEntry
+from cellplan.io.schema.path import CsvEntry
 from cellplan.io.schema.robot import RobotEntry
-from cellplan.io.schema.task import CsvEntry
 from cellplan.io.schema.units import Deg, si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel

@@ -5,7 +5,7 @@ from typing import Final
 
 from cellplan.io.cell.as_listed import holders_as_written, operators_as_written
 from cellplan.io.cell.solver_rules import accurate_findings, feedback_findings
-from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, unknown_name
+from cellplan.io.input.findings import Finding, KeyPath, unknown_name
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
@@ -14,7 +14,6 @@ TIME_ROOM: Final = 1e-9  # [-] of the duration: rounding of start_s + duration_s
 ORIENTATION_AXES: Final = frozenset({"rx", "ry", "rz"})
 MEANS_ELSE: Final = {"part": "the workpiece", "world": "the frame that everything stands in"}
 AT_REST: Final = frozenset({"part_at_rest", "semi_coordinated"})  # modes in which tasks are done on a part at rest
-ANGLE_RANGES: Final = ("base", "start_deg", "start")
 
 
 def rule_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
@@ -27,7 +26,6 @@ def rule_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Findi
         yield from _tool_axis(task, document, name)
     yield from feedback_findings(valid, document)
     yield from accurate_findings(valid, document)
-    yield from _layout(valid, document)
     yield from _timing(valid, document)
 
 
@@ -133,20 +131,6 @@ def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[F
         text = f"tool_axis: normal requires a path that is projected onto the part: {cure}"
         key = "path" if task.tool_axis is None else "tool_axis"
         yield document.finding(("tasks", name, key), text)
-
-
-def _layout(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
-    """What a layout search may change exists."""
-    for key, value in (valid.layout.vary if valid.layout else {}).items():
-        path = ("layout", "vary", key)
-        robot, _, what = key.rpartition(".")
-        if what not in ANGLE_RANGES or not robot:
-            text = f"expected ROBOT.base, ROBOT.start_deg or ROBOT.start{did_you_mean(what, ANGLE_RANGES)}"
-            yield document.key_finding(path, text)
-        elif robot not in valid.names["robots"]:
-            yield document.key_finding(path, unknown_name("a robot of this cell", robot, valid.names["robots"]))
-        elif (what == "base") == (value is True):
-            yield document.finding(path, "expected ranges for a base and true for a start posture")
 
 
 def _timing(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:

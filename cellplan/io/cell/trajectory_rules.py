@@ -6,7 +6,8 @@ from typing import Final
 from cellplan.io.cell.rules import TIME_ROOM, needs_surface
 from cellplan.io.input.findings import Finding, KeyPath
 from cellplan.io.schema.partial import ValidEntries
-from cellplan.io.schema.task import CsvEntry, TaskEntry
+from cellplan.io.schema.path import CsvEntry
+from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.task import SampledPath, TimedPath
 

@@ -66,10 +66,11 @@ def robot_findings(name: str, entry: RobotEntry, model: RobotModel, document: Ya
     if reach > FARTHEST_FLANGE:
         text = f"expected a reach of at most {FARTHEST_FLANGE:g} m, got {reach:.6g} m; is the unit right?"
         yield document.finding(("robots", name, "model"), text)
-    length = Mm(np.linalg.norm(entry.tool.xyz_mm)).si
+    rod = entry.tool.rod
+    length = Mm(np.linalg.norm(entry.tool.xyz_mm) if rod is None else rod.length_mm).si
     if length > FARTHEST_FLANGE:
         text = f"expected a tool of at most {FARTHEST_FLANGE:g} m, got {length:.6g} m; is the unit right?"
-        yield document.finding(("robots", name, "tool", "xyz_mm"), text)
+        yield document.finding(("robots", name, "tool", *(("xyz_mm",) if rod is None else ("rod", "length_mm"))), text)
 
 
 def configuration_findings(path: KeyPath, given: Given, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:

@@ -6,8 +6,6 @@ from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
 from cellplan.io.schema.common import (
-    Angle,
-    Coordinate,
     Coordinates,
     Entry,
     Name,
@@ -18,8 +16,9 @@ from cellplan.io.schema.common import (
     require_each_once,
     rule,
 )
+from cellplan.io.schema.layout import LayoutEntry
 from cellplan.io.schema.program import ProgramEntry
-from cellplan.io.schema.robot import Mass, RobotEntry, SlidingSpeed
+from cellplan.io.schema.robot import RobotEntry, SlidingSpeed
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.schema.task import (
@@ -31,6 +30,7 @@ from cellplan.io.schema.task import (
     TimeLawChoice,
     ToolDepth,
 )
+from cellplan.io.schema.tool import Mass
 from cellplan.io.schema.units import Deg, Mm, Ms, Within
 
 SCHEMA_VERSION: Final = 1
@@ -267,45 +267,6 @@ class ChecksEntry(Entry):
         description="Largest allowed speed of any tool tip in the world; it is only reported when absent.",
     )
     exclude: tuple[ExclusionEntry, ...] = Field(default=(), description="Pairs left out of the collision check.")
-
-
-LengthRange = tuple[Coordinate, Coordinate]
-AngleRange = tuple[Angle, Angle]
-
-
-class BaseRangeEntry(Entry):
-    """Ranges in which a base may be placed."""
-
-    x_mm: LengthRange | None = Field(default=None, description="Lowest and highest x.")
-    y_mm: LengthRange | None = Field(default=None, description="Lowest and highest y.")
-    z_mm: LengthRange | None = Field(default=None, description="Lowest and highest z.")
-    roll_deg: AngleRange | None = Field(default=None, description="Lowest and highest roll.")
-    pitch_deg: AngleRange | None = Field(default=None, description="Lowest and highest pitch.")
-    yaw_deg: AngleRange | None = Field(default=None, description="Lowest and highest yaw.")
-
-    @model_validator(mode="after")
-    def _is_ordered(self) -> Self:
-        """Low before high."""
-        for name, bounds in self.model_dump(exclude_none=True).items():
-            if not bounds[0] < bounds[1]:
-                raise rule(f"expected a number above {bounds[0]:g}, got {bounds[1]:g}", f"{name}[1]")
-        return self
-
-
-VARY_WORDS: Final = "true or a mapping of ranges (x_mm, y_mm, z_mm, roll_deg, pitch_deg, yaw_deg)"
-VaryChoice = Annotated[
-    Annotated[Literal[True], Tag(f"<{VARY_WORDS}>")] | Annotated[BaseRangeEntry, Tag("<mapping>")],
-    by_kind(VARY_WORDS, **{VARY_WORDS: bool}, mapping=dict),
-]
-
-
-class LayoutEntry(Entry):
-    """What a layout search may change."""
-
-    vary: dict[str, VaryChoice] = Field(
-        default={},
-        description="Ranges by ROBOT.base, and true by ROBOT.start_deg for start postures that may be changed.",
-    )
 
 
 def _is_known_version(version: int) -> int:

@@ -12,10 +12,10 @@ from cellplan.io.schema.cell import (
     TASK_LIMIT,
     CellDocument,
     ChecksEntry,
-    LayoutEntry,
     MotionEntry,
     PartEntry,
 )
+from cellplan.io.schema.layout import LayoutEntry
 from cellplan.io.schema.messages import AnyEntry, valid_entry, validate
 from cellplan.io.schema.program import ProgramEntry
 from cellplan.io.schema.robot import RobotEntry

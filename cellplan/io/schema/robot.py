@@ -8,7 +8,6 @@ from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
 from cellplan.io.schema.common import (
     Angle,
     Coordinate,
-    Coordinates,
     Direction,
     Entry,
     Name,
@@ -23,7 +22,7 @@ from cellplan.io.schema.common import (
 from cellplan.io.schema.controller import ControllerEntry
 from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.mounting import AttachmentEntry, HangingEntry, PedestalEntry, RailBodyEntry, WallEntry
-from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
+from cellplan.io.schema.tool import HEAVIEST_KG, ToolEntry
 from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Quantity, Within
 
 LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a wrong unit
@@ -31,7 +30,6 @@ FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a wrong unit
 FASTEST_MM_S: Final = 10_000.0  # 10 m/s: faster is a wrong unit
 STEEPEST: Final = 1e9  # deg/s2 or mm/s2, as in robot files
 WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses all its digits
-HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
 ROUGHEST_MM: Final = 1_000.0  # bodies that are farther off stand for nothing
 AXIS_LIMIT: Final = 64  # joints of one robot
 ORDER_LIMIT: Final = 400  # tasks and marks of one robot
@@ -45,7 +43,6 @@ TurningAcceleration = Annotated[DegPerS2, Within(gt=0.0, le=STEEPEST)]
 SlidingAcceleration = Annotated[MmPerS2, Within(gt=0.0, le=STEEPEST)]
 TurningJerk = Annotated[DegPerS3, Within(gt=0.0, le=STEEPEST)]
 SlidingJerk = Annotated[MmPerS3, Within(gt=0.0, le=STEEPEST)]
-Mass = Annotated[float, Field(ge=0.0, le=HEAVIEST_KG)]
 Accuracy = Annotated[Mm, Within(ge=0.0, le=ROUGHEST_MM)]
 LoadFigure = Annotated[float, Field(gt=0.0, le=HEAVIEST_KG)]
 Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
@@ -83,28 +80,6 @@ LockedPosition = Annotated[
     Annotated[Literal["zero"], Tag(f"<{LOCK_WORDS}>")] | Annotated[JointPosition, Tag("<number>")],
     by_kind(LOCK_WORDS, number=(int, float)),
 ]
-
-
-class ToolEntry(PoseEntry):
-    """A tool: its tip in the flange frame, z out of the tool, and its solids."""
-
-    geometry: ToolShapeEntry | None = Field(
-        default=None, description="Shape that ends at the tool tip; none when absent."
-    )
-    bodies: tuple[ToolBodyEntry, ...] = Field(default=(), description="Further solids, placed in the flange frame.")
-    mass_kg: Mass | None = Field(
-        default=None, description="Mass, for the payload and for weights that grow with the load; absent: not stated."
-    )
-    centre_mm: Coordinates | None = Field(
-        default=None, description="Centre of mass in the flange frame, for the payload; the tool tip when absent."
-    )
-
-    @model_validator(mode="after")
-    def _weighs_what_it_balances(self) -> Self:
-        """A centre of mass requires a mass."""
-        if self.centre_mm is not None and self.mass_kg is None:
-            raise rule("unexpected key, a centre of mass requires mass_kg", "centre_mm")
-        return self
 
 
 class LimitsEntry(Entry):

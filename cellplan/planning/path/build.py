@@ -7,7 +7,7 @@ import numpy as np
 from cellplan.errors import CellplanError, InputError
 from cellplan.geometry.curves.arc_length import ArcLength, measure
 from cellplan.geometry.curves.curve import Curve
-from cellplan.geometry.curves.orientation import Orientation
+from cellplan.geometry.curves.orientation import Orientation, SpunFrame
 from cellplan.geometry.transforms import Array, is_rigid, pose_from
 from cellplan.model.cell import Part
 from cellplan.model.task import Task, TimedPath
@@ -38,6 +38,8 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
     arc = measure(curve.curve)
     refuse_unlikely_path(curve.curve, arc, task=task, part=part)
     orientation = orient_tool(task, curve)
+    if task.spin:
+        orientation = SpunFrame(frame=orientation, angle=task.spin)
     is_timed = isinstance(task.path, TimedPath)
     if not is_timed:
         _refuse_standstill(curve.curve, arc, task.where("path"))

@@ -98,7 +98,7 @@ def test_a_csv_that_is_named_only_is_written_with_its_defaults(cells: Path, tmp_
             'checks: {exclude: [{bodies: [worker/foot, floor], reason: "it stands: there, #1"}]}\nenvironment:',
         ),
         ("environment:", "solver: {damping: 1e-5, seed: 7}\nenvironment:"),
-        ("environment:", "layout: {vary: {worker.base: {x_mm: [0, 1.5]}, worker.start_deg: true}}\nenvironment:"),
+        ("environment:", "layout: {vary: {worker.base: {x_mm: [0, 1.5]}, holder.start_deg: true}}\nenvironment:"),
         (
             "circle: {radius_mm: 100, plane: xy}",
             "polyline: {points_mm: [[0, 0], [10, 0], [10, 10]], plane: xy, closed: true}",

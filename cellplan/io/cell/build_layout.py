@@ -1,0 +1,157 @@
+"""The layout of a cell file: what a search may change, as data or as findings."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.geometry.shapes import Box, Cylinder
+from cellplan.geometry.transforms import Array
+from cellplan.io.cell.layout_addresses import AddressError, read_address
+from cellplan.io.cell.layout_choices import read_choice, read_path
+from cellplan.io.cell.layout_ranges import Context, read_ranges
+from cellplan.io.cell.layout_ties import Ties
+from cellplan.io.input.findings import Finding, KeyPath
+from cellplan.io.schema.layout import KeepOutEntry, LayoutEntry
+from cellplan.io.schema.partial import ValidEntries
+from cellplan.io.schema.units import in_si
+from cellplan.io.shapes import pose_from_entry
+from cellplan.io.yaml.reader import YamlDocument
+from cellplan.model.layout import Choice, KeepOut, LayoutSettings, PathRange, VariableKind, VaryRange
+from cellplan.model.robot import RobotModel
+from cellplan.model.units import MM
+
+NEAR_MM: Final = 1000.0  # x and y of a base may change by so much where no range is given
+HIGHEST_MM: Final = 600.0  # z of a base where no range is given
+CHOICES: Final = ("robot", "mode", "branch")
+SIDES: Final = ("x", "y")
+
+
+@dataclass(slots=True)
+class _Found:
+    """What was read so far."""
+
+    ranges: dict[str, VaryRange] = field(default_factory=dict)
+    paths: list[PathRange] = field(default_factory=list)
+    choices: list[Choice] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
+
+
+def read_layout(
+    valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument
+) -> tuple[LayoutSettings, list[Finding]]:
+    """What a layout search may change, and what is wrong with it.
+
+    A file that says nothing lets the bases of all operators and the start of the first holder change.
+    """
+    entry = valid.layout or LayoutEntry()
+    context, found = Context(valid=valid, models=models, document=document), _Found()
+    vary = entry.vary if entry.vary is not None else _usual(context)
+    for key, value in vary.items():
+        _read_one(key, value, context, found)
+    ties = Ties(entry, found.ranges, context, found.findings)
+    fixed = ties.fixed()
+    _keep_on_floor(entry, found, document)
+    settings = LayoutSettings(
+        ranges=tuple(found.ranges.values()),
+        paths=tuple(each for each in found.paths if f"robots.{each.robot}.path" not in fixed),
+        choices=tuple(each for each in found.choices if each.address not in fixed),
+        equal=ties.equal(),
+        mirrored=ties.mirrored(),
+        keep_out=tuple(_keep_out(name, area) for name, area in entry.keep_out.items()),
+        floor=_floor(entry),
+        margin=entry.margin_deg.si,
+        margin_sliding=entry.margin_mm.si,
+        cost=ties.cost(),
+        is_default=entry.vary is None,
+    )
+    return settings, found.findings
+
+
+def _read_one(key: str, value: Any, context: Context, found: _Found) -> None:
+    """One entry of ``vary``."""
+    path: KeyPath = ("layout", "vary", key)
+    try:
+        address = read_address(key, context.valid, context.models)
+    except AddressError as error:
+        found.findings.append(context.document.key_finding(path, str(error)))
+        return
+    if address is None:
+        return
+    if address.what == "path":
+        _keep(found.paths, read_path(address, value, path, context), found)
+    elif address.what in CHOICES:
+        _keep(found.choices, read_choice(address, value, path, context), found)
+    else:
+        for each in read_ranges(address, value, path, context):
+            if isinstance(each, VaryRange) and each.address in found.ranges:
+                text = f"expected each variable once, got '{each.address}' twice"
+                each = context.document.key_finding(path, text)  # noqa: PLW2901
+            if isinstance(each, Finding):
+                found.findings.append(each)
+            else:
+                found.ranges[each.address] = each
+
+
+def _keep(into: list[Any], each: Any, found: _Found) -> None:
+    """What was read goes into its list, a finding to the findings."""
+    (found.findings if isinstance(each, Finding) else into).append(each)
+
+
+def _usual(context: Context) -> dict[str, Any]:
+    """Ranges of a file that gives none: bases of the operators near their places, and the start of the first holder."""
+    valid, usual = context.valid, dict[str, Any]()
+    holders = [grasp.robot for grasp in valid.part.held_by] if valid.part is not None else []
+    operators = {task.robot for task in valid.tasks.values()} - set(holders)
+    planes = [it.plane.z_mm for it in valid.environment.values() if it.plane is not None]
+    for name, entry in valid.robots.items():
+        mount = entry.mount
+        if name not in operators or (mount is not None and mount.wall is not None):
+            continue
+        x, y, z = entry.base.xyz_mm
+        ranges = {"x_mm": (x - NEAR_MM, x + NEAR_MM), "y_mm": (y - NEAR_MM, y + NEAR_MM)}
+        if mount is None and not any(abs(z - plane) <= 1e-3 for plane in planes):
+            ranges["z_mm"] = (min(0.0, z), max(HIGHEST_MM, z))
+        yaw = entry.base.rpy_deg[2]
+        ranges["yaw_deg"] = (yaw - 180.0, yaw + 180.0)
+        usual[f"{name}.base"] = ranges
+    for name in holders[:1]:
+        if name in context.models:
+            turns = all(joint.is_revolute for joint in context.models[name].joints)
+            usual[f"{name}.{'start_deg' if turns else 'start'}"] = True
+    return usual
+
+
+def _keep_on_floor(entry: LayoutEntry, found: _Found, document: YamlDocument) -> None:
+    """Narrow the ranges of all bases to the floor."""
+    floor = _floor(entry)
+    for address, each in list(found.ranges.items()) if floor is not None else ():
+        if floor is None or each.kind is not VariableKind.BASE or each.index > 1:
+            continue
+        lower, upper = (float(bound) for bound in floor[:, each.index])
+        if max(each.lower, lower) < min(each.upper, upper):
+            found.ranges[address] = replace(each, lower=max(each.lower, lower), upper=min(each.upper, upper))
+        else:
+            text = (
+                f"expected bounds that overlap the range of {address}, {MM * each.lower:g} to {MM * each.upper:g} mm, "
+                f"got {MM * lower:g} to {MM * upper:g}"
+            )
+            found.findings.append(document.finding(("layout", "floor", f"{SIDES[each.index]}_mm"), text))
+
+
+def _floor(entry: LayoutEntry) -> Array | None:
+    """Lowest and highest x and y of all bases in [m]; None without bounds."""
+    if entry.floor is None:
+        return None
+    bounds = [entry.floor.x_mm, entry.floor.y_mm]
+    return np.array([[-math.inf, math.inf] if each is None else in_si(each) for each in bounds]).T
+
+
+def _keep_out(name: str, entry: KeepOutEntry) -> KeepOut:
+    """An area without bases, one metre high."""
+    if entry.cylinder is not None:
+        return KeepOut(name=name, shape=Cylinder(entry.cylinder.radius_mm.si, 1.0), X_WS=pose_from_entry(entry.at))
+    x, y = (size.si for size in entry.box.size_mm[:2]) if entry.box is not None else (0.0, 0.0)
+    return KeepOut(name=name, shape=Box((x, y, 1.0)), X_WS=pose_from_entry(entry.at))

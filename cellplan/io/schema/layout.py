@@ -1,0 +1,149 @@
+"""What a layout search may change, as written in a cell file."""
+
+from typing import Annotated, ClassVar, Final, Literal, Self
+
+from pydantic import ConfigDict, Field, Tag, model_validator
+
+from cellplan.io.schema.common import (
+    Coordinate,
+    Entry,
+    Name,
+    PoseEntry,
+    Size,
+    Text,
+    by_kind,
+    one_of_keys,
+    require_one,
+    rule,
+)
+from cellplan.io.schema.units import Deg, Mm, Within
+
+KEEP_OUT_SHAPES: Final = ("box", "cylinder")
+ITEM_LIMIT: Final = 1000
+FARTHEST: Final = 1e6  # in the unit of the key
+RANGE_WORDS: Final = "a range [low, high] or a number"
+ITEM_WORDS: Final = "a name, a number or a range [low, high]"
+VARY_WORDS: Final = "true, a mapping of ranges, or a list"
+
+Number = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
+Range = tuple[Number, Number]
+RangeChoice = Annotated[
+    Annotated[Literal["a range"], Tag(f"<{RANGE_WORDS}>")]
+    | Annotated[int, Tag("<number>")]
+    | Annotated[Range, Tag("<list>")],
+    by_kind(RANGE_WORDS, number=int, list=tuple),
+]
+ItemChoice = Annotated[
+    Annotated[Name, Tag(f"<{ITEM_WORDS}>")] | Annotated[Number, Tag("<number>")] | Annotated[Range, Tag("<list>")],
+    by_kind(ITEM_WORDS, number=(int, float), list=tuple),
+]
+VaryChoice = Annotated[
+    Annotated[Literal[True], Tag(f"<{VARY_WORDS}>")]
+    | Annotated[dict[str, RangeChoice], Tag("<mapping>")]
+    | Annotated[tuple[ItemChoice, ...], Tag("<list>")],
+    by_kind(VARY_WORDS, **{VARY_WORDS: bool}, mapping=dict, list=tuple),
+]
+
+
+class MirroredEntry(Entry):
+    """Two bases of which the second is the mirror image of the first."""
+
+    bases: tuple[Text, Text] = Field(description="Two addresses ROBOT.base.")
+    plane: Literal["xz", "yz"] = Field(description="Plane of the mirror, upright in the world.")
+    at_mm: Coordinate = Field(default=Mm(0.0), description="Where the plane stands: its y (xz) or its x (yz).")
+
+    @model_validator(mode="after")
+    def _are_two(self) -> Self:
+        """Two different bases."""
+        if self.bases[0] == self.bases[1]:
+            raise rule(f"expected two different bases, got '{self.bases[0]}' twice", "bases[1]")
+        return self
+
+
+class KeepOutBoxEntry(Entry):
+    """A box seen from above."""
+
+    size_mm: tuple[Size, Size] | tuple[Size, Size, Size] = Field(
+        description="Edge lengths along x and y; one along z may follow, and does not count."
+    )
+
+
+class KeepOutCylinderEntry(Entry):
+    """A round area."""
+
+    radius_mm: Size = Field(description="Radius.")
+
+
+class KeepOutEntry(Entry):
+    """A floor area without robots, at any height: exactly one of box and cylinder."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*KEEP_OUT_SHAPES))
+
+    box: KeepOutBoxEntry | None = Field(default=None, description="Rectangle, centred on its pose.")
+    cylinder: KeepOutCylinderEntry | None = Field(default=None, description="Circle, centred on its pose.")
+    at: PoseEntry = Field(default=PoseEntry(), description="Pose in the world: x, y and yaw count.")
+
+    @model_validator(mode="after")
+    def _is_one_upright_shape(self) -> Self:
+        """Exactly one shape, which stands upright."""
+        require_one(self, KEEP_OUT_SHAPES)
+        for index, word in enumerate(("roll", "pitch")):
+            if self.at.rpy_deg[index]:
+                raise rule(f"expected 0, as an area of the floor has no {word}", f"at.rpy_deg[{index}]")
+        return self
+
+
+class FloorEntry(Entry):
+    """Where the bases of all robots that may move must stay."""
+
+    x_mm: tuple[Coordinate, Coordinate] | None = Field(default=None, description="Lowest and highest x.")
+    y_mm: tuple[Coordinate, Coordinate] | None = Field(default=None, description="Lowest and highest y.")
+
+    @model_validator(mode="after")
+    def _is_ordered(self) -> Self:
+        """Low before high."""
+        for key in ("x_mm", "y_mm"):
+            bounds = getattr(self, key)
+            if bounds is not None and not bounds[0] < bounds[1]:
+                raise rule(f"expected a number above {bounds[0]:g}, got {bounds[1]:g}", f"{key}[1]")
+        return self
+
+
+class LayoutEntry(Entry):
+    """What a layout search may change; addresses are those of the file, `robots.` may be left out."""
+
+    vary: dict[str, VaryChoice] | None = Field(
+        default=None,
+        max_length=ITEM_LIMIT,
+        description="Variables by address. ROBOT.base: {x_mm: [low, high], y_mm, z_mm, roll_deg, pitch_deg, yaw_deg}; "
+        "ROBOT.start_deg: true or one range per joint (ROBOT.start by key where joints slide); ROBOT.tool: {length_mm, "
+        "tilt_deg, roll_deg} of a tool with rod; ROBOT.weights: true or [low, high]; ROBOT.path: true or "
+        "{coefficients: 14, degree: 5}; ROBOT.branch: true; tasks.TASK.spin_deg: true or [low, high]; "
+        "tasks.TASK.robot: [ROBOT, …]; part.held_by[0].at, part.at: ranges as of a base; motion.mode: [MODE, …]. When "
+        "absent: the bases of all operators (x and y within 1 m, z between 0 and 600 mm unless they stand on a floor, "
+        "any yaw) and the start posture of the first holder.",
+    )
+    fixed: tuple[Text, ...] = Field(
+        default=(), max_length=ITEM_LIMIT, description="Addresses that stay as they are, whatever vary says."
+    )
+    equal: tuple[tuple[Text, ...], ...] = Field(
+        default=(), max_length=ITEM_LIMIT, description="Lists of addresses of variables that have one value."
+    )
+    mirrored: tuple[MirroredEntry, ...] = Field(
+        default=(), max_length=ITEM_LIMIT, description="Pairs of bases that are placed symmetrically."
+    )
+    keep_out: dict[Name, KeepOutEntry] = Field(
+        default={}, max_length=ITEM_LIMIT, description="Areas in which no base and no pedestal of a varied base stands."
+    )
+    floor: FloorEntry | None = Field(default=None, description="Where the origins of all varied bases must stay.")
+    margin_deg: Annotated[Deg, Within(ge=0.0, le=180.0)] = Field(
+        default=Deg(0.0), description="Distance from its limits that every turning joint is to keep."
+    )
+    margin_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = Field(
+        default=Mm(0.0), description="Distance from its limits that every sliding joint is to keep."
+    )
+    cost: dict[str, Annotated[float, Field(ge=0.0, le=1e6)]] = Field(
+        default={},
+        max_length=ITEM_LIMIT,
+        description="Cost by address of a change by 100 mm or 10 deg, or of a weight by a factor of 10; else 1.",
+    )

@@ -1,0 +1,1 @@
+"""Variables of a layout search: from the cell file to the kernel, and back."""

@@ -1,0 +1,70 @@
+"""How bases and tool tips move with the numbers of a layout, m of them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.geometry.transforms import cross, inverse
+from cellplan.model.cell import Cell
+from cellplan.model.layout import VariableKind, VaryRange
+from cellplan.search.variables.state import State, pose_of
+from cellplan.search.variables.twists import about_origin, at_point, carried, pose_twists, rod_twists
+
+
+def base_twists(state: State, cell: Cell, ranges: Sequence[VaryRange]) -> Array:
+    """Motion of each base: velocity of its origin in W and angular velocity, shape (robots, 6, m)."""
+    found = np.zeros((len(cell.robots), 6, len(ranges)))
+    for column, each in enumerate(ranges):
+        if each.kind is VariableKind.BASE:
+            robot = cell.index(each.name)
+            found[robot, :, column] = pose_twists(state.bases[robot, 3:])[each.index]
+    return found
+
+
+def effective_base_twists(state: State, cell: Cell, ranges: Sequence[VaryRange]) -> Array:
+    """Likewise of the bases as the kernel sees them, where a part at rest that moves moves all bases instead."""
+    found, shift = base_twists(state, cell, ranges), state.base_shift(cell)
+    found[:, :3], found[:, 3:] = shift[:3, :3] @ found[:, :3], shift[:3, :3] @ found[:, 3:]
+    for column, each in enumerate(ranges):
+        if each.kind is VariableKind.PART:
+            twist = -carried(part_twists(state)[each.index], shift)
+            for robot in range(len(cell.robots)):
+                origin = (shift @ pose_of(state.bases[robot]))[:3, 3]
+                found[robot, :, column] = at_point(twist, origin)
+    return found
+
+
+def part_twists(state: State) -> Array:
+    """Motion of the part at rest by its six components, about the origin of W, shape (6, 6)."""
+    return about_origin(pose_twists(state.part[3:]), state.part[:3])
+
+
+def tip_twists(state: State, cell: Cell, ranges: Sequence[VaryRange]) -> Array:
+    """Motion of each tool tip as the kernel sees it: of its origin in the flange frame, shape (robots, 6, m)."""
+    found = np.zeros((len(cell.robots), 6, len(ranges)))
+    robots = {task.name: task.robot for task in cell.tasks}
+    for column, each in enumerate(ranges):
+        if each.kind in {VariableKind.TOOL, VariableKind.SPIN, VariableKind.GRASP}:
+            robot = cell.index(robots.get(each.name, each.name) if each.kind is VariableKind.SPIN else each.name)
+            tip = (state.tip(cell, robot) @ state.tip_shift(cell, robot))[:3, 3]
+            found[robot, :, column] = at_point(_tip_twist(state, cell, robot, each), tip)
+    return found
+
+
+def _tip_twist(state: State, cell: Cell, robot: int, each: VaryRange) -> Array:
+    """Motion of a tool tip by one number, about the centre of the flange, shape (6,)."""
+    X_FT, rod = state.tip(cell, robot), state.rods[robot]
+    if each.kind is VariableKind.TOOL and rod is not None:
+        return rod_twists(rod)[each.index]
+    if each.kind is VariableKind.SPIN:
+        w = -X_FT[:3, 2]
+        return np.concatenate([cross(X_FT[:3, 3], w), w])
+    return grasp_twists(state, cell, robot)[each.index]
+
+
+def grasp_twists(state: State, cell: Cell, robot: int) -> Array:
+    """Motion of the part by the six components of a grasp, about the centre of the holder's flange, shape (6, 6)."""
+    six = state.grasps[cell.positioners.index(cell.robots[robot].name)]
+    X_FP = state.tip(cell, robot) @ inverse(pose_of(six))
+    return -carried(about_origin(pose_twists(six[3:]), six[:3]), X_FP)

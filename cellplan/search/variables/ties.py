@@ -1,0 +1,164 @@
+"""From the numbers of a cell file that may change to the variables of a search: equal and mirrored ones are one."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.model.layout import LayoutSettings, VariableKind, VaryRange, mirror_image
+
+USUAL_LENGTH: Final = 0.1  # [m] of a step, and of a change that costs 1
+USUAL_ANGLE: Final = math.radians(10.0)  # [rad] likewise
+COSTLY_FACTOR: Final = math.log(10.0)  # [-] logarithm of the factor of a weight that costs 1
+USUAL_FACTOR: Final = math.log(1.5)  # [-] logarithm of the factor of a weight that is a step
+STEPS: Final = 4.0  # [-] steps that a range has at least
+FULL_TURN: Final = 2.0 * math.pi
+TURN_ROOM: Final = 1e-9  # [rad] by which a range of a full turn may be short of it: rounding
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tied:
+    """The variables, n of them, and the m numbers that follow from them: ``numbers = factors x + terms``.
+
+    Numbers and variables are in [m] and [rad]; of a weight they are the natural logarithm.
+
+    Attributes:
+        ranges: The numbers.
+        factors: Shape (m, n), one entry of 1 or -1 in each row.
+        terms: Shape (m,).
+        names: Address of the first number that each variable stands for.
+        lower: Lowest values, shape (n,).
+        upper: Highest values, shape (n,).
+        given: Values in the file, brought into the bounds, shape (n,).
+        scale: Usual steps, shape (n,).
+        cost: Costs of a change by one unit, shape (n,).
+        remarks: What was brought into its bounds.
+    """
+
+    ranges: tuple[VaryRange, ...]
+    factors: Array
+    terms: Array
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    given: Array
+    scale: Array
+    cost: Array
+    remarks: tuple[str, ...]
+
+    @classmethod
+    def of(cls, settings: LayoutSettings) -> "Tied":
+        """Those of a layout."""
+        ranges = settings.ranges
+        led = _leaders(settings)
+        leaders = [each.address for each in ranges if led[each.address][0] == each.address]
+        factors, terms = np.zeros((len(ranges), len(leaders))), np.zeros(len(ranges))
+        lower, upper = np.full(len(leaders), -np.inf), np.full(len(leaders), np.inf)
+        cost, scale, given = np.zeros(len(leaders)), np.zeros(len(leaders)), np.zeros(len(leaders))
+        remarks = list[str]()
+        for row, each in enumerate(ranges):
+            leader, factor, term = led[each.address]
+            column = leaders.index(leader)
+            factors[row, column], terms[row] = factor, term
+            low, high = number_of(each, each.lower), number_of(each, each.upper)
+            if leader == each.address or not _is_full_turn(each):
+                ends = sorted(((low - term) / factor, (high - term) / factor))
+                lower[column], upper[column] = max(lower[column], ends[0]), min(upper[column], ends[1])
+            cost[column] += settings.cost.get(each.address, 1.0) / _costly(each)
+        for column, address in enumerate(leaders):
+            each = next(it for it in ranges if it.address == address)
+            scale[column] = min(_usual(each), (upper[column] - lower[column]) / STEPS)
+            given[column], remark = _brought_in(each, float(lower[column]), float(upper[column]))
+            remarks += [remark] if remark else []
+        return cls(
+            ranges=ranges,
+            factors=factors,
+            terms=terms,
+            names=tuple(leaders),
+            lower=lower,
+            upper=upper,
+            given=given,
+            scale=scale,
+            cost=cost,
+            remarks=tuple(remarks),
+        )
+
+    def values(self, numbers: Array) -> Array:
+        """Variables with given numbers, brought into their bounds; as in the file where a number is NaN, shape (n,)."""
+        found = self.given.copy()
+        for row, each in enumerate(self.ranges):
+            if each.address in self.names and np.isfinite(numbers[row]):
+                column = self.names.index(each.address)
+                lower, upper = float(self.lower[column]), float(self.upper[column])
+                found[column] = min(max(into_turn(each, float(numbers[row]), lower, upper), lower), upper)
+        return found
+
+
+def number_of(each: VaryRange, value: float) -> float:
+    """A number of the file as a variable has it: the logarithm of a weight, all others as they are."""
+    return math.log(value) if each.kind is VariableKind.WEIGHT else value
+
+
+def into_turn(each: VaryRange, value: float, lower: float, upper: float) -> float:
+    """An angle of a pose or a tool, by whole turns between bounds where that is possible; others as they are."""
+    if not each.is_angle or each.kind is VariableKind.START or lower <= value <= upper:
+        return value
+    moved = value + FULL_TURN * math.ceil((lower - TURN_ROOM - value) / FULL_TURN)
+    return moved if moved <= upper + TURN_ROOM else value
+
+
+def _leaders(settings: LayoutSettings) -> dict[str, tuple[str, float, float]]:
+    """The number that each one follows, with a factor and a term; itself for those that follow none."""
+    led = {each.address: (each.address, 1.0, 0.0) for each in settings.ranges}
+    for members in settings.equal:
+        led |= dict.fromkeys(members, (members[0], 1.0, 0.0))
+    bases = {(each.name, each.index): each.address for each in settings.ranges if each.kind is VariableKind.BASE}
+    for pair in settings.mirrored:
+        for index in range(6):
+            first, second = (bases.get((robot, index)) for robot in pair.robots)
+            if first is None or second is None:
+                continue
+            factor, term = mirror_image(pair, index)
+            leader, own, shift = led[first]
+            led[second] = (leader, factor * own, factor * shift + term)
+    return led
+
+
+def _is_full_turn(each: VaryRange) -> bool:
+    """Whether a range holds every direction, so that it bounds nothing."""
+    is_turning = each.is_angle and each.kind is not VariableKind.START
+    return is_turning and each.upper - each.lower >= FULL_TURN - TURN_ROOM
+
+
+def _usual(each: VaryRange) -> float:
+    """A usual step."""
+    if each.kind is VariableKind.WEIGHT:
+        return USUAL_FACTOR
+    return USUAL_ANGLE if each.is_angle else USUAL_LENGTH
+
+
+def _costly(each: VaryRange) -> float:
+    """A change that costs 1 unless the file says otherwise."""
+    return COSTLY_FACTOR if each.kind is VariableKind.WEIGHT else _usual(each)
+
+
+def _brought_in(each: VaryRange, lower: float, upper: float) -> tuple[float, str | None]:
+    """The value in the file between its bounds, and what there is to say about it."""
+    if each.given is None:
+        return 0.5 * (lower + upper), None
+    value = into_turn(each, number_of(each, each.given), lower, upper)
+    inside = min(max(value, lower), upper)
+    if abs(inside - value) <= TURN_ROOM:
+        return inside, None
+    if each.kind is VariableKind.WEIGHT:
+        shown = [f"{math.exp(number):g}" for number in (value, lower, upper)]
+    else:
+        unit, scale = ("deg", math.degrees(1.0)) if each.is_angle else ("mm", 1000.0)
+        shown = [f"{number * scale:.6g} {unit}" for number in (value, lower, upper)]
+    end = shown[1] if value < lower else shown[2]
+    return (
+        inside,
+        f"{each.address}: {shown[0]} is outside its range {shown[1]} to {shown[2]}: the search starts at {end}",
+    )

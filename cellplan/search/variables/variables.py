@@ -1,0 +1,184 @@
+"""Variables of a layout search: numbers of a cell file that may change, for the kernel and for the file."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell import Cell, Part, Tool
+from cellplan.model.layout import LayoutSettings, VariableKind
+from cellplan.search.kernel.job import Layouts
+from cellplan.search.kernel.screws import Directions
+from cellplan.search.variables.directions import base_twists, effective_base_twists, tip_twists
+from cellplan.search.variables.displaced import DisplacedBody, displaced_bodies
+from cellplan.search.variables.pedestals import with_pedestals
+from cellplan.search.variables.state import State, pose_of
+from cellplan.search.variables.ties import Tied
+from cellplan.search.variables.written import written_number, written_starts, written_weight
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Variables:
+    """The continuous variables of a layout search, n of them, with what they do to a cell.
+
+    Lengths are in [m], angles in [rad]; a variable of a joint weight is the weight's natural logarithm.
+
+    Attributes:
+        base: The cell that is searched: obstacles below varied bases are pedestals of these robots here.
+        names: Addresses in the file, of tied numbers that of the first, n of them.
+        lower: Lowest values, shape (n,).
+        upper: Highest values, shape (n,).
+        given: Values in the file, brought into the bounds, shape (n,).
+        scale: A usual step of each, shape (n,).
+        cost: Cost of a change by one unit of each, shape (n,).
+        margin: Distance from its limits that each joint is to keep, in [rad] or [m], shape (nq,).
+        remarks: What was converted, kept or brought into its bounds, for people.
+        settings: What may change, as the cell file says it.
+        tied: How the numbers of the file follow from the variables.
+        given_cell: The cell as it was given.
+        given_state: Its layout.
+        conversion: Values that turn the given cell into ``base``.
+    """
+
+    base: Cell
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    given: Array
+    scale: Array
+    cost: Array
+    margin: Array
+    remarks: tuple[str, ...]
+    settings: LayoutSettings
+    tied: Tied
+    given_cell: Cell
+    given_state: State
+    conversion: Mapping[str, object]
+
+    @classmethod
+    def of(cls, cell: Cell) -> "Variables":
+        """The variables that a cell file gives.
+
+        Raises:
+            InputError: The cell was not read from a file, or was changed in Python since.
+        """
+        settings = cell.layout
+        if settings is None:
+            raise InputError(f"cell '{cell.name}': expected a cell that was read from a file, got one built in Python")
+        conversion, remarks = with_pedestals(cell, settings)
+        base, tied = cell.with_values(conversion), Tied.of(settings)
+        joints = [joint for robot in base.robots for joint in robot.model.joints]
+        return cls(
+            base=base,
+            names=tied.names,
+            lower=tied.lower,
+            upper=tied.upper,
+            given=tied.given,
+            scale=tied.scale,
+            cost=tied.cost,
+            margin=np.array([settings.margin if it.is_revolute else settings.margin_sliding for it in joints]),
+            remarks=(*remarks, *tied.remarks),
+            settings=settings,
+            tied=tied,
+            given_cell=cell,
+            given_state=State.given(base),
+            conversion=conversion,
+        )
+
+    def state(self, x: Array) -> State:
+        """The layout at values of the variables, shape (n,)."""
+        return self.given_state.changed(self.base, self.tied.ranges, self.tied.factors @ x + self.tied.terms)
+
+    def placed(self, x: Array) -> Cell:
+        """The cell at values of the variables, shape (n,), neither rounded nor validated: quick, for scenes.
+
+        Bases, tools with their solids, grasps, the part at rest, spins and weights are those of the layout, and start
+        postures as far as they are among the variables.
+        """
+        return self.state(x).cell(self.base)
+
+    def tools(self, x: Array) -> dict[str, Tool]:
+        """Tools at values of the variables, by robot, of those that change."""
+        names = {each.name for each in self.tied.ranges if each.kind is VariableKind.TOOL}
+        return {robot.name: robot.tool for robot in self.placed(x).robots if robot.name in names}
+
+    def part(self, x: Array) -> Part:
+        """The part at values of the variables: that of ``base`` itself where nothing of it changes."""
+        kinds = {each.kind for each in self.tied.ranges}
+        return self.placed(x).part if kinds & {VariableKind.GRASP, VariableKind.PART} else self.base.part
+
+    def layouts(self, x: Array, start: Array) -> Layouts:
+        """Candidates for the kernel, with a job of ``base``.
+
+        The kernel knows no grasp, spin or part at rest: there the tool tip of a robot or the bases of all robots are
+        elsewhere, which gives the same motion. Scenes take ``placed``.
+
+        Args:
+            x: Values of the variables, shape (K, n).
+            start: Start postures in [rad] or [m], shape (K, nq); those among the variables are taken from x.
+        """
+        states = [self.state(each) for each in x]
+        robots = range(len(self.base.robots))
+        chosen = np.array([state.starts for state in states])
+        return Layouts(
+            X_WB=np.array([[state.base_shift(self.base) @ pose_of(six) for six in state.bases] for state in states]),
+            X_FT=np.array(
+                [[state.tip(self.base, i) @ state.tip_shift(self.base, i) for i in robots] for state in states]
+            ),
+            start=np.where(np.isnan(chosen), start, chosen),
+            weights=np.array([state.weights for state in states]),
+        )
+
+    def directions(self, x: Array) -> Directions:
+        """What each variable does to a candidate for the kernel, at values of shape (n,)."""
+        state, cell, ranges, factors = self.state(x), self.base, self.tied.ranges, self.tied.factors
+        start, weights = np.zeros((cell.joint_count, len(ranges))), np.zeros((cell.joint_count, len(ranges)))
+        for column, each in enumerate(ranges):
+            if each.kind in {VariableKind.START, VariableKind.WEIGHT}:
+                joint = cell.columns(each.name).start + each.index
+                is_start = each.kind is VariableKind.START
+                (start if is_start else weights)[joint, column] = 1.0 if is_start else state.weights[joint]
+        return Directions(
+            base=effective_base_twists(state, cell, ranges) @ factors,
+            tool=tip_twists(state, cell, ranges) @ factors,
+            start=start @ factors,
+            weights=weights @ factors,
+        )
+
+    def base_twists(self, x: Array) -> Array:
+        """What each variable does to each base: velocity of its origin in W, angular velocity, shape (robots, 6, n)."""
+        return base_twists(self.state(x), self.base, self.tied.ranges) @ self.tied.factors
+
+    def displaced(self, x: Array) -> tuple[DisplacedBody, ...]:
+        """Bodies that the variables move or reshape while all joints stand still, beside what moves with a base."""
+        return displaced_bodies(self.state(x), self.base, self.tied.ranges, self.tied.factors)
+
+    def values(self, x: Array, start: Array) -> dict[str, object]:
+        """What to write into the given cell file: values by address, rounded.
+
+        Args:
+            x: Values of the variables, shape (n,).
+            start: Start postures in [rad] or [m], shape (nq,); those among the variables are taken from x.
+        """
+        found = dict[str, object](self.conversion)
+        numbers = self.tied.factors @ x + self.tied.terms
+        state = self.state(x)
+        for each, number in zip(self.tied.ranges, numbers.tolist(), strict=True):
+            if each.kind is VariableKind.WEIGHT:
+                found[f"robots.{each.name}.weights"] = [
+                    written_weight(weight) for weight in state.weights[self.base.columns(each.name)].tolist()
+                ]
+            elif each.kind is not VariableKind.START:
+                found[each.address] = written_number(each, number)
+        return found | written_starts(self.base, self.settings, np.where(np.isnan(state.starts), start, state.starts))
+
+    def cell(self, x: Array, start: Array) -> Cell:
+        """The cell of the file with these values, as ``solve`` will have it; see ``values``."""
+        return self.given_cell.with_values(self.values(x, start))
+
+    def read_from(self, cell: Cell) -> Array:
+        """Values of the variables in another cell with the same robots, brought into the bounds, shape (n,)."""
+        numbers = State.given(cell).numbers(cell, self.tied.ranges)
+        return self.tied.values(numbers)

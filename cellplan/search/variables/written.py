@@ -1,0 +1,53 @@
+"""Numbers of a layout as they are written in a cell file: in its units, with the digits that are worth writing."""
+
+from typing import Any, Final
+
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.layout import LayoutSettings, VariableKind, VaryRange
+from cellplan.model.units import DEG, MM
+
+LENGTH_DIGITS: Final = 3  # of a millimetre
+ANGLE_DIGITS: Final = 6  # of a degree
+WEIGHT_DIGITS: Final = 6  # significant ones
+
+
+def written_number(each: VaryRange, number: float) -> float:
+    """A length or an angle as the file has it: millimetres or degrees."""
+    return written_quantity(number, is_angle=each.is_angle)
+
+
+def written_weight(weight: float) -> float:
+    """A joint weight as the file has it."""
+    return float(f"{weight:.{WEIGHT_DIGITS}g}")
+
+
+def written_quantity(value: float, *, is_angle: bool) -> float:
+    """A length in [m] or an angle in [rad] as the file has it."""
+    return round(DEG * value, ANGLE_DIGITS) if is_angle else round(MM * value, LENGTH_DIGITS)
+
+
+def written_starts(cell: Cell, settings: LayoutSettings, start: Array) -> dict[str, Any]:
+    """Start postures, shape (nq,), of all robots at work, by address; that of a holder that has one stays."""
+    working = {task.robot for task in cell.tasks} | set(cell.positioners)
+    kept = {name for name in cell.positioners[:1] if cell.robot(name).start is not None}
+    kept -= {each.name for each in settings.ranges if each.kind is VariableKind.START}
+    values = dict[str, Any]()
+    for robot in cell.robots:
+        if robot.name in working and robot.name not in kept:
+            values |= _written_start(cell, robot, start[cell.columns(robot.name)])
+    return values
+
+
+def _written_start(cell: Cell, robot: Robot, start: Array) -> dict[str, Any]:
+    """The start posture of a robot under the key that its file uses, or that suits its joints."""
+    joints = robot.model.joints
+    numbers = [
+        written_quantity(value, is_angle=it.is_revolute) for value, it in zip(start.tolist(), joints, strict=True)
+    ]
+    entry: Any = cell.origin.document["robots"]
+    as_list = all(joint.is_revolute for joint in joints) and "start" not in entry[robot.name]
+    if as_list:
+        return {f"robots.{robot.name}.start_deg": numbers}
+    keys = [f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in joints]
+    return {f"robots.{robot.name}.start": dict(zip(keys, numbers, strict=True))}
