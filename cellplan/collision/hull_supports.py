@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.collision.bodies import CollisionBody
+from cellplan.collision.separation import supports
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.shapes import FACING_TOL, Box, Capsule, Cylinder, Mesh, Solid, Sphere, support_point
 
@@ -32,6 +33,22 @@ class HullSupports:
         kept = {index: hull for index, hull in self._meshes.items() if index not in changed}
         other._meshes = {**kept, **meshes}
         return other
+
+    def reach(self, bodies: Indices, n: Array) -> Array:
+        """How far each body reaches along a unit direction from the origin of its own frame in [m], shape (M,).
+
+        Args:
+            bodies: Which bodies, shape (M,).
+            n: Directions in their frames, shape (M, 3).
+        """
+        sizes = self._sizes[bodies]
+        found = np.einsum("mi,mi->m", np.abs(n), sizes[:, :3])
+        found += sizes[:, 3] * np.hypot(n[:, 0], n[:, 1]) + sizes[:, 4]
+        for index, hull in self._meshes.items():
+            rows = np.flatnonzero(bodies == index)
+            if len(rows):
+                found[rows] = supports(hull, n[rows])
+        return found
 
     def points(self, bodies: Indices, n: Array) -> Array:
         """The farthest point of each body along a unit direction, in its own frame in [m]; see ``support_point``.

@@ -6,7 +6,12 @@ from cellplan.geometry.arrays import Array
 
 
 def line_distances(first: Array, second: Array) -> Array:
-    """Smallest distances in [m] between segments with given ends, shape (M, 2, 3) each, points among them, (M,).
+    """Smallest distances in [m] between segments with given ends, shape (M, 2, 3) each, points among them, (M,)."""
+    return np.linalg.norm(line_gaps(first, second), axis=1)
+
+
+def line_gaps(first: Array, second: Array) -> Array:
+    """From the nearest point of each first segment to that of the second, in [m], shape (M, 3); see `line_distances`.
 
     The nearest points of two lines, or, where one of these lies beyond an end, of that end and the other segment.
     """
@@ -18,4 +23,4 @@ def line_distances(first: Array, second: Array) -> Array:
         s = np.clip(np.nan_to_num((uw * vv - vw * uv) / determinant), 0.0, 1.0)
         t = np.clip(np.nan_to_num((s * uv - vw) / vv), 0.0, 1.0)
         s = np.clip(np.nan_to_num((t * uv + uw) / uu), 0.0, 1.0)
-    return np.linalg.norm(w + t[:, None] * v - s[:, None] * u, axis=1)
+    return w + t[:, None] * v - s[:, None] * u

@@ -78,7 +78,6 @@ class BodyTable:
         moved = R @ self.X_LS[:, None, :3]
         return BodyPoses(np.ascontiguousarray(moved[..., :3]), moved[..., 3] + D[self.links, :, :3, 3])
 
-
     def bounds(self, poses: BodyPoses) -> tuple[Array, Array]:
         """Centres of the bounding spheres and ends of the bounding lines in the world in [m].
 

@@ -9,10 +9,11 @@ import numpy as np
 from cellplan.collision.bodies import BodyPoses, CollisionBody
 from cellplan.collision.engine import Engine
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.geometry.line_distances import line_distances
+from cellplan.geometry.line_distances import line_gaps
 from cellplan.kinematics.link_forest import WORLD, LinkForest
 from cellplan.scene.body_table import BodyTable, placed_points
 
+TINY: Final = 1e-12  # [m] lines nearer than that cross
 CLEAR_OF_TIP: Final = 1e-3  # [m] by which the hull of a cut tool keeps clear of the tip where it stands for the tool
 
 
@@ -133,7 +134,11 @@ class NearTable:
         centres, lines = table.bounds(poses)
         places, samples = self._near_spheres(centres, within)
         a, b = ends[places].T
-        slim = line_distances(lines[a, samples], lines[b, samples]) < table.girths[a] + table.girths[b] + within
+        gaps = line_gaps(lines[a, samples], lines[b, samples])
+        apart = np.linalg.norm(gaps, axis=1)
+        slim = np.flatnonzero(apart < table.girths[a] + table.girths[b] + within)
+        along = gaps[slim] / np.maximum(apart[slim], TINY)[:, None]
+        slim = slim[self._proved(poses, (a[slim], b[slim]), samples[slim], along) < within]
         places, samples = places[slim], samples[slim]
         near, distances, points = engine.signed.below(engine.bodies, ends[places], poses, samples, within=within)
         places, samples, first, second = places[near], samples[near], points[:, 0].copy(), points[:, 1].copy()
@@ -148,6 +153,14 @@ class NearTable:
         apart = centres[bodies[:, 1], samples] - centres[bodies[:, 0], samples]
         normals = _directions(distances, first, second, apart)
         return self.pairs.rows[places], samples, distances, normals, first, second, bodies
+
+    def _proved(self, poses: BodyPoses, ends: tuple[Indices, Indices], samples: Indices, n: Array) -> Array:
+        """Distances in [m] that directions, shape (M, 3), prove between hulls, shape (M,); see ``separation``."""
+        found = np.einsum("mi,mi->m", n, poses.p[ends[1], samples] - poses.p[ends[0], samples])
+        for bodies, away in zip(ends, (n, -n), strict=True):
+            local = (away[:, None] @ poses.R[bodies, samples])[:, 0]
+            found -= self.bodies.supports.reach(bodies, local)
+        return found
 
     def _near_spheres(self, centres: Array, within: float) -> tuple[Indices, Indices]:
         """Pairs of solids whose bounding spheres, centres of shape (B, K, 3), are near enough, and at which samples."""

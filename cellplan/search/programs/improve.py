@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.search.programs.measures import Measures
+from cellplan.search.programs.measures import LENGTH, Measures, Missed
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point, Problem
-from cellplan.search.programs.program import SLACK, Program
+from cellplan.search.programs.program import Program
 from cellplan.search.programs.rows import Linear
 
 WIDEST: Final = 1.5  # [-] usual steps
@@ -24,6 +24,8 @@ BORNE_OUT: Final = 0.1  # [-] share of what a program expects that the true moti
 GOOD: Final = 0.7  # [-] share from which the next region is wider
 GROWS: Final = 1.6  # [-] factor of the region after a good step
 SHRINKS: Final = 0.4  # [-] and after one that is refused
+LEAST: Final = 1e-6  # [-] that a step must gain
+CORRECTIONS: Final = 1  # programs with the bends of the rows that a refused step has shown
 LOOKS_BACK: Final = 8  # [-] iterations over which the gain is judged
 GAINED: Final = 3e-3  # [-] share of the objective that so many must gain
 
@@ -56,7 +58,7 @@ class Improved:
         start: Start posture of all joints in [rad] or [m], shape (nq,).
         point: The motion.
         cycle: Shortest cycle in [s].
-        objective: The objective: the cycle in [s], the smallest clearance beyond demand in [m], or the cost.
+        objective: What was to be small, see ``Measures.objective``.
         violation: What is missed, in usual units; 0 where all demands are kept at the nodes and keys.
         history: All programs.
     """
@@ -80,8 +82,13 @@ class _State:
     """A point and how it stands."""
 
     measures: Measures
-    violation: float
+    missed: Missed
     objective: float
+
+    @property
+    def violation(self) -> float:
+        """What is missed."""
+        return self.missed.violation
 
     @property
     def rank(self) -> tuple[float, float]:
@@ -142,7 +149,7 @@ class _Climb:
         if len(self._history) <= LOOKS_BACK:
             return False
         before, now = self._history[-1 - LOOKS_BACK], self._history[-1]
-        return before.violation <= 0.0 and before.objective - now.objective < GAINED * abs(before.objective)
+        return before.violation <= 0.0 and before.objective - now.objective < GAINED * self._unit(before.objective)
 
     def _step(self, here: _State, linear: Linear) -> _State | None:
         """The state after one program; None where its step is refused. Sets the next region."""
@@ -150,52 +157,58 @@ class _Climb:
         lower = np.minimum(np.maximum((problem.lower - point.x) / problem.scale, -self._trust), 0.0)
         upper = np.maximum(np.minimum((problem.upper - point.x) / problem.scale, self._trust), 0.0)
         rows = linear.rows(self._demands, self._effort.room, np.maximum(-lower, upper))
-        weight = problem.cost * problem.scale
-        changed = ((point.x - problem.given) * problem.cost, weight)
+        changed = ((point.x - problem.given) * problem.cost, problem.cost * problem.scale)
         program = Program(rows=rows, box=(lower, upper), demands=self._demands, changed=changed)
-        found = program.solve()
-        if found is None:
-            self._trust *= SHRINKS
-            return None
-        z, expected, _ = found
+        bends: Array | None = None
+        for _ in range(1 + CORRECTIONS):
+            found = program.solve(bends)
+            if found is None:
+                break
+            z, expected, _ = found
+            there = self._at(here, linear, z)
+            gain = -np.inf if there is None else self._gain(here, there)
+            if there is None:
+                break
+            if gain > max(BORNE_OUT * expected, LEAST):
+                if gain > GOOD * expected:
+                    self._trust = min(WIDEST, GROWS * self._trust)
+                return there
+            bends = np.concatenate([each.bends(here.measures, there.measures, z) for each in rows])
+        reach = self._trust if found is None else float(np.abs(found[0]).max(initial=0.0))
+        self._trust = SHRINKS * min(self._trust, reach)
+        return None
+
+    def _at(self, here: _State, linear: Linear, z: Array) -> _State | None:
+        """The state after a step, in usual steps; None where a tool cannot follow."""
+        problem, point = self._problem, here.measures.point
         dx = np.clip(point.x + z * problem.scale, problem.lower, problem.upper) - point.x
         near = replace(point, q=point.q + linear.derivatives.q @ dx)
         motion = problem.evaluate(point.x + dx, point.start, near)
-        there = None if motion is None else self._state(motion)
-        gain = -np.inf if there is None else self._gain(here, there)
-        if there is None or gain < max(BORNE_OUT * expected, 1e-6):
-            self._trust = SHRINKS * min(self._trust, float(np.abs(z).max(initial=0.0)))
-            return None
-        if gain > GOOD * expected:
-            self._trust = min(WIDEST, GROWS * self._trust)
-        return there
+        return None if motion is None else self._state(motion)
 
     def _gain(self, here: _State, there: _State) -> float:
         """What a step gains: the merit of the program, true."""
-        objective = here.objective - there.objective
-        if self._demands.objective is Objective.CYCLE:
-            objective /= here.objective
-        return objective + SLACK * (here.violation - there.violation)
+        objective = (here.objective - there.objective) / self._unit(here.objective)
+        return objective + here.missed.cost - there.missed.cost
+
+    def _unit(self, objective: float) -> float:
+        """What counts as one in the objective of a program."""
+        match self._demands.objective:
+            case Objective.CYCLE:
+                return objective
+            case Objective.CLEARANCE:
+                return LENGTH
+            case _:
+                return 1.0
 
     def _state(self, point: Point) -> _State:
         """How a point stands."""
         measures = Measures.of(self._problem, point, self._demands, self._effort)
         return _State(
             measures=measures,
-            violation=measures.violation(self._problem, self._demands, self._effort.room),
-            objective=self._objective(measures),
+            missed=measures.missed(self._problem, self._demands, self._effort.room),
+            objective=measures.objective(self._problem, self._demands),
         )
-
-    def _objective(self, measures: Measures) -> float:
-        """What is to be small."""
-        match self._demands.objective:
-            case Objective.CYCLE:
-                return measures.cycle
-            case Objective.CHANGE:
-                problem = self._problem
-                return float((np.abs(measures.point.x - problem.given) * problem.cost).sum())
-            case _:
-                return 0.0
 
     def _note(self, state: _State, *, is_taken: bool) -> None:
         """Keep a line of the history."""

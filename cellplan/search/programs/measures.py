@@ -8,12 +8,14 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.search.kernel.figures import Crests
-from cellplan.search.programs.objective import Demands, Effort, Room
+from cellplan.search.programs.objective import Demands, Effort, Objective, Room
 from cellplan.search.programs.problem import Distances, Point, Problem
 
 ANGLE: Final = 0.01  # [rad] of a lack that weighs as much as
 LENGTH: Final = 0.003  # [m] and as
 SHARE: Final = 0.01  # [-] of the duration
+SLACK: Final = 10.0  # [-] share of the objective that one unit costs: feasibility first
+IN_ROOM: Final = 0.1  # [-] likewise where only the room is missed that counts as kept
 OWN_ROOM: Final = 0.1  # [-] share of the room that is asked of a robot's own bodies
 
 
@@ -40,6 +42,7 @@ class Measures:
             times as long as the nodes do.
         distances: Near pairs at the keys.
         lacks: By how much pairs miss what is demanded of them, in [m], negative where they keep it, shape (M,).
+        within: Distance in [m] beyond what is demanded, from which on pairs are not near.
         factor: How many times as long as the nodes the motion must last for all speeds and accelerations.
         cycle: Shortest cycle in [s].
     """
@@ -51,6 +54,7 @@ class Measures:
     accelerations: Crests
     distances: Distances
     lacks: Array
+    within: float
     factor: float
     cycle: float
 
@@ -61,8 +65,7 @@ class Measures:
         speeds = Crests.of(times, point.qd / limits.velocity, in_magnitude=True)
         accelerations = Crests.of(times, point.qdd / problem.acceleration, in_magnitude=True)
         factor = max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
-        within = effort.within + demands.clearance
-        distances = problem.distances(point, key_nodes(problem, effort), within)
+        distances = problem.distances(point, key_nodes(problem, effort), effort.within + demands.clearance)
         added = np.where(distances.is_own, 0.0, demands.clearance)
         return cls(
             point=point,
@@ -72,22 +75,92 @@ class Measures:
             accelerations=accelerations,
             distances=distances,
             lacks=distances.demands + added - distances.values,
+            within=effort.within,
             factor=factor,
             cycle=factor * float(times[-1] - times[0]),
         )
 
-    def violation(self, problem: Problem, demands: Demands, room: Room) -> float:
-        """Sum over all joints and pairs of what they miss at their worst, half of the room off, in usual units."""
-        turning = problem.limits.is_revolute
-        units = np.where(turning, ANGLE, LENGTH)
-        missed = np.maximum(self.lower.value.max(axis=0), self.upper.value.max(axis=0)) + 0.5 * room.margin
-        total = float((np.maximum(missed, 0.0) / units).sum())
+    def missed(self, problem: Problem, demands: Demands, room: Room) -> "Missed":
+        """What every joint and pair misses at its worst."""
+        units = np.where(problem.limits.is_revolute, ANGLE, LENGTH)
+        joints = (np.stack([self.lower.value.max(axis=0), self.upper.value.max(axis=0)]) + room.margin) / units
+        lacks, allowed = [joints.ravel()], [np.tile(0.5 * room.margin / units, 2)]
         worst = np.full(int(self.distances.pairs.max(initial=-1)) + 1, -np.inf)
-        np.maximum.at(worst, self.distances.pairs, self.lacks + 0.5 * rooms(self.distances, room))
-        total += float(np.maximum(worst, 0.0).sum()) / LENGTH
-        if demands.duration is not None:
-            total += max(0.0, self.cycle * (1.0 + 0.5 * room.time) / demands.duration - 1.0) / SHARE
-        return total
+        asked = rooms(self.distances, room)
+        np.maximum.at(worst, self.distances.pairs, (self.lacks + asked) / LENGTH)
+        most = np.zeros_like(worst)
+        most[self.distances.pairs] = 0.5 * asked / LENGTH
+        lacks.append(worst)
+        allowed.append(most)
+        if demands.duration is not None and demands.objective is not Objective.CYCLE:
+            whole = demands.duration / self.span / (1.0 + room.time)
+            loads = np.concatenate([self.speeds.value.max(axis=0), np.sqrt(self.accelerations.value.max(axis=0))])
+            lacks.append((loads / whole - 1.0) / SHARE)
+            allowed.append(np.full(len(loads), 0.5 * room.time / SHARE))
+        return Missed(lacks=np.concatenate(lacks), allowed=np.concatenate(allowed))
+
+    def values(self, kind: Kind, subjects: Indices, nodes: Indices) -> Array:
+        """What rows of a kind are about: lacks of margins and distances, shares of speeds; NaN where not measured."""
+        match kind:
+            case Kind.LOWER_LIMIT:
+                return self.lower.value[nodes, subjects]
+            case Kind.UPPER_LIMIT:
+                return self.upper.value[nodes, subjects]
+            case Kind.SPEED:
+                return self.speeds.value[nodes, subjects]
+            case Kind.ACCELERATION:
+                return np.sqrt(self.accelerations.value[nodes, subjects])
+            case Kind.DISTANCE:
+                found = self.distances
+                places = zip(found.pairs.tolist(), found.nodes.tolist(), strict=True)
+                known = dict(zip(places, self.lacks.tolist(), strict=True))
+                asked = zip(subjects.tolist(), nodes.tolist(), strict=True)
+                return np.array([known.get(key, np.nan) for key in asked])
+
+    def objective(self, problem: Problem, demands: Demands) -> float:
+        """What is to be small: the cycle in [s], the cost of the change, or the least room between bodies, negative."""
+        match demands.objective:
+            case Objective.CYCLE:
+                return self.cycle
+            case Objective.CHANGE:
+                return float((np.abs(self.point.x - problem.given) * problem.cost).sum())
+            case Objective.CLEARANCE:
+                return self.nearest
+            case Objective.CONFORMING:
+                return 0.0
+
+    @property
+    def nearest(self) -> float:
+        """The largest of ``lacks`` but those of a robot's own bodies in [m]: bodies are so much too near each other."""
+        return float(self.lacks[~self.distances.is_own].max(initial=-self.within))
+
+    @property
+    def span(self) -> float:
+        """Time in [s] from the first node to the last."""
+        return self.cycle / self.factor if self.factor > 0.0 else 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Missed:
+    """What joints and pairs miss at their worst, in usual units.
+
+    Attributes:
+        lacks: With the whole room, negative where kept, shape (F,).
+        allowed: What of it counts as kept, shape (F,).
+    """
+
+    lacks: Array
+    allowed: Array
+
+    @property
+    def violation(self) -> float:
+        """Sum of what does not count as kept."""
+        return float(np.maximum(self.lacks - self.allowed, 0.0).sum())
+
+    @property
+    def cost(self) -> float:
+        """What it costs in the merit of a point: feasibility first, then some of the room."""
+        return SLACK * self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum())
 
 
 def rooms(distances: Distances, room: Room) -> Array:

@@ -6,14 +6,14 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array, Flags
+from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.search.programs.measures import IN_ROOM, SLACK
 from cellplan.search.programs.objective import Demands, Objective
 from cellplan.search.programs.rows import Rows
 from cellplan.search.programs.solver import Solved, least
 
-SLACK: Final = 10.0  # [-] share of the objective that the slack of one unit costs: feasibility first
 PROXIMAL: Final = 1e-3  # [-] weight of a step: of equal ones the shortest
-FARTHEST: Final = 1e3  # [-] by which the objective of one step may change
+FARTHEST: Final = 1e6  # [-] by which the objective of one step may change
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,27 +32,37 @@ class Program:
     demands: Demands
     changed: tuple[Array, Array]
 
-    def solve(self) -> tuple[Array, float, Solved] | None:
-        """The step in usual steps, what it is expected to gain, and the solution; None where the solver finds none."""
-        count = len(self.box[0])
-        lacks = np.concatenate([np.zeros(0), *(each.lacks for each in self.rows)])
+    def solve(self, corrections: Array | None = None) -> tuple[Array, float, Solved] | None:
+        """The step in usual steps, what it is expected to gain, and the solution; None where the solver finds none.
+
+        Args:
+            corrections: Added to the lacks of all rows, shape (M,): what a step was seen to miss beyond its rows.
+        """
+        count, lacks = len(self.box[0]), self._stacked([each.lacks for each in self.rows])
         gradients = np.concatenate([np.zeros((0, count)), *(each.gradients for each in self.rows)])
-        aims = np.concatenate([np.zeros(0), *(np.full(len(each.lacks), each.aim) for each in self.rows)])
-        family, most = self._families(lacks, aims)
+        aims = np.repeat([each.aim for each in self.rows], [len(each.lacks) for each in self.rows])
+        family, most, free = self._families((lacks > 0.0) & (aims == 0.0), lacks)
         slacks, costs = len(most), self._costs
-        A = np.zeros((len(lacks) + 2 * costs, count + 1 + slacks + costs))
+        A = np.zeros((len(lacks) + 2 * costs, count + 1 + 2 * slacks + costs))
         A[: len(lacks), :count], A[: len(lacks), count] = gradients, -aims
         is_loose = np.flatnonzero(family >= 0)
-        A[is_loose, count + 1 + family[is_loose]] = -1.0
-        top = np.concatenate([-lacks, *self._changes(A[len(lacks) :], count + 1 + slacks)])
-        cost = np.concatenate([np.zeros(count), [self._weight], np.full(slacks, SLACK), np.ones(costs)])
-        lower = np.concatenate([self.box[0], [-FARTHEST], np.zeros(slacks + costs)])
-        upper = np.concatenate([self.box[1], [FARTHEST], most, np.full(costs, FARTHEST)])
+        for first in (count + 1, count + 1 + slacks):
+            A[is_loose, first + family[is_loose]] = -1.0
+        asked = lacks if corrections is None else lacks + corrections
+        top = np.concatenate([-asked, *self._changes(A[len(lacks) :], count + 1 + 2 * slacks)])
+        weights = [np.zeros(count), [self._weight], np.full(slacks, IN_ROOM), np.full(slacks, SLACK), np.ones(costs)]
+        cost = np.concatenate(weights)
+        lower = np.concatenate([self.box[0], [-FARTHEST], np.zeros(2 * slacks + costs)])
+        upper = np.concatenate([self.box[1], [FARTHEST], free, most - free, np.full(costs, FARTHEST)])
         solved = least(cost, np.full(len(cost), PROXIMAL), A, top, (lower, upper))
         if solved is None:
             return None
-        now = np.concatenate([np.zeros(count), [0.0], most, np.abs(self.changed[0])[: costs or 0]])
+        now = np.concatenate([np.zeros(count), [0.0], free, most - free, np.abs(self.changed[0])[:costs]])
         return solved.at[:count], float(cost @ (now - solved.at)), solved
+
+    def _stacked(self, parts: Sequence[Array]) -> Array:
+        """Arrays of all rows, one after the other."""
+        return np.concatenate([np.zeros(0), *parts])
 
     @property
     def _weight(self) -> float:
@@ -64,21 +74,21 @@ class Program:
         """Number of variables that stand for the costs of changes."""
         return len(self.box[0]) if self.demands.objective is Objective.CHANGE else 0
 
-    def _families(self, lacks: Array, aims: Array) -> tuple[Array, Array]:
-        """Which slack each row has, -1 for none, and the most that each slack may be: what is missed now.
+    def _families(self, is_loose: Flags, lacks: Array) -> tuple[Indices, Array, Array]:
+        """Which slack each row has, -1 for none; what is missed now of each, and how much of it counts as kept.
 
         Rows about one joint or one pair share theirs.
         """
         kinds = np.repeat(np.arange(len(self.rows)), [len(each.lacks) for each in self.rows])
         subjects = np.concatenate([np.zeros(0, dtype=np.intp), *(each.subjects for each in self.rows)])
-        is_violated: Flags = (lacks > 0.0) & (aims == 0.0)
-        family = np.full(len(lacks), -1)
-        labels = np.stack([kinds, subjects], axis=1)[is_violated]
+        family = np.full(len(lacks), -1, dtype=np.intp)
+        labels = np.stack([kinds, subjects], axis=1)[is_loose]
         found, which = np.unique(labels, axis=0, return_inverse=True) if len(labels) else (labels, np.zeros(0, int))
-        family[is_violated] = which
-        most = np.zeros(len(found))
-        np.maximum.at(most, which, lacks[is_violated])
-        return family, most
+        family[is_loose] = which
+        most, free = np.zeros(len(found)), np.zeros(len(found))
+        np.maximum.at(most, which, lacks[is_loose])
+        free[which] = self._stacked([each.allowed for each in self.rows])[is_loose]
+        return family, most, np.minimum(free, most)
 
     def _changes(self, block: Array, first: int) -> list[Array]:
         """Fill in the rows that keep the cost of each change above the change itself, both ways; their bounds."""

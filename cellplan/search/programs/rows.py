@@ -1,7 +1,7 @@
 """Rows: the demands on a point, linear in a step of the variables; only those that a step of the region could bind."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,8 @@ class Rows:
         nodes: Nodes of the motion, shape (M,).
         lacks: By how much the demand and the room are missed now, in usual units, negative where kept, shape (M,).
         gradients: Derivatives of the lacks by z, shape (M, n).
+        allowed: What of the lacks counts as kept at a point, shape (M,).
+        units: Usual units of what is measured, see ``Measures.values``, shape (M,).
         aim: 1 where the row bounds the objective, 0 where it must be kept.
     """
 
@@ -30,6 +32,8 @@ class Rows:
     nodes: Indices
     lacks: Array
     gradients: Array
+    allowed: Array
+    units: Array
     aim: float = 0.0
 
     def that_can_bind(self, box: Array) -> "Rows":
@@ -37,6 +41,11 @@ class Rows:
         reach = np.abs(self.gradients) @ box
         highest = self.lacks + reach
         return self.of(highest > (float((self.lacks - reach).max(initial=-np.inf)) if self.aim else 0.0))
+
+    def bends(self, here: Measures, there: Measures, z: Array) -> Array:
+        """By how much more than the rows say a step z was seen to change the lacks, shape (M,); 0 where not seen."""
+        before, after = (each.values(self.kind, self.subjects, self.nodes) for each in (here, there))
+        return np.nan_to_num((after - before) / self.units - self.gradients @ z)
 
     def of(self, kept: Flags) -> "Rows":
         """Some of them."""
@@ -46,6 +55,8 @@ class Rows:
             nodes=self.nodes[kept],
             lacks=self.lacks[kept],
             gradients=self.gradients[kept],
+            allowed=self.allowed[kept],
+            units=self.units[kept],
             aim=self.aim,
         )
 
@@ -74,6 +85,8 @@ class Linear:
     def rows(self, demands: Demands, room: Room, box: Array) -> list[Rows]:
         """All rows that a step within a box can bind; the ones that bound the objective first."""
         parts = [*self._timing(demands, room), *self._margins(room, box), self._apart(room)]
+        if demands.objective is Objective.CLEARANCE:
+            parts.append(self._aimed_apart())
         return [rows.that_can_bind(box) for rows in parts if len(rows.lacks)]
 
     def _timing(self, demands: Demands, room: Room) -> Iterator[Rows]:
@@ -101,6 +114,8 @@ class Linear:
                 nodes=nodes,
                 lacks=(at / whole - 1.0) / unit,
                 gradients=gradients * problem.scale / (whole * unit),
+                allowed=np.full(len(at), 0.0 if is_aim else 0.5 * room.time / unit),
+                units=np.full(len(at), whole * unit),
                 aim=1.0 if is_aim else 0.0,
             )
 
@@ -122,6 +137,8 @@ class Linear:
                 nodes=nodes,
                 lacks=(crests.value[nodes, columns] + room.margin) / units[columns],
                 gradients=gradients * problem.scale,
+                allowed=0.5 * room.margin / units[columns],
+                units=units[columns],
             )
 
     def _apart(self, room: Room) -> Rows:
@@ -133,4 +150,11 @@ class Linear:
             nodes=distances.nodes,
             lacks=(self.measures.lacks + rooms(distances, room)) / LENGTH,
             gradients=-self.distances * self.problem.scale / LENGTH,
+            allowed=0.5 * rooms(distances, room) / LENGTH,
+            units=np.full(len(distances.pairs), LENGTH),
         )
+
+    def _aimed_apart(self) -> Rows:
+        """Distances of near pairs but those of a robot's own bodies, as bounds of the objective."""
+        rows = self._apart(Room(distance=0.0)).of(~self.measures.distances.is_own)
+        return replace(rows, lacks=rows.lacks - self.measures.nearest / LENGTH, aim=1.0)
