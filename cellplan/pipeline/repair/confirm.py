@@ -1,0 +1,122 @@
+"""Confirmation: a layout of the search is solved and verified in full, and corrected where it falls short."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell import Cell
+from cellplan.model.report import Check
+from cellplan.model.units import MM
+from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.repair.neat import changed_values, neat
+from cellplan.pipeline.repair.solved import TIMED, Solved, demanded_margin
+from cellplan.pipeline.solve import solve
+from cellplan.search.programs.improve import improve
+from cellplan.search.programs.objective import Demands, Effort, Room
+
+SOLVES: Final = 4  # [-] times that a layout is corrected and solved before it is given up
+NODES: Final = 129  # [-] of a correction
+KEYS: Final = 33  # [-] configurations at which it asks for distances
+ITERATIONS: Final = 20
+MORE_ANGLE: Final = float(np.radians(0.05))  # [rad] asked for beyond what is missed
+MORE_LENGTH: Final = 0.0005  # [m] likewise
+MORE_TIME: Final = 0.002  # [-] likewise
+DISTANCES: Final = ("clearance", "collision", "tool_depth")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Confirmed:
+    """What came of a change when it was solved in full.
+
+    Attributes:
+        values: What changes, by address of the cell file.
+        cost: Size of the change.
+        solved: The last solution; None where there is none.
+        reason: Why it is no remedy; empty where it passed.
+        solves: How often it was solved.
+    """
+
+    values: Mapping[str, object]
+    cost: float
+    solved: Solved | None
+    reason: str
+    solves: int
+
+
+def confirmed(ready: Prepared, x: Array, start: Array) -> Confirmed:
+    """A layout of the search, corrected until it passes every check with the demanded margins.
+
+    Args:
+        ready: What may change.
+        x: Values of the variables, shape (n,).
+        start: Start posture in [rad] or [m], shape (nq,).
+    """
+    demands, effort, problem = ready.demands(), Effort(iterations=ITERATIONS, keys=KEYS, trust=0.2), None
+    variables = ready.variables
+    for solves in range(1, SOLVES + 1):
+        x, start = neat(ready, x, start)
+        values = changed_values(ready, x, start)
+        cost = float(np.abs(x - variables.given) @ variables.cost)
+        solved, reason = solved_cell(ready.cell, values)
+        done = Confirmed(values=values, cost=cost, solved=solved, reason=reason, solves=solves)
+        if solved is None or not reason or solves == SOLVES:
+            return done
+        problem = problem or ready.problem(NODES)
+        tighter = _tightened(solved, demands, effort, problem.times)
+        if tighter is None:
+            return done
+        demands, effort = tighter
+        found = improve(problem, x, start, demands, effort)
+        if found is None or not found.is_conforming:
+            return done
+        x, start = found.x, found.start
+    raise AssertionError("unreachable")
+
+
+def solved_cell(cell: Cell, values: Mapping[str, object]) -> tuple[Solved | None, str]:
+    """A changed cell solved in full, and why it is no remedy; empty where it passes with the demanded margins."""
+    try:
+        changed = cell.with_values(values) if values else cell
+        solved = Solved(solution=solve(changed), margin=demanded_margin(cell))
+    except (InputError, NoSolutionError) as error:
+        return None, str(error).splitlines()[0]
+    failed = solved.failed
+    return solved, failed[0].message if failed else ""
+
+
+def _tightened(
+    solved: Solved, demands: Demands, effort: Effort, times: Array
+) -> tuple[Demands, Effort] | None:
+    """Demands that ask for what the verified motion lacks; None where it lacks something else."""
+    failed = solved.failed
+    names = {check.name for check in failed}
+    if not names <= {*TIMED, *DISTANCES, "joint_position", "joint_margin"}:
+        return None
+    lacks = solved.lacks
+    margin = demands.margin + np.where(lacks > 0.0, lacks + MORE_ANGLE, 0.0)
+    near = [check for check in failed if check.name in DISTANCES]
+    room = replace(effort.room, distance=effort.room.distance + _missing(near), time=effort.room.time + _late(failed))
+    at = [int(np.abs(times - check.at_s).argmin()) for check in near if check.at_s is not None]
+    keys = tuple(sorted({*effort.extra_keys, *at}))
+    return replace(demands, margin=margin), replace(effort, room=_most(room), extra_keys=keys)
+
+
+def _missing(near: Sequence[Check]) -> float:
+    """Distance in [m] to ask for beyond what is asked for already."""
+    lengths = [check.limit - check.value for check in near if check.unit == "mm" and check.name == "clearance"]
+    return max(0.0, max(lengths, default=0.0)) / MM + MORE_LENGTH if near else 0.0
+
+
+def _late(failed: Sequence[Check]) -> float:
+    """Share of the time to ask for beyond what is asked for already."""
+    shares: list[Any] = [check.value / check.limit - 1.0 for check in failed if check.name in TIMED]
+    return max(shares) + MORE_TIME if shares else 0.0
+
+
+def _most(room: Room) -> Room:
+    """The room, within reason: what asks for more is not corrected any further."""
+    return replace(room, distance=min(room.distance, 0.05), time=min(room.time, 0.5))
