@@ -44,7 +44,15 @@ class InvalidFileError(InputError):
 
 
 class OverrunError(InputError):
-    """A file crashed its reader, or exceeded the limits of time or memory."""
+    """Work in a child process crashed it, or exceeded the limits of time or memory."""
+
+
+class TimeLimitError(OverrunError):
+    """Work in a child process took longer than it may."""
+
+
+class StudyStoppedError(InputError):
+    """A study cannot go on, whatever its next trial is: its folder cannot be written, its cluster does not answer."""
 
 
 class NotVerifiedError(CellplanError):

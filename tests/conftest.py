@@ -52,6 +52,15 @@ def two_processors(one_processor: None) -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
+def trials_here() -> Iterator[None]:
+    """Trials of studies run in this process: a child would import the package for each study."""
+    from builders.study_trials import InThisProcess
+
+    with mock.patch("cellplan.study.study.Workers", InThisProcess):
+        yield
+
+
+@pytest.fixture(scope="session")
 def repository() -> Path:
     """The folder that holds the package, the cells and the docs."""
     return ROOT

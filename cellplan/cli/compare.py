@@ -78,4 +78,5 @@ def exit_status(counts: dict[str, int]) -> ExitStatus:
     """Passed if one variant did; bad input if none is a valid cell."""
     if counts["passed"]:
         return ExitStatus.PASSED
-    return ExitStatus.CHECK_FAILED if counts["failed"] + counts["no_solution"] else ExitStatus.BAD_INPUT
+    others = counts["failed"] + counts["no_solution"] + counts["crashed"]
+    return ExitStatus.CHECK_FAILED if others else ExitStatus.BAD_INPUT

@@ -16,6 +16,7 @@ from cellplan.cli.errors import OutputError, report_failure
 from cellplan.cli.explain import explain
 from cellplan.cli.export import export
 from cellplan.cli.fastest import fastest
+from cellplan.cli.layout import layout
 from cellplan.cli.output import say
 from cellplan.cli.rehearse import rehearse
 from cellplan.cli.robots import robots
@@ -63,6 +64,7 @@ app.command()(sweep)
 app.command()(compare)
 app.command()(fastest)
 app.command("map")(base_map)
+app.command()(layout)
 app.command()(rehearse)
 app.command()(robots)
 app.command()(schema)

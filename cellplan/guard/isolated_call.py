@@ -5,10 +5,10 @@ import contextlib
 import os
 import threading
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from cellplan.errors import CellplanError, OverrunError
-from cellplan.guard.worker import Job
+from cellplan.guard.worker import Answer, Job
 from cellplan.guard.worker_process import ChildProcess, Guard
 
 Value = TypeVar("Value")
@@ -27,18 +27,23 @@ def in_child(function: Callable[..., Value], *arguments: object, guard: Guard) -
         CellplanError: What the function itself raises; other exceptions are reported as internal errors.
     """
     with _lock:
-        answer = _child().ask(_job(function, arguments, guard), guard)
+        answer = _child().ask(job_here(function, arguments, guard), guard)
+    value: Value = value_of(answer, guard)
+    return value
+
+
+def value_of(answer: Answer, guard: Guard) -> Any:
+    """The value of an answer; its error is raised."""
     if answer.error is not None:
         raise answer.error
     if answer.is_out_of_memory:
         raise OverrunError(f"{guard.file}: {guard.worker} needed more than {guard.megabytes} MB")
     if answer.surprise is not None:
         raise CellplanError(f"{guard.file}: {guard.worker} failed: {answer.surprise}")
-    value: Value = answer.value
-    return value
+    return answer.value
 
 
-def _job(function: Callable[..., object], arguments: tuple[object, ...], guard: Guard) -> Job:
+def job_here(function: Callable[..., object], arguments: tuple[object, ...], guard: Guard) -> Job:
     """A job for the child, in the working directory of this process."""
     folder = None
     with contextlib.suppress(OSError):  # it may have been removed

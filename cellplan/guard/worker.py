@@ -3,8 +3,10 @@
 import contextlib
 import os
 import pickle
+import select
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
@@ -38,6 +40,7 @@ def serve() -> None:
     Output of libraries is discarded: the pipe carries answers only. Ctrl-C is handled by the parent.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _set_limit("RLIMIT_CORE", 0)  # a crash leaves no file behind
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -49,6 +52,15 @@ def serve() -> None:
             return
         answers.write(pickle.dumps(_done(job)))
         answers.flush()
+
+
+def _end_with_parent() -> None:
+    """End this process, in the middle of a job too, when the parent has ended and its end of the pipe is closed."""
+    with contextlib.suppress(AttributeError, OSError, ValueError):  # Windows cannot wait for it
+        pipe = select.poll()
+        pipe.register(sys.stdin.fileno(), 0)
+        pipe.poll()
+        os._exit(1)
 
 
 def _done(job: Job) -> Answer:

@@ -10,7 +10,7 @@ import threading
 from dataclasses import dataclass
 from typing import Final
 
-from cellplan.errors import OverrunError
+from cellplan.errors import OverrunError, TimeLimitError
 from cellplan.guard.worker import Answer, Job
 
 # The child starts without its working directory on the path, or a file named pickle.py there would be run.
@@ -28,13 +28,15 @@ class Guard:
     Attributes:
         file: The file at fault when it goes wrong, as messages name it.
         worker: Name of the worker in messages, such as "the mesh reader".
-        seconds: Longest time, of the clock and of the processor.
+        seconds: Longest time of the processor.
+        patience: Longest time of the clock, as a multiple of it.
         megabytes: Largest address space of the child, what Python and its libraries take included.
     """
 
     file: str
     worker: str
     seconds: float = 60.0
+    patience: float = 1.0
     megabytes: int = 1500
 
 
@@ -61,7 +63,7 @@ class ChildProcess:
     def ask(self, job: Job, guard: Guard) -> Answer:
         """Answer to a job; the process is ended when there is none, and after an interruption."""
         late = threading.Event()
-        clock = threading.Timer(guard.seconds, self._end_late, [late])
+        clock = threading.Timer(guard.patience * guard.seconds, self._end_late, [late])
         clock.start()
         try:
             return self._exchange(job)
@@ -114,7 +116,7 @@ class ChildProcess:
         """The error for a process that ended without an answer."""
         status = self._process.returncode
         if is_late or status == -getattr(signal, "SIGXCPU", 0):
-            return OverrunError(f"{guard.file}: {guard.worker} took longer than {guard.seconds:g} s")
+            return TimeLimitError(f"{guard.file}: {guard.worker} took longer than {guard.seconds:g} s")
         try:
             how = signal.Signals(-(status or 0)).name
         except ValueError:

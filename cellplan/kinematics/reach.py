@@ -16,11 +16,15 @@ SWEEP_COUNT: Final = 24  # rounds over all joints; the grid shrinks by half in e
 UNLIMITED_RANGE: Final = 2.0 * np.pi  # [rad] range of a joint that may turn without end
 
 
-def arm_reach(model: RobotModel) -> float:
+def arm_reach(model: RobotModel, *, rounds: int = SWEEP_COUNT) -> float:
     """Largest distance in [m] of the flange from the first joint's axis, within the joint limits.
 
     One joint after the other is moved to its best position on a grid that gets finer in each round, from several
     configurations. A first joint that slides has no axis to turn about: then the distance from its point is taken.
+
+    Args:
+        model: The robot.
+        rounds: Number of rounds; five are enough for a drawing.
     """
     placed = Robot(
         name=model.name,
@@ -41,14 +45,15 @@ def arm_reach(model: RobotModel) -> float:
     lower = np.where(np.isfinite(model.lower), model.lower, -0.5 * UNLIMITED_RANGE)
     upper = np.where(np.isfinite(model.upper), model.upper, 0.5 * UNLIMITED_RANGE)
     starts = np.random.default_rng(0).uniform(lower, upper, size=(START_COUNT, len(lower)))
-    return _climb(distances, starts, lower, upper)
+    return _climb(distances, starts, (lower, upper), rounds)
 
 
-def _climb(distances: Callable[[Array], Array], starts: Array, lower: Array, upper: Array) -> float:
+def _climb(distances: Callable[[Array], Array], starts: Array, limits: tuple[Array, Array], rounds: int) -> float:
     """Distance at the best configuration found from any of ``starts``, shape (S, n), in [m]."""
     best, rows = starts.copy(), np.arange(len(starts))
+    lower, upper = limits
     width = upper - lower
-    for _ in range(SWEEP_COUNT):
+    for _ in range(rounds):
         for joint in range(best.shape[1]):
             tried = np.repeat(best[:, None], GRID_COUNT, axis=1)
             offsets = np.linspace(-width[joint], width[joint], GRID_COUNT)

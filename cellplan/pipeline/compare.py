@@ -105,8 +105,8 @@ def compare(
         "inputs": dict(zip(_names(job.subjects), map(_inputs, sources), strict=True)),
         "versions": versions(),
     }
-    study = Study(folder=folder, header=header, variants=variants)
-    trials = study.run(partial(evaluate_subject, job), workers=workers, resume=resume, progress=progress)
+    study = Study.of_variants(folder, header, variants)
+    trials = study.run(partial(evaluate_subject, job), workers=workers, resume=resume, progress=progress).trials
     curves = [trial["figures"].pop("curves", None) for trial in trials]
     record = comparison_record(header, trials, found)
     write_results(folder, comparison_files(record, curves))

@@ -17,10 +17,7 @@ CORNERS: Final = 24  # [-] of an outline
 ANGLES: Final = 2.0 * np.pi * (np.arange(CORNERS) + 0.5) / CORNERS
 AROUND: Final = np.stack([np.cos(ANGLES), np.sin(ANGLES), np.zeros(CORNERS)], axis=1)  # horizontal directions
 ALL_ROUND: Final = np.concatenate(
-    [
-        np.cos(tilt) * AROUND + np.sin(tilt) * np.array([0.0, 0.0, 1.0])
-        for tilt in np.radians((-75, -45, -15, 15, 45, 75))
-    ]
+    [np.cos(tilt) * AROUND[::2] + np.sin(tilt) * np.array([0.0, 0.0, 1.0]) for tilt in np.radians((-60, -20, 20, 60))]
 )  # directions all round a body, of which its corners are sought once
 PATH_POINTS: Final = 121  # [-]
 SQUARE: Final = 40.0  # [mm]

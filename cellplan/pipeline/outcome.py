@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from cellplan.errors import InputError, NoSolutionError
+from cellplan.errors import InputError, NoSolutionError, StudyStoppedError
 from cellplan.model.cell import Cell
 from cellplan.pipeline.overrides import require_task
 from cellplan.pipeline.solution import Solution
@@ -28,6 +28,9 @@ def solved_outcome(
         file: The cell file; reasons name it without its folder.
         task: Name of the only task to work on; None for all.
         folder: Run folder to be written; None for none.
+
+    Raises:
+        StudyStoppedError: The run folder cannot be written.
     """
     try:
         cell = read()
@@ -38,7 +41,10 @@ def solved_outcome(
         reason = str(error).splitlines()[0].replace(str(file), file.name)  # the same wherever the cell file lies
         return Outcome(status=status, reason=reason, figures={})
     if folder is not None:
-        write_run(solution, folder)
+        try:
+            write_run(solution, folder)
+        except InputError as error:
+            raise StudyStoppedError(str(error)) from error
     failed = [check.message for run in solution.runs for check in run.report.checks if not check.passed]
     status = TrialStatus.FAILED if failed else TrialStatus.PASSED
     return Outcome(status=status, reason=failed[0] if failed else "", figures=figures(solution))

@@ -83,8 +83,8 @@ def sweep(
         "inputs": dict(base.inputs),
         "versions": versions(),
     }
-    study = Study(folder=folder, header=header, variants=variants)
-    trials = study.run(partial(evaluate_variant, job), workers=workers, resume=resume, progress=progress)
+    study = Study.of_variants(folder, header, variants)
+    trials = study.run(partial(evaluate_variant, job), workers=workers, resume=resume, progress=progress).trials
     record = study_record(header, trials)
     write_results(folder, study_files(record))
     return record

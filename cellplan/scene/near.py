@@ -72,7 +72,7 @@ def near_table(
     carriers = [*solids, *(solids[index] for index in cut_from)]
     of_solids = [(row, pair) for row, pair in enumerate(pairs) if pair.solids is not None]
     of_grounds = [(row, pair) for row, pair in enumerate(pairs) if pair.is_ground]
-    demands = [pair.demand if pair.rule is Rule.CLEARANCE else 0.0 for _, pair in of_solids]
+    demands = [pair.demand if pair.rule is Rule.CLEARANCE else 0.0 for _, pair in (*of_solids, *of_grounds)]
     return NearTable(
         forest=forest,
         bodies=BodyTable.of(forest, carriers, engine.bodies),

@@ -26,7 +26,7 @@ class WatchedPairs:
         solids: Bodies of the engine of the first ones, shape (P, 2).
         above: Solids of the others, shape (G,).
         planes: Poses of their half-spaces in the world, everything below the xy plane is solid, shape (G, 4, 4).
-        demands: Distance in [m] down to which the hulls of a pair are enough, shape (P,).
+        demands: Distances in [m] that are demanded; down to them the hulls of a pair are enough, shape (P + G,).
         once: Whether a pair is looked at in the first configuration only, shape (P + G,).
     """
 

@@ -9,12 +9,16 @@ from typing import Final
 
 from cellplan.errors import InputError
 from cellplan.io.run.content import LEFT_ALONE, foreign_within, is_run_folder
-from cellplan.study.journal import JOURNAL, SCHEMA
+from cellplan.study.running import STATE, require_idle
 
+SCHEMA: Final = "cellplan.study/1"
+JOURNAL: Final = "study.jsonl"
+AHEAD: Final = "study-ahead.jsonl"  # trials that wait for one before them
 RUNS: Final = "runs"
 OWN: Final = re.compile(r"\.?study(-[a-z]+)?\.(jsonl|json|csv|html|svg|png)(\.draft)?")
 RUN_NAME: Final = re.compile(r"\d{4,6}")
 MARK_WITHIN: Final = 200  # [bytes]
+BEFORE_JOURNAL: Final = {STATE, f".{JOURNAL}.draft"}  # all that a study which was killed at its start leaves
 
 
 def run_folder(folder: Path, number: int) -> Path:
@@ -26,7 +30,7 @@ def prepare_folder(folder: Path, *, resume: bool) -> None:
     """Make the folder of a study, or empty that of an earlier one; a study that is continued keeps journal and runs.
 
     Raises:
-        InputError: The folder holds something that no study wrote, or cannot be written.
+        InputError: The folder holds something that no study wrote, cannot be written, or is being written by a study.
     """
     try:
         if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
@@ -37,7 +41,8 @@ def prepare_folder(folder: Path, *, resume: bool) -> None:
             raise InputError(
                 f"{folder}: holds '{foreign}', which no study wrote; choose another folder with -o or empty this one"
             )
-        kept = {JOURNAL, RUNS} if resume else set()
+        require_idle(folder)
+        kept = {STATE, JOURNAL, AHEAD, RUNS} if resume else {STATE}
         for entry in folder.iterdir():
             if entry.name not in kept:
                 shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
@@ -56,23 +61,35 @@ def write_results(folder: Path, files: Mapping[str, bytes]) -> None:
         InputError: The folder cannot be written.
     """
     for name, content in files.items():
-        draft = folder / f".{name}.draft"
         try:
-            with draft.open("wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            draft.replace(folder / name)
+            write_whole(folder / name, content)
         except OSError as error:
-            draft.unlink(missing_ok=True)
             raise _cannot_write(folder / name, error) from error
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all.
+
+    Raises:
+        OSError: It cannot be written; what was there stays.
+    """
+    draft = path.with_name(f".{path.name}.draft")
+    try:
+        with draft.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        draft.replace(path)
+    except OSError:
+        draft.unlink(missing_ok=True)
+        raise
 
 
 def _foreign(folder: Path) -> str | None:
     """The first thing in a folder that no study wrote; None when there is none."""
     entries = sorted(folder.iterdir())
-    if not entries or not _has_journal(folder):
-        return entries[0].name if entries else None
+    if not _has_journal(folder):
+        return next((entry.name for entry in entries if entry.name not in BEFORE_JOURNAL), None)
     for entry in entries:
         if entry.name == LEFT_ALONE or (OWN.fullmatch(entry.name) and entry.is_file() and not entry.is_symlink()):
             continue

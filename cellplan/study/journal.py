@@ -1,4 +1,7 @@
-"""Journal of a study: ``study.jsonl``, a header and a line for each trial, in their order and only ever appended to."""
+"""Journal of a study: ``study.jsonl``, a header and a line for each trial, in their order and only ever appended to.
+
+A trial that ends before one with a smaller number waits in ``study-ahead.jsonl``, so that it is not lost either.
+"""
 
 import json
 import os
@@ -6,13 +9,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Final, Self
 
-from cellplan.errors import InputError
+from cellplan.errors import InputError, StudyStoppedError
 from cellplan.io.input.files import read_regular_file
+from cellplan.study.folder import AHEAD, JOURNAL, SCHEMA, write_whole
 from cellplan.study.trial import Trial
 from cellplan.study.variants import Variant
 
-SCHEMA: Final = "cellplan.study/1"
-JOURNAL: Final = "study.jsonl"
 MAX_BYTES: Final = 500_000_000
 
 
@@ -20,91 +22,116 @@ class Journal:
     """Writer of a journal, to be used in a ``with`` statement; every line is on the disk before the next trial counts.
 
     Attributes:
-        trials: The trials that were recorded earlier and need not be repeated, in their order.
+        trials: The trials that are recorded, in their order; those of an earlier journal need not be repeated.
+        ahead: Trials that are known although one before them is not, by number.
     """
 
-    def __init__(self, folder: Path, header: Mapping[str, Any], variants: Sequence[Variant], *, resume: bool) -> None:
+    def __init__(self, folder: Path, header: Mapping[str, Any], *, resume: bool) -> None:
         """Name the journal; it is opened by the ``with`` statement.
 
         Args:
             folder: Folder of the study, which exists.
             header: What the study is about: a journal with another header is not continued.
-            variants: All variants of the study.
             resume: Whether trials of an earlier journal count.
 
         Raises:
             InputError: The earlier journal cannot be read, or is that of another study.
         """
-        self._path = folder / JOURNAL
+        self._path, self._ahead = folder / JOURNAL, folder / AHEAD
         self._header = json.dumps({"schema": SCHEMA, **header}, ensure_ascii=False, allow_nan=False)
-        self._file: IO[bytes] | None = None
-        self._kept = b""
+        self._files: dict[Path, IO[bytes]] = {}
+        self._kept = f"{self._header}\n".encode()
         self.trials: list[Trial] = []
-        if resume and self._path.exists():
-            self._read(variants)
+        self.ahead: dict[int, Trial] = {}
+        if resume:
+            self._read()
 
     def __enter__(self) -> Self:
         """Write the header and the trials that are kept; a line that was cut off is dropped."""
-        kept = self._kept or f"{self._header}\n".encode()
-        draft = self._path.with_name(f".{JOURNAL}.draft")
+        waiting = "".join(f"{self.ahead[number].line}\n" for number in sorted(self.ahead)).encode()
         try:
-            draft.write_bytes(kept)
-            draft.replace(self._path)
-            self._file = self._path.open("ab")
+            write_whole(self._path, self._kept)
+            if waiting:
+                write_whole(self._ahead, waiting)
+            else:
+                self._ahead.unlink(missing_ok=True)
         except OSError as error:
             raise self._cannot_write(error) from error
         return self
 
     def append(self, trial: Trial) -> None:
-        """Record a trial.
+        """Record the next trial.
 
         Raises:
-            InputError: The disk is full or otherwise refuses.
+            StudyStoppedError: The disk is full or otherwise refuses.
         """
-        if self._file is None:
-            raise ValueError("journal: not open")
-        try:
-            self._file.write(f"{trial.line}\n".encode())
-            self._file.flush()
-            os.fsync(self._file.fileno())
-        except OSError as error:
-            raise self._cannot_write(error) from error
+        self._write(self._path, trial)
         self.trials.append(trial)
+        self.ahead.pop(trial.variant.number, None)
+
+    def park(self, trial: Trial) -> None:
+        """Record a trial before which another is missing.
+
+        Raises:
+            StudyStoppedError: The disk is full or otherwise refuses.
+        """
+        self._write(self._ahead, trial)
+        self.ahead[trial.variant.number] = trial
+
+    def require(self, variants: Sequence[Variant]) -> None:
+        """Refuse trials that are not those of the study, among the variants of one round.
+
+        Raises:
+            InputError: An earlier journal holds another trial in the place of one of them.
+        """
+        for variant in variants:
+            number = variant.number
+            if number < len(self.trials) and self.trials[number].variant != variant:
+                raise InputError(
+                    f"{self._path}:{number + 2}: expected the trial of variant {number}, got another one; begin anew "
+                    "without --resume"
+                )
+            if number in self.ahead and self.ahead[number].variant != variant:
+                del self.ahead[number]
 
     def __exit__(self, *_exception: object) -> None:
-        """Close the file."""
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+        """Close the files; the one of trials that wait for another goes when there are none."""
+        while self._files:
+            self._files.popitem()[1].close()
+        if not self.ahead:
+            self._ahead.unlink(missing_ok=True)
 
-    def _read(self, variants: Sequence[Variant]) -> None:
+    def _write(self, path: Path, trial: Trial) -> None:
+        """Append a line and have it on the disk."""
+        try:
+            file = self._files.get(path) or self._files.setdefault(path, path.open("ab"))
+            file.write(f"{trial.line}\n".encode())
+            file.flush()
+            os.fsync(file.fileno())
+        except OSError as error:
+            raise self._cannot_write(error) from error
+
+    def _read(self) -> None:
         """Take over the trials of an earlier journal."""
-        content = read_regular_file(self._path, file=str(self._path), limit=MAX_BYTES)
-        complete = content[: content.rfind(b"\n") + 1]  # the line at which it was interrupted may be cut off
-        lines = complete.decode("utf-8", "replace").splitlines()
-        if not lines:
-            return
-        if lines[0] != self._header:
-            raise InputError(
-                f"{self._path}:1: expected the study that is to be continued, got {self._difference(lines[0])}"
-            )
-        for number, line in enumerate(lines[1:]):
-            self.trials.append(self._trial(line, number, variants))
-        self._kept = complete
+        complete, lines = whole_lines(self._path)
+        if lines:
+            if lines[0] != self._header:
+                raise InputError(
+                    f"{self._path}:1: expected the study that is to be continued, got {self._difference(lines[0])}"
+                )
+            self.trials = [self._trial(line, number) for number, line in enumerate(lines[1:])]
+            self._kept = complete
+        self.ahead = {number: trial for number, trial in read_ahead(self._ahead).items() if number >= len(lines) - 1}
 
-    def _trial(self, line: str, number: int, variants: Sequence[Variant]) -> Trial:
-        """The trial of a line, which must be the next variant."""
-        where = f"{self._path}:{number + 2}"
+    def _trial(self, line: str, number: int) -> Trial:
+        """The trial of a line."""
         try:
             trial = Trial.from_record(json.loads(line))
         except (ValueError, KeyError, TypeError, RecursionError):
             raise InputError(
-                f"{where}: expected a trial of a study, got something else; begin anew without --resume"
+                f"{self._path}:{number + 2}: expected a trial of a study, got something else; begin anew without "
+                "--resume"
             ) from None
-        if number >= len(variants) or trial.variant != variants[number]:
-            raise InputError(
-                f"{where}: expected the trial of variant {number}, got another one; begin anew without --resume"
-            )
         return trial
 
     def _difference(self, line: str) -> str:
@@ -113,10 +140,31 @@ class Journal:
         try:
             other, own = json.loads(line), json.loads(self._header)
             keys = [key for key in {**own, **other} if own.get(key) != other.get(key)]
-        except (ValueError, AttributeError, RecursionError):
+        except (ValueError, AttributeError, TypeError, RecursionError):
             return f"no header of a study; {anew}"
         return f"one with another value of '{keys[0]}'; {anew}" if keys else f"its values in another order; {anew}"
 
     def _cannot_write(self, error: OSError) -> InputError:
         """The error that users see."""
-        return InputError(f"{self._path}: cannot write the study: {(error.strerror or str(error)).lower()}")
+        return StudyStoppedError(f"{self._path}: cannot write the study: {(error.strerror or str(error)).lower()}")
+
+
+def whole_lines(path: Path) -> tuple[bytes, list[str]]:
+    """Content of a journal and its lines, without one that was cut off; nothing where there is no file."""
+    if not path.exists():
+        return b"", []
+    content = read_regular_file(path, file=str(path), limit=MAX_BYTES)
+    complete = content[: content.rfind(b"\n") + 1]
+    return complete, complete.decode("utf-8", "replace").split("\n")[:-1]
+
+
+def read_ahead(path: Path) -> dict[int, Trial]:
+    """Trials that wait for others, by number; a line that cannot be read is none."""
+    found: dict[int, Trial] = {}
+    for line in whole_lines(path)[1]:
+        try:
+            trial = Trial.from_record(json.loads(line))
+        except (ValueError, KeyError, TypeError, RecursionError):
+            continue
+        found[trial.variant.number] = trial
+    return found

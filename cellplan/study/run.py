@@ -1,123 +1,150 @@
-"""Running of a study: variants on an executor, outcomes recorded in the order of the variants."""
+"""Running of trials: on an executor, each in a child process, outcomes as they come or in the order of the variants."""
 
-import multiprocessing
+import json
 import signal
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+import threading
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Final
 
-from cellplan.errors import CellplanError
-from cellplan.model.progress import Progress, silent
-from cellplan.study.journal import Journal
-from cellplan.study.trial import Outcome, Trial
+from cellplan.study.trial import Outcome
 from cellplan.study.variants import Variant
+from cellplan.study.workers import Evaluate, Limits, Lost, Workers, crashed, outcome_in_child, packed
 
-AHEAD: Final = 4  # variants of each worker that are begun before the first of them is recorded
-BEGUN: Final = 256  # variants that are begun at once on an executor of the caller
-
-Evaluate = Callable[[Variant], Outcome]
+BEGUN: Final = 256  # trials that are begun at once on an executor of the caller
+SURE: Final = 2  # ends of its process, the last one alone, after which a trial is the culprit
 
 
-def run_trials(
-    variants: Sequence[Variant],
-    evaluate: Evaluate,
-    journal: Journal,
-    *,
-    workers: int | Executor = 1,
-    progress: Progress = silent,
-) -> list[Trial]:
-    """Evaluate all variants that the journal does not hold yet.
+class Flight:
+    """Trials under way.
 
-    The journal is the same for any number of workers: outcomes are recorded in the order of the variants.
+    A trial whose process ended or took too long is repeated when no other is under way, so that what others do to the
+    machine decides nothing; what happens again is its outcome.
+    """
+
+    def __init__(self, evaluate: Evaluate, executor: Executor, limits: Limits) -> None:
+        """Begin with none.
+
+        Args:
+            evaluate: Outcome of a variant; sent to the workers, so it must be picklable.
+            executor: What the trials are submitted to.
+            limits: Those of each trial.
+        """
+        self._evaluate, self._executor, self._limits = packed(evaluate), executor, limits
+        self._slots: int = getattr(executor, "count", BEGUN)
+        self._waiting: deque[Variant] = deque()
+        self._lost: deque[Variant] = deque()
+        self._losses: Counter[int] = Counter()
+        self._flying: dict[Future[str | Lost], Variant] = {}
+        self._is_alone = False
+
+    def outcomes(self, variants: Iterable[Variant]) -> Iterator[tuple[Variant, Outcome]]:
+        """Variants and their outcomes, in the order in which these come."""
+        self._waiting.extend(variants)
+        while self._waiting or self._lost or self._flying:
+            self._fill()
+            wait(self._flying, return_when=FIRST_COMPLETED)
+            yield from self.ended()
+
+    def ended(self) -> Iterator[tuple[Variant, Outcome]]:
+        """Those whose outcomes have come, without waiting for others."""
+        done = [future for future in self._flying if future.done()]
+        for future in sorted(done, key=lambda each: self._flying[each].number):
+            outcome = self._outcome(self._flying[future], future.result())
+            if outcome is not None:
+                yield self._flying[future], outcome
+            del self._flying[future]
+
+    def arrived(self) -> list[tuple[Variant, Outcome]]:
+        """Outcomes that have come and were perhaps not taken, when the study is interrupted."""
+        done = [future for future in self._flying if future.done() and not future.cancelled()]
+        answers = [(self._flying[each], each.result()) for each in done if each.exception() is None]
+        return [(variant, self._read(answer)) for variant, answer in answers if isinstance(answer, str)]
+
+    def cancel(self) -> None:
+        """Give up what has not begun."""
+        self._waiting.clear()
+        self._lost.clear()
+        for future in self._flying:
+            future.cancel()
+        self._flying.clear()
+
+    def _fill(self) -> None:
+        """Begin as many trials as the executor takes; one that was lost only by itself."""
+        if self._lost:
+            if not self._flying:
+                self._begin(self._lost.popleft(), alone=True)
+            return
+        while self._waiting and len(self._flying) < self._slots:
+            self._begin(self._waiting.popleft(), alone=self._slots == 1)
+
+    def _begin(self, variant: Variant, *, alone: bool) -> None:
+        self._is_alone = alone
+        self._flying[self._executor.submit(outcome_in_child, self._evaluate, variant, self._limits)] = variant
+
+    def _outcome(self, variant: Variant, answer: str | Lost) -> Outcome | None:
+        """The outcome of an answer; None when the trial is to be repeated."""
+        if isinstance(answer, str):
+            return self._read(answer)
+        self._losses[variant.number] += 1
+        if self._is_alone and (answer.is_late or self._losses[variant.number] >= SURE):
+            return crashed(answer.reason)
+        self._lost.append(variant)
+        return None
+
+    @staticmethod
+    def _read(answer: str) -> Outcome:
+        return Outcome.from_record(json.loads(answer))
+
+
+@contextmanager
+def outcomes(variants: Sequence[Variant], evaluate: Evaluate, workers: int) -> Iterator[Iterator[Outcome]]:
+    """Outcomes in the order of the variants, for a ``with`` statement; one worker is this process itself.
 
     Args:
-        variants: All variants of the study.
-        evaluate: Outcome of a variant; sent to the workers, so it must be picklable.
-        journal: The open journal.
-        workers: Number of processes, 1 to evaluate in this one; or an executor, which stays open.
-        progress: Called with the stage and the fraction done.
-
-    Returns:
-        All trials in the order of the variants.
-
-    Raises:
-        CellplanError: A worker process ended by itself.
+        variants: What is evaluated.
+        evaluate: Outcome of a variant; must be picklable for more than one worker.
+        workers: Number of processes.
     """
-    left = variants[len(journal.trials) :]
-    with outcomes(left, evaluate, workers) as found:
-        for variant, outcome in zip(left, found, strict=True):
-            journal.append(Trial(variant=variant, outcome=outcome))
-            progress(f"variant {len(journal.trials)} of {len(variants)}", len(journal.trials) / len(variants))
-    return list(journal.trials)
-
-
-@contextmanager
-def outcomes(variants: Sequence[Variant], evaluate: Evaluate, workers: int | Executor) -> Iterator[Iterator[Outcome]]:
-    """Outcomes in the order of the variants, for a ``with`` statement; arguments as in ``run_trials``."""
-    if isinstance(workers, Executor):
-        yield _in_order(variants, evaluate, workers, ahead=BEGUN)
-    elif min(workers, len(variants)) <= 1:
+    if min(workers, len(variants)) <= 1:
         yield (evaluate(variant) for variant in variants)
     else:
-        with _processes(min(workers, len(variants))) as pool:
-            yield _in_order(variants, evaluate, pool, ahead=AHEAD * workers)
+        with Workers(min(workers, len(variants))) as executor:
+            yield _in_order(Flight(evaluate, executor, Limits()).outcomes(variants))
 
 
-def _in_order(variants: Sequence[Variant], evaluate: Evaluate, executor: Executor, *, ahead: int) -> Iterator[Outcome]:
-    """Outcomes in the order of the variants, at most ``ahead`` of them begun."""
-    waiting: deque[Future[Outcome]] = deque()
-    following = iter(variants)
-    try:
-        while True:
-            while len(waiting) < ahead and (variant := next(following, None)) is not None:
-                waiting.append(executor.submit(evaluate, variant))
-            if not waiting:
-                return
-            yield waiting.popleft().result()
-    except BrokenProcessPool:
-        raise CellplanError(
-            "a worker process ended by itself, for want of memory perhaps; continue with --resume and fewer --workers"
-        ) from None
-    finally:
-        for future in waiting:
-            future.cancel()
+def _in_order(found: Iterator[tuple[Variant, Outcome]]) -> Iterator[Outcome]:
+    """Outcomes by the numbers of their variants, which begin with 0."""
+    early: dict[int, Outcome] = {}
+    following = 0
+    for variant, outcome in found:
+        early[variant.number] = outcome
+        while following in early:
+            yield early.pop(following)
+            following += 1
 
 
 @contextmanager
-def _processes(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Worker processes, which are ended at once when the study is interrupted."""
-    earlier = set(multiprocessing.active_children())
-    context = multiprocessing.get_context("spawn")
-    pool = _Workers(workers, mp_context=context, initializer=_ignore_interruptions)
+def deferred_interruptions() -> Iterator[None]:
+    """Let Ctrl-C and its like wait for the end of the ``with`` statement: half a line is none."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    caught: list[int] = []
+    numbers = [
+        number
+        for name in ("SIGINT", "SIGTERM", "SIGHUP")
+        if (number := getattr(signal, name, None)) is not None
+        and signal.getsignal(number) is signal.default_int_handler
+    ]
     try:
-        yield pool
-    except BaseException:
-        for process in set(multiprocessing.active_children()) - earlier:
-            process.terminate()
-        pool.shutdown(wait=True, cancel_futures=True)
-        raise
-    pool.shutdown()
-
-
-class _Workers(ProcessPoolExecutor):
-    """Processes that never see Ctrl-C: the parent, which sees it too, ends them."""
-
-    def submit(self, function: Callable[..., Any], /, *arguments: object, **named: object) -> Future[Any]:
-        """Begin a job; a process that is started for it inherits that interruptions are blocked."""
-        if not hasattr(signal, "pthread_sigmask"):
-            return super().submit(function, *arguments, **named)
-        earlier = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            return super().submit(function, *arguments, **named)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, earlier)
-
-
-def _ignore_interruptions() -> None:
-    """Ignore Ctrl-C in a worker, and no longer block it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        for number in numbers:
+            signal.signal(number, lambda caught_number, _frame: caught.append(caught_number))
+        yield
+    finally:
+        for number in numbers:
+            signal.signal(number, signal.default_int_handler)
+        if caught:
+            raise KeyboardInterrupt

@@ -10,12 +10,13 @@ from cellplan.study.variants import Variant
 
 
 class TrialStatus(StrEnum):
-    """What came of a variant."""
+    """What came of a variant; a crashed one raised an error, ended its process or took too long."""
 
     PASSED = "passed"
     FAILED = "failed"
     NO_SOLUTION = "no_solution"
     BAD_INPUT = "bad_input"
+    CRASHED = "crashed"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +33,22 @@ class Outcome:
     reason: str = ""
     figures: Mapping[str, object]
 
+    @property
+    def record(self) -> dict[str, Any]:
+        """The outcome as plain data."""
+        return {"status": str(self.status), "reason": self.reason, "figures": dict(self.figures)}
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, Any]) -> Self:
+        """The outcome of plain data.
+
+        Raises:
+            KeyError: A key is missing.
+            TypeError: A value is of another kind.
+            ValueError: The status is unknown.
+        """
+        return cls(status=TrialStatus(record["status"]), reason=str(record["reason"]), figures=dict(record["figures"]))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
@@ -43,13 +60,7 @@ class Trial:
     @property
     def record(self) -> dict[str, Any]:
         """The trial as plain data."""
-        return {
-            "trial": self.variant.number,
-            "values": dict(self.variant.values),
-            "status": str(self.outcome.status),
-            "reason": self.outcome.reason,
-            "figures": dict(self.outcome.figures),
-        }
+        return {"trial": self.variant.number, "values": dict(self.variant.values), **self.outcome.record}
 
     @property
     def line(self) -> str:
@@ -65,7 +76,5 @@ class Trial:
             TypeError: A value is of another kind.
             ValueError: The status is unknown.
         """
-        outcome = Outcome(
-            status=TrialStatus(record["status"]), reason=str(record["reason"]), figures=dict(record["figures"])
-        )
-        return cls(variant=Variant(int(record["trial"]), dict(record["values"])), outcome=outcome)
+        variant = Variant(int(record["trial"]), dict(record["values"]))
+        return cls(variant=variant, outcome=Outcome.from_record(record))

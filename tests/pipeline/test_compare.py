@@ -4,12 +4,13 @@ import csv
 import json
 import shutil
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import pytest
+from builders.study_trials import InThisProcess
 from builders.two_phases import PAIR
 
 from cellplan import CompareJob, compare, load_cell, solve
@@ -24,7 +25,7 @@ from cellplan.report.record.key_figures import key_figures
 from cellplan.report.record.study import STATUSES
 from cellplan.study.variants import Variant
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("trials_here", "kept_solutions")
 
 TOLERANCES = tuple(f"tasks.{task}.tolerance.position_mm=0.5" for task in ("first", "second"))
 COARSE = ("motion.step_s=0.02", "solver.integrator=accurate", *TOLERANCES)
@@ -200,19 +201,14 @@ def test_a_study_that_is_continued_has_the_same_bytes(place: Path, modes: dict[s
     }
 
 
-class InterruptedExecutor(Executor):
+class InterruptedExecutor(InThisProcess):
     """Evaluates the first job; the others are interrupted."""
 
-    def __init__(self) -> None:
-        self.count = 0
-
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
-        self.count += 1
+        if not self.numbers:
+            return super().submit(function, *arguments, **named)
         future: Future[Any] = Future()
-        if self.count == 1:
-            future.set_result(function(*arguments, **named))
-        else:
-            future.set_exception(KeyboardInterrupt())
+        future.set_exception(KeyboardInterrupt())
         return future
 
 
@@ -276,7 +272,7 @@ def test_the_command_prints_verdicts_first_and_its_status_is_that_of_a_study(
 
 @pytest.mark.parametrize(
     ("counts", "expected"),
-    [((1, 2, 0, 0), 0), ((0, 2, 1, 1), 1), ((0, 0, 1, 2), 1), ((0, 0, 0, 3), 2)],
+    [((1, 2, 0, 0, 0), 0), ((0, 2, 1, 1, 0), 1), ((0, 0, 1, 2, 0), 1), ((0, 0, 0, 3, 0), 2), ((0, 0, 0, 2, 1), 1)],
 )
 def test_the_exit_status_is_that_of_the_best_variant(counts: tuple[int, ...], expected: int) -> None:
     assert exit_status(dict(zip(STATUSES, counts, strict=True))) == expected

@@ -17,6 +17,7 @@ from cellplan.study.variants import read_axis
 CELLS = Path(__file__).resolve().parents[2] / "cells"
 CELL = CELLS / "planar_pair.yaml"
 SLOW = ("motion.step_s=0.02", "solver.integrator=accurate", "tasks.circle.tolerance.position_mm=0.5")
+pytestmark = pytest.mark.usefixtures("trials_here")
 AXIS = "motion.duration_s=1,2,-1"
 
 
@@ -81,7 +82,7 @@ def test_the_command_prints_a_row_for_each_variant(tmp_path: Path, capsys: pytes
     assert run(["sweep", *arguments, "--resume", "--json", "--quiet"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert record["exit"] == 0
-    assert record["study"]["counts"] == {"passed": 2, "failed": 0, "no_solution": 0, "bad_input": 0}
+    assert record["study"]["counts"] == {"passed": 2, "failed": 0, "no_solution": 0, "bad_input": 0, "crashed": 0}
 
 
 def test_a_study_without_a_variant_that_passes_ends_with_status_1(

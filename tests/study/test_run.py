@@ -1,49 +1,34 @@
 """Running, recording and continuing of a study whose evaluation is a formula."""
 
 import json
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from pathlib import Path
+from typing import Any
 
 import pytest
+from builders.study_trials import InThisProcess, product, product_until_5
 
-from cellplan.errors import InputError
-from cellplan.study.folder import prepare_folder, run_folder, write_results
-from cellplan.study.journal import JOURNAL, Journal
-from cellplan.study.run import run_trials
-from cellplan.study.trial import Outcome, Trial, TrialStatus
-from cellplan.study.variants import Axis, Variant, combinations
+from cellplan.errors import InputError, StudyStoppedError
+from cellplan.study.folder import AHEAD, JOURNAL, run_folder, write_results
+from cellplan.study.study import Study
+from cellplan.study.variants import Axis, combinations
 
 HEADER = {"kind": "sweep", "cell": "a cell"}
 VARIANTS = combinations([Axis("x", tuple(range(7))), Axis("y", (0.5, 2.0))])
 
 
-def product(variant: Variant) -> Outcome:
-    """A figure that can be computed by hand; odd numbers fail."""
-    x, y = variant.values["x"], variant.values["y"]
-    assert isinstance(x, int)
-    assert isinstance(y, float)
-    status = TrialStatus.FAILED if x % 2 else TrialStatus.PASSED
-    return Outcome(status=status, reason="odd" if x % 2 else "", figures={"product": x * y})
-
-
-def refuse(variant: Variant) -> Outcome:
-    """An evaluation that must not be called."""
-    raise AssertionError(f"variant {variant.number} was evaluated again")
-
-
-def run(folder: Path, evaluate: object = product, *, resume: bool = False, workers: object = 1) -> list[Trial]:
+def run(folder: Path, evaluate: Any = product, *, resume: bool = False, workers: Any = None) -> list[dict[str, Any]]:
     """All trials of the study in a folder."""
-    prepare_folder(folder, resume=resume)
-    with Journal(folder, HEADER, VARIANTS, resume=resume) as journal:
-        return run_trials(VARIANTS, evaluate, journal, workers=workers)  # type: ignore[arg-type]
+    study = Study.of_variants(folder, HEADER, VARIANTS)
+    return study.run(evaluate, workers=workers or InThisProcess(), resume=resume).trials
 
 
 def test_every_variant_has_its_line_with_values_and_figures(tmp_path: Path) -> None:
     trials = run(tmp_path / "study")
     lines = [json.loads(line) for line in (tmp_path / "study" / JOURNAL).read_text().splitlines()]
     assert lines[0] == {"schema": "cellplan.study/1", **HEADER}
-    assert lines[1:] == [trial.record for trial in trials]
+    assert lines[1:] == trials
     assert lines[4] == {
         "trial": 3,
         "values": {"x": 1, "y": 2.0},
@@ -53,11 +38,28 @@ def test_every_variant_has_its_line_with_values_and_figures(tmp_path: Path) -> N
     }
 
 
-@pytest.mark.parametrize("workers", [2, 5])
-def test_the_journal_does_not_depend_on_the_workers(tmp_path: Path, workers: int) -> None:
+class LastFirst(InThisProcess):
+    """Ends trials in the reverse of the order in which they were begun."""
+
+    count = 5
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.held: list[tuple[Future[Any], Future[Any]]] = []
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        given: Future[Any] = Future()
+        self.held.append((given, super().submit(function, *arguments, **named)))
+        if len(self.held) == self.count or arguments[1].number == len(VARIANTS) - 1:
+            while self.held:
+                given_last, done = self.held.pop()
+                given_last.set_result(done.result())
+        return given
+
+
+def test_the_journal_does_not_depend_on_the_order_in_which_trials_end(tmp_path: Path) -> None:
     run(tmp_path / "one")
-    with ThreadPoolExecutor(workers) as executor:
-        run(tmp_path / "many", workers=executor)
+    run(tmp_path / "many", workers=LastFirst())
     assert (tmp_path / "one" / JOURNAL).read_bytes() == (tmp_path / "many" / JOURNAL).read_bytes()
 
 
@@ -73,32 +75,39 @@ def test_a_study_that_was_cut_off_anywhere_ends_in_the_same_bytes(tmp_path: Path
     run(folder)
     whole = (folder / JOURNAL).read_bytes()
     (folder / JOURNAL).write_bytes(whole[:-cut])
-    left: list[int] = []
-
-    def counted(variant: Variant) -> Outcome:
-        left.append(variant.number)
-        return product(variant)
-
-    run(folder, counted, resume=True)
+    executor = InThisProcess()
+    run(folder, resume=True, workers=executor)
     assert (folder / JOURNAL).read_bytes() == whole
+    left = executor.numbers
     assert left == list(range(len(VARIANTS) - len(left), len(VARIANTS)))
     assert 0 < len(left) < len(VARIANTS)
 
 
 def test_a_finished_study_evaluates_nothing_again(tmp_path: Path) -> None:
     run(tmp_path / "study")
-    assert len(run(tmp_path / "study", refuse, resume=True)) == len(VARIANTS)
+    executor = InThisProcess()
+    assert len(run(tmp_path / "study", resume=True, workers=executor)) == len(VARIANTS)
+    assert executor.numbers == []
 
 
-def test_an_error_keeps_what_is_recorded(tmp_path: Path) -> None:
-    def failing(variant: Variant) -> Outcome:
-        if variant.number == 5:
-            raise OSError("no more")
-        return product(variant)
-
-    with pytest.raises(OSError, match="no more"):
-        run(tmp_path / "study", failing)
+def test_a_study_that_cannot_go_on_keeps_what_is_recorded(tmp_path: Path) -> None:
+    with pytest.raises(StudyStoppedError, match="no more"):
+        run(tmp_path / "study", product_until_5)
     assert len((tmp_path / "study" / JOURNAL).read_text().splitlines()) == 6
+
+
+def test_a_trial_that_ended_before_others_is_not_lost(tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    run(folder)
+    whole = (folder / JOURNAL).read_bytes()
+    lines = whole.splitlines(keepends=True)
+    (folder / JOURNAL).write_bytes(b"".join(lines[:4]))
+    (folder / AHEAD).write_bytes(lines[7] + lines[6] + lines[9][:-5])
+    executor = InThisProcess()
+    run(folder, resume=True, workers=executor)
+    assert (folder / JOURNAL).read_bytes() == whole
+    assert executor.numbers == [3, 4, *range(7, len(VARIANTS))]
+    assert not (folder / AHEAD).exists()
 
 
 def edited(tmp_path: Path, old: str, new: str) -> str:
@@ -109,7 +118,7 @@ def edited(tmp_path: Path, old: str, new: str) -> str:
     assert old in text
     (folder / JOURNAL).write_text(text.replace(old, new, 1))
     with pytest.raises(InputError) as raised:
-        run(folder, refuse, resume=True)
+        run(folder, resume=True)
     return str(raised.value).removeprefix(f"{folder}/")
 
 
@@ -138,7 +147,7 @@ def foreign(folder: Path, names: Sequence[str]) -> str:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("mine")
     with pytest.raises(InputError) as raised:
-        run(folder, refuse)
+        run(folder)
     assert all((folder / name).exists() for name in names)
     return str(raised.value).removeprefix(f"{folder}: ")
 
@@ -154,6 +163,6 @@ def test_results_replace_those_of_an_earlier_study(tmp_path: Path) -> None:
     folder = tmp_path / "study"
     run(folder)
     write_results(folder, {"study.json": b"{}", "study.csv": b"a"})
-    run(folder, refuse, resume=True)
+    run(folder, resume=True)
     assert sorted(path.name for path in folder.iterdir()) == [JOURNAL]
     assert run_folder(folder, 7) == folder / "runs" / "0007"

@@ -35,12 +35,14 @@ def read_choice(address: Address, value: Any, path: KeyPath, context: Context) -
 def _wrong_options(address: Address, value: Any, path: KeyPath, context: Context) -> Finding | None:
     """What is wrong with a list of robots or modes; None if nothing is."""
     finding, valid, is_mode = context.document.finding, context.valid, address.what == "mode"
-    known: tuple[str, ...] = MODES if is_mode else valid.names["robots"]
+    held = {grasp.robot for grasp in valid.part.held_by} if valid.part is not None else set()
+    robots = tuple(name for name in valid.names["robots"] if name not in held)
+    known: tuple[str, ...] = MODES if is_mode else robots
     if not isinstance(value, tuple) or not value:
         return finding(path, f"expected a list of what may be chosen ({listed(known)}), got {shown(value)}")
     for index, option in enumerate(value):
         if option not in known:
-            what = "a mode" if is_mode else "a robot of this cell"
+            what = "a mode" if is_mode else "a robot that does not hold the part"
             return finding((*path, index), unknown_name(what, option, known))
         if option in value[:index]:
             return finding((*path, index), f"expected each once, got '{option}' twice")

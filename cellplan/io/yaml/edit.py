@@ -76,11 +76,12 @@ def _read(events: Iterator[Any], event: Any, path: KeyPath, key: tuple[int, int]
     found[path] = node
     if not isinstance(event, yaml.CollectionStartEvent):
         return node
-    end, places = event.end_mark.index, 0
+    end, places, is_mapping = node.span[1], 0, isinstance(event, yaml.MappingStartEvent)
+    entry: Any
     while not _ends(entry := next(events)):
         own, where = entry, (entry.start_mark.index, entry.end_mark.index)
         step: str | int = places
-        if isinstance(event, yaml.MappingStartEvent):
+        if is_mapping:
             step, own = str(entry.value), next(events)
         node.children.append((*path, step))
         end = _read(events, own, (*path, step), where, found).span[1]

@@ -12,11 +12,12 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.layout import LayoutSettings
 from cellplan.model.units import DEG, MM
-from cellplan.pipeline.layout.bodies import LayoutBodies
+from cellplan.pipeline.layout.bodies import PlacedVariables
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
 from cellplan.pipeline.repair.attempts import Attempt
 from cellplan.planning.start.inverse_kinematics import finite_limits
+from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.run import run
 from cellplan.search.variables.pedestals import with_pedestals
 from cellplan.search.variables.ties import Tied
@@ -111,7 +112,7 @@ def _among(ready: Prepared, addresses: frozenset[str]) -> Prepared:
         tied=tied,
         conversion=with_pedestals(ready.cell, settings)[0],
     )
-    return replace(ready, variables=variables, bodies=LayoutBodies(ready.scene, variables))
+    return replace(ready, variables=variables, bodies=CellDistances.of(ready.scene, PlacedVariables(variables)))
 
 
 def _restricted(settings: LayoutSettings, addresses: frozenset[str]) -> LayoutSettings:

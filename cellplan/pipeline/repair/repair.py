@@ -26,7 +26,6 @@ from cellplan.pipeline.repair.solved import MARGIN, TIMED
 from cellplan.pipeline.repair.trial import GIVEN, evaluate
 from cellplan.pipeline.repair.wording import change_text, effects
 from cellplan.pipeline.write_run import versions
-from cellplan.planning.methods.names import KNOWS_LIMITS
 from cellplan.report.record.advice import SCHEMA, AdviceRecord, AttemptRecord, RemedyRecord
 from cellplan.report.record.common import number
 from cellplan.search.programs.objective import Effort, Objective
@@ -35,6 +34,7 @@ from cellplan.study.trial import Outcome, TrialStatus
 from cellplan.study.variants import Variant
 
 KINDS: Final = list(RemedyKind)
+WITH_LIMITS: Final = "quadratic_program"  # the method that keeps joints within their limits
 LIMITS: Final = frozenset({"joint_position", MARGIN, *TIMED})
 
 
@@ -97,8 +97,8 @@ def _last(ready: Prepared, case: "_Case") -> list[Attempt]:
     if not failed or not failed <= LIMITS:
         return []
     found = list(of_weights(ready.cell, ready.variables.settings))
-    if str(ready.cell.solver.method) not in KNOWS_LIMITS:
-        found.append(Attempt(kind=RemedyKind.METHOD, robots=(), values={"solver.method": KNOWS_LIMITS[0]}))
+    if str(ready.cell.solver.method) != WITH_LIMITS:
+        found.append(Attempt(kind=RemedyKind.METHOD, robots=(), values={"solver.method": WITH_LIMITS}))
     if failed <= TIMED:
         found.append(Attempt(kind=RemedyKind.DURATION, robots=()))
     return found

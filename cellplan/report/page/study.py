@@ -14,6 +14,7 @@ STATUS_TEXTS: Final = {
     "failed": "✗ failed",
     "no_solution": "✗ no solution",
     "bad_input": "✗ bad input",
+    "crashed": "✗ crashed",
 }
 
 

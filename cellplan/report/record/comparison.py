@@ -22,7 +22,7 @@ class ComparedRecord(TypedDict):
     name: Annotated[str, "the mode, or the cell or run as it was named"]
     trial: Annotated[int, "its number, from 0"]
     values: Annotated[dict[str, Any], "by address: the values that make a mode; else `cell` or `run` and where it is"]
-    status: Annotated[str, "`passed`, `failed` (a check), `no_solution` or `bad_input`"]
+    status: Annotated[str, "`passed`, `failed` (a check), `no_solution`, `bad_input` or `crashed`"]
     reason: Annotated[str, "first failed check, or why there is no motion; empty if passed"]
     figures: Annotated[VariantFigures | dict[str, Any], "figures; empty if there is no motion"]
 

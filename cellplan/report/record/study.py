@@ -10,7 +10,7 @@ from cellplan.report.record.common import Record
 from cellplan.report.record.key_figures import KeyFigures
 
 SCHEMA: Final = "cellplan.study/1"
-STATUSES: Final = ("passed", "failed", "no_solution", "bad_input")
+STATUSES: Final = ("passed", "failed", "no_solution", "bad_input", "crashed")
 
 
 class TrialRecord(TypedDict):
@@ -18,7 +18,7 @@ class TrialRecord(TypedDict):
 
     trial: Annotated[int, "number of the variant, from 0"]
     values: Annotated[dict[str, Any], "by address: the values that make the variant"]
-    status: Annotated[str, "`passed`, `failed` (a check), `no_solution` or `bad_input`"]
+    status: Annotated[str, "`passed`, `failed` (a check), `no_solution`, `bad_input` or `crashed`"]
     reason: Annotated[str, "first failed check, or why there is no motion; empty if passed"]
     figures: Annotated[KeyFigures | dict[str, Any], "key figures; empty if there is no motion"]
 

@@ -94,7 +94,7 @@ def _worse(one: Record, other: Record) -> list[str]:
 def _failure(variant: Record) -> str:
     """What is wrong with a variant that does not pass."""
     if not variant["figures"]:
-        what = "has no solution" if variant["status"] == "no_solution" else "is no valid cell"
+        what = {"no_solution": "has no solution", "crashed": "crashed"}.get(variant["status"], "is no valid cell")
         return f"{variant['name']} {what}: {variant['reason']}."
     count, first = variant["figures"]["failed_checks"], next(iter(variant["figures"]["failed"]), variant["reason"])
     return f"{variant['name']} fails {count} check{'' if count == 1 else 's'}, first: {first}."

@@ -7,18 +7,17 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.certify.depths import mounted_depths
 from cellplan.checks.joints.acceleration_limits import acceleration_limit
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.cell import joint_at
 from cellplan.scene.scene import Scene
+from cellplan.search.base_map.contacts import contacts
 from cellplan.search.base_map.places import Places
 from cellplan.search.kernel.figures import Figures, Peaks
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.run import run
 
 AT_ONCE: Final = 256  # [-] motions worked out together
-KEYS: Final = (3, 9, 33)  # [-] nodes at which distances are asked, more and more while nothing is too near
 
 
 class Verdict(StrEnum):
@@ -144,16 +143,14 @@ def _judged(asked: MapJob, q: Array, at: Indices) -> Iterator[PlaceVerdict]:
         figures = Figures.of(job, motions)
         allowed = acceleration_limits(asked.scene)
         rates = Peaks.of(job.times, job.rates @ (motions.qd / allowed), in_magnitude=True).value
+    known = {
+        k: _known(asked, q[k], figures.margins[k], figures.speeds.value[k], rates[k])
+        for k in np.flatnonzero(motions.is_followed).tolist()
+    }
+    _with_contacts(asked, known, motions.q, asked.places.X_WB[at])
     for k in range(len(q)):
-        if not motions.is_followed[k]:
-            lost_at = float(max(motions.lost_at[k], 0.0))
-            yield PlaceVerdict(verdict=Verdict.OUT_OF_REACH, start=q[k], lost_at=lost_at)
-            continue
-        known = _known(asked, q[k], figures.margins[k], figures.speeds.value[k], rates[k])
-        if known.verdict is Verdict.PASSES:
-            moved = asked.scene.moved({asked.robot: asked.places.X_WB[at[k]]})
-            known = _of_distances(asked, known, motions.q[k], moved)
-        yield known
+        lost_at = float(max(motions.lost_at[k], 0.0))
+        yield known.get(k, PlaceVerdict(verdict=Verdict.OUT_OF_REACH, start=q[k], lost_at=lost_at))
 
 
 def acceleration_limits(scene: Scene) -> Array:
@@ -184,29 +181,26 @@ def _known(asked: MapJob, start: Array, margins: Array, speeds: Array, rates: Ar
     return known
 
 
-def _of_distances(asked: MapJob, known: PlaceVerdict, q: Array, scene: Scene) -> PlaceVerdict:
-    """The same, or a collision where two bodies are too near at a node, or one stands too deep in another."""
-    demands, seen = np.array([pair.demand for pair in scene.pairs]), np.zeros(len(q), dtype=bool)
-    for count in KEYS:
-        nodes = np.unique(np.linspace(0, len(q) - 1, count).round().astype(np.intp))
-        nodes = nodes[~seen[nodes]]
-        seen[nodes] = True
-        near = scene.near(q[nodes], float(demands.max()))
-        short = near.distances - demands[near.rows]
-        if len(short) and short.min() < 0.0:
-            worst = int(np.argmin(short))
-            return replace(
-                known,
+def _with_contacts(asked: MapJob, known: dict[int, PlaceVerdict], q: Array, X_WB: Array) -> None:
+    """Make collisions of those that pass in which two bodies are too near at a node, or one stands too deep in another.
+
+    Args:
+        asked: The job and the places.
+        known: What is known of some motions without the bodies, by motion.
+        q: All motions, shape (K, N, nq).
+        X_WB: Bases of the robot, shape (K, 4, 4).
+    """
+    passing = [motion for motion, each in known.items() if each.verdict is Verdict.PASSES]
+    found = contacts(asked.scene, asked.robot, X_WB[passing], q[passing])
+    for motion, contact in zip(passing, found, strict=True):
+        if contact is not None:
+            known[motion] = replace(
+                known[motion],
                 verdict=Verdict.COLLISION,
-                pair=scene.names(scene.pairs[near.rows[worst]]),
-                distance=float(near.distances[worst]),
-                at=float(asked.job.times[nodes[near.samples[worst]]]),
+                pair=contact.pair,
+                distance=contact.distance,
+                at=float(asked.job.times[contact.node]),
             )
-    for found in mounted_depths(scene, q[:1]):
-        if found.depth > found.pair.limit:
-            names = (scene.bodies[found.pair.first].name, scene.bodies[found.pair.second].name)
-            return replace(known, verdict=Verdict.COLLISION, pair=names, distance=-found.depth, at=0.0)
-    return known
 
 
 def best_first(found: Sequence[PlaceVerdict]) -> list[int]:

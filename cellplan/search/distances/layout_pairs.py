@@ -49,7 +49,7 @@ def layout_pairs(scene: Scene) -> tuple[tuple[LayoutPair, ...], WatchedPairs]:
         solids=np.concatenate([known.solids, _ends([(each.first, each.second) for _, each in solids])]),
         above=np.array([*known.above, *(each.first for _, each in grounds)], dtype=np.intp),
         planes=np.concatenate([known.planes, _poses([bodies[each.second].X_BS for _, each in grounds])]),
-        demands=np.append(known.demands, [-each.limit for _, each in solids]),
+        demands=np.array([found[row].demand for row in rows]),
         once=np.array([found[row].is_fixed for row in rows], dtype=bool),
     )
     return tuple(found), pairs
@@ -76,7 +76,7 @@ def among(pairs: WatchedPairs, kept: Flags) -> WatchedPairs:
         solids=pairs.solids[solids],
         above=pairs.above[above],
         planes=pairs.planes[above],
-        demands=pairs.demands[solids],
+        demands=pairs.demands[is_kept],
         once=pairs.once[is_kept],
     )
 

@@ -1,65 +1,25 @@
 """The layout problem: bases, tools, start postures and weights; the motion by the weighted pseudo-inverse."""
 
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell import joint_at
 from cellplan.model.joint_limits import JointLimits
+from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
 from cellplan.search.kernel.derivatives import differentiate
-from cellplan.search.kernel.job import Job, Layouts
+from cellplan.search.kernel.job import Job
 from cellplan.search.kernel.run import run, run_near
-from cellplan.search.kernel.screws import Directions
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
-
-
-class LayoutVariables(Protocol):
-    """What a layout problem needs of its variables; see ``Problem`` for their bounds."""
-
-    names: tuple[str, ...]
-    lower: Array
-    upper: Array
-    scale: Array
-    cost: Array
-    given: Array
-
-    def layouts(self, x: Array, start: Array) -> Layouts:
-        """The layouts at some values, shape (K, n), with start postures near the right ones, shape (K, nq)."""
-
-    def directions(self, x: Array) -> Directions:
-        """What each variable displaces at some values, shape (n,)."""
-
-
-class NearRows(Protocol):
-    """Near pairs at some configurations, M of them."""
-
-    pairs: Indices
-    keys: Indices
-    distances: Array
-    demands: Array
-    is_own: Flags
-
-
-class LayoutDistances(Protocol):
-    """What a layout problem needs of the bodies of its cell."""
-
-    def near(self, x: Array, q: Array, within: float) -> NearRows:
-        """Pairs less than ``within`` in [m] beyond their demand at some configurations, shape (k, nq)."""
-
-    def derivatives(self, near: NearRows, x: Array, dq: Array) -> Array:
-        """Derivatives of their distances, shape (M, n), from those of the joints at the keys, shape (k, nq, n)."""
-
-    def names(self, pair: int) -> tuple[str, str]:
-        """Names of the bodies of a pair."""
+from cellplan.search.variables.variables import Variables
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Found:
     """Near pairs and the nodes that their keys are."""
 
-    near: NearRows
+    near: LayoutDistances
     nodes: Indices
 
 
@@ -75,14 +35,16 @@ class LayoutProblem:
     """
 
     job: Job
-    variables: LayoutVariables
-    bodies: LayoutDistances
+    variables: Variables
+    bodies: CellDistances
     acceleration: Array
     is_accelerating: bool = field(init=False)
+    most_demanded: float = field(init=False)
 
     def __post_init__(self) -> None:
-        """Note once whether accelerations count at all."""
+        """Note once whether accelerations count at all, and the largest distance that is demanded in [m]."""
         object.__setattr__(self, "is_accelerating", bool(np.isfinite(self.acceleration).any()))
+        object.__setattr__(self, "most_demanded", max((pair.demand for pair in self.bodies.pairs), default=0.0))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -145,7 +107,8 @@ class LayoutProblem:
 
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
         """See ``Problem``."""
-        near = self.bodies.near(point.x, point.q[nodes], within)
+        layout = self.variables.layouts(point.x[None], point.start[None])
+        near = self.bodies.near(point.x, layout, point.q[nodes], within + self.most_demanded)
         return Distances(
             pairs=near.pairs,
             nodes=nodes[near.keys],
@@ -163,7 +126,7 @@ class LayoutProblem:
 
     def pair_names(self, pair: int) -> tuple[str, str]:
         """See ``Problem``."""
-        return self.bodies.names(pair)
+        return self.bodies.pairs[pair].names
 
     def joint_names(self, column: int) -> tuple[str, str]:
         """See ``Problem``."""

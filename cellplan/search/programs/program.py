@@ -50,8 +50,8 @@ class Program:
             A[is_loose, first + family[is_loose]] = -1.0
         asked = lacks if corrections is None else lacks + corrections
         top = np.concatenate([-asked, *self._changes(A[len(lacks) :], count + 1 + 2 * slacks)])
-        weights = [np.zeros(count), [self._weight], np.full(slacks, IN_ROOM), np.full(slacks, SLACK), np.ones(costs)]
-        cost = np.concatenate(weights)
+        prices = np.repeat([IN_ROOM, SLACK, 1.0], [slacks, slacks, costs])
+        cost = np.concatenate([np.zeros(count), [self._weight], prices])
         lower = np.concatenate([self.box[0], [-FARTHEST], np.zeros(2 * slacks + costs)])
         upper = np.concatenate([self.box[1], [FARTHEST], free, most - free, np.full(costs, FARTHEST)])
         solved = least(cost, np.full(len(cost), PROXIMAL), A, top, (lower, upper))

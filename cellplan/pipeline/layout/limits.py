@@ -1,0 +1,207 @@
+"""What holds a layout back or what it breaks, and what each variable does about it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.model.units import DEG, MM
+from cellplan.report.record.common import number
+from cellplan.report.record.layout import LimitRecord
+from cellplan.search.kernel.figures import Crests
+from cellplan.search.programs.measures import Measures
+from cellplan.search.programs.objective import Demands
+from cellplan.search.programs.problem import Point, PointDerivatives, Problem
+
+BINDS: Final = 0.99  # [-] share of the largest load on the clock from which a joint counts as one that decides it
+NEAR_ANGLE: Final = np.radians(0.5)  # [rad] above the demand at which a margin binds
+NEAR_LENGTH: Final = 0.004  # [m] likewise of a distance or a sliding joint
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Standing:
+    """A point measured against its demands.
+
+    Attributes:
+        problem: The problem.
+        measures: Its figures.
+        demands: What is demanded.
+    """
+
+    problem: Problem
+    measures: Measures
+    demands: Demands
+
+    @property
+    def margin(self) -> float | None:
+        """Smallest distance of a turning joint from its limits in [deg]; None without such a joint."""
+        turning = self.problem.limits.is_revolute
+        if not turning.any():
+            return None
+        return DEG * float((self.demands.margin - self._beyond)[turning].min())
+
+    @property
+    def clearance(self) -> float | None:
+        """Smallest distance of bodies at the keys in [mm]; None where none are near."""
+        values = self.measures.distances.values
+        return MM * float(values.min()) if len(values) else None
+
+    @property
+    def apart(self) -> float | None:
+        """The same of bodies that do not belong to one robot."""
+        values = self.measures.distances.values[~self.measures.distances.is_own]
+        return MM * float(values.min()) if len(values) else None
+
+    @property
+    def _beyond(self) -> Array:
+        """How far the joints are beyond what is demanded, shape (nq,)."""
+        return np.maximum(self.measures.lower.value.max(axis=0), self.measures.upper.value.max(axis=0))
+
+    def violations(self) -> list[LimitRecord]:
+        """What it breaks, the worst first."""
+        found = [*self._margins(0.0, 0.0), *self._distances(0.0)]
+        if self.demands.duration is not None:
+            found += self._loads(self._whole)
+        return [record for _, record in sorted(found, key=lambda each: -each[0])]
+
+    def binding(self) -> list[LimitRecord]:
+        """What holds it back: loads on the clock, margins, distances, bounds of variables."""
+        loads = self._loads(BINDS * self._whole) if self._whole > 0.0 else iter(())
+        found = [*loads, *self._margins(NEAR_ANGLE, NEAR_LENGTH), *self._distances(NEAR_LENGTH)]
+        return [record for _, record in found] + list(self._bounds())
+
+    @property
+    def _whole(self) -> float:
+        """How many times as long as the nodes the motion lasts: as demanded, or as short as possible."""
+        if self.demands.duration is None:
+            return self.measures.factor
+        return self.demands.duration / float(self.problem.times[-1] - self.problem.times[0])
+
+    def _loads(self, factor: float) -> Iterator[tuple[float, LimitRecord]]:
+        """Joints whose speed or acceleration asks for a time of at least ``factor`` times that of the nodes."""
+        measures, times = self.measures, self.problem.times
+        for kind, crests, order in (("velocity", measures.speeds, 1.0), ("acceleration", measures.accelerations, 2.0)):
+            value = crests.value.max(axis=0) ** (1.0 / order)
+            for column in np.flatnonzero(value > factor).tolist():
+                share = value[column] / self._whole
+                at = times[int(crests.value[:, column].argmax())] / times[-1]
+                name = " ".join(self.problem.joint_names(column))
+                text = (
+                    f"{name} at {100.0 * share**order:.4g} % of its {kind} limit, at {100.0 * at:.0f} % of the motion"
+                )
+                yield 100.0 * (float(share) - 1.0), {"kind": kind, "subject": name, "text": text}
+
+    def _margins(self, angle: float, length: float) -> Iterator[tuple[float, LimitRecord]]:
+        """Joints nearer to their limits than demanded and a little more."""
+        beyond = self._beyond
+        for column, is_turning in enumerate(self.problem.limits.is_revolute.tolist()):
+            if not beyond[column] > -(angle if is_turning else length):
+                continue
+            scale, unit = (DEG, "deg") if is_turning else (MM, "mm")
+            left = scale * float(self.demands.margin[column] - beyond[column])
+            demand = scale * float(self.demands.margin[column])
+            name = " ".join(self.problem.joint_names(column))
+            what = f"{-left:.4g} {unit} beyond its limit" if left < 0.0 else f"{left:.4g} {unit} from its limit"
+            more = f", {demand:.4g} {unit} demanded" if demand > 0.0 else ""
+            yield scale * float(beyond[column]), {"kind": "position", "subject": name, "text": f"{name} {what}{more}"}
+
+    def _distances(self, room: float) -> Iterator[tuple[float, LimitRecord]]:
+        """Pairs nearer to each other than demanded and a little more, each once."""
+        found, lacks = self.measures.distances, self.measures.lacks
+        seen = set[int]()
+        for row in np.argsort(-lacks, kind="stable").tolist():
+            pair = int(found.pairs[row])
+            if not lacks[row] > -room:
+                return
+            if pair in seen:
+                continue
+            seen.add(pair)
+            distance, demand = MM * float(found.values[row]), MM * float(found.demands[row])
+            names = " and ".join(self.problem.pair_names(pair))
+            how = f"{distance:.3g} mm apart" if distance >= 0.0 else f"{-distance:.3g} mm into each other"
+            text = f"{names} {how}, {demand:.3g} mm demanded"
+            yield MM * float(lacks[row]), {"kind": "distance", "subject": names, "text": text}
+
+    def _bounds(self) -> Iterator[LimitRecord]:
+        """Variables at their bounds."""
+        problem, x = self.problem, self.measures.point.x
+        near = 1e-6 * problem.scale
+        for place, name in enumerate(problem.names):
+            for side, gap in (("lower", x[place] - problem.lower[place]), ("upper", problem.upper[place] - x[place])):
+                if gap <= near[place]:
+                    yield {"kind": "bound", "subject": name, "text": f"{name} at its {side} bound"}
+
+
+def reason(violation: LimitRecord) -> str:
+    """Why a trial ended without a conforming layout, the same for all that end for it."""
+    kinds = {"position": "joint too near its limit", "distance": "bodies too near each other"}
+    what = kinds.get(violation["kind"], f"{violation['kind']} above its limit")
+    return f"{what}: {violation['subject']}"
+
+
+def standing_of(problem: Problem, point: Point, demands: Demands, effort: Any) -> Standing:
+    """A point measured."""
+    return Standing(problem=problem, measures=Measures.of(problem, point, demands, effort), demands=demands)
+
+
+def effects(standing: Standing, steps: Array) -> dict[str, list[float | None]]:
+    """Effects of a step of each variable: on the cycle in [s], the smallest margin in [deg] and clearance in [mm].
+
+    Args:
+        standing: The point.
+        steps: The steps, shape (n,).
+    """
+    problem, measures = standing.problem, standing.measures
+    by = problem.derivatives(measures.point)
+    span = float(problem.times[-1] - problem.times[0])
+    return {
+        "cycle_s": _listed(span * _of_factor(standing, by) * steps),
+        "margin_deg": _listed(_of_margin(standing, by) * DEG * steps),
+        "clearance_mm": _listed(_of_distance(standing, by) * MM * steps),
+    }
+
+
+def _of_factor(standing: Standing, by: PointDerivatives) -> Array:
+    """Derivatives of the load of the joint that decides the clock."""
+    problem, measures = standing.problem, standing.measures
+    rates = np.sqrt(measures.accelerations.value)
+    if by.qdd is not None and rates.max() > measures.speeds.value.max():
+        found = _highest(measures.accelerations, by.qdd, problem.acceleration, measures.accelerations.value)
+        return found / (2.0 * float(rates.max()))
+    return _highest(measures.speeds, by.qd, problem.limits.velocity, measures.speeds.value)
+
+
+def _of_margin(standing: Standing, by: PointDerivatives) -> Array:
+    """Derivatives of the smallest margin of a turning joint."""
+    turning = standing.problem.limits.is_revolute
+    lower, upper = standing.measures.lower, standing.measures.upper
+    if not turning.any():
+        return np.full(by.q.shape[-1], np.nan)
+    seen = [np.where(turning, side.value, -np.inf) for side in (lower, upper)]
+    is_lower = seen[0].max() > seen[1].max()
+    ones = np.ones(len(turning))
+    return _highest(lower, by.q, ones, seen[0]) if is_lower else -_highest(upper, by.q, ones, seen[1])
+
+
+def _of_distance(standing: Standing, by: PointDerivatives) -> Array:
+    """Derivatives of the smallest distance of bodies that do not belong to one robot."""
+    found = standing.measures.distances
+    if not len(found.values) or found.is_own.all():
+        return np.full(by.q.shape[-1], np.nan)
+    values = np.where(found.is_own, np.inf, found.values - found.demands)
+    derivatives: Array = standing.problem.distance_derivatives(standing.measures.point, found, by)
+    return derivatives[int(values.argmin())]
+
+
+def _highest(crests: Crests, by: Array, limits: Array, values: Array) -> Array:
+    """Derivatives of the highest value, shape (n,)."""
+    node, column = np.unravel_index(int(values.argmax()), values.shape)
+    nodes, columns = np.array([node], dtype=np.intp), np.array([column], dtype=np.intp)
+    return np.asarray(crests.derivatives(nodes, columns, by)[0] / limits[column])
+
+
+def _listed(values: Array) -> list[float | None]:
+    """Plain numbers; None for those that are not finite."""
+    return [number(round(float(value), 9)) if np.isfinite(value) else None for value in values.tolist()]

@@ -1,0 +1,151 @@
+"""A cell made ready for a layout search: its variables, its bodies, and its job at as many nodes as are asked for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Schedule
+from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.layout.bodies import PlacedVariables, SearchedVariables
+from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
+from cellplan.pipeline.plan.start import chosen_start
+from cellplan.planning.modes import plan_phases
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import clock_paths, schedule_paths
+from cellplan.scene.scene import Scene
+from cellplan.search.base_map.verdicts import acceleration_limits
+from cellplan.search.distances.cell_distances import CellDistances
+from cellplan.search.kernel.job import Job
+from cellplan.search.programs.layout_problem import LayoutProblem
+from cellplan.search.programs.objective import Demands, Objective
+from cellplan.search.starts.generator import StartGenerator
+from cellplan.search.starts.problem import StartProblem
+from cellplan.search.variables.variables import Variables
+
+NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prepared:
+    """A cell whose layout is searched.
+
+    Attributes:
+        request: What is searched for.
+        cell: The cell, with what the request sets in it.
+        variables: What may change.
+        scene: The bodies of the cell.
+        bodies: Their distances, wherever the layout puts them.
+        schedule: The tasks on the common clock.
+        moving: Names of the robots that move.
+    """
+
+    request: LayoutRequest
+    cell: Cell
+    variables: Variables
+    scene: Scene
+    bodies: CellDistances
+    schedule: Schedule
+    moving: tuple[str, ...]
+
+    @classmethod
+    def of(cls, request: LayoutRequest, cell: Cell) -> "Prepared":
+        """Make a cell ready.
+
+        Args:
+            request: What is searched for.
+            cell: The cell, as ``searched_cell`` gives it.
+
+        Raises:
+            InputError: The paths, bodies or variables of the cell are not usable.
+        """
+        variables = Variables.of(cell)
+        scene = Scene.from_cell(variables.base)
+        paths = clock_paths(variables.base, [build_toolpath(task, cell.part) for task in cell.tasks])
+        phase = plan_phases(variables.base).program[0]
+        return cls(
+            request=request,
+            cell=cell,
+            variables=variables,
+            scene=scene,
+            bodies=CellDistances.of(scene, PlacedVariables(variables)),
+            schedule=schedule_paths(variables.base, [paths[name] for name in phase.tasks]),
+            moving=tuple(phase.moving),
+        )
+
+    def problem(self, nodes: int = NODES) -> LayoutProblem:
+        """The layout problem at about so many nodes."""
+        job = Job.of(self.variables.base, self.schedule, moving=self.moving, nodes=nodes)
+        return LayoutProblem(
+            job=job, variables=self.variables, bodies=self.bodies, acceleration=acceleration_limits(self.scene)
+        )
+
+    @cached_property
+    def coarse(self) -> LayoutProblem:
+        """The layout problem of the trials."""
+        return self.problem()
+
+    @cached_property
+    def given_start(self) -> Array:
+        """The start posture of the given layout in [rad] or [m], shape (nq,); found where the cell gives none.
+
+        Raises:
+            NoSolutionError: There is none.
+        """
+        return self.start_of(self.variables.base)
+
+    def start_of(self, cell: Cell, progress: Progress = silent) -> Array:
+        """The start posture of a cell with this job; see ``given_start``."""
+        if all(robot.start is not None for robot in cell.robots):
+            return np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
+        scene = self.scene if cell is self.variables.base else Scene.from_cell(cell)
+        paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
+        return chosen_start(scene, paths, progress=progress).start
+
+    @cached_property
+    def starts(self) -> StartGenerator:
+        """Starts of the search: the given layout with other branches, then sampled ones."""
+        problem = StartProblem.of(self.variables.base, SearchedVariables(self.variables), margin=self.variables.margin)
+        return StartGenerator(problem, seed=self.request.seed)
+
+    @property
+    def duration(self) -> float:
+        """Duration of the job in [s], as the cell has it."""
+        return float(self.schedule.times[-1])
+
+    @property
+    def has_accelerations(self) -> bool:
+        """Whether any joint is judged by its acceleration."""
+        return self.coarse.is_accelerating
+
+    def demands(self, **changes: Any) -> Demands:
+        """What is demanded of a layout."""
+        objective = self.request.objective
+        values: dict[str, Any] = {
+            "objective": objective,
+            "margin": self.variables.margin,
+            "duration": None if objective is Objective.CYCLE else self.duration,
+            "timing": self.request.timing,
+        }
+        return Demands(**(values | changes))
+
+
+def prepared(request: LayoutRequest, choice: Mapping[str, object] | None = None) -> Prepared:
+    """The cell of a request, with the discrete choices of one trial; made once in each process.
+
+    Args:
+        request: What is searched for.
+        choice: Values by address.
+    """
+    return _prepared(request, tuple(sorted((choice or {}).items())))
+
+
+@lru_cache(maxsize=4)
+def _prepared(request: LayoutRequest, choice: tuple[tuple[str, object], ...]) -> Prepared:
+    """See ``prepared``."""
+    cell = searched_cell(request)
+    return Prepared.of(request, cell.with_values(dict(choice)) if choice else cell)

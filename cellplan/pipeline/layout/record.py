@@ -1,0 +1,304 @@
+"""The record of a layout search: what JSON, page and console show."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.errors import NoSolutionError
+from cellplan.geometry.arrays import Array
+from cellplan.io.cell.changes import plain_values
+from cellplan.kinematics.reach import arm_reach
+from cellplan.model.units import DEG, MM
+from cellplan.pipeline.drawing import drawing, swept_area
+from cellplan.pipeline.layout.finish import Certified, certified_cell
+from cellplan.pipeline.layout.limits import Standing, effects, standing_of
+from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.proposals import BESTS, SIZE, origin_text
+from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.trial import EFFORT
+from cellplan.pipeline.write_run import versions
+from cellplan.report.record.common import number
+from cellplan.report.record.layout import (
+    SCHEMA,
+    CandidateRecord,
+    DroppedRecord,
+    GivenRecord,
+    LayoutRecord,
+    ProgressRecord,
+    VariableRecord,
+)
+from cellplan.report.text.layout import verdict_line
+from cellplan.study.study import Finished
+from cellplan.study.trial import TrialStatus
+
+TOP: Final = 10  # [-] layouts that are listed
+SAME: Final = 1e-4  # [-] share by which figures of two layouts differ that are not one
+REACH: Final = 5  # [-] rounds that the reach of an arm is sought in: to some millimetres
+SWEPT: Final = 33  # [-] configurations that the swept area is made of
+FINE: Final = 6  # decimals of figures of the search: far above rounding
+LENGTH_STEP: Final = 0.1  # [m] that effects are stated for
+ANGLE_STEP: Final = float(np.radians(10.0))  # [rad] likewise
+
+
+def layout_record(
+    ready: Prepared, finished: Finished, *, tried: Mapping[int, Certified], best: Certified | None, solves: int
+) -> LayoutRecord:
+    """The search in printed units.
+
+    Args:
+        ready: The cell.
+        finished: Its trials.
+        tried: What came of those that were solved in full, by number.
+        best: The best certified layout.
+        solves: How often a layout was solved in full.
+    """
+    request, cell = ready.request, ready.cell
+    listed = list(_candidates(ready, finished, tried))
+    given = _given_standing(ready)
+    standing = given if best is None else best.standing
+    is_free = request.objective == "cycle"
+    return {
+        "schema": SCHEMA,
+        "kind": "layout",
+        "cell": cell.name,
+        "file": request.cell.name,
+        "status": "certified" if best else _no_result(finished),
+        "objective": str(request.objective),
+        "timing": str(request.timing),
+        "duration_s": None if is_free else number(ready.duration),
+        "required_clearance_mm": number(MM * cell.checks.clearance),
+        "required_margin_deg": number(DEG * float(ready.variables.settings.margin)),
+        "has_accelerations": ready.has_accelerations,
+        "seed": request.seed,
+        "trials": len(finished.trials),
+        "rounds": -(-len(finished.trials) // SIZE),
+        "solves": solves,
+        "given": _given(given, ready),
+        "best": next((each for each in listed if best and each["trial"] == best.trial), None),
+        "velocity_only_s": _velocity_only(best) if best and ready.has_accelerations else None,
+        "top": listed[:TOP],
+        "front": _front(listed),
+        "binding": best.standing.binding() if best else [],
+        "variables": _variables(ready, standing, best),
+        "convergence": _convergence(finished),
+        "dropped": _dropped(finished),
+        "remarks": list(ready.variables.remarks),
+        "drawing": _drawing(ready, best) if best else {},
+        "files": [],
+        "inputs": dict(cell.inputs),
+        "versions": versions(),
+    }
+
+
+def head_of(record: LayoutRecord, request: LayoutRequest) -> str:
+    """Comment above a resulting cell file."""
+    return (
+        f"Layout of {request.cell.name} found by cellplan layout, objective {request.objective}, seed {request.seed}, "
+        f"{record['trials']} trials.\n{verdict_line(record)}.\nChanged values say what they were; solve this file as "
+        "any other."
+    )
+
+
+def _candidates(ready: Prepared, finished: Finished, tried: Mapping[int, Certified]) -> Iterator[CandidateRecord]:
+    """Layouts that trials ended at: certified ones first, then by the objective; equal ones once."""
+    best = BESTS[ready.request.objective]
+    sign = -1.0 if best.is_largest else 1.0
+    listed = [_candidate(ready, trial, tried.get(trial["trial"])) for trial in finished.trials if trial["figures"]]
+    figure = {"cycle_s": "cycle_s", "apart_mm": "clearance_mm", "change": "change"}.get(best.figure, "cycle_s")
+    ranks = {"certified": 0, "conforming": 1, "rejected": 2, "violating": 3}
+
+    def rank(each: CandidateRecord) -> tuple[int, float, int]:
+        value: Any = each[figure]  # type: ignore[literal-required]
+        return ranks[each["status"]], sign * (np.inf * sign if value is None else float(value)), each["trial"]
+
+    last: CandidateRecord | None = None
+    for each in sorted(listed, key=rank):
+        if last is None or not _is_same(each, last):
+            last = each
+            yield each
+
+
+def _is_same(one: CandidateRecord, other: CandidateRecord) -> bool:
+    """Whether two trials ended at one layout."""
+    return one["status"] == other["status"] and all(
+        np.isclose(one["settings"][key], other["settings"][key], rtol=SAME, atol=1.0)
+        for key in one["settings"]
+        if isinstance(one["settings"][key], int | float) and isinstance(other["settings"].get(key), int | float)
+    )
+
+
+def _candidate(ready: Prepared, trial: Mapping[str, Any], certified: Certified | None) -> CandidateRecord:
+    """One layout."""
+    figures = trial["figures"]
+    x, start = np.array(figures["x"]), np.array(figures["start"])
+    status, reason = "conforming" if trial["status"] == TrialStatus.PASSED else "violating", ""
+    shown = {key: figures[key] for key in ("cycle_s", "margin_deg", "clearance_mm", "change")}
+    if certified is not None:
+        x, start = certified.x, certified.start
+        status, reason = ("certified", "") if certified.passed else ("rejected", certified.reason)
+        if certified.program is not None:
+            shown |= {
+                "cycle_s": certified.program.cycle,
+                "margin_deg": certified.margin,
+                "clearance_mm": certified.clearance,
+                "change": float((np.abs(x - ready.variables.given) * ready.variables.cost).sum()),
+            }
+    settings = plain_values({**(trial["values"].get("choice") or {}), **ready.variables.values(x, start)})
+    rounded = {key: None if value is None else number(round(value, FINE)) for key, value in shown.items()}
+    return {
+        "trial": trial["trial"],
+        "origin": origin_text(trial["values"]),
+        "status": status,
+        "reason": reason,
+        "cycle_s": rounded["cycle_s"],
+        "margin_deg": rounded["margin_deg"],
+        "clearance_mm": rounded["clearance_mm"],
+        "change": rounded["change"],
+        "settings": settings,
+    }
+
+
+def _front(listed: list[CandidateRecord]) -> list[CandidateRecord]:
+    """Layouts that no other one beats in both cycle and clearance, the shortest cycle first."""
+    found: list[CandidateRecord] = []
+    widest = -np.inf
+    usable = [each for each in listed if each["status"] in {"certified", "conforming"}]
+    for each in sorted(usable, key=lambda one: (one["cycle_s"] or np.inf, -(one["clearance_mm"] or 0.0))):
+        if each["clearance_mm"] is not None and each["clearance_mm"] > widest:
+            widest = each["clearance_mm"]
+            found.append(each)
+    return found
+
+
+def _given_standing(ready: Prepared) -> Standing | None:
+    """How the given layout stands; None where a tool cannot follow."""
+    try:
+        point = ready.coarse.evaluate(ready.variables.given, ready.given_start)
+    except NoSolutionError:
+        return None
+    return None if point is None else standing_of(ready.coarse, point, ready.demands(), EFFORT)
+
+
+def _given(standing: Standing | None, ready: Prepared) -> GivenRecord:
+    """The given layout."""
+    if standing is None:
+        return {"status": "violating", "cycle_s": None, "margin_deg": None, "clearance_mm": None, "violations": []}
+    at_duration = standing_of(
+        ready.coarse, standing.measures.point, ready.demands(objective="conforming", duration=ready.duration), EFFORT
+    )
+    violations = at_duration.violations()
+    return {
+        "status": "violating" if violations else "conforming",
+        "cycle_s": number(round(standing.measures.cycle, FINE)),
+        "margin_deg": None if standing.margin is None else number(round(standing.margin, FINE)),
+        "clearance_mm": None if standing.clearance is None else number(round(standing.clearance, FINE)),
+        "violations": violations,
+    }
+
+
+def _variables(ready: Prepared, standing: Standing | None, best: Certified | None) -> list[VariableRecord]:
+    """The variables in the units of the file, with their effects."""
+    variables, names = ready.variables, ready.variables.names
+    units = [_unit(name) for name in names]
+    steps = np.array([{"mm": LENGTH_STEP, "deg": ANGLE_STEP, "": float(np.log(2.0))}[unit] for unit in units])
+    of = effects(standing, steps) if standing is not None else {}
+    shown: list[VariableRecord] = []
+    for place, (name, unit) in enumerate(zip(names, units, strict=True)):
+        values = (variables.lower, variables.upper, variables.given)
+        lower, upper, given = (_in_file_units(float(value[place]), unit) for value in values)
+        shown.append(
+            {
+                "name": name,
+                "unit": unit,
+                "lower": lower,
+                "upper": upper,
+                "given": given,
+                "best": None if best is None else _in_file_units(float(best.x[place]), unit),
+                "step": {"mm": MM * LENGTH_STEP, "deg": DEG * ANGLE_STEP, "": 2.0}[unit],
+                "cycle_s": of["cycle_s"][place] if of else None,
+                "margin_deg": of["margin_deg"][place] if of else None,
+                "clearance_mm": of["clearance_mm"][place] if of else None,
+            }
+        )
+    return shown
+
+
+def _unit(name: str) -> str:
+    """Unit of a variable; empty for a weight."""
+    if ".weights" in name:
+        return ""
+    return "mm" if "_mm" in name else "deg"
+
+
+def _in_file_units(value: float, unit: str) -> float | None:
+    """A value in the unit of the file; None where it is infinite."""
+    if not np.isfinite(value):
+        return None
+    return number(
+        round({"mm": MM * value, "deg": DEG * value, "": float(np.exp(value)) if not unit else 0.0}[unit], FINE)
+    )
+
+
+def _convergence(finished: Finished) -> list[ProgressRecord]:
+    """The cycle of every trial and the best so far, in the order of the trials."""
+    best: float | None = None
+    found: list[ProgressRecord] = []
+    for trial in finished.trials:
+        is_usable = trial["status"] == TrialStatus.PASSED and not trial["values"].get("clearance_m")
+        cycle = round(trial["figures"]["cycle_s"], FINE) if is_usable else None
+        best = cycle if best is None else min(best, cycle) if cycle is not None else best
+        found.append({"trial": trial["trial"], "cycle_s": cycle, "best_s": best})
+    return found
+
+
+def _dropped(finished: Finished) -> list[DroppedRecord]:
+    """Trials without a conforming layout, by reason, the most frequent first."""
+    lost = [trial for trial in finished.trials if trial["status"] != TrialStatus.PASSED]
+    counts = Counter(trial["reason"] for trial in lost)
+    first = {reason: min(trial["trial"] for trial in lost if trial["reason"] == reason) for reason in counts}
+    ordered = sorted(counts.items(), key=lambda each: (-each[1], first[each[0]]))
+    return [{"reason": reason, "count": count, "trial": first[reason]} for reason, count in ordered]
+
+
+def _no_result(finished: Finished) -> str:
+    """Why there is no best layout."""
+    is_started = any(trial["figures"] for trial in finished.trials)
+    return "none_certified" if is_started else "no_start"
+
+
+def _velocity_only(best: Certified) -> float:
+    """Cycle of the best layout by its limits of speed alone in [s]."""
+    measures, times = best.standing.measures, best.standing.problem.times
+    return round(float(measures.speeds.value.max()) * float(times[-1] - times[0]), FINE)
+
+
+def _drawing(ready: Prepared, best: Certified) -> dict[str, Any]:
+    """Floor plan of the given and the best layout."""
+    cell = certified_cell(best)
+    if best.program is None:
+        return {}
+    scene, solution = best.program.scene, best.program.solution
+    rows = np.unique(np.linspace(0, len(solution.motion.q) - 1, SWEPT).round().astype(np.intp))
+    q = solution.motion.q[rows]
+    return {
+        "given": drawing(ready.scene, _shown_start(ready), ready.schedule),
+        "best": drawing(scene, q[0], solution.runs[0].schedule),
+        "swept": swept_area(scene, q),
+        "reach_mm": {
+            robot.name: number(
+                round(MM * float(arm_reach(robot.model, rounds=REACH) + np.linalg.norm(robot.tool.X_FT[:3, 3])), 3)
+            )
+            for robot in cell.robots
+        },
+        "keep_out": {},
+    }
+
+
+def _shown_start(ready: Prepared) -> Array:
+    """The configuration in which the given layout is drawn: its start, or all joints at zero without one."""
+    try:
+        return ready.given_start
+    except NoSolutionError:
+        return np.zeros(ready.cell.joint_count)

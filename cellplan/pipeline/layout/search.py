@@ -1,0 +1,195 @@
+"""Layout search: trials in rounds, the best of them finished and certified, and all of it in one folder."""
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
+from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals
+from cellplan.pipeline.layout.record import head_of, layout_record
+from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
+from cellplan.pipeline.layout.result_file import file_records, result_files
+from cellplan.pipeline.layout.trial import evaluate
+from cellplan.pipeline.write_run import versions
+from cellplan.report.page.layout import layout_files
+from cellplan.report.record.layout import LayoutRecord
+from cellplan.search.programs.objective import Objective
+from cellplan.study.folder import write_results
+from cellplan.study.study import Finished, Stop, Study
+from cellplan.study.trial import Trial, TrialStatus
+from cellplan.study.workers import Limits, Workers
+
+BUDGET: Final = 60.0  # [s] of a search that does not say where to end
+CANDIDATES: Final = 4  # [-] layouts that are finished until one passes
+TRIAL_LIMIT: Final = 900.0  # [s] of the processor for one trial
+MODULES: Final = ("cellplan.pipeline.layout.trial",)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LayoutResult:
+    """What a layout search has come to.
+
+    Attributes:
+        record: The record of ``study.json``.
+        best: The best certified layout; None without one.
+    """
+
+    record: LayoutRecord
+    best: Certified | None
+
+
+@dataclass(slots=True, kw_only=True)
+class _Search:
+    """One search."""
+
+    request: LayoutRequest
+    folder: Path
+    ready: Prepared
+    workers: int | Executor
+    stop: Stop
+    progress: Progress
+    finish: Finish
+    tried: dict[int, Certified] = field(default_factory=dict)
+
+    def run(self, *, resume: bool) -> tuple[Finished, Certified | None]:
+        """Rounds and finish; a search for any conforming layout goes on where the first one is rejected."""
+        while True:
+            finished = self._study().run(
+                partial(evaluate, self.request),
+                workers=self.workers,
+                stop=self.stop,
+                limits=Limits(seconds=TRIAL_LIMIT),
+                resume=resume or bool(self.tried),
+                progress=self.progress,
+            )
+            best = self._best(finished)
+            if best is not None or self.request.objective is not Objective.CONFORMING or not self._goes_on(finished):
+                return finished, best
+
+    def _study(self) -> Study:
+        """The study, without the candidates that were rejected."""
+        rejected = frozenset(self.tried)
+        proposals = Proposals(request=self.request, choices=choices_of(self.ready))
+        is_enough = partial(_is_enough, rejected) if self.request.objective is Objective.CONFORMING else None
+        cell = self.ready.cell
+        header = {
+            "kind": "layout",
+            "cell": cell.name,
+            **self.request.record,
+            "inputs": dict(cell.inputs),
+            "versions": versions(),
+        }
+        best = BESTS[self.request.objective]
+        return Study(folder=self.folder, header=header, size=SIZE, propose=proposals, best=best, enough=is_enough)
+
+    def _best(self, finished: Finished) -> Certified | None:
+        """The first candidate that passes, best first."""
+        for trial in self.candidates(finished)[:CANDIDATES]:
+            number = trial["trial"]
+            if number not in self.tried:
+                self.progress(f"certifying trial {number}", 1.0)
+                choice = trial["values"].get("choice") or {}
+                self.finish.ready = (
+                    Prepared.of(self.request, self.ready.cell.with_values(choice)) if choice else self.ready
+                )
+                self.tried[number] = self.finish.certified(number, trial["figures"])
+            if self.tried[number].passed:
+                return self.tried[number]
+        return None
+
+    def candidates(self, finished: Finished) -> list[dict[str, Any]]:
+        """Trials that conform by the search, best first."""
+        best = BESTS[self.request.objective]
+        sign = -1.0 if best.is_largest else 1.0
+        listed = [
+            trial
+            for trial in finished.trials
+            if trial["status"] == TrialStatus.PASSED and not trial["values"].get("clearance_m")
+        ]
+        return sorted(listed, key=lambda trial: (sign * _value(trial, best.figure, sign), trial["trial"]))
+
+    def _goes_on(self, finished: Finished) -> bool:
+        """Whether there is anything more to try."""
+        return bool(self.candidates(finished)) and finished.stopped_by == "enough"
+
+
+def search_layout(
+    request: LayoutRequest,
+    folder: Path,
+    *,
+    stop: Stop | None = None,
+    workers: int | Executor = 1,
+    resume: bool = False,
+    progress: Progress = silent,
+) -> LayoutResult:
+    """Search for the best layout of a cell and write it, with what it was chosen from, into a folder.
+
+    The folder holds ``study.jsonl``, a line for each trial that grows while the search runs, and at the end
+    ``best.yaml``, the given cell file with the values of the best layout, ``study.json`` and ``study.html``. Only a
+    layout that passed every check of ``solve`` is written as the best one. For an equal number of trials the files are the same,
+    for any number of workers.
+
+    Args:
+        request: What is searched for.
+        folder: Folder of the study; an earlier one is replaced, or continued with ``resume``.
+        stop: Where it ends: a number of trials, or a budget of seconds; None for 60 s.
+        workers: Number of processes that search; or an executor, which stays open.
+        resume: Whether trials that the folder holds already are not repeated.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The cell cannot be read or searched, or the folder cannot be used.
+        KeyboardInterrupt: It was interrupted; says how many trials are recorded.
+    """
+    with ExitStack() as opened:
+        pool = workers
+        if isinstance(workers, int):
+            pool = opened.enter_context(Workers(workers, modules=MODULES))
+        ready = Prepared.of(request, searched_cell(request))
+        search = _Search(
+            request=request,
+            folder=folder,
+            ready=ready,
+            workers=pool,
+            stop=stop or Stop(seconds=BUDGET),
+            progress=progress,
+            finish=Finish(ready=ready, progress=progress),
+        )
+        finished, best = search.run(resume=resume)
+        progress("writing the result", 1.0)
+        return _written(search, finished, best)
+
+
+def choices_of(ready: Prepared) -> dict[str, Sequence[object]]:
+    """Discrete choices of a cell that are values of its file, by address."""
+    settings = ready.variables.settings
+    return {choice.address: choice.options for choice in settings.choices if choice.options}
+
+
+def _written(search: _Search, finished: Finished, best: Certified | None) -> LayoutResult:
+    """The record and all files."""
+    record = layout_record(search.ready, finished, tried=search.tried, best=best, solves=search.finish.solves)
+    beside: dict[str, bytes] = {}
+    if best is not None:
+        head = head_of(record, search.request)
+        beside = result_files(certified_cell(best), search.request.cell, search.folder, head=head)
+        record["files"] = file_records(beside)  # type: ignore[typeddict-item]
+    write_results(search.folder, {**layout_files(record), **beside})
+    return LayoutResult(record=record, best=best)
+
+
+def _is_enough(rejected: frozenset[int], trial: Trial) -> bool:
+    """Whether a trial ends the search for any conforming layout."""
+    return trial.outcome.status is TrialStatus.PASSED and trial.variant.number not in rejected
+
+
+def _value(trial: dict[str, Any], figure: str, sign: float) -> float:
+    """The figure of a trial that is compared; without one it comes last."""
+    value = trial["figures"].get(figure)
+    return float(value) if isinstance(value, int | float) else sign * float("inf")

@@ -1,0 +1,96 @@
+"""Which places of a base bring two bodies too near each other: the motions of many places asked together."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.depths import mounted_depths
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.scene.moved import stands_by_link
+from cellplan.scene.scene import Scene
+
+KEYS: Final = (3, 9, 33)  # [-] nodes at which distances are asked, more and more while nothing is too near
+AT_ONCE: Final = 128  # [-] configurations placed together: about 10 MB
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """Two bodies that are too near.
+
+    Attributes:
+        pair: Their names.
+        distance: Their distance in [m], negative where they overlap by so much.
+        node: Node of the motion at which it is so.
+    """
+
+    pair: tuple[str, str]
+    distance: float
+    node: int
+
+
+def contacts(scene: Scene, robot: str, X_WB: Array, q: Array) -> list[Contact | None]:
+    """The worst contact of each motion at the first nodes that show one; None for a motion without any.
+
+    Args:
+        scene: The cell; of its mounted pairs those that are to be judged.
+        robot: Name of the robot that stands elsewhere.
+        X_WB: Its base for each motion, shape (K, 4, 4).
+        q: The motions, shape (K, N, nq).
+    """
+    if stands_by_link(scene.cell, robot) and len(q) > 1:  # its pairs depend on where it stands
+        return [contacts(scene, robot, X_WB[k : k + 1], q[k : k + 1])[0] for k in range(len(q))]
+    found: list[Contact | None] = [None] * len(q)
+    if not len(q):
+        return found
+    placed = scene.moved({robot: X_WB[0]})
+    places, seen = np.arange(len(q)), np.zeros(q.shape[1], dtype=bool)
+    for count in KEYS:
+        nodes = np.unique(np.linspace(0, q.shape[1] - 1, count).round().astype(np.intp))
+        nodes = nodes[~seen[nodes]]
+        seen[nodes] = True
+        step = max(1, AT_ONCE // max(1, len(nodes)))
+        for some in (places[begin : begin + step] for begin in range(0, len(places), step)):
+            for place, contact in _worst(placed, robot, X_WB[some], q[some][:, nodes]).items():
+                found[some[place]] = Contact(
+                    pair=contact.pair, distance=contact.distance, node=int(nodes[contact.node])
+                )
+        places = np.array([place for place in places.tolist() if found[place] is None], dtype=np.intp)
+    for place in places.tolist():
+        found[place] = _standing(scene.moved({robot: X_WB[place]}), q[place, :1])
+    return found
+
+
+def _worst(scene: Scene, robot: str, X_WB: Array, q: Array) -> dict[int, Contact]:
+    """The worst contact of motions of shape (K, nodes, nq), by motion and node, for those that have one."""
+    table, (count, nodes, joints) = scene.near_table, q.shape
+    bases = np.array([np.tile(each.X_WB, (count * nodes, 1, 1)) for each in scene.cell.robots])
+    bases[scene.cell.index(robot)] = np.repeat(X_WB, nodes, axis=0)
+    demands = np.zeros(len(scene.pairs))
+    demands[table.pairs.rows] = table.pairs.demands
+    D = table.forest.displacements(q.reshape(-1, joints), bases)
+    near = table.find(scene.engine, D, float(demands.max(initial=0.0)))
+    short, motions = near.distances - demands[near.rows], near.samples // nodes
+    found = dict[int, Contact]()
+    for query in _first_of_each(short, motions).tolist():
+        pair = scene.names(scene.pairs[near.rows[query]])
+        node = int(near.samples[query] % nodes)
+        found[int(motions[query])] = Contact(pair=pair, distance=float(near.distances[query]), node=node)
+    return found
+
+
+def _first_of_each(short: Array, motions: Indices) -> Indices:
+    """Of each motion the pair that falls short by most, of those that do."""
+    below = np.flatnonzero(short < 0.0)
+    order = below[np.lexsort((short[below], motions[below]))]
+    _, first = np.unique(motions[order], return_index=True)
+    return order[first]
+
+
+def _standing(scene: Scene, q: Array) -> Contact | None:
+    """The first pair of which one stands too deep in the other, at a configuration of shape (1, nq)."""
+    for found in mounted_depths(scene, q):
+        if found.depth > found.pair.limit:
+            names = (scene.bodies[found.pair.first].name, scene.bodies[found.pair.second].name)
+            return Contact(pair=names, distance=-found.depth, node=0)
+    return None

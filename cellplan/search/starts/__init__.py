@@ -1,0 +1,1 @@
+"""Starts: where a search for a layout begins."""

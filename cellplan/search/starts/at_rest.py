@@ -1,0 +1,248 @@
+"""Starts with the part at rest: where the first holder keeps it, and bases of one operator that follow its path."""
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.search.starts.freedom import FIXED, drawn_within
+from cellplan.search.starts.problem import StartProblem
+from cellplan.search.starts.reaching import Placed, followed, matched, reached
+
+SETTINGS: Final = 400  # [-] postures of the holder that are drawn
+MATCHED: Final = 150  # [-] of these, free of contact, that are compared by what operators reach of them
+MATCHES: Final = 300  # [-] configurations of each operator for that
+NEAR: Final = 0.5  # [rad] and half metres by which a configuration may miss a path's start and still speak for it
+HOLDER_RANGE: Final = 0.7  # share of each joint range that postures of the holder are drawn from: room to move
+GIVEN_BASE: Final = 0.5  # share of the draws with the holder's base where it is given
+DRAWS: Final = 1500  # [-] bases of an operator
+CONFIGURATIONS: Final = 6  # [-] per base that are drawn; the best matching ones are taken
+TEMPLATES: Final = 100  # [-] of these with tools, tilts and heights of their own; places and yaws follow from the path
+KEPT: Final = 40  # [-] bases of an operator that are kept
+LOOKED_AT: Final = 0.0, 0.34, 0.67  # shares of a path at which contacts are asked
+CONTACTS_AT_ONCE: Final = 32
+ROOMY: Final = 0.7  # [rad, m] a margin above which more of it is worth no more
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Setting:
+    """Where the part rests.
+
+    Attributes:
+        x: The variables; those of operators as given, shape (n,).
+        start: Start postures; those of operators as given, shape (nq,).
+        X_WB: Base of every robot, shape (robots, 4, 4).
+        X_WP: The part, shape (4, 4).
+    """
+
+    x: Array
+    start: Array
+    X_WB: Array
+    X_WP: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pool:
+    """Bases of one operator that follow its path with the part at rest, the best first; M of them.
+
+    Attributes:
+        x: The variables, of which its own columns count, shape (M, n).
+        q: Its start configurations in [rad] or [m], shape (M, n).
+        cost: What following costs in speed and margin, shape (M,).
+        drops: How many draws failed by what.
+    """
+
+    x: Array
+    q: Array
+    cost: Array
+    drops: Counter[str]
+
+
+def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tuple[list[Setting], Counter[str]]:
+    """Places for the part at rest, the ones that operators reach best first.
+
+    Args:
+        problem: The cell.
+        rng: Random numbers.
+        count: How many at most.
+
+    Returns:
+        The settings, and by what draws failed.
+    """
+    cell, drops = problem.cell, Counter[str]()
+    if cell.carrier is None:
+        layouts = problem.variables.layouts(problem.variables.given[None], problem.start[None])
+        return [
+            Setting(x=problem.variables.given, start=problem.start, X_WB=layouts.X_WB[0], X_WP=cell.part.X_CP)
+        ], drops
+    x = _drawn_settings(problem, rng)
+    layouts = problem.variables.layouts(x, np.tile(problem.start, (len(x), 1)))
+    columns, arm = cell.columns(cell.robots[cell.carrier].name), problem.arms[cell.carrier]
+    placed = Placed(q=layouts.start[:, columns], X_WB=layouts.X_WB[:, cell.carrier], X_FT=layouts.X_FT[:, cell.carrier])
+    usable = np.ones(len(x), dtype=bool)
+    own = problem.goal(cell.carrier, np.eye(4))
+    if own is not None:
+        placed, usable = reached(arm, own, problem.bounds(cell.carrier), placed)
+        drops["does not reach its own path"] += int(np.sum(~usable))
+    room = np.minimum(placed.q - arm.lower, arm.upper - placed.q) - problem.margin[columns]
+    usable[1:] &= room[1:].min(axis=1) >= 0.0
+    drops["at a joint limit"] += int(np.sum(~usable)) - drops["does not reach its own path"]
+    X_WB, start = layouts.X_WB.copy(), layouts.start.copy()
+    X_WB[:, cell.carrier], start[:, columns] = placed.X_WB, placed.q
+    X_WP = placed.X_WB @ arm.flanges(placed.q) @ placed.X_FT @ cell.part.X_CP
+    usable = np.flatnonzero(usable)
+    short = problem.contacts[cell.carrier].shortfalls(X_WB[usable], start[usable])
+    drops.update(f"{pair[0]} too near {pair[1]}" for pair in short.pair if pair is not None)
+    usable = usable[short.worst <= 0.0][:MATCHED]
+    if not len(usable):
+        return [], drops
+    x = problem.with_starts(
+        _with_bases(problem, cell.carrier, x, X_WB[:, cell.carrier], layouts.X_WB[:, cell.carrier]), start
+    )
+    found = [Setting(x=x[i], start=start[i], X_WB=X_WB[i], X_WP=X_WP[i]) for i in usable.tolist()]
+    ability = _abilities(problem, found, rng)
+    return [found[i] for i in np.argsort(-ability, kind="stable")[:count].tolist()], drops
+
+
+def _drawn_settings(problem: StartProblem, rng: np.random.Generator) -> Array:
+    """Variables with those of the holder drawn, the given ones first, shape (SETTINGS, n)."""
+    cell, variables = problem.cell, problem.variables
+    holder = 0 if cell.carrier is None else cell.carrier
+    x = drawn_within(variables, problem.freedom.own[holder], SETTINGS, rng)
+    places = problem.freedom.columns[cell.columns(cell.robots[holder].name)]
+    joints = places[places != FIXED]
+    middle = 0.5 * (np.maximum(variables.lower, -np.pi) + np.minimum(variables.upper, np.pi))[joints]
+    x[:, joints] = middle + HOLDER_RANGE * (x[:, joints] - middle)
+    base = problem.drawn_columns(holder)
+    stays = rng.uniform(size=SETTINGS) < GIVEN_BASE
+    x[np.ix_(stays, base)] = variables.given[base]
+    x[0] = variables.given
+    return x
+
+
+def _abilities(problem: StartProblem, found: list[Setting], rng: np.random.Generator) -> Array:
+    """How much of what each operator can do suits the start of its path, for the worst operator, shape (S,)."""
+    ability = np.full(len(found), np.inf)
+    for robot in problem.operators:
+        arm, bounds = problem.arms[robot], problem.bounds(robot)
+        draws = _draws(problem, robot, found[0], MATCHES, rng)[1]
+        X_BT = arm.flanges(draws.q) @ draws.X_FT
+        for place, setting in enumerate(found):
+            goal = problem.goal(robot, setting.X_WP)
+            if goal is not None:
+                miss = matched(goal, bounds, X_BT, draws.X_WB)[1]
+                ability[place] = min(ability[place], float(np.sum(np.exp(-((miss / NEAR) ** 2)))))
+    return ability
+
+
+def _draws(
+    problem: StartProblem, robot: int, setting: Setting, count: int, rng: np.random.Generator
+) -> tuple[Array, Placed]:
+    """Variables, shape (count, n), and configurations, bases and tools of an operator drawn within their bounds."""
+    arm, model = problem.arms[robot], problem.cell.robots[robot]
+    own = problem.drawn_columns(robot)
+    x = np.tile(setting.x, (TEMPLATES, 1))
+    x[:, own] = drawn_within(problem.variables, own, TEMPLATES, rng)[:, own]
+    layouts = problem.variables.layouts(x, np.tile(setting.start, (TEMPLATES, 1)))
+    row = np.arange(count) % TEMPLATES
+    margin = problem.margin[problem.cell.columns(model.name)]
+    lower, upper = np.minimum(arm.lower + margin, arm.upper), np.maximum(arm.upper - margin, arm.lower)
+    q = rng.uniform(np.minimum(lower, upper), np.maximum(lower, upper), (count, len(lower)))
+    return x[row], Placed(q=q, X_WB=layouts.X_WB[row, robot], X_FT=layouts.X_FT[row, robot])
+
+
+def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Generator) -> Pool:
+    """Bases of one operator from which its tool follows the whole path with the part at rest, free of contact.
+
+    Args:
+        problem: The cell.
+        robot: Index of the operator.
+        setting: Where the part rests.
+        rng: Random numbers.
+    """
+    goal, arm, bounds = problem.goal(robot, setting.X_WP), problem.arms[robot], problem.bounds(robot)
+    if goal is None:
+        raise ValueError(f"pool: robot {robot} has no path")
+    x, draws = _draws(problem, robot, setting, DRAWS * CONFIGURATIONS, rng)
+    X_WB, miss = matched(goal, bounds, arm.flanges(draws.q) @ draws.X_FT, draws.X_WB)
+    best = np.argsort(miss, kind="stable")[:DRAWS]
+    drops = Counter[str]()
+    x, drawn = x[best], draws.X_WB[best]
+    at, has_arrived = reached(arm, goal, bounds, replace(draws, X_WB=X_WB).of_places(best))
+    drops["does not reach the start of its path"] = int(np.sum(~has_arrived))
+    x, drawn, at = x[has_arrived], drawn[has_arrived], at.of_places(has_arrived)
+    x = _with_bases(problem, robot, x, at.X_WB, drawn)
+    inside = _within(problem, robot, x)
+    drops["base out of bounds"] = int(np.sum(~inside))
+    x, at = x[inside], at.of_places(inside)
+    q, has_followed = followed(arm, goal, at)
+    drops["loses its path"] = int(np.sum(~has_followed))
+    x, at, q = x[has_followed], at.of_places(has_followed), q[has_followed]
+    room = np.minimum(q - arm.lower, arm.upper - q) - problem.margin[problem.cell.columns(goal.relation.robot)]
+    roomy = room.min(axis=(1, 2), initial=np.inf) >= 0.0
+    drops["joint limit"] = int(np.sum(~roomy))
+    order = np.flatnonzero(roomy)
+    cost = _costs(problem, arm.velocity, q[roomy], room[roomy])
+    ranked = np.argsort(cost, kind="stable")
+    kept = _free(problem, robot, setting, at.X_WB[order][ranked], q[order][ranked], drops)
+    rows = order[ranked[kept]]
+    return Pool(x=x[rows], q=q[rows, 0], cost=cost[ranked[kept]], drops=drops)
+
+
+def _costs(problem: StartProblem, velocity: Array, q: Array, room: Array) -> Array:
+    """Logarithm of the largest speed, and what is missing of a wide margin, shape (B,)."""
+    if not len(q):
+        return np.zeros(0)
+    steps = np.diff(problem.at_rest.times)
+    moves = np.abs(np.diff(q, axis=1))[:, steps > 0.0] / steps[steps > 0.0][:, None]
+    speed = np.log(np.maximum((moves / velocity).max(axis=(1, 2), initial=0.0), 1e-9))
+    found: Array = speed + np.maximum(0.0, 1.0 - room.min(axis=(1, 2)) / ROOMY)
+    return found
+
+
+def _free(problem: StartProblem, robot: int, setting: Setting, X_WB: Array, q: Array, drops: Counter[str]) -> Indices:
+    """The first ``KEPT`` of some draws that keep their distance from all but other operators."""
+    kept, columns = list[int](), problem.cell.columns(problem.cell.robots[robot].name)
+    nodes = np.unique([round(share * (q.shape[1] - 1)) for share in LOOKED_AT])
+    for first in range(0, len(q), CONTACTS_AT_ONCE):
+        group = np.arange(first, min(first + CONTACTS_AT_ONCE, len(q)))
+        bases = np.tile(setting.X_WB, (len(group) * len(nodes), 1, 1, 1))
+        bases[:, robot] = np.repeat(X_WB[group], len(nodes), axis=0)
+        start = np.tile(setting.start, (len(bases), 1))
+        start[:, columns] = q[group][:, nodes].reshape(len(bases), -1)
+        short = problem.contacts[robot].shortfalls(bases, start)
+        worst = short.worst.reshape(len(group), len(nodes))
+        for place, index in enumerate(group.tolist()):
+            node = int(np.argmax(worst[place]))
+            pair = short.pair[place * len(nodes) + node]
+            if pair is None:
+                kept.append(index)
+            else:
+                drops[f"{pair[0]} too near {pair[1]}"] += 1
+        if len(kept) >= KEPT:
+            break
+    return np.array(kept[:KEPT], dtype=np.intp)
+
+
+def _with_bases(problem: StartProblem, robot: int, x: Array, X_WB: Array, drawn: Array) -> Array:
+    """Variables of bases that were moved from where they were drawn, shape (B, n)."""
+    found, columns = x.copy(), problem.freedom.base[robot]
+    for component in np.flatnonzero(columns[:3] != FIXED).tolist():
+        found[:, columns[component]] += X_WB[:, component, 3] - drawn[:, component, 3]
+    if columns[3] != FIXED:
+        turn = X_WB[:, :3, :3] @ np.swapaxes(drawn[:, :3, :3], 1, 2)
+        angle = found[:, columns[3]] + np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
+        lower, upper = problem.variables.lower[columns[3]], problem.variables.upper[columns[3]]
+        middle = 0.5 * (lower + upper) if np.isfinite(lower + upper) else 0.0
+        found[:, columns[3]] = middle + (angle - middle + np.pi) % (2.0 * np.pi) - np.pi
+    return found
+
+
+def _within(problem: StartProblem, robot: int, x: Array) -> Flags:
+    """Which variables of a robot's base are within their bounds, shape (B,)."""
+    columns = problem.freedom.base[robot]
+    columns = columns[columns != FIXED]
+    lower, upper = problem.variables.lower[columns], problem.variables.upper[columns]
+    return np.all((x[:, columns] >= lower) & (x[:, columns] <= upper), axis=1)

@@ -1,0 +1,111 @@
+"""Which variables of a search place which robot: what a start may choose for one robot without touching another."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.model.cell import Cell
+from cellplan.search.distances.moving_bodies import LayoutVariables
+
+PROBE: Final = 0.1  # of a variable's range or usual step: far above rounding
+COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "yaw_deg")  # of a base that a start chooses so that its tool comes there
+FIXED: Final = -1  # in place of a column
+
+
+class StartVariables(LayoutVariables, Protocol):
+    """Variables as starts need them; n of them, see ``search.variables``."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Address of each."""
+        ...
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds in [m] or [rad], shape (n,)."""
+        ...
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds, shape (n,)."""
+        ...
+
+    @property
+    def scale(self) -> Array:
+        """A usual step of each, shape (n,)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Freedom:
+    """The variables of a search, sorted by the robot that they place.
+
+    Attributes:
+        own: Columns of the variables that move only this robot's base, tool or start posture, by robot.
+        base: Columns of x, y, z and yaw of each robot's base among its own; ``FIXED`` where there is none,
+            shape (robots, 4).
+        columns: Column of the start position of each joint; ``FIXED`` where there is none, shape (nq,).
+        shared: Columns of all other variables.
+    """
+
+    own: tuple[Indices, ...]
+    base: Indices
+    columns: Indices
+    shared: Indices
+
+    @classmethod
+    def of(cls, cell: Cell, variables: StartVariables, start: Array) -> "Freedom":
+        """Sort the variables by what changes when each of them does.
+
+        Args:
+            cell: The cell.
+            variables: The variables.
+            start: A start posture, shape (nq,).
+        """
+        count = len(variables.names)
+        x = np.tile(variables.given, (count + 1, 1))
+        step = PROBE * np.minimum(variables.scale, np.maximum(variables.upper - variables.lower, 0.0))
+        down = variables.given + step > variables.upper
+        x[1:] += np.diag(np.where(down, -step, step))
+        seen = variables.layouts(x, np.tile(start, (count + 1, 1)))
+        starts = seen.start[1:] != seen.start[0]
+        moved = np.zeros((count, len(cell.robots)), dtype=bool)
+        for index, robot in enumerate(cell.robots):
+            placed = (seen.X_WB[:, index], seen.X_FT[:, index])
+            by_pose = [np.any(part[1:] != part[0], axis=(1, 2)) for part in placed]
+            moved[:, index] = np.any([*by_pose, np.any(starts[:, cell.columns(robot.name)], axis=1)], axis=0)
+        is_own = moved.sum(axis=1) == 1
+        own = tuple(np.flatnonzero(is_own & moved[:, index]) for index in range(len(cell.robots)))
+        columns = np.full(cell.joint_count, FIXED)
+        for column in np.flatnonzero(is_own).tolist():
+            changed = np.flatnonzero(starts[column])
+            if len(changed) == 1:
+                columns[changed[0]] = column
+        base = [_base_columns(robot.name, variables.names, own[i]) for i, robot in enumerate(cell.robots)]
+        return cls(own=own, base=np.array(base, dtype=np.intp), columns=columns, shared=np.flatnonzero(~is_own))
+
+
+def _base_columns(robot: str, names: Sequence[str], own: Indices) -> list[int]:
+    """Columns of the components of a robot's base."""
+    places = {names[column]: column for column in own.tolist()}
+    return [places.get(f"robots.{robot}.base.{component}", FIXED) for component in COMPONENTS]
+
+
+def drawn_within(variables: StartVariables, columns: Indices, count: int, rng: np.random.Generator) -> Array:
+    """Values of some variables drawn evenly within their bounds, shape (count, n); ten steps where these are infinite.
+
+    Args:
+        variables: The variables.
+        columns: Those that are drawn; all others keep the given values.
+        count: How many.
+        rng: Random numbers.
+    """
+    x = np.tile(variables.given, (count, 1))
+    spread = np.where(variables.scale > 0.0, 10.0 * variables.scale, 1.0)
+    lower = np.where(np.isfinite(variables.lower), variables.lower, variables.given - spread)[columns]
+    upper = np.where(np.isfinite(variables.upper), variables.upper, variables.given + spread)[columns]
+    x[:, columns] = rng.uniform(lower, upper, (count, len(columns)))
+    return x

@@ -1,0 +1,198 @@
+"""Where a search for a layout begins: the given layout, the engineer's own ones, and what sampling finds.
+
+Start number ``index`` depends on the cell, the seed and this number only, so any worker makes the same one.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.model.seeds import generator
+from cellplan.search.starts.at_rest import Pool, Setting, pool, settings
+from cellplan.search.starts.combined import Judged, combined, judged
+from cellplan.search.starts.freedom import drawn_within
+from cellplan.search.starts.postures import branch_starts
+from cellplan.search.starts.problem import StartProblem
+
+SETTINGS_TRIED: Final = 4  # [-] places of the part at rest, one after the other until all operators reach one
+CLOSE_ENOUGH: Final = 0.0  # violation up to which no further place of the part is tried
+RANDOM: Final = 16  # [-] random layouts that are drawn for one start
+EVERY_RANDOM: Final = 8  # of the sampled starts every so manieth is drawn at random
+SHOWN: Final = 3  # [-] reasons that are named for one robot
+
+
+class Origin(StrEnum):
+    """Where a start comes from."""
+
+    GIVEN = "given"
+    TRY = "try"
+    BRANCH = "branch"
+    SAMPLED = "sampled"
+    RANDOM = "random"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Start:
+    """A layout from which a search may go on: all tools follow their paths.
+
+    Attributes:
+        x: Values of the variables in [m] or [rad], shape (n,).
+        start: Start posture with the tools on their paths in [rad] or [m], shape (nq,).
+        origin: Where it comes from.
+        text: The same in words.
+        violation: 0 where limits, speeds and the distances that were asked are kept; larger the farther off.
+        cycle: Shortest time in [s] of the same motion that keeps speeds and accelerations.
+    """
+
+    x: Array
+    start: Array
+    origin: Origin
+    text: str
+    violation: float
+    cycle: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Starts:
+    """The starts of one number, the best first, each far from those before it where that could be had.
+
+    Attributes:
+        found: The starts.
+        reason: Why there is none, or why draws failed that were tried before.
+    """
+
+    found: tuple[Start, ...]
+    reason: str
+
+    def __iter__(self) -> Iterator[Start]:
+        """The starts, the best first."""
+        return iter(self.found)
+
+
+class StartGenerator:
+    """All starts of one search."""
+
+    def __init__(self, problem: StartProblem, *, seed: int, tries: Sequence[tuple[str, Array, Array]] = ()) -> None:
+        """Take what is searched.
+
+        Args:
+            problem: The cell and its variables.
+            seed: Seed of the whole search.
+            tries: The engineer's own layouts: name, values of the variables, shape (n,), and start posture, (nq,).
+        """
+        self._problem, self._seed, self._tries = problem, seed, tuple(tries)
+
+    def at(self, index: int) -> Starts:
+        """The starts of one number: 0 the given layout, then those of the engineer, then sampled and random ones."""
+        if index == 0:
+            return self._of_layout(Origin.GIVEN, "the given layout", self._problem.variables.given, self._problem.start)
+        if index <= len(self._tries):
+            name, x, start = self._tries[index - 1]
+            return self._of_layout(Origin.TRY, f"layout of {name}", x, start)
+        number = index - len(self._tries) - 1
+        rng = generator(f"starts/{index}", self._seed)
+        if number % EVERY_RANDOM == EVERY_RANDOM - 1:
+            return self._random(rng, number)
+        return self._sampled(rng, number)
+
+    def _of_layout(self, origin: Origin, text: str, x: Array, start: Array) -> Starts:
+        """One layout as it is, else with other branches of inverse kinematics of the operators."""
+        problem = self._problem
+        as_it_is = judged(problem, x[None], start[None])
+        if len(as_it_is.x):
+            return Starts(found=self._starts(origin, text, as_it_is), reason="")
+        x, starts, reason = branch_starts(problem, x, start, generator(f"branches/{text}", self._seed))
+        others = judged(problem, x, starts) if len(x) else as_it_is
+        words = f"{text}: {reason or _words(others.drops)}"
+        return Starts(found=self._starts(Origin.BRANCH, f"{text}, other branches", others), reason=words)
+
+    def _sampled(self, rng: np.random.Generator, number: int) -> Starts:
+        """Starts with the part at rest first, put together afterwards."""
+        problem, best, reasons = self._problem, None, list[str]()
+        places, drops = settings(problem, rng, SETTINGS_TRIED)
+        if not places:
+            return Starts(found=(), reason=f"no posture of the holder can be used: {_words(drops)}")
+        for setting in places:
+            pools = self._pools(setting, rng, reasons)
+            if pools is None:
+                continue
+            found = judged(problem, *combined(problem, setting, pools, rng))
+            if not len(found.x):
+                reasons.append(f"no combination follows all paths: {_words(found.drops)}")
+            elif best is None or found.violation[0] < best.violation[0]:
+                best = found
+            if best is not None and best.violation[0] <= CLOSE_ENOUGH:
+                break
+        if best is None:
+            return Starts(found=(), reason="; ".join(reasons))
+        return Starts(
+            found=self._starts(Origin.SAMPLED, f"sampled with the part at rest, draw {number}", best),
+            reason="; ".join(reasons),
+        )
+
+    def _pools(self, setting: Setting, rng: np.random.Generator, reasons: list[str]) -> Mapping[int, Pool] | None:
+        """Bases of all operators; None, and the reason, where one has none."""
+        pools = dict[int, Pool]()
+        for robot in self._problem.operators:
+            pools[robot] = pool(self._problem, robot, setting, rng)
+            if not len(pools[robot].q):
+                name, drops = self._problem.cell.robots[robot].name, pools[robot].drops
+                reasons.append(f"'{name}' follows its path from none of {drops.total()} bases: {_words(drops)}")
+                return None
+        return pools
+
+    def _random(self, rng: np.random.Generator, number: int) -> Starts:
+        """Layouts drawn within the bounds, with all branches of inverse kinematics."""
+        problem = self._problem
+        everything = np.arange(len(problem.variables.names))
+        drawn = drawn_within(problem.variables, everything, RANDOM, rng)
+        parts = [branch_starts(problem, x, problem.start, rng) for x in drawn]
+        x, start = (np.concatenate([part[place] for part in parts]) for place in (0, 1))
+        if not len(x):
+            return Starts(found=(), reason=_most_frequent([part[2] for part in parts]))
+        found = judged(problem, x, start)
+        text = f"drawn within the bounds, draw {number}"
+        return Starts(
+            found=self._starts(Origin.RANDOM, text, found), reason="" if len(found.x) else _words(found.drops)
+        )
+
+    def _starts(self, origin: Origin, text: str, found: Judged) -> tuple[Start, ...]:
+        """Candidates as starts, spread."""
+        return tuple(
+            Start(
+                x=found.x[i],
+                start=found.start[i],
+                origin=origin,
+                text=text,
+                violation=float(found.violation[i]),
+                cycle=float(found.cycle[i]),
+            )
+            for i in _spread(found.violation, found.picks).tolist()
+        )
+
+
+def _spread(violation: Array, picks: Indices) -> Indices:
+    """An order that puts what shares no base with those before it first, of equal ones the better."""
+    first, others = list[int](), list[int]()
+    for candidate in range(len(violation)):
+        shares = any(np.any(picks[candidate] == picks[other]) for other in first)
+        (others if shares else first).append(candidate)
+    feasible = [i for i in first if violation[i] == 0.0]
+    return np.array([*feasible, *sorted({*first, *others} - set(feasible))], dtype=np.intp)
+
+
+def _words(drops: Counter[str]) -> str:
+    """The most frequent reasons in words."""
+    shown = sorted(((count, reason) for reason, count in drops.items() if count), key=lambda each: (-each[0], each[1]))
+    return ", ".join(f"{reason} ({count})" for count, reason in shown[:SHOWN]) or "nothing was drawn"
+
+
+def _most_frequent(reasons: Sequence[str]) -> str:
+    """The reason that comes most often, and how often."""
+    (reason, count), *_ = sorted(Counter(reasons).items(), key=lambda each: (-each[1], each[0]))
+    return f"{reason} (in {count} of {len(reasons)} layouts)"

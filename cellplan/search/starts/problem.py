@@ -1,0 +1,145 @@
+"""What all starts of one cell share: its variables, its job at nodes, its bodies and the paths of its tools."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.model.cell import Cell
+from cellplan.model.motion import Schedule
+from cellplan.model.task import Frame
+from cellplan.planning.modes import plan_phases
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.start.inverse_kinematics import finite_limits
+from cellplan.planning.timing.schedule import clock_paths, schedule_paths
+from cellplan.scene.scene import Scene
+from cellplan.search.distances.cell_distances import CellDistances
+from cellplan.search.kernel.job import Job, Layouts
+from cellplan.search.starts.contacts import Contacts
+from cellplan.search.starts.freedom import FIXED, Freedom, StartVariables
+from cellplan.search.starts.reaching import BaseBounds, FreeArm, Goal
+
+NODES: Final = 65  # [-] of a motion: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
+NODES_AT_REST: Final = 24  # [-] of a path with the part at rest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StartProblem:
+    """A cell whose layout is searched.
+
+    Attributes:
+        cell: The cell.
+        variables: What is varied.
+        freedom: Which of it places which robot.
+        start: Start postures near the given ones, in mid-range where none is given, in [rad] or [m], shape (nq,).
+        margin: Demanded distance of each joint from its limits in [rad] or [m], shape (nq,).
+        job: The tasks at the nodes of a motion.
+        at_rest: The tasks at fewer nodes, for paths with the part at rest.
+        scene: The bodies.
+        arms: Kinematics of each robot, base and tool left open.
+        distances: What each layout is judged by in the end.
+        all_contacts: All pairs.
+        contacts: Pairs of each robot with itself, the surroundings and the first holder with the part.
+    """
+
+    cell: Cell
+    variables: StartVariables
+    freedom: Freedom
+    start: Array
+    margin: Array
+    job: Job
+    at_rest: Job
+    scene: Scene
+    arms: tuple[FreeArm, ...]
+    distances: CellDistances
+    all_contacts: Contacts
+    contacts: tuple[Contacts, ...]
+
+    @classmethod
+    def of(cls, cell: Cell, variables: StartVariables, *, margin: Array | float = 0.0) -> "StartProblem":
+        """Prepare a cell.
+
+        Args:
+            cell: The cell; its first phase is what starts are judged by.
+            variables: What is varied.
+            margin: Demanded distance of the joints from their limits in [rad] or [m], shape (nq,) or one number.
+
+        Raises:
+            InputError: The paths or bodies of the cell are not usable.
+        """
+        scene, (schedule, moving) = Scene.from_cell(cell), _first_phase(cell)
+        start = np.concatenate([_start_of(robot.start, *finite_limits(robot.model)) for robot in cell.robots])
+        holder = cell.positioners[:1]
+        return cls(
+            cell=cell,
+            variables=variables,
+            freedom=Freedom.of(cell, variables, start),
+            start=start,
+            margin=np.broadcast_to(np.asarray(margin, dtype=float), (cell.joint_count,)),
+            job=Job.of(cell, schedule, moving=moving, nodes=NODES),
+            at_rest=Job.of(cell, schedule, moving=moving, nodes=NODES_AT_REST),
+            scene=scene,
+            arms=tuple(FreeArm(robot) for robot in cell.robots),
+            distances=CellDistances.of(scene, variables),
+            all_contacts=Contacts(scene, [robot.name for robot in cell.robots]),
+            contacts=tuple(Contacts(scene, [robot.name], holder) for robot in cell.robots),
+        )
+
+    @property
+    def operators(self) -> tuple[int, ...]:
+        """Indices of the robots with a task or grasp of their own, the first holder left out, in the order of these."""
+        return tuple(index for index in self._working if index != self.cell.carrier)
+
+    @property
+    def _working(self) -> tuple[int, ...]:
+        """Indices of the robots of all relations."""
+        return tuple(self.cell.index(relation.robot) for relation in self.job.relations)
+
+    def goal(self, robot: int, X_WP: Array) -> Goal | None:
+        """The path of a robot with the part at rest, X_WP of shape (4, 4); None for robots without one."""
+        if robot not in self._working:
+            return None
+        place = self._working.index(robot)
+        relation = self.job.relations[place]
+        X_WR = X_WP if relation.relative_to is Frame.PART else np.eye(4)
+        return Goal(relation=relation, X_RT=np.moveaxis(self.at_rest.X[:, :, place], -1, 0), X_WR=X_WR)
+
+    def part_pose(self, layouts: Layouts) -> Array:
+        """The part at the start of the first of some layouts, shape (4, 4)."""
+        if self.cell.carrier is None:
+            return self.cell.part.X_CP
+        columns = self.cell.columns(self.cell.positioners[0])
+        X_BF = self.arms[self.cell.carrier].flanges(layouts.start[:1, columns])[0]
+        X_WB, X_FT = (part[0, self.cell.carrier] for part in (layouts.X_WB, layouts.X_FT))
+        found: Array = X_WB @ X_BF @ X_FT @ self.cell.part.X_CP
+        return found
+
+    def bounds(self, robot: int) -> BaseBounds:
+        """How far the base of a robot may be moved."""
+        columns = self.freedom.base[robot]
+        lower, upper = (np.append(part, 0.0)[columns[:3]] for part in (self.variables.lower, self.variables.upper))
+        return BaseBounds(is_free=columns != FIXED, lower=lower, upper=upper)
+
+    def drawn_columns(self, robot: int) -> Indices:
+        """Columns of what is drawn for an operator: all its own but the positions of its joints at the start."""
+        own = self.freedom.own[robot]
+        return own[~np.isin(own, self.freedom.columns)]
+
+    def with_starts(self, x: Array, start: Array) -> Array:
+        """Variables, shape (K, n), with those that are positions of joints at the start taken from these, (K, nq)."""
+        found, columns = x.copy(), self.freedom.columns
+        found[:, columns[columns != FIXED]] = start[:, columns != FIXED]
+        return found
+
+
+def _start_of(start: Array | None, lower: Array, upper: Array) -> Array:
+    """A start posture, in mid-range where none is given."""
+    return 0.5 * (lower + upper) if start is None else start
+
+
+def _first_phase(cell: Cell) -> tuple[Schedule, tuple[str, ...]]:
+    """The tasks of the first phase on their clock, and the robots that move in it."""
+    paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
+    phase = plan_phases(cell).program[0]
+    return schedule_paths(cell, [paths[name] for name in phase.tasks]), tuple(phase.moving)

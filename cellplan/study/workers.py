@@ -1,0 +1,171 @@
+"""Worker processes of a study: each trial is worked out in a child process, which it may crash or block."""
+
+import atexit
+import json
+import pickle
+import re
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import import_module
+from types import TracebackType
+from typing import Final, NamedTuple
+
+from cellplan.errors import CellplanError, OverrunError, StudyStoppedError, TimeLimitError
+from cellplan.guard import ChildStock, Guard
+from cellplan.study.trial import Outcome, TrialStatus
+from cellplan.study.variants import Variant
+
+ADDRESS: Final = re.compile(r" at 0x[0-9a-fA-F]+")  # of an object in an error text: another one in each process
+PATIENCE: Final = 4.0  # [-] clock over processor: trials may share a processor with others
+START_S: Final = 120.0  # [s] of the processor within which a worker has imported its modules
+
+Evaluate = Callable[[Variant], Outcome]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Limits of one trial, far above what an honest one needs.
+
+    Attributes:
+        seconds: Longest time of the processor; of the clock, four times as long.
+        megabytes: Largest address space of its process, Python and its libraries included.
+    """
+
+    seconds: float = 3600.0
+    megabytes: int = 16_000
+
+
+class Lost(NamedTuple):
+    """Why the process of a trial ended without an outcome."""
+
+    reason: str
+    is_late: bool = False
+
+
+class Workers(ThreadPoolExecutor):
+    """Executor whose threads each wait for a worker process; to be used in a ``with`` statement.
+
+    The processes start at once and import modules while the caller goes on. They end with the ``with`` statement, in
+    the middle of a trial if it is left by an exception, and with this process, however that ends.
+    """
+
+    def __init__(self, count: int, modules: Sequence[str] = ()) -> None:
+        """Start the processes.
+
+        Args:
+            count: Number of processes.
+            modules: Names of modules that trials need.
+        """
+        self.count, self._children = count, ChildStock()
+        super().__init__(count, thread_name_prefix="cellplan-worker", initializer=_use, initargs=(self._children,))
+        for _ in range(count):
+            self.submit(_warm, tuple(modules))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """End the processes."""
+        self.shutdown(wait=False, cancel_futures=True)
+        self._children.end()
+        self.shutdown(wait=True)
+
+
+CHILDREN: Final = ChildStock()  # of threads that another executor has made
+atexit.register(CHILDREN.end)
+_thread = threading.local()
+
+
+def _use(children: ChildStock) -> None:
+    """Have this thread ask processes of its own executor."""
+    _thread.children = children
+
+
+def _children() -> ChildStock:
+    children: ChildStock = getattr(_thread, "children", CHILDREN)
+    return children
+
+
+def packed(evaluate: Evaluate) -> bytes:
+    """What an evaluator is sent to a worker as.
+
+    Raises:
+        TypeError: It cannot be sent to another process.
+    """
+    try:
+        return pickle.dumps(evaluate)
+    except (AttributeError, TypeError, pickle.PicklingError) as error:
+        raise TypeError(f"evaluate: expected a function of a module, bound to plain data, got {error}") from None
+
+
+def outcome_in_child(evaluate: bytes, variant: Variant, limits: Limits) -> str | Lost:
+    """Outcome of a trial as JSON, worked out in a child process of this one; or how it was lost.
+
+    Args:
+        evaluate: The packed evaluator.
+        variant: Number and values of the trial.
+        limits: Its limits.
+
+    Raises:
+        StudyStoppedError: The evaluator says that no trial can be worked out any more.
+    """
+    guard = Guard(
+        file=f"trial {variant.number}",
+        worker="its process",
+        seconds=limits.seconds,
+        patience=PATIENCE,
+        megabytes=limits.megabytes,
+    )
+    try:
+        text: str = _children().call(evaluated, evaluate, variant, guard=guard)
+    except OverrunError as error:
+        return Lost(str(error), isinstance(error, TimeLimitError))
+    return text
+
+
+def evaluated(evaluate: bytes, variant: Variant) -> str:
+    """Outcome of a trial as JSON; an exception of the evaluator is one too.
+
+    Raises:
+        StudyStoppedError: The evaluator says that no trial can be worked out any more.
+        MemoryError: There is not enough of it.
+    """
+    try:
+        return _text(_unpacked(evaluate)(variant))
+    except (StudyStoppedError, MemoryError):
+        raise
+    except Exception as error:  # noqa: BLE001 - the trial's own
+        said = (str(error).splitlines() or [""])[0]
+        reason = said if isinstance(error, CellplanError) else f"{type(error).__name__}: {said}"
+        return _text(crashed(ADDRESS.sub("", reason)))
+
+
+def crashed(reason: str) -> Outcome:
+    """Outcome of a trial that has none of its own."""
+    return Outcome(status=TrialStatus.CRASHED, reason=reason, figures={})
+
+
+@lru_cache(maxsize=1)
+def _unpacked(evaluate: bytes) -> Evaluate:
+    """The evaluator, which keeps what it has read from one trial to the next."""
+    found: Evaluate = pickle.loads(evaluate)  # noqa: S301 - packed by the process that asks
+    return found
+
+
+def _text(outcome: Outcome) -> str:
+    return json.dumps(outcome.record, ensure_ascii=False, allow_nan=False)
+
+
+def _warm(modules: tuple[str, ...]) -> None:
+    """Import modules in a child process; what goes wrong does so again in the first trial, which says it."""
+    guard = Guard(file="cellplan", worker="a worker process", seconds=START_S, patience=PATIENCE, megabytes=16_000)
+    with suppress(CellplanError):
+        _children().call(_imported, modules, guard=guard)
+
+
+def _imported(modules: tuple[str, ...]) -> None:
+    for name in modules:
+        import_module(name)
