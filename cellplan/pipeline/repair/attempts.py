@@ -32,6 +32,17 @@ class RemedyKind(StrEnum):
     DURATION = "duration"  # a longer cycle
 
 
+WORDS: Final = {
+    RemedyKind.TOOL: "length, tilt and roll of the rod of",
+    RemedyKind.SPIN: "spin of the tool of",
+    RemedyKind.FREE_SPIN: "free spin of the tool of",
+    RemedyKind.WEIGHTS: "joint weights of",
+    RemedyKind.BRANCH: "start branch of",
+    RemedyKind.DURATION: "longer cycle",
+}
+CONTINUOUS: Final = frozenset({RemedyKind.LAYOUT, RemedyKind.SPIN, RemedyKind.WEIGHTS, RemedyKind.TOOL})
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
     """What may change at once, as plain data.
@@ -76,25 +87,12 @@ class Attempt:
     def text(self) -> str:
         """What may change, in words."""
         names = listed_names(self.robots)
-        match self.kind:
-            case RemedyKind.LAYOUT if self.robots == (PART,):
-                return "place of the part at rest"
-            case RemedyKind.LAYOUT:
-                return f"{listed_names(list(dict.fromkeys(map(_what, self.addresses))))} of {names}"
-            case RemedyKind.TOOL:
-                return f"length, tilt and roll of the rod of {names}"
-            case RemedyKind.SPIN:
-                return f"spin of the tool of {names}"
-            case RemedyKind.FREE_SPIN:
-                return f"spin of the tool of {names} left open"
-            case RemedyKind.WEIGHTS:
-                return f"joint weights of {names}"
-            case RemedyKind.BRANCH:
-                return f"start branch of {names}"
-            case RemedyKind.METHOD:
-                return f"method {self.values['solver.method']}"
-            case RemedyKind.DURATION:
-                return "longer cycle"
+        if self.kind is RemedyKind.LAYOUT:
+            what = listed_names(list(dict.fromkeys(map(_what, self.addresses))))
+            return "place of the part at rest" if self.robots == (PART,) else f"{what} of {names}"
+        if self.kind is RemedyKind.METHOD:
+            return f"method {self.values['solver.method']}"
+        return f"{WORDS[self.kind]} {names}".rstrip()
 
 
 def listed_names(names: Sequence[str]) -> str:
@@ -147,9 +145,7 @@ def of_branches(cell: Cell) -> Iterator[Attempt]:
     for robot in cell.robots:
         if robot.start is not None and any(task.robot == robot.name for task in cell.tasks):
             key = "start" if "start" in document[robot.name] else "start_deg"
-            yield Attempt(
-                kind=RemedyKind.BRANCH, robots=(robot.name,), values={f"robots.{robot.name}.{key}": "auto"}
-            )
+            yield Attempt(kind=RemedyKind.BRANCH, robots=(robot.name,), values={f"robots.{robot.name}.{key}": "auto"})
 
 
 def of_weights(cell: Cell, settings: LayoutSettings) -> Iterator[Attempt]:

@@ -55,26 +55,22 @@ def confirmed(ready: Prepared, x: Array, start: Array) -> Confirmed:
         x: Values of the variables, shape (n,).
         start: Start posture in [rad] or [m], shape (nq,).
     """
-    demands, effort, problem = ready.demands(), Effort(iterations=ITERATIONS, keys=KEYS, trust=0.2), None
-    variables = ready.variables
+    variables, problem, demands = ready.variables, ready.problem(NODES), ready.demands()
+    effort = Effort(iterations=ITERATIONS, keys=KEYS, trust=0.2)
+    done = Confirmed(values={}, cost=0.0, solved=None, reason="a tool cannot follow its path", solves=0)
     for solves in range(1, SOLVES + 1):
-        x, start = neat(ready, x, start)
-        values = changed_values(ready, x, start)
-        cost = float(np.abs(x - variables.given) @ variables.cost)
+        found = improve(problem, x, start, demands, effort)
+        if found is None or not (found.is_conforming or solves == 1):
+            break
+        x, start = neat(ready, found.x, found.start)
+        values, cost = changed_values(ready, x, start), float(np.abs(x - variables.given) @ variables.cost)
         solved, reason = solved_cell(ready.cell, values)
         done = Confirmed(values=values, cost=cost, solved=solved, reason=reason, solves=solves)
-        if solved is None or not reason or solves == SOLVES:
-            return done
-        problem = problem or ready.problem(NODES)
-        tighter = _tightened(solved, demands, effort, problem.times)
+        tighter = _tightened(solved, demands, effort, problem.times) if solved is not None and reason else None
         if tighter is None:
-            return done
+            break
         demands, effort = tighter
-        found = improve(problem, x, start, demands, effort)
-        if found is None or not found.is_conforming:
-            return done
-        x, start = found.x, found.start
-    raise AssertionError("unreachable")
+    return done
 
 
 def solved_cell(cell: Cell, values: Mapping[str, object]) -> tuple[Solved | None, str]:
@@ -88,9 +84,7 @@ def solved_cell(cell: Cell, values: Mapping[str, object]) -> tuple[Solved | None
     return solved, failed[0].message if failed else ""
 
 
-def _tightened(
-    solved: Solved, demands: Demands, effort: Effort, times: Array
-) -> tuple[Demands, Effort] | None:
+def _tightened(solved: Solved, demands: Demands, effort: Effort, times: Array) -> tuple[Demands, Effort] | None:
     """Demands that ask for what the verified motion lacks; None where it lacks something else."""
     failed = solved.failed
     names = {check.name for check in failed}

@@ -1,6 +1,5 @@
 """A motion solved and verified in full, as plain figures, and what it lacks of the demands of a repair."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -16,8 +15,16 @@ from cellplan.report.record.common import check_record, number
 ROUNDING: Final = 1e-9  # [rad] or [m] by which a margin may be missed
 MARGIN: Final = "joint_margin"  # a demanded margin among the checks
 TIMED: Final = frozenset(
-    {"joint_velocity", "joint_acceleration", "joint_acceleration_assumed", "joint_jerk", "part_acceleration", "tool_speed"}
+    {
+        "joint_velocity",
+        "joint_acceleration",
+        "joint_acceleration_assumed",
+        "joint_jerk",
+        "part_acceleration",
+        "tool_speed",
+    }
 )  # checks that a slower motion passes
+LIMITS: Final = frozenset({"joint_position", MARGIN, *TIMED})  # checks of limits of joints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,11 +111,6 @@ class Solved:
                 )
             )
         return checks
-
-
-def own_failures(figures: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Failed checks of plain figures."""
-    return list(figures["failed"])
 
 
 def demanded_margin(cell: Cell) -> Array:

@@ -6,7 +6,7 @@ from typing import Any, Final
 from cellplan.model.cell import Cell
 from cellplan.pipeline.repair.attempts import Attempt, RemedyKind, listed_names
 from cellplan.pipeline.repair.neat import written_at
-from cellplan.pipeline.repair.solved import MARGIN
+from cellplan.pipeline.repair.solved import MARGIN, TIMED
 from cellplan.report.record.advice import EffectRecord
 from cellplan.report.record.common import number
 
@@ -131,11 +131,17 @@ def effects(given: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Effect
             found.append(_effect(check, old, new, unit, text))
             continue
         now = after.get((check["name"], subject))
-        if check["name"] == "collision":
-            found.append(_effect(check, check["value"], 0.0, "s", f"{subject}: no contact"))
+        name, unit, old = check["name"].removeprefix("joint_").replace("_", " "), check["unit"], check["value"]
+        if name == "collision":
+            found.append(_effect(check, old, 0.0, unit, f"{subject}: no contact"))
+        elif now is not None and check["name"] in TIMED:
+            shares = [100.0 * each["value"] / each["limit"] for each in (check, now)]
+            text = f"{subject.replace('/', ' ')} {name} {shares[0]:.3g} % -> {shares[1]:.3g} % of its limit"
+            found.append(_effect(check, shares[0], shares[1], "%", text))
         elif now is not None:
-            text = f"{check['name'].replace('_', ' ')} {subject} {check['value']:.3g} -> {now['value']:.3g} {check['unit']}"
-            found.append(_effect(check, check["value"], now["value"], check["unit"], text))
+            found.append(
+                _effect(check, old, now["value"], unit, f"{name} {subject} {old:.3g} -> {now['value']:.3g} {unit}")
+            )
     return found
 
 
