@@ -3,12 +3,14 @@
 The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
-- compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``base_map``, ``rehearse``
+- compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``base_map``, ``search_layout``,
+  ``rehearse``
 - verify: ``verify``, ``open_gate``
 - write: ``write_run``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``, ``export_program``
 - inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``BaseGrid``,
-  ``CompareJob``
-- results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``
+  ``CompareJob``, ``LayoutRequest``, ``Stop``
+- results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``,
+  ``LayoutResult``
 - errors: ``CellplanError``
 
 Names are imported at first use, so that ``import cellplan`` and the help of the command line are fast.
@@ -39,6 +41,8 @@ if TYPE_CHECKING:
     from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
     from cellplan.pipeline.fastest.write import write_fastest
     from cellplan.pipeline.gate.open_gate import open_gate
+    from cellplan.pipeline.layout.request import LayoutRequest
+    from cellplan.pipeline.layout.search import LayoutResult, search_layout
     from cellplan.pipeline.rehearsal.rehearse import rehearse
     from cellplan.pipeline.rehearsal.write import write_rehearsal
     from cellplan.pipeline.screen import screen
@@ -48,6 +52,7 @@ if TYPE_CHECKING:
     from cellplan.pipeline.verify import verify
     from cellplan.pipeline.write_run import write_run
     from cellplan.planning.layout_screening import Candidates, Screening
+    from cellplan.study.study import Stop
     from cellplan.study.variants import Axis
 
 _HOME: Final = {
@@ -58,6 +63,8 @@ _HOME: Final = {
     "CellplanError": "errors",
     "Check": "model.report",
     "CompareJob": "pipeline.compare",
+    "LayoutRequest": "pipeline.layout.request",
+    "LayoutResult": "pipeline.layout.search",
     "Motion": "model.motion",
     "Part": "model.cell",
     "Program": "model.motion",
@@ -66,6 +73,7 @@ _HOME: Final = {
     "Screening": "planning.layout_screening",
     "ShortestCycles": "pipeline.fastest.shortest",
     "Solution": "pipeline.solution",
+    "Stop": "study.study",
     "SweepJob": "pipeline.sweep",
     "Task": "model.task",
     "Toolpath": "model.toolpath",
@@ -78,6 +86,7 @@ _HOME: Final = {
     "open_gate": "pipeline.gate.open_gate",
     "rehearse": "pipeline.rehearsal.rehearse",
     "screen": "pipeline.screen",
+    "search_layout": "pipeline.layout.search",
     "solve": "pipeline.solve",
     "sweep": "pipeline.sweep",
     "verify": "pipeline.verify",
@@ -95,6 +104,8 @@ __all__ = [
     "CellplanError",
     "Check",
     "CompareJob",
+    "LayoutRequest",
+    "LayoutResult",
     "Motion",
     "Part",
     "Program",
@@ -103,6 +114,7 @@ __all__ = [
     "Screening",
     "ShortestCycles",
     "Solution",
+    "Stop",
     "SweepJob",
     "Task",
     "Toolpath",
@@ -116,6 +128,7 @@ __all__ = [
     "open_gate",
     "rehearse",
     "screen",
+    "search_layout",
     "solve",
     "sweep",
     "verify",

@@ -11,6 +11,7 @@ from cellplan.pipeline.export import EXPORTERS
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 PRINTED = {
     "batch_of_cells": ["examples/plate.yaml: passed; smallest joint margin", "examples/missing.yaml: ", "no such file"],
+    "layout": ["certified after 1 trial, 1 solved", "solved again: passed True"],
     "own_exporter": ["written: left.json right.json"],
     "own_method": ["circle: 150 Euler steps, position error 0.2"],
     "plot_joint": ["picture: outputs/examples/joint.png"],
@@ -20,6 +21,7 @@ PRINTED = {
     "verify_edited_table": ["as written: passed", "edited: position error of task 'circle': 0.159 mm at 1.480 s"],
 }  # by script: texts of its output, in their order
 WRITTEN = {
+    "layout": ["outputs/examples/layout/best.yaml", "outputs/examples/layout/study.html"],
     "own_exporter": ["outputs/examples/json/left.json", "outputs/examples/json/right.json"],
     "plot_joint": ["outputs/examples/joint.png"],
     "solve": ["outputs/examples/solve/report.html", "outputs/examples/solve/tables/right.csv"],

@@ -14,13 +14,27 @@ class ChildStock:
 
     def __init__(self) -> None:
         """Begin without a process."""
+        self._prepared: dict[ChildProcess, object] = {}
         self._lock = threading.Lock()
         self._idle: list[ChildProcess] = []
         self._busy: list[ChildProcess] = []
         self._is_open = True
 
-    def call(self, function: Callable[..., Any], *arguments: object, guard: Guard) -> Any:
+    def call(
+        self,
+        function: Callable[..., Any],
+        *arguments: object,
+        guard: Guard,
+        prepare: tuple[Callable[[Any], object], object, Guard] | None = None,
+    ) -> Any:
         """Result of ``function(*arguments)``, worked out in a child process; as ``in_child``.
+
+        Args:
+            function: A function of a module; the child imports it from there.
+            *arguments: Plain data.
+            guard: Names for messages, and limits.
+            prepare: What a process does first that has not done so, its argument and limits: imports, for which the
+                limits of the job are too narrow.
 
         Raises:
             OverrunError: The work crashed, or took too long or too much memory.
@@ -28,6 +42,10 @@ class ChildStock:
         """
         child = self._taken()
         try:
+            if prepare is not None and self._prepared.get(child) != prepare[1]:
+                begin, argument, limits = prepare
+                value_of(child.ask(job_here(begin, (argument,), limits), limits), limits)
+                self._prepared[child] = argument
             value = value_of(child.ask(job_here(function, arguments, guard), guard), guard)
         except OverrunError:
             child.end()
@@ -37,6 +55,8 @@ class ChildStock:
                 self._busy.remove(child)
                 if self._is_open and child.is_usable:
                     self._idle.append(child)
+                else:
+                    self._prepared.pop(child, None)
         return value
 
     def end(self) -> None:

@@ -13,6 +13,7 @@ from cellplan.model.robot import RobotModel
 START_COUNT: Final = 4  # configurations the search climbs from; the bundled arms need one
 GRID_COUNT: Final = 25  # positions tried per joint and round
 SWEEP_COUNT: Final = 24  # rounds over all joints; the grid shrinks by half in each, down to a rounding error
+ROUNDING: Final = 1e-9  # [m] poses are worked out to less than that
 UNLIMITED_RANGE: Final = 2.0 * np.pi  # [rad] range of a joint that may turn without end
 
 
@@ -46,6 +47,24 @@ def arm_reach(model: RobotModel, *, rounds: int = SWEEP_COUNT) -> float:
     upper = np.where(np.isfinite(model.upper), model.upper, 0.5 * UNLIMITED_RANGE)
     starts = np.random.default_rng(0).uniform(lower, upper, size=(START_COUNT, len(lower)))
     return _climb(distances, starts, (lower, upper), rounds)
+
+
+def reach_bound(robot: Robot) -> float:
+    """Distance in [m] from the point of the first axis that the tool tip never exceeds, whatever the joints are.
+
+    The points of two axes that follow each other belong to one link: their distance does not change, but for slides.
+    """
+    model, X_BT = robot.model, robot.model.X_BF @ robot.tool.X_FT
+    links = model.links_to_flange
+    if not links:
+        return np.inf
+    points = np.array([*(model.axes[link].point_B for link in links), X_BT[:3, 3]])
+    strokes = [
+        abs(drive.ratio) * max(abs(joint.lower), abs(joint.upper)) + abs(drive.offset)
+        for link, drive in ((link, model.drive(link)) for link in links)
+        if not (joint := model.joints[drive.joint]).is_revolute
+    ]
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum() + sum(strokes)) + ROUNDING
 
 
 def _climb(distances: Callable[[Array], Array], starts: Array, limits: tuple[Array, Array], rounds: int) -> float:

@@ -6,7 +6,7 @@ one of them shows as an error in the report ([Ribeiro2010]_ appendix B).
 
 import numpy as np
 
-from cellplan.geometry.transforms import Array, pose_from, rotation_about
+from cellplan.geometry.transforms import Array, pose_from, rotation_about, skew
 from cellplan.model.cell import Robot
 from cellplan.model.robot import FollowerJoint, Joint
 
@@ -89,9 +89,26 @@ class ScrewChain:
         return np.concatenate([np.where(is_revolute, np.cross(s0, s), s), np.where(is_revolute, s, 0.0)], axis=-1)
 
     def tool_motion(self, q: Array) -> tuple[Array, Array]:
-        """`tool_poses` and `flange_screws` at once, for searches that need both many times."""
-        D = self.link_displacements(q)
-        return D[:, self._flange_link + 1] @ self._X_BT, self._screws(D)
+        """`tool_poses` and `flange_screws` at once, for searches that need both many times.
+
+        With the matrix X of a unit screw ``A(q) = 1 + sin(q) X + (1 - cos(q)) X^2``, or ``1 + q X`` for a slide. What
+        the links before an axis give with X, X^2, its direction and its point is one product for all configurations.
+        """
+        D, screws = np.tile(self._X_WB, (len(q), 1, 1)), np.zeros((len(q), 6, self._n))
+        positions = self._positions(q)
+        for link in self._links_to_flange:
+            axis, drive, position = self._axes[link], self._drives[link], positions[link][:, None, None]
+            carried = (D.reshape(-1, 4) @ _screw_factors(axis)).reshape(len(q), 4, 10)
+            s, s0 = carried[:, :3, 8], carried[:, :3, 9]
+            if axis.is_revolute:
+                D = D + np.sin(position) * carried[:, :, :4] + (1.0 - np.cos(position)) * carried[:, :, 4:8]
+                for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+                    screws[:, i, drive.joint] += drive.ratio * (s0[:, j] * s[:, k] - s0[:, k] * s[:, j])
+                screws[:, 3:, drive.joint] += drive.ratio * s
+            else:
+                D = D + position * carried[:, :, :4]
+                screws[:, :3, drive.joint] += drive.ratio * s
+        return D @ self._X_BT, screws
 
     def _screws(self, D: Array) -> Array:
         """Screws of the joints that carry the flange, from link displacements, shape (N, 6, n)."""
@@ -113,6 +130,19 @@ def screw_displacement(axis: Joint | FollowerJoint, position: Array) -> Array:
         return pose_from(np.broadcast_to(np.eye(3), (len(position), 3, 3)), position[:, None] * axis.axis_B)
     R = rotation_about(axis.axis_B, position)
     return pose_from(R, axis.point_B - R @ axis.point_B)
+
+
+def _screw_factors(axis: Joint | FollowerJoint) -> Array:
+    """Matrix X of an axis' unit screw, its square, the axis' direction and its point side by side, shape (4, 10)."""
+    factors = np.zeros((4, 10))
+    if axis.is_revolute:
+        factors[:3, :3] = skew(axis.axis_B)
+        factors[:3, 3] = -factors[:3, :3] @ axis.point_B
+        factors[:, 4:8] = factors[:, :4] @ factors[:, :4]
+    else:
+        factors[:3, 3] = axis.axis_B
+    factors[:3, 8], factors[:, 9] = axis.axis_B, (*axis.point_B, 1.0)
+    return factors
 
 
 def _moved_screw(axis: Joint | FollowerJoint, D: Array) -> Array:

@@ -37,8 +37,8 @@ class VaryRange:
         address: Its address in the file: ``robots.kuka.base.x_mm``.
         kind: What it belongs to.
         name: Robot or task; empty for the part at rest.
-        index: Which component: x, y, z, roll, pitch, yaw of a pose; length, tilt, roll of a rod; the joint of a start
-            posture or of weights.
+        index: Which component: x, y, z, roll, pitch, yaw of a pose; length, tilt, roll of a rod; the joint of
+            weights or of a start posture.
         is_angle: Whether it is an angle, in [rad]; a length in [m] or a number otherwise.
         lower: Lowest value.
         upper: Highest value.

@@ -36,8 +36,7 @@ from cellplan.report.record.summary import summary_record
 from cellplan.report.record.variant_figures import variant_curves, variant_figures
 from cellplan.study.folder import run_folder, write_results
 from cellplan.study.study import Study
-from cellplan.study.trial import Outcome, TrialStatus
-from cellplan.study.variants import Variant
+from cellplan.study.trial import Outcome, TrialStatus, Variant
 
 MODE: Final = "motion.mode"
 REPORT: Final = "report.json"

@@ -20,8 +20,8 @@ from cellplan.report.record.key_figures import KeyFigures, key_figures
 from cellplan.report.record.study import StudyRecord, study_record
 from cellplan.study.folder import run_folder, write_results
 from cellplan.study.study import Study
-from cellplan.study.trial import Outcome
-from cellplan.study.variants import Axis, Variant, combinations
+from cellplan.study.trial import Outcome, Variant
+from cellplan.study.variants import Axis, combinations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

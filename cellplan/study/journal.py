@@ -12,8 +12,7 @@ from typing import IO, Any, Final, Self
 from cellplan.errors import InputError, StudyStoppedError
 from cellplan.io.input.files import read_regular_file
 from cellplan.study.folder import AHEAD, JOURNAL, SCHEMA, write_whole
-from cellplan.study.trial import Trial
-from cellplan.study.variants import Variant
+from cellplan.study.trial import Trial, Variant
 
 MAX_BYTES: Final = 500_000_000
 

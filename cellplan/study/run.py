@@ -1,16 +1,13 @@
-"""Running of trials: on an executor, each in a child process, outcomes as they come or in the order of the variants."""
+"""Running of trials on an executor, each in a child process."""
 
 import json
-import signal
-import threading
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import contextmanager
 from typing import Final
 
-from cellplan.study.trial import Outcome
-from cellplan.study.variants import Variant
+from cellplan.study.trial import Outcome, Variant
 from cellplan.study.workers import Evaluate, Limits, Lost, Workers, crashed, outcome_in_child, packed
 
 BEGUN: Final = 256  # trials that are begun at once on an executor of the caller
@@ -124,27 +121,3 @@ def _in_order(found: Iterator[tuple[Variant, Outcome]]) -> Iterator[Outcome]:
         while following in early:
             yield early.pop(following)
             following += 1
-
-
-@contextmanager
-def deferred_interruptions() -> Iterator[None]:
-    """Let Ctrl-C and its like wait for the end of the ``with`` statement: half a line is none."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    caught: list[int] = []
-    numbers = [
-        number
-        for name in ("SIGINT", "SIGTERM", "SIGHUP")
-        if (number := getattr(signal, name, None)) is not None
-        and signal.getsignal(number) is signal.default_int_handler
-    ]
-    try:
-        for number in numbers:
-            signal.signal(number, lambda caught_number, _frame: caught.append(caught_number))
-        yield
-    finally:
-        for number in numbers:
-            signal.signal(number, signal.default_int_handler)
-        if caught:
-            raise KeyboardInterrupt

@@ -160,4 +160,4 @@ def _duration(seconds: float) -> str:
     """A time in the unit that suits it."""
     if seconds >= HOUR:
         return f"{seconds / HOUR:.1f} h"
-    return f"{seconds / MINUTE:.0f} min" if seconds >= 2 * MINUTE else f"{seconds:.0f} s"
+    return f"{seconds / MINUTE:.1f} min" if seconds >= 2 * MINUTE else f"{seconds:.0f} s"

@@ -6,7 +6,18 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self
 
-from cellplan.study.variants import Variant
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One combination of values.
+
+    Attributes:
+        number: Its place among all combinations, from 0.
+        values: Value by address.
+    """
+
+    number: int
+    values: Mapping[str, object]
 
 
 class TrialStatus(StrEnum):

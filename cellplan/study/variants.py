@@ -1,7 +1,7 @@
 """Variants of a cell: values at addresses of its file, every combination of several lists."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from itertools import product
@@ -11,6 +11,7 @@ from typing import Final
 from cellplan.errors import InputError
 from cellplan.io.cell.changes import plain_values, read_setting
 from cellplan.io.input.findings import shown
+from cellplan.study.trial import Variant
 
 MAX_VARIANTS: Final = 100_000  # more would take weeks
 NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -29,19 +30,6 @@ class Axis:
 
     address: str
     values: tuple[object, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Variant:
-    """One combination of values.
-
-    Attributes:
-        number: Its place among all combinations, from 0.
-        values: Value by address.
-    """
-
-    number: int
-    values: Mapping[str, object]
 
 
 def read_axis(text: str) -> Axis:

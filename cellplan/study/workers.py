@@ -16,12 +16,13 @@ from typing import Final, NamedTuple
 
 from cellplan.errors import CellplanError, OverrunError, StudyStoppedError, TimeLimitError
 from cellplan.guard import ChildStock, Guard
-from cellplan.study.trial import Outcome, TrialStatus
-from cellplan.study.variants import Variant
+from cellplan.study.trial import Outcome, TrialStatus, Variant
 
 ADDRESS: Final = re.compile(r" at 0x[0-9a-fA-F]+")  # of an object in an error text: another one in each process
 PATIENCE: Final = 4.0  # [-] clock over processor: trials may share a processor with others
-START_S: Final = 120.0  # [s] of the processor within which a worker has imported its modules
+START: Final = Guard(
+    file="cellplan", worker="the start of a worker process", seconds=300.0, patience=PATIENCE, megabytes=16_000
+)
 
 Evaluate = Callable[[Variant], Outcome]
 
@@ -120,7 +121,7 @@ def outcome_in_child(evaluate: bytes, variant: Variant, limits: Limits) -> str |
         megabytes=limits.megabytes,
     )
     try:
-        text: str = _children().call(evaluated, evaluate, variant, guard=guard)
+        text: str = _children().call(evaluated, evaluate, variant, guard=guard, prepare=(prepared, evaluate, START))
     except OverrunError as error:
         return Lost(str(error), isinstance(error, TimeLimitError))
     return text
@@ -143,6 +144,12 @@ def evaluated(evaluate: bytes, variant: Variant) -> str:
         return _text(crashed(ADDRESS.sub("", reason)))
 
 
+def prepared(evaluate: bytes) -> None:
+    """Read what the evaluator needs; an error of it shows in every trial."""
+    with suppress(Exception):
+        _unpacked(evaluate)
+
+
 def crashed(reason: str) -> Outcome:
     """Outcome of a trial that has none of its own."""
     return Outcome(status=TrialStatus.CRASHED, reason=reason, figures={})
@@ -156,14 +163,16 @@ def _unpacked(evaluate: bytes) -> Evaluate:
 
 
 def _text(outcome: Outcome) -> str:
-    return json.dumps(outcome.record, ensure_ascii=False, allow_nan=False)
+    try:
+        return json.dumps(outcome.record, ensure_ascii=False, allow_nan=False)
+    except (TypeError, ValueError):
+        return _text(crashed("expected finite numbers and other plain data as its figures, got something else"))
 
 
 def _warm(modules: tuple[str, ...]) -> None:
     """Import modules in a child process; what goes wrong does so again in the first trial, which says it."""
-    guard = Guard(file="cellplan", worker="a worker process", seconds=START_S, patience=PATIENCE, megabytes=16_000)
     with suppress(CellplanError):
-        _children().call(_imported, modules, guard=guard)
+        _children().call(_imported, modules, guard=START)
 
 
 def _imported(modules: tuple[str, ...]) -> None:

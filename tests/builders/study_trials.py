@@ -11,8 +11,7 @@ from typing import Any
 from cellplan.errors import StudyStoppedError
 from cellplan.study.status import Best
 from cellplan.study.study import Study
-from cellplan.study.trial import Outcome, Trial, TrialStatus
-from cellplan.study.variants import Variant
+from cellplan.study.trial import Outcome, Trial, TrialStatus, Variant
 from cellplan.study.workers import evaluated
 
 HEADER = {"kind": "try", "seed": 3}

@@ -24,6 +24,7 @@ COMMANDS = (
     "explain",
     "export",
     "fastest",
+    "layout",
     "map",
     "rehearse",
     "robots",

@@ -80,6 +80,7 @@ LONG = {  # their commands and functions have tests of their own, which are quic
     "questions.md",
     "verify-and-export.md",
     "which-method.md",
+    "find-a-layout.md",
     "rehearse-with-errors.md",
     "limits.md",
     "shortest-cycle.md",

@@ -23,7 +23,7 @@ from cellplan.pipeline.compare import evaluate_subject
 from cellplan.report.page.comparison import comparison_files
 from cellplan.report.record.key_figures import key_figures
 from cellplan.report.record.study import STATUSES
-from cellplan.study.variants import Variant
+from cellplan.study.trial import Variant
 
 pytestmark = pytest.mark.usefixtures("trials_here", "kept_solutions")
 

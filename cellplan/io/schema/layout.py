@@ -2,7 +2,7 @@
 
 from typing import Annotated, ClassVar, Final, Literal, Self
 
-from pydantic import ConfigDict, Field, Tag, model_validator
+from pydantic import ConfigDict, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.io.schema.common import (
     Coordinate,
@@ -24,13 +24,15 @@ FARTHEST: Final = 1e6  # in the unit of the key
 RANGE_WORDS: Final = "a range [low, high] or a number"
 ITEM_WORDS: Final = "a name, a number or a range [low, high]"
 VARY_WORDS: Final = "true, a mapping of ranges, or a list"
+NAMED: Final = {"type": "string"}
+NUMBER: Final = {"type": "number"}
+PAIR: Final = {"type": "array", "prefixItems": [NUMBER, NUMBER], "minItems": 2, "maxItems": 2}
+BY_KEY: Final = {"type": "object", "additionalProperties": {"anyOf": [PAIR, {"type": "integer"}]}}
 
 Number = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 Range = tuple[Number, Number]
 RangeChoice = Annotated[
-    Annotated[Literal["a range"], Tag(f"<{RANGE_WORDS}>")]
-    | Annotated[int, Tag("<number>")]
-    | Annotated[Range, Tag("<list>")],
+    Annotated[int, Tag("<number>")] | Annotated[Range, Tag("<list>")],
     by_kind(RANGE_WORDS, number=int, list=tuple),
 ]
 ItemChoice = Annotated[
@@ -42,6 +44,7 @@ VaryChoice = Annotated[
     | Annotated[dict[str, RangeChoice], Tag("<mapping>")]
     | Annotated[tuple[ItemChoice, ...], Tag("<list>")],
     by_kind(VARY_WORDS, **{VARY_WORDS: bool}, mapping=dict, list=tuple),
+    WithJsonSchema({"anyOf": [{"const": True}, BY_KEY, {"type": "array", "items": {"anyOf": [NAMED, NUMBER, PAIR]}}]}),
 ]
 
 

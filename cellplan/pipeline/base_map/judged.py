@@ -165,6 +165,7 @@ def _goal(asked: MapJob) -> StartGoal:
     place = next(place for place, each in enumerate(job.relations) if each.robot == asked.robot)
     relation = job.relations[place]
     return StartGoal(
+        robot=cell.robot(asked.robot),
         chain=asked.scene.chains[asked.robot],
         relation=relation,
         X_RT=job.X[:, :, place, 0],

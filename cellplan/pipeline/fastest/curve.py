@@ -12,8 +12,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.fastest.scaling import scaled_values, steps_within, whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.study.run import outcomes
-from cellplan.study.trial import Outcome, TrialStatus
-from cellplan.study.variants import Variant
+from cellplan.study.trial import Outcome, TrialStatus, Variant
 
 LONGEST: Final = 3.0  # [-] times the shortest cycle: where the curve ends
 

@@ -24,6 +24,15 @@ KEYS: Final = 25  # [-] configurations at which distances are asked there
 ITERATIONS: Final = 25
 ROUNDS: Final = 4  # [-] times that a layout is improved and solved before it is given up
 DURATIONS: Final = 4  # [-] durations tried until the limits hold
+SLOWED: Final = {
+    "position_error_between_rows": 0.5,
+    "orientation_error_between_rows": 0.5,
+    "closure_position_error_between_rows": 0.5,
+    "closure_orientation_error_between_rows": 0.5,
+    "joint_jerk": 1.0 / 3.0,
+    "part_acceleration": 0.5,
+    "tool_speed": 1.0,
+}  # checks that pass when the motion is slow enough: how the time that they ask for grows with their value
 MORE_ANGLE: Final = np.radians(0.05)  # [rad] asked for beyond what was missed
 MORE_LENGTH: Final = 0.0005  # [m] likewise
 MORE_TIME: Final = 0.002  # [-] likewise
@@ -175,13 +184,20 @@ class Finish:
         factor = whole_steps(cell, cycle / self.ready.duration)
         for _ in range(DURATIONS):
             program = self._at(cell, factor)
-            if program.load <= 1.0 and program.load > 1.0 - MORE_TIME:
+            load = _load(program)
+            if 1.0 - MORE_TIME < load <= 1.0:
                 break
-            following = whole_steps(cell, factor * program.load, longer_than=factor if program.load > 1.0 else 0.0)
+            following = whole_steps(cell, factor * load, longer_than=factor if load > 1.0 else 0.0)
             if following == factor:
                 break
             factor = following
-        return program if program.load <= 1.0 else self._at(cell, whole_steps(cell, factor, longer_than=factor))
+        for _ in range(DURATIONS):
+            asked = max(_load(program), _time_asked(program))
+            if asked <= 1.0:
+                break
+            factor = whole_steps(cell, factor * asked, longer_than=factor)
+            program = self._at(cell, factor)
+        return program
 
     def _at(self, cell: Cell, factor: float) -> TimedProgram:
         """The program slower or faster by a factor, verified but for its clearance."""
@@ -196,6 +212,19 @@ class Finish:
         if margin is not None and margin < demanded - ROUNDING:
             return f"smallest margin {margin:.4g} deg, {demanded:.4g} deg demanded"
         return ""
+
+
+def _load(program: TimedProgram) -> float:
+    """Share of its time in which the limits of speed and acceleration of the joints would allow the same motion."""
+    figures = program.figures
+    return max(figures["max_velocity_ratio"] or 0.0, (figures["max_acceleration_ratio"] or 0.0) ** 0.5)
+
+
+def _time_asked(program: TimedProgram) -> float:
+    """How many times as long the motion must last for what is no limit of a joint but gets less when it is slower."""
+    checks = [check for run in program.solution.runs for check in run.report.checks if not check.passed]
+    asked = [(check.value / check.limit) ** SLOWED[check.name] for check in checks if check.name in SLOWED]
+    return max(asked, default=1.0)
 
 
 def certified_cell(found: Certified) -> Cell:
@@ -222,8 +251,8 @@ def _enlarged(room: _Room, program: TimedProgram, demands: Demands) -> bool:
         room.length += (required - clearance) / MM + MORE_LENGTH
         room.keys = 2 * room.keys - 1
         is_asked = True
-    if program.load > 1.0:
-        room.time += program.load - 1.0 + MORE_TIME
+    if _load(program) > 1.0:
+        room.time += _load(program) - 1.0 + MORE_TIME
         is_asked = True
     room.nodes = 2 * room.nodes - 1 if is_asked else room.nodes
     return is_asked

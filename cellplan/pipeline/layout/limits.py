@@ -17,6 +17,7 @@ from cellplan.search.programs.problem import Point, PointDerivatives, Problem
 
 BINDS: Final = 0.99  # [-] share of the largest load on the clock from which a joint counts as one that decides it
 NEAR_ANGLE: Final = np.radians(0.5)  # [rad] above the demand at which a margin binds
+TOUCHING: Final = 1e-9  # [m] bodies of which less is demanded may touch
 NEAR_LENGTH: Final = 0.004  # [m] likewise of a distance or a sliding joint
 
 
@@ -45,13 +46,18 @@ class Standing:
     @property
     def clearance(self) -> float | None:
         """Smallest distance of bodies at the keys in [mm]; None where none are near."""
-        values = self.measures.distances.values
-        return MM * float(values.min()) if len(values) else None
+        return self._smallest(with_own=True)
 
     @property
     def apart(self) -> float | None:
         """The same of bodies that do not belong to one robot."""
-        values = self.measures.distances.values[~self.measures.distances.is_own]
+        return self._smallest(with_own=False)
+
+    def _smallest(self, *, with_own: bool) -> float | None:
+        """Smallest distance of pairs that are to be apart, not only in touch; None where none are near."""
+        found = self.measures.distances
+        kept = found.demands >= min(TOUCHING, float(found.demands.max(initial=0.0)))
+        values = found.values[kept & (with_own | ~found.is_own)]
         return MM * float(values.min()) if len(values) else None
 
     @property

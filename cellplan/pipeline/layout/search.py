@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+from cellplan.io.cell.load import load_cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
 from cellplan.pipeline.layout.prepared import Prepared
@@ -132,8 +133,8 @@ def search_layout(
 
     The folder holds ``study.jsonl``, a line for each trial that grows while the search runs, and at the end
     ``best.yaml``, the given cell file with the values of the best layout, ``study.json`` and ``study.html``. Only a
-    layout that passed every check of ``solve`` is written as the best one. For an equal number of trials the files are the same,
-    for any number of workers.
+    layout that passed every check of ``solve`` is written as the best one. For an equal number of trials the files are
+    the same, for any number of workers.
 
     Args:
         request: What is searched for.
@@ -152,6 +153,8 @@ def search_layout(
         if isinstance(workers, int):
             pool = opened.enter_context(Workers(workers, modules=MODULES))
         ready = Prepared.of(request, searched_cell(request))
+        for path in request.attempts:
+            load_cell(path, allow_dirs=request.allow_dirs)  # what is wrong with it is said before anything is tried
         search = _Search(
             request=request,
             folder=folder,

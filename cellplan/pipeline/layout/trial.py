@@ -16,8 +16,7 @@ from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Effort
 from cellplan.search.programs.perturb import perturbed
 from cellplan.search.starts.generator import Starts
-from cellplan.study.trial import Outcome, TrialStatus
-from cellplan.study.variants import Variant
+from cellplan.study.trial import Outcome, TrialStatus, Variant
 
 EFFORT: Final = Effort()
 NOT_FOLLOWED: Final = "a tool cannot follow its path"

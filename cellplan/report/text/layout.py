@@ -27,6 +27,8 @@ def layout_lines(record: Record, folder: Path) -> list[str]:
             lines.append("  what holds it back")
             lines += [f"    {each['text']}" for each in record["binding"][:MOST]]
     else:
+        rejected = [each for each in record["top"] if each["status"] == "rejected"]
+        lines += [f"  rejected by solve: {each['reason']}" for each in rejected[:MOST]]
         lines += [f"  {each['reason']} ({_trials(each['count'])})" for each in record["dropped"][:MOST]]
     lines += [f"  {remark}" for remark in record["remarks"]]
     lines.append(f"  {_trials(record['trials'])} in {record['rounds']} rounds, {record['solves']} solved in full")

@@ -13,8 +13,9 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.transforms import inverse
+from cellplan.kinematics.reach import reach_bound
 from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Relation
+from cellplan.model.cell import Relation, Robot
 from cellplan.model.robot import RobotModel
 from cellplan.model.seeds import generator
 from cellplan.planning.start.inverse_kinematics import (
@@ -24,6 +25,7 @@ from cellplan.planning.start.inverse_kinematics import (
     random_configurations,
     reached_by_rows,
 )
+from cellplan.planning.tracking.task_constraints import constraint_rows
 from cellplan.search.base_map.places import Places
 
 APART: Final = 400.0  # [mm] at most from one place with random configurations to the next, where the grid is finer
@@ -37,13 +39,15 @@ class StartGoal:
     """What a robot's tool is to reach.
 
     Attributes:
-        chain: The robot at its present base.
+        robot: The robot.
+        chain: The same at its present base.
         relation: Its task.
         X_RT: Tool tip at the start of the path in the frame R that the task is relative to, shape (4, 4).
         X_WR: That frame in the world, shape (4, 4).
         given: The present start posture in [rad] or [m], shape (n,).
     """
 
+    robot: Robot
     chain: ScrewChain
     relation: Relation
     X_RT: Array
@@ -74,6 +78,7 @@ def starts_at(goal: StartGoal, places: Places, model: RobotModel, X_WB: Array, *
 
     stride = _first_stride(places)
     coarse = places.coarse(stride)
+    coarse = coarse[_within_reach(goal, places.X_WB[coarse])]
     q, at = solved(np.repeat(coarse, SEEDS), np.tile(drawn, (len(coarse), 1)))
     while stride := stride // 2:
         among = np.isin(np.arange(len(places)), places.coarse(stride))
@@ -87,6 +92,16 @@ def starts_at(goal: StartGoal, places: Places, model: RobotModel, X_WB: Array, *
     distances = np.abs(q - goal.given).max(axis=1)
     order = np.lexsort((np.round(distances / SAME_POSTURE), at))
     return q[order], at[order]
+
+
+def _within_reach(goal: StartGoal, X_WB: Array) -> Flags:
+    """Which bases, shape (K, 4, 4), are not too far from the start for any posture; all where position is not asked."""
+    X_WT = goal.X_WR @ goal.X_RT
+    if np.linalg.matrix_rank(constraint_rows(goal.relation, goal.X_RT[None])[0][:, :3]) < 3:
+        return np.ones(len(X_WB), dtype=bool)
+    model = goal.robot.model
+    first = X_WB[:, :3, :3] @ model.axes[model.links_to_flange[0]].point_B + X_WB[:, :3, 3]
+    return np.linalg.norm(X_WT[:3, 3] - first, axis=1) <= reach_bound(goal.robot)
 
 
 def _first_stride(places: Places) -> int:

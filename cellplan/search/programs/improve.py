@@ -27,6 +27,7 @@ SHRINKS: Final = 0.4  # [-] and after one that is refused
 LEAST: Final = 1e-6  # [-] that a step must gain
 CORRECTIONS: Final = 1  # programs with the bends of the rows that a refused step has shown
 LOOKS_BACK: Final = 8  # [-] iterations over which the gain is judged
+GIVE_UP_AFTER: Final = 12  # programs: see ``Effort.give_up_above``
 GAINED: Final = 3e-3  # [-] share of the objective that so many must gain
 
 
@@ -148,17 +149,15 @@ class _Climb:
             return True
         if len(self._history) <= LOOKS_BACK:
             return False
+        limit = self._effort.give_up_above
+        if limit is not None and len(self._history) >= GIVE_UP_AFTER and here.objective > limit:
+            return True
         before, now = self._history[-1 - LOOKS_BACK], self._history[-1]
         return before.violation <= 0.0 and before.objective - now.objective < GAINED * self._unit(before.objective)
 
     def _step(self, here: _State, linear: Linear) -> _State | None:
         """The state after one program; None where its step is refused. Sets the next region."""
-        problem, point = self._problem, here.measures.point
-        lower = np.minimum(np.maximum((problem.lower - point.x) / problem.scale, -self._trust), 0.0)
-        upper = np.maximum(np.minimum((problem.upper - point.x) / problem.scale, self._trust), 0.0)
-        rows = linear.rows(self._demands, self._effort.room, np.maximum(-lower, upper))
-        changed = ((point.x - problem.given) * problem.cost, problem.cost * problem.scale)
-        program = Program(rows=rows, box=(lower, upper), demands=self._demands, changed=changed)
+        program = Program.of(linear, self._demands, self._effort.room, self._trust)
         bends: Array | None = None
         for _ in range(1 + CORRECTIONS):
             found = program.solve(bends)
@@ -173,7 +172,7 @@ class _Climb:
                 if gain > GOOD * expected:
                     self._trust = min(WIDEST, GROWS * self._trust)
                 return there
-            bends = np.concatenate([each.bends(here.measures, there.measures, z) for each in rows])
+            bends = np.concatenate([each.bends(here.measures, there.measures, z) for each in program.rows])
         reach = self._trust if found is None else float(np.abs(found[0]).max(initial=0.0))
         self._trust = SHRINKS * min(self._trust, reach)
         return None

@@ -1,12 +1,15 @@
 """The layout problem: bases, tools, start postures and weights; the motion by the weighted pseudo-inverse."""
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell import joint_at
 from cellplan.model.joint_limits import JointLimits
+from cellplan.model.motion import Schedule
 from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
 from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.job import Job
@@ -45,6 +48,17 @@ class LayoutProblem:
         """Note once whether accelerations count at all, and the largest distance that is demanded in [m]."""
         object.__setattr__(self, "is_accelerating", bool(np.isfinite(self.acceleration).any()))
         object.__setattr__(self, "most_demanded", max((pair.demand for pair in self.bodies.pairs), default=0.0))
+
+    def finer(self, schedule: Schedule, *, nodes: int, instants: Sequence[float] = ()) -> Self:
+        """The same problem on more nodes.
+
+        Args:
+            schedule: The tasks on the common clock.
+            nodes: About how many nodes there are, evenly.
+            instants: Times in [s] on the clock of the nodes about which there are more.
+        """
+        job = Job.of(self.job.cell, schedule, moving=self.job.moving, nodes=nodes, instants=instants)
+        return replace(self, job=job)
 
     @property
     def names(self) -> tuple[str, ...]:

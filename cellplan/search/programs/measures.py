@@ -14,8 +14,8 @@ from cellplan.search.programs.problem import Distances, Point, Problem
 ANGLE: Final = 0.01  # [rad] of a lack that weighs as much as
 LENGTH: Final = 0.003  # [m] and as
 SHARE: Final = 0.01  # [-] of the duration
-SLACK: Final = 10.0  # [-] share of the objective that one unit costs: feasibility first
-IN_ROOM: Final = 0.1  # [-] likewise where only the room is missed that counts as kept
+SLACK: Final = 1.0  # [-] share of the objective that one unit costs: feasibility first
+IN_ROOM: Final = 0.02  # [-] likewise where only the room is missed that counts as kept
 OWN_ROOM: Final = 0.1  # [-] share of the room that is asked of a robot's own bodies
 
 
@@ -169,8 +169,7 @@ def rooms(distances: Distances, room: Room) -> Array:
 
 
 def key_nodes(problem: Problem, effort: Effort) -> Indices:
-    """Nodes at which distances are asked: the ones nearest to even times, and the extra ones."""
+    """Nodes at which distances are asked: the ones nearest to even times, and to the instants given."""
     times = problem.times
-    even = np.linspace(times[0], times[-1], effort.keys)
-    nearest = np.abs(times[:, None] - even).argmin(axis=0)
-    return np.unique(np.concatenate([nearest, np.array(effort.extra_keys, dtype=np.intp)])).astype(np.intp)
+    asked = np.append(np.linspace(times[0], times[-1], effort.keys), effort.instants)
+    return np.unique(np.abs(times[:, None] - asked).argmin(axis=0)).astype(np.intp)

@@ -77,15 +77,17 @@ class Effort:
     Attributes:
         iterations: Linear programs at most.
         keys: Configurations at which distances are asked, evenly over the motion.
-        extra_keys: Nodes at which they are asked as well.
+        instants: Times in [s] along the nodes at which they are asked as well.
         within: Distance in [m] above what is demanded, within which pairs become rows.
         trust: First radius of the trust region, in usual steps of the variables.
         room: What the rows ask for beyond the demands.
+        give_up_above: Objective above which it is given up after ``GIVE_UP_AFTER`` programs; None for never.
     """
 
     iterations: int = 60
     keys: int = 9
-    extra_keys: tuple[int, ...] = ()
+    instants: tuple[float, ...] = ()
     within: float = 0.06
     trust: float = 0.5
     room: Room = field(default_factory=Room)
+    give_up_above: float | None = None

@@ -8,8 +8,8 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.search.programs.measures import IN_ROOM, SLACK
-from cellplan.search.programs.objective import Demands, Objective
-from cellplan.search.programs.rows import Rows
+from cellplan.search.programs.objective import Demands, Objective, Room
+from cellplan.search.programs.rows import Linear, Rows
 from cellplan.search.programs.solver import Solved, least
 
 PROXIMAL: Final = 1e-3  # [-] weight of a step: of equal ones the shortest
@@ -31,6 +31,19 @@ class Program:
     box: tuple[Array, Array]
     demands: Demands
     changed: tuple[Array, Array]
+
+    @classmethod
+    def of(cls, linear: Linear, demands: Demands, room: Room, trust: float) -> "Program":
+        """The program of a point, for a trust region of some radius in usual steps."""
+        problem, x = linear.problem, linear.measures.point.x
+        lower = np.minimum(np.maximum((problem.lower - x) / problem.scale, -trust), 0.0)
+        upper = np.maximum(np.minimum((problem.upper - x) / problem.scale, trust), 0.0)
+        return cls(
+            rows=linear.rows(demands, room, np.maximum(-lower, upper)),
+            box=(lower, upper),
+            demands=demands,
+            changed=((x - problem.given) * problem.cost, problem.cost * problem.scale),
+        )
 
     def solve(self, corrections: Array | None = None) -> tuple[Array, float, Solved] | None:
         """The step in usual steps, what it is expected to gain, and the solution; None where the solver finds none.

@@ -184,21 +184,25 @@ def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Gen
     roomy = room.min(axis=(1, 2), initial=np.inf) >= 0.0
     drops["joint limit"] = int(np.sum(~roomy))
     order = np.flatnonzero(roomy)
-    cost = _costs(problem, arm.velocity, q[roomy], room[roomy])
+    cost = _costs(problem, robot, q[roomy], room[roomy])
     ranked = np.argsort(cost, kind="stable")
     kept = _free(problem, robot, setting, at.X_WB[order][ranked], q[order][ranked], drops)
     rows = order[ranked[kept]]
     return Pool(x=x[rows], q=q[rows, 0], cost=cost[ranked[kept]], drops=drops)
 
 
-def _costs(problem: StartProblem, velocity: Array, q: Array, room: Array) -> Array:
-    """Logarithm of the largest speed, and what is missing of a wide margin, shape (B,)."""
+def _costs(problem: StartProblem, robot: int, q: Array, room: Array) -> Array:
+    """Logarithm of how long the joints need for the path, and what is missing of a wide margin, shape (B,)."""
     if not len(q):
         return np.zeros(0)
-    steps = np.diff(problem.at_rest.times)
-    moves = np.abs(np.diff(q, axis=1))[:, steps > 0.0] / steps[steps > 0.0][:, None]
-    speed = np.log(np.maximum((moves / velocity).max(axis=(1, 2), initial=0.0), 1e-9))
-    found: Array = speed + np.maximum(0.0, 1.0 - room.min(axis=(1, 2)) / ROOMY)
+    columns, rates = problem.cell.columns(problem.cell.robots[robot].name), problem.at_rest.rates
+    speeds = rates @ q
+    shares = (
+        np.abs(speeds / problem.arms[robot].velocity),
+        np.sqrt(np.abs(rates @ speeds) / problem.acceleration[columns]),
+    )
+    longest = np.maximum(*(share.max(axis=(1, 2)) for share in shares))
+    found: Array = np.log(np.maximum(longest, 1e-9)) + np.maximum(0.0, 1.0 - room.min(axis=(1, 2)) / ROOMY)
     return found
 
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.search.kernel.figures import Figures
+from cellplan.search.kernel.figures import Figures, Peaks
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.run import Motions, run
 from cellplan.search.starts.at_rest import Pool, Setting
@@ -116,7 +116,8 @@ def _by_joints(problem: StartProblem, motions: Motions) -> tuple[Array, Array, C
     with np.errstate(all="ignore"):  # what lost its path is no number
         figures = Figures.of(job, motions)
         lack = np.maximum(0.0, problem.margin - figures.margins).max(axis=1)
-        times = np.maximum(figures.speeds.value, np.sqrt(figures.accelerations.value)).max(axis=1)
+        rates = Peaks.of(job.times, job.rates @ (motions.qd / problem.acceleration), in_magnitude=True).value
+        times = np.maximum(figures.speeds.value, np.sqrt(rates)).max(axis=1)
     excess = np.maximum(0.0, times - 1.0)
     violation = np.where(motions.is_followed, lack / ANGLE + excess / SPEED, np.inf)
     violation = np.where(np.isnan(violation), np.inf, violation)

@@ -19,8 +19,7 @@ from cellplan.search.starts.freedom import drawn_within
 from cellplan.search.starts.postures import branch_starts
 from cellplan.search.starts.problem import StartProblem
 
-SETTINGS_TRIED: Final = 4  # [-] places of the part at rest, one after the other until all operators reach one
-CLOSE_ENOUGH: Final = 0.0  # violation up to which no further place of the part is tried
+SETTINGS_TRIED: Final = 4  # [-] places of the part at rest, one after the other until a combination follows all paths
 RANDOM: Final = 16  # [-] random layouts that are drawn for one start
 EVERY_RANDOM: Final = 8  # of the sampled starts every so manieth is drawn at random
 SHOWN: Final = 3  # [-] reasons that are named for one robot
@@ -113,7 +112,7 @@ class StartGenerator:
 
     def _sampled(self, rng: np.random.Generator, number: int) -> Starts:
         """Starts with the part at rest first, put together afterwards."""
-        problem, best, reasons = self._problem, None, list[str]()
+        problem, reasons = self._problem, list[str]()
         places, drops = settings(problem, rng, SETTINGS_TRIED)
         if not places:
             return Starts(found=(), reason=f"no posture of the holder can be used: {_words(drops)}")
@@ -122,18 +121,11 @@ class StartGenerator:
             if pools is None:
                 continue
             found = judged(problem, *combined(problem, setting, pools, rng))
-            if not len(found.x):
-                reasons.append(f"no combination follows all paths: {_words(found.drops)}")
-            elif best is None or found.violation[0] < best.violation[0]:
-                best = found
-            if best is not None and best.violation[0] <= CLOSE_ENOUGH:
-                break
-        if best is None:
-            return Starts(found=(), reason="; ".join(reasons))
-        return Starts(
-            found=self._starts(Origin.SAMPLED, f"sampled with the part at rest, draw {number}", best),
-            reason="; ".join(reasons),
-        )
+            if len(found.x):
+                text = f"sampled with the part at rest, draw {number}"
+                return Starts(found=self._starts(Origin.SAMPLED, text, found), reason="; ".join(reasons))
+            reasons.append(f"no combination follows all paths: {_words(found.drops)}")
+        return Starts(found=(), reason="; ".join(reasons))
 
     def _pools(self, setting: Setting, rng: np.random.Generator, reasons: list[str]) -> Mapping[int, Pool] | None:
         """Bases of all operators; None, and the reason, where one has none."""

@@ -14,6 +14,7 @@ from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.scene.scene import Scene
+from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.starts.contacts import Contacts
@@ -34,6 +35,7 @@ class StartProblem:
         freedom: Which of it places which robot.
         start: Start postures near the given ones, in mid-range where none is given, in [rad] or [m], shape (nq,).
         margin: Demanded distance of each joint from its limits in [rad] or [m], shape (nq,).
+        acceleration: Largest acceleration of each joint in [rad/s^2] or [m/s^2] as the checks judge it, shape (nq,).
         job: The tasks at the nodes of a motion.
         at_rest: The tasks at fewer nodes, for paths with the part at rest.
         scene: The bodies.
@@ -48,6 +50,7 @@ class StartProblem:
     freedom: Freedom
     start: Array
     margin: Array
+    acceleration: Array
     job: Job
     at_rest: Job
     scene: Scene
@@ -77,6 +80,7 @@ class StartProblem:
             freedom=Freedom.of(cell, variables, start),
             start=start,
             margin=np.broadcast_to(np.asarray(margin, dtype=float), (cell.joint_count,)),
+            acceleration=acceleration_limits(scene),
             job=Job.of(cell, schedule, moving=moving, nodes=NODES),
             at_rest=Job.of(cell, schedule, moving=moving, nodes=NODES_AT_REST),
             scene=scene,

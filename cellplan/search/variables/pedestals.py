@@ -1,20 +1,27 @@
 """Obstacles that a robot stands on become its pedestal, so that they move with its base."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
+from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import Box, Cylinder
 from cellplan.model.cell import Cell, Obstacle, Robot
-from cellplan.model.layout import LayoutSettings, VariableKind
+from cellplan.model.layout import LayoutSettings, VariableKind, VaryRange
+from cellplan.model.mounting import Hanger, Pedestal, Wedge
 from cellplan.model.units import MM
 from cellplan.search.variables.written import written_quantity
 
 CENTRED: Final = 1e-3  # [m] by which a base may stand beside the middle of its obstacle, above it or below its top
 UPRIGHT: Final = 1e-6  # [-] of an axis that leans
 ALIGNED: Final = 1e-6  # [rad] between the sides of a box and the axes of the base on it
+SHORTEST: Final = 1e-3  # [m] of a column that is left below a base
+STEEPEST: Final = math.radians(75.0)  # [rad] of a tilted base
+OUTSIDE: Final = 1.01  # [-] a column with a slanting top is a prism round the circle
 MOST_LEAN: Final = math.radians(1.0)  # [rad] of a base that stands upright
 
 
@@ -59,6 +66,45 @@ def with_pedestals(cell: Cell, settings: LayoutSettings) -> tuple[dict[str, obje
     return values, tuple(remarks)
 
 
+def with_room_below(cell: Cell, ranges: Sequence[VaryRange]) -> tuple[VaryRange, ...]:
+    """Ranges of heights narrowed so that a column below a base, or above one that hangs, does not vanish.
+
+    Raises:
+        InputError: That leaves no height.
+    """
+    found = []
+    for each in ranges:
+        mount = cell.robot(each.name).pedestal if each.kind is VariableKind.BASE and each.index == 2 else None
+        lower, upper = each.lower, each.upper
+        if isinstance(mount, Hanger):
+            upper = min(upper, mount.ceiling - SHORTEST)
+        elif isinstance(mount, Pedestal | Wedge):
+            lower = max(lower, mount.floor + SHORTEST)
+        if isinstance(mount, Wedge):
+            lower = max(lower, mount.floor + SHORTEST + _slope(cell, each.name, ranges) * _outer_radius(mount))
+        if not lower < upper:
+            where = cell.origin.at(f"layout.vary.{each.address.removeprefix('robots.').removesuffix('.z_mm')}")
+            raise InputError(f"{where}: expected heights that leave a column at the base of '{each.name}'")
+        found.append(replace(each, lower=lower, upper=upper))
+    return tuple(found)
+
+
+def _slope(cell: Cell, robot: str, ranges: Sequence[VaryRange]) -> float:
+    """Steepest slope of a base at any roll and pitch that it may have."""
+    R = cell.robot(robot).X_WB[:3, :3]
+    steepest = math.acos(min(1.0, max(-1.0, float(R[2, 2]))))
+    own = [each for each in ranges if each.kind is VariableKind.BASE and each.name == robot and each.index in {3, 4}]
+    widest = sum(max(abs(each.lower), abs(each.upper)) for each in own)
+    return math.tan(min(max(widest, steepest), STEEPEST))
+
+
+def _outer_radius(mount: Wedge) -> float:
+    """Distance of the corners of a column from its middle in [m]."""
+    if mount.size is not None:
+        return 0.5 * math.hypot(*mount.size)
+    return OUTSIDE * float(mount.radius or 0.0)
+
+
 def _stands_on(robot: Robot, obstacle: Obstacle) -> bool:
     """Whether the origin of a base is on top of an upright column or box."""
     ends = _ends(obstacle)
@@ -89,9 +135,9 @@ def _ends(obstacle: Obstacle) -> tuple[float, float] | None:
 def _column(robot: Robot, obstacle: Obstacle) -> dict[str, Any] | None:
     """The pedestal as a cell file writes it; None where it would not be the same body."""
     ends, shape = _ends(obstacle), obstacle.shape
-    aside = robot.X_WB[:2, 3] - obstacle.X_WS[:2, 3]
+    beside = robot.X_WB[:2, 3] - obstacle.X_WS[:2, 3]
     leans = math.acos(min(1.0, max(-1.0, float(robot.X_WB[2, 2])))) > MOST_LEAN
-    if ends is None or leans or float(np.hypot(*aside)) > CENTRED:
+    if ends is None or leans or float(np.hypot(*beside)) > CENTRED:
         return None
     floor = {"floor_z_mm": written_quantity(ends[0], is_angle=False)}
     if isinstance(shape, Cylinder):

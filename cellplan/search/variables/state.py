@@ -1,4 +1,4 @@
-"""One layout: poses, rods, postures and weights that a search may change, as the cell has them at given numbers."""
+"""One layout: poses, rods, start postures and weights that a search may change, at given numbers."""
 
 import math
 from collections.abc import Sequence

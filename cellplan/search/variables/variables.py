@@ -1,7 +1,7 @@
 """Variables of a layout search: numbers of a cell file that may change, for the kernel and for the file."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
 from cellplan.search.variables.directions import base_twists, effective_base_twists, tip_twists
 from cellplan.search.variables.displaced import DisplacedBody, displaced_bodies
-from cellplan.search.variables.pedestals import with_pedestals
+from cellplan.search.variables.pedestals import with_pedestals, with_room_below
 from cellplan.search.variables.state import State, pose_of
 from cellplan.search.variables.ties import Tied
 from cellplan.search.variables.written import written_number, written_starts, written_weight
@@ -68,7 +68,9 @@ class Variables:
         if settings is None:
             raise InputError(f"cell '{cell.name}': expected a cell that was read from a file, got one built in Python")
         conversion, remarks = with_pedestals(cell, settings)
-        base, tied = cell.with_values(conversion), Tied.of(settings)
+        base = cell.with_values(conversion)
+        settings = replace(settings, ranges=with_room_below(base, settings.ranges))
+        tied = Tied.of(settings)
         joints = [joint for robot in base.robots for joint in robot.model.joints]
         return cls(
             base=base,
@@ -94,8 +96,8 @@ class Variables:
     def placed(self, x: Array) -> Cell:
         """The cell at values of the variables, shape (n,), neither rounded nor validated: quick, for scenes.
 
-        Bases, tools with their solids, grasps, the part at rest, spins and weights are those of the layout, and start
-        postures as far as they are among the variables.
+        Bases, tools with their solids, grasps, the part at rest, spins and weights are those of the layout, and so are
+        start postures as far as they are among the variables.
         """
         return self.state(x).cell(self.base)
 

@@ -5,6 +5,7 @@ from typing import Any, Final
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.layout import LayoutSettings, VariableKind, VaryRange
+from cellplan.model.robot import Joint
 from cellplan.model.units import DEG, MM
 
 LENGTH_DIGITS: Final = 3  # of a millimetre
@@ -42,12 +43,19 @@ def written_starts(cell: Cell, settings: LayoutSettings, start: Array) -> dict[s
 def _written_start(cell: Cell, robot: Robot, start: Array) -> dict[str, Any]:
     """The start posture of a robot under the key that its file uses, or that suits its joints."""
     joints = robot.model.joints
-    numbers = [
-        written_quantity(value, is_angle=it.is_revolute) for value, it in zip(start.tolist(), joints, strict=True)
-    ]
+    numbers = [_within_limits(value, joint) for value, joint in zip(start.tolist(), joints, strict=True)]
     entry: Any = cell.origin.document["robots"]
     as_list = all(joint.is_revolute for joint in joints) and "start" not in entry[robot.name]
     if as_list:
         return {f"robots.{robot.name}.start_deg": numbers}
     keys = [f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in joints]
     return {f"robots.{robot.name}.start": dict(zip(keys, numbers, strict=True))}
+
+
+def _within_limits(value: float, joint: Joint) -> float:
+    """A joint position as the file has it, rounded towards the inside where it is at a limit."""
+    written, unit = written_quantity(value, is_angle=joint.is_revolute), DEG if joint.is_revolute else MM
+    digits = ANGLE_DIGITS if joint.is_revolute else LENGTH_DIGITS
+    if joint.lower <= value <= joint.upper and not joint.lower <= written / unit <= joint.upper:
+        written = round(written + (-1.0 if written / unit > joint.upper else 1.0) * 10.0**-digits, digits)
+    return written

@@ -84,8 +84,8 @@ def test_distances_from_a_pedestal_change_as_its_points_say(plain: Cell, column:
     (body,) = variables.displaced(variables.given)
     assert (body.name, body.frame) == ("abb/pedestal", BodyFrame.WORLD)
     base = cell.robot("abb").X_WB[:3, 3]
-    for aside in ([0.6, 0.1, -0.1], [0.35, 0.3, 0.2], [0.05, 0.02, 0.3], [-0.4, 0.3, -0.35]):
-        p = base + aside
+    for beside in ([0.6, 0.1, -0.1], [0.35, 0.3, 0.2], [0.05, 0.02, 0.3], [-0.4, 0.3, -0.35]):
+        p = base + beside
 
         def distance(cell: Cell, p: Array = p) -> float:
             shape, X_WS = _pedestal(cell)

@@ -173,3 +173,47 @@ def test_choices_keep_one_task_a_robot(cell: Cell) -> None:
         {**swapped, "motion.mode": "pairwise", **autos},
     ]
     assert [task.robot for task in cell.with_values(found[2]).tasks] == ["abb", "kuka", "staubli"]
+
+
+def test_a_part_at_rest_elsewhere_is_the_robots_the_other_way() -> None:
+    circle = {"radius_mm": 200, "center_mm": [1532.0508, 0], "plane": "xz"}
+    plain = load_cell(CELLS / "papers" / "nicolato_circle.yaml").with_values({"tasks.circle.path": {"circle": circle}})
+    start = start_of(plain)
+    variables = Variables.of(
+        plain.with_values({"layout.vary": {"part.at": {"x_mm": [-20000, 20000], "yaw_deg": [-180, 180]}}})
+    )
+    x = variables.given + np.array([-0.05, 0.1])
+    q = motion_of(variables.base, variables.layouts(x[None], start[None]))
+    written = variables.cell(x, q[0])
+    assert np.abs(motion_of(written, Layouts.of([written], q[:1])) - q).max() <= 5e-6
+    (body,) = variables.displaced(x)
+    points = np.random.default_rng(1).uniform(-0.3, 0.3, (3, 3))
+    X_WP = variables.placed(x).part.X_WP
+    assert X_WP is not None
+    exact = body.velocity((X_WP @ np.c_[points, np.ones(3)].T).T[:, :3])
+    found = variables.directions(x)
+    for column, unit in enumerate(STEP * np.eye(2)):
+        ends = [variables.placed(x + sign * unit).part.X_WP for sign in (1.0, -1.0)]
+        rate = (ends[0] - ends[1]) / (2.0 * STEP)
+        assert np.abs((rate @ np.c_[points, np.ones(3)].T).T[:, :3] - exact[..., column]).max() <= 1e-8
+        X = [variables.layouts((x + sign * unit)[None], start[None]).X_WB[0, 0] for sign in (1.0, -1.0, 0.0)]
+        assert np.abs(twist(*X) - found.base[0, :, column]).max() <= 1e-8
+
+
+def test_sliding_joints_start_by_their_keys() -> None:
+    plain = load_cell(CELLS / "rail.yaml")
+    rail = next(robot for robot in plain.robots if any(not joint.is_revolute for joint in robot.model.joints))
+    cell = plain.with_values({"layout": {"vary": {f"{rail.name}.start": {"rail_mm": [-1000, 1000]}}, "margin_mm": 30}})
+    variables = Variables.of(cell)
+    column = cell.columns(rail.name).start
+    assert (variables.margin[column], variables.margin[column + 1]) == (0.03, 0.0)
+    values = variables.values(np.array([-0.2345678]), np.zeros(cell.joint_count))
+    assert values[f"robots.{rail.name}.start"]["rail_mm"] == -234.568  # type: ignore[index]
+
+
+def test_a_column_never_vanishes(cell: Cell) -> None:
+    ranges = {"kuka.base": {"z_mm": [0, 600]}, "abb.base": {"z_mm": [0, 600], "roll_deg": [-20, 20]}}
+    variables = Variables.of(cell.with_values({"layout.vary": ranges}))
+    assert variables.lower[0] == pytest.approx(0.001)
+    lowest = variables.cell(np.array([variables.lower[0], variables.lower[1], np.radians(20.0)]), start_of(cell))
+    assert all(robot.pedestal is not None and robot.pedestal.solid(robot.X_WB) is not None for robot in lowest.robots)

@@ -1,0 +1,107 @@
+"""What binds at a point, and what each variable does there: the multipliers and gradients of the last program."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, Kind, Measures
+from cellplan.search.programs.objective import Demands, Effort, Objective
+from cellplan.search.programs.problem import Point, Problem
+from cellplan.search.programs.program import Program
+from cellplan.search.programs.rows import Linear, Rows
+
+NEAR: Final = 0.02  # [-] usual steps of the region in which the multipliers hold
+COUNTS: Final = 1e-6  # [-] multiplier from which on a row binds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Binding:
+    """A demand that keeps the objective from being better.
+
+    Attributes:
+        kind: What it is about.
+        names: Robot and joint, or the two bodies.
+        time: When, in [s] on the clock of the nodes.
+        share: Of the objective's gradient; that of speeds and accelerations where the cycle is the objective, so that
+            these add up to 1.
+        gain: What the objective gains per unit in SI by which the demand is lower; None where it is the objective.
+    """
+
+    kind: Kind
+    names: tuple[str, str]
+    time: float
+    share: float
+    gain: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Explanation:
+    """What binds at a point and what each variable does.
+
+    Attributes:
+        binding: What binds, the largest share first.
+        by_variable: Derivatives of the objective by the variables in SI, whatever else is demanded, shape (n,).
+        held: How fast the objective still falls along each variable with all demands kept, shape (n,): not 0 only where
+            the variable is at its bound, or the point is no local optimum.
+    """
+
+    binding: tuple[Binding, ...]
+    by_variable: Array
+    held: Array
+
+
+def explain(problem: Problem, point: Point, demands: Demands, effort: Effort) -> Explanation | None:
+    """What binds at a point; None where the program there has no solution."""
+    measures = Measures.of(problem, point, demands, effort)
+    program = Program.of(Linear.of(problem, measures), demands, effort.room, NEAR)
+    found = program.solve()
+    if found is None:
+        return None
+    solved, unit = found[2], _unit(measures, demands)
+    binding, gradient, at = list[Binding](), np.zeros(len(point.x)), 0
+    for rows in program.rows:
+        multipliers = solved.multipliers[at : at + len(rows.lacks)]
+        at += len(rows.lacks)
+        gradient += rows.aim * (multipliers @ rows.gradients)
+        binding += _bound(problem, rows, multipliers, unit)
+    if demands.objective is Objective.CHANGE:
+        gradient = np.sign(point.x - problem.given) * problem.cost * problem.scale
+    return Explanation(
+        binding=tuple(sorted(binding, key=lambda each: -each.share)),
+        by_variable=gradient * unit / problem.scale,
+        held=solved.of_bounds[: len(point.x)] * unit / problem.scale,
+    )
+
+
+def _unit(measures: Measures, demands: Demands) -> float:
+    """The objective that one unit of a program's is, in [s], [m] or cost."""
+    match demands.objective:
+        case Objective.CYCLE:
+            return measures.cycle
+        case Objective.CLEARANCE:
+            return LENGTH
+        case _:
+            return 1.0
+
+
+def _bound(problem: Problem, rows: Rows, multipliers: Array, unit: float) -> list[Binding]:
+    """The rows of one kind that bind."""
+    units = {Kind.DISTANCE: LENGTH, Kind.LOWER_LIMIT: ANGLE, Kind.UPPER_LIMIT: ANGLE}
+    found = []
+    for row in np.flatnonzero(multipliers > COUNTS).tolist():
+        subject, size = int(rows.subjects[row]), units.get(rows.kind, SHARE)
+        if size == ANGLE and not problem.limits.is_revolute[subject]:
+            size = LENGTH
+        is_pair = rows.kind is Kind.DISTANCE
+        found.append(
+            Binding(
+                kind=rows.kind,
+                names=problem.pair_names(subject) if is_pair else problem.joint_names(subject),
+                time=float(problem.times[rows.nodes[row]]),
+                share=float(multipliers[row]),
+                gain=None if rows.aim else float(multipliers[row]) * unit / size,
+            )
+        )
+    return found

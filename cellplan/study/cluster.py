@@ -1,0 +1,183 @@
+"""Cluster: the trials of a study on the workers of a Dask scheduler, each in a child process of its worker."""
+
+import platform
+import queue
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from contextlib import suppress
+from functools import partial
+from types import TracebackType
+from typing import Any, Final, Self
+
+import numpy as np
+
+import cellplan
+from cellplan.errors import InputError, StudyStoppedError
+from cellplan.study.workers import Lost
+
+CONNECT_S: Final = 10.0  # [s] within which the scheduler answers at the start
+RECONNECT_S: Final = 30.0  # [s] within which it answers again after the connection was lost
+NO_WORKERS_S: Final = 60.0  # [s] after which a cluster without a worker is given up
+CHECK_EVERY_S: Final = 0.2  # [s] between two checks of the connection
+PER_THREAD: Final = 2  # trials begun for each thread of the cluster, so that none waits for the next one
+
+
+class Cluster(Executor):
+    """Executor of a Dask cluster, to be used in a ``with`` statement.
+
+    A worker that is killed costs its trials a repetition on another one. A connection that is lost is made again, and
+    what was under way is begun again.
+
+    Attributes:
+        is_remote: That outcomes come from other machines, so that those that count are worked out here again.
+        count: Number of trials that are begun at once.
+    """
+
+    is_remote = True
+
+    def __init__(self, address: str) -> None:
+        """Connect.
+
+        Args:
+            address: Address of the scheduler, such as ``tcp://10.0.0.5:8786``.
+
+        Raises:
+            InputError: Dask is not installed, the address is none or nothing answers there.
+        """
+        self._address = address
+        self._client = _connected(address)
+        self._dask = self._client.get_executor(pure=False)
+        threads = sum(self._client.nthreads().values())
+        self.count = max(2, PER_THREAD * threads)
+        self._under_way: dict[Future[Any], Future[Any]] = {}
+        self._again: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]]] = queue.SimpleQueue()
+        self._is_over = threading.Event()
+        self._watch = threading.Thread(target=self._watched, name="cellplan-cluster", daemon=True)
+        self._watch.start()
+
+    def __enter__(self) -> Self:
+        """Begin to take trials."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Leave the cluster; what it has not begun is cancelled."""
+        self._is_over.set()
+        self._watch.join()
+        with suppress(Exception):
+            self._dask.shutdown(wait=False)
+            self._client.close(timeout=CONNECT_S)
+
+    def submit(self, function: Callable[..., Any], /, *arguments: object, **named: object) -> Future[Any]:
+        """Begin a job on the cluster."""
+        outer: Future[Any] = Future()
+        call = partial(self._dask.submit, checked, _versions(), function, *arguments, **named)
+        self._send(outer, call)
+        return outer
+
+    def _send(self, outer: Future[Any], call: Callable[[], Any]) -> None:
+        """Give a job to Dask."""
+        if outer.cancelled():
+            return
+        try:
+            inner: Future[Any] = call()
+        except Exception as error:  # noqa: BLE001 - the client was closed when it could not connect again
+            self._stop(outer, f"cannot be sent a trial: {error}")
+            return
+        self._under_way[outer] = inner
+        inner.add_done_callback(partial(self._arrived, outer, call))
+
+    def _arrived(self, outer: Future[Any], call: Callable[[], Any], inner: Future[Any]) -> None:
+        """Pass on an answer; a job whose connection was lost is begun again."""
+        self._under_way.pop(outer, None)
+        if outer.done():
+            return
+        if inner.cancelled():
+            self._again.put((outer, call))
+            return
+        error = inner.exception()
+        if error is None:
+            outer.set_result(inner.result())
+        elif type(error).__name__ == "KilledWorker":
+            outer.set_result(Lost("the workers of the cluster that worked it out ended"))
+        elif isinstance(error, StudyStoppedError):
+            outer.set_exception(error)
+        else:
+            said = (str(error).splitlines() or [""])[0]
+            self._stop(outer, f"a worker cannot work out trials: {type(error).__name__}: {said}")
+
+    def _watched(self) -> None:
+        """Begin jobs again once there is a connection, and give up when there is none or no worker for too long."""
+        lost_since = idle_since = None
+        while not self._is_over.wait(CHECK_EVERY_S):
+            now = time.monotonic()
+            if self._is_connected():
+                lost_since = None
+                while not self._again.empty():
+                    self._send(*self._again.get())
+            else:
+                lost_since = lost_since or now
+                if now - lost_since > RECONNECT_S:
+                    self._give_up(f"does not answer any more for {RECONNECT_S:g} s")
+            idle_since = None if self._workers() or lost_since else idle_since or now
+            if idle_since and now - idle_since > NO_WORKERS_S:
+                self._give_up(f"has had no worker for {NO_WORKERS_S:g} s")
+
+    def _is_connected(self) -> bool:
+        comm = self._client.scheduler_comm
+        return self._client.status == "running" and comm is not None and not comm.closed()
+
+    def _workers(self) -> int:
+        """Number of workers that the client knows of."""
+        info = getattr(self._client, "_scheduler_identity", None) or {}
+        return len(info.get("workers", {}))
+
+    def _give_up(self, reason: str) -> None:
+        """Stop the study."""
+        while not self._again.empty():
+            self._stop(self._again.get()[0], reason)
+        for outer in list(self._under_way):
+            self._under_way.pop(outer, None)
+            self._stop(outer, reason)
+
+    def _stop(self, outer: Future[Any], reason: str) -> None:
+        if not outer.done():
+            outer.set_exception(
+                StudyStoppedError(f"--scheduler {self._address}: {reason}; --resume goes on from what is recorded")
+            )
+
+
+def checked(versions: dict[str, str], function: Callable[..., Any], *arguments: object) -> Any:
+    """Result of a job on a worker of the cluster.
+
+    Raises:
+        StudyStoppedError: The worker has other versions, so that its figures would be other ones.
+    """
+    if versions != _versions():
+        raise StudyStoppedError(f"--scheduler: expected workers with {versions}, got one with {_versions()}")
+    return function(*arguments)
+
+
+def _versions() -> dict[str, str]:
+    """What figures depend on."""
+    return {"cellplan": cellplan.__version__, "python": platform.python_version(), "numpy": np.__version__}
+
+
+def _connected(address: str) -> Any:
+    """A client of the scheduler."""
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError(
+            "--scheduler: expected Dask, got no package 'distributed': pip install cellplan[cluster]"
+        ) from None
+    try:
+        return Client(address, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError, TypeError, ImportError) as error:
+        said = (str(error).splitlines() or [""])[0]
+        raise InputError(
+            f"--scheduler {address}: expected the address of a Dask scheduler that answers, got: {said}"
+        ) from None

@@ -1,0 +1,141 @@
+"""One run of a study: round after round, until the number of trials, the budget or the search itself ends it."""
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import ExitStack
+from dataclasses import dataclass
+from enum import StrEnum
+from types import TracebackType
+from typing import Self
+
+from cellplan.study.record import Recorder
+from cellplan.study.run import Flight
+from cellplan.study.trial import Outcome, Trial, Variant
+from cellplan.study.workers import Evaluate, Limits, Workers
+
+Propose = Callable[[Sequence[Trial]], Sequence[Mapping[str, object]]]
+
+
+class StoppedBy(StrEnum):
+    """Why a study has ended."""
+
+    TRIALS = "trials"
+    BUDGET = "budget"
+    ENOUGH = "enough"
+    SEARCH = "search"  # there is nothing more to try
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """Where a study ends, unless it ends by itself.
+
+    Attributes:
+        trials: Number of trials; None for no limit.
+        seconds: Budget: no round is begun that would end later if it took as long as the one before; one is always
+            worked out. None for no limit.
+    """
+
+    trials: int | None = None
+    seconds: float | None = None
+
+
+class Crew:
+    """What works out the trials of a study, for a ``with`` statement; processes start with the first trial."""
+
+    def __init__(self, evaluate: Evaluate, workers: int | Executor, limits: Limits, size: int) -> None:
+        """Prepare.
+
+        Args:
+            evaluate: Outcome of a variant.
+            workers: Number of processes, or an executor, which stays open.
+            limits: Those of each trial.
+            size: Number of trials in a round.
+        """
+        self._evaluate, self._workers, self._limits, self._size = evaluate, workers, limits, size
+        self._opened = ExitStack()
+        self._flights: dict[str, Flight] = {}
+
+    def __enter__(self) -> Self:
+        """Begin without a process."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Cancel what has not begun and end the processes."""
+        self._opened.__exit__(kind, error, traceback)
+
+    @property
+    def flight(self) -> Flight:
+        """The trials under way."""
+        if "all" not in self._flights:
+            workers = self._workers
+            self._begin("all", Workers(min(workers, self._size)) if isinstance(workers, int) else workers)
+        return self._flights["all"]
+
+    @property
+    def again(self) -> Callable[[Variant], Outcome] | None:
+        """What works out a trial a second time on this machine; None where the first time was on it."""
+        return self._again if getattr(self._workers, "is_remote", False) else None
+
+    def arrived(self) -> list[tuple[Variant, Outcome]]:
+        """Outcomes that have come and were perhaps not taken, when the study is interrupted."""
+        return self._flights["all"].arrived() if "all" in self._flights else []
+
+    def _again(self, variant: Variant) -> Outcome:
+        if "again" not in self._flights:
+            self._begin("again", Workers(1))
+        ((_, outcome),) = self._flights["again"].outcomes([variant])
+        return outcome
+
+    def _begin(self, name: str, executor: Executor) -> None:
+        if executor is not self._workers:
+            self._opened.enter_context(executor)
+        self._flights[name] = Flight(self._evaluate, executor, self._limits)
+        self._opened.callback(self._flights[name].cancel)
+
+
+def run_rounds(propose: Propose, size: int, stop: Stop, record: Recorder, crew: Crew) -> StoppedBy:
+    """Work out round after round; why the study has ended.
+
+    Args:
+        propose: Values of the trials of the next round.
+        size: Number of trials in a round.
+        stop: Where it ends at the latest.
+        record: Where trials are recorded.
+        crew: What works them out.
+    """
+    number, last = 0, 0.0
+    while True:
+        begin = number * size
+        if stop.trials is not None and begin >= stop.trials:
+            return StoppedBy.TRIALS
+        is_new = begin >= record.done
+        if is_new and number > 0 and stop.seconds is not None and record.seconds + last > stop.seconds:
+            return StoppedBy.BUDGET
+        began = time.monotonic()
+        values = propose(record.journal.trials[:begin])[:size]
+        variants = [Variant(begin + k, json.loads(json.dumps(dict(each)))) for k, each in enumerate(values)]
+        _run_round([each for each in variants if stop.trials is None or each.number < stop.trials], record, crew)
+        if record.is_enough():
+            record.journal.ahead.clear()
+            return StoppedBy.ENOUGH
+        if len(values) < size:
+            return StoppedBy.SEARCH
+        last = time.monotonic() - began
+        number += 1
+
+
+def _run_round(variants: Sequence[Variant], record: Recorder, crew: Crew) -> None:
+    """Work out and record those variants of a round that are not recorded yet, until one ends the study."""
+    record.journal.require(variants)
+    record.follow(crew.again)
+    known, ahead = len(record.journal.trials), record.journal.ahead
+    left = [each for each in variants if each.number >= known and each.number not in ahead]
+    if left and not record.is_enough():
+        for variant, outcome in crew.flight.outcomes(left):
+            record.add(variant, outcome, crew.again)
+            if record.is_enough():
+                return

@@ -1,0 +1,100 @@
+"""A layout search from end to end: what it calls best is what ``solve`` passes."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cellplan import LayoutRequest, LayoutResult, Stop, load_cell, search_layout, solve
+from cellplan.report.text.layout import layout_lines
+
+CELL = Path(__file__).resolve().parents[3] / "cells" / "planar_pair.yaml"
+SETTINGS = ("motion.duration_s=2", "motion.step_s=0.02", "checks.clearance_mm=10")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("searched")
+
+
+@pytest.fixture(scope="module")
+def found(folder: Path) -> LayoutResult:
+    shutil.copy(CELL, folder / "given.yaml")
+    request = LayoutRequest(
+        cell=folder / "given.yaml",
+        settings=SETTINGS,
+        vary=("right.base={x_mm: [1500, 2300], y_mm: [0, 600]}",),
+        margin=10.0,
+    )
+    return search_layout(request, folder / "study", stop=Stop(trials=1))
+
+
+def test_the_result_is_a_cell_file_that_passes_solve(found: LayoutResult, folder: Path) -> None:
+    solution = solve(load_cell(folder / "study" / "best.yaml"))
+
+    best = found.record["best"]
+    assert best is not None
+    assert solution.passed
+    assert solution.motion.times[-1] == best["cycle_s"]
+    margins = [np.degrees(use.margin) for run in solution.runs for use in run.report.joints]
+    assert min(margins) == pytest.approx(best["margin_deg"], abs=1e-5)
+    assert min(margins) >= 10.0
+
+
+def test_the_result_keeps_the_words_of_the_given_file(found: LayoutResult, folder: Path) -> None:
+    given, best = ((folder / name).read_text().splitlines() for name in ("given.yaml", "study/best.yaml"))
+
+    left = [line for line in given if line not in best]
+    assert found.record["status"] == "certified"
+    assert any("was xyz_mm: [1900, 300, 500]" in line for line in best)
+    assert all(any(key in line for key in ("base:", "start_deg:", "motion:")) for line in left)
+
+
+def test_the_cycle_is_the_shortest_of_this_motion(found: LayoutResult, folder: Path) -> None:
+    cell = load_cell(folder / "study" / "best.yaml")
+    step = cell.motion.step
+    faster = cell.with_values({"motion.duration_s": (cell.motion.duration or 0.0) - step})
+
+    assert found.record["given"]["status"] in {"conforming", "violating"}
+    assert not solve(faster).passed
+
+
+def test_record_page_and_console_say_the_same(found: LayoutResult, folder: Path) -> None:
+    record = json.loads((folder / "study" / "study.json").read_text())
+    page = (folder / "study" / "study.html").read_text()
+
+    lines = layout_lines(record, folder / "study")
+    assert record == found.record
+    assert lines[0].startswith("planar-pair: CERTIFIED: cycle ")
+    assert lines[0].partition(": ")[2] in page
+    assert lines[-2] == f"next: cellplan solve {folder / 'study' / 'best.yaml'}"
+    assert page.count("<svg") >= 2
+
+
+def test_effects_of_the_variables_are_derivatives_of_the_cycle(found: LayoutResult) -> None:
+    best = found.best
+    assert best is not None
+    problem, x = best.standing.problem, best.standing.measures.point.x
+    step = 1e-5
+
+    changed = []
+    for sign in (1.0, -1.0):
+        point = problem.evaluate(x + sign * step * np.eye(len(x))[0], best.start)
+        assert point is not None
+        node, column = np.unravel_index(best.standing.measures.speeds.value.argmax(), point.qd.shape)
+        changed.append(abs(point.qd[node, column]) / problem.limits.velocity[column])
+
+    slope = (changed[0] - changed[1]) / (2.0 * step) * float(problem.times[-1]) * 0.1  # of 100 mm
+    assert found.record["variables"][0]["cycle_s"] == pytest.approx(slope, rel=0.05, abs=1e-3)
+
+
+@pytest.mark.slow
+def test_equal_trials_give_equal_bytes_with_any_number_of_workers(tmp_path: Path) -> None:
+    request = LayoutRequest(cell=CELL, settings=SETTINGS)
+    for name, workers in (("one", 1), ("two", 2)):
+        search_layout(request, tmp_path / name, stop=Stop(trials=5), workers=workers)
+
+    for name in ("study.jsonl", "study.json", "study.html", "best.yaml"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()

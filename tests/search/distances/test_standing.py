@@ -1,0 +1,174 @@
+"""What never moves but stands where a base is: each kind that stands in another fails the checks and is a distance."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from builders.scene_builders import arm_model, body, fixed_part, floor, make_cell, placed, thing
+
+from cellplan.certify.certify import certify
+from cellplan.checks.clearance.mounting import check_mounting
+from cellplan.geometry.shapes import Box, Shape
+from cellplan.geometry.transforms import Array, pose
+from cellplan.model.cell import Cell, Part, Robot, Tool
+from cellplan.model.mounting import Pedestal
+from cellplan.model.robot import BASE
+from cellplan.scene.scene import Scene
+from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
+from cellplan.search.kernel.job import Layouts
+from cellplan.search.kernel.screws import Directions
+
+COLUMN = Pedestal(radius=0.3, floor=0.0)
+HIGH, LOW = pose((0.0, 0.0, 0.5)), np.eye(4)
+AT_REST = np.zeros((2, 12))
+BIG = Box((0.5, 0.5, 0.4))
+WALL = Box((0.1, 4.0, 0.15))
+
+
+@dataclass
+class BaseOfB:
+    """Where the second robot stands: x, y and z."""
+
+    cell: Cell
+
+    @property
+    def given(self) -> Array:
+        return np.zeros(3)
+
+    def layouts(self, x: Array, start: Array) -> Layouts:
+        return Layouts.of([self.at(each) for each in x], start)
+
+    def directions(self, x: Array) -> Directions:
+        base = np.zeros((2, 6, 3))
+        base[1, :3] = np.eye(3)
+        empty = np.zeros((self.cell.joint_count, 3))
+        return Directions(base=base, tool=np.zeros((2, 6, 3)), start=empty, weights=empty)
+
+    def tools(self, x: Array) -> Mapping[str, Tool]:
+        return {}
+
+    def part(self, x: Array) -> Part:
+        return self.cell.part
+
+    def at(self, x: Array) -> Cell:
+        a, b = self.cell.robots
+        return replace(self.cell, robots=(a, replace(b, X_WB=pose(tuple(x)) @ b.X_WB)))
+
+
+def arm(name: str, base: Array, **changes) -> Robot:
+    """A robot of which only the foot has a body."""
+    model = arm_model()
+    return replace(placed(name, replace(model, bodies=model.bodies[:1]), base=base), **changes)
+
+
+def cabinet(x: float) -> dict[str, tuple]:
+    return {"attachments": (body("cabinet", BASE, shape=BIG, at=(x, 0.0, 0.2)),)}
+
+
+def facing(base: Array, x: float) -> Array:
+    """A base so far along x, turned towards the first robot."""
+    return pose((x, 0.0, 0.0)) @ base @ pose((0.0, 0.0, 0.0), (0.0, 0.0, np.pi))
+
+
+def cell_of(a: Robot, b: Robot, *things: tuple[str, Shape, Array], part: Part | None = None) -> Cell:
+    return make_cell(a, b, part=part, things=(floor(), *(thing(*each) for each in things)))
+
+
+KINDS = {
+    "foot in the plinth of another": (
+        cell_of(arm("a", HIGH, pedestal=COLUMN), arm("b", facing(LOW, 2.0))),
+        {"a/pedestal", "b/foot"},
+        1.55,
+    ),
+    "plinth in plinth": (
+        cell_of(arm("a", HIGH, pedestal=COLUMN), arm("b", facing(HIGH, 2.0), pedestal=COLUMN)),
+        {"a/pedestal", "b/pedestal"},
+        1.4,
+    ),
+    "foot in an obstacle": (
+        cell_of(arm("a", LOW), arm("b", facing(LOW, 2.0)), ("wall", WALL, pose((1.2, 0.0, 0.075)))),
+        {"b/foot", "wall"},
+        0.6,
+    ),
+    "plinth in an obstacle": (
+        cell_of(arm("a", LOW), arm("b", facing(HIGH, 2.0), pedestal=COLUMN), ("wall", WALL, pose((1.2, 0.0, 0.075)))),
+        {"b/pedestal", "wall"},
+        0.45,
+    ),
+    "feet of two robots": (cell_of(arm("a", LOW), arm("b", facing(LOW, 2.0))), {"a/foot", "b/foot"}, 1.7),
+    "attachment in an obstacle": (
+        cell_of(arm("a", LOW), arm("b", facing(LOW, 2.0), **cabinet(-0.5)), ("wall", WALL, pose((3.2, 0.0, 0.075)))),
+        {"b/cabinet", "wall"},
+        -0.4,
+    ),
+    "attachment in a foot": (
+        cell_of(arm("a", LOW, **cabinet(-0.6)), arm("b", facing(LOW, -2.0))),
+        {"a/cabinet", "b/foot"},
+        -1.0,
+    ),
+    "attachment in a plinth": (
+        cell_of(arm("a", LOW, **cabinet(-0.6)), arm("b", facing(HIGH, -2.5), pedestal=COLUMN)),
+        {"a/cabinet", "b/pedestal"},
+        -1.35,
+    ),
+    "attachments of two robots": (
+        cell_of(arm("a", LOW, **cabinet(-0.6)), arm("b", facing(LOW, -3.0), **cabinet(-0.6))),
+        {"a/cabinet", "b/cabinet"},
+        -1.3,
+    ),
+    "foot in a part at rest": (
+        cell_of(arm("a", LOW), arm("b", facing(LOW, 2.0)), part=fixed_part(BIG, pose((1.2, 0.0, 0.2)))),
+        {"b/foot", "part"},
+        0.4,
+    ),
+    "plinth in a part at rest": (
+        cell_of(
+            arm("a", LOW), arm("b", facing(HIGH, 2.0), pedestal=COLUMN), part=fixed_part(BIG, pose((1.2, 0.0, 0.2)))
+        ),
+        {"b/pedestal", "part"},
+        0.25,
+    ),
+}
+
+
+def verdict(cell: Cell) -> bool:
+    """What the checks say of a cell at rest."""
+    scene = Scene.from_cell(cell)
+    return certify(scene, AT_REST).is_kept and all(check.passed for check in check_mounting(scene, AT_REST))
+
+
+def near_at(distances: CellDistances, variables: BaseOfB, x: Array, within: float) -> LayoutDistances:
+    return distances.near(x, variables.layouts(x[None], AT_REST[:1]), AT_REST[:1], within)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_stands_in_another_thing_fails_the_checks_and_falls_short_of_its_distance(kind: str) -> None:
+    cell, names, apart = KINDS[kind]
+    variables, sign = BaseOfB(cell), 1.0 if apart > 0.0 else -1.0
+    distances = CellDistances.of(Scene.from_cell(cell), variables)
+    for deep in (-0.02, 0.03):
+        x = np.array([-apart - sign * deep, 0.0, 0.0])
+        near = near_at(distances, variables, x, 0.1)
+        short = near.distances < near.demands
+        failing = [set(distances.pairs[row].names) for row in near.pairs[short].tolist()]
+        assert verdict(variables.at(x)) is (deep < 0.0)
+        assert failing == ([names] if deep > 0.0 else [])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_distances_of_what_stands_change_with_the_base_as_differences_say(kind: str) -> None:
+    cell, names, apart = KINDS[kind]
+    variables = BaseOfB(cell)
+    distances = CellDistances.of(Scene.from_cell(cell), variables)
+    x = np.array([np.copysign(0.01, apart) - apart, 0.01, 0.02])
+    near = near_at(distances, variables, x, 0.1)
+    exact = distances.derivatives(near, x, np.zeros((1, cell.joint_count, 3)))
+    row = next(row for row, pair in enumerate(near.pairs.tolist()) if set(distances.pairs[pair].names) == names)
+    step = 1e-5
+    for variable in range(3):
+        found = []
+        for sign in (step, -step):
+            other = near_at(distances, variables, x + sign * np.eye(3)[variable], 0.2)
+            found.append(float(other.distances[other.pairs == near.pairs[row]][0]))
+        assert exact[row, variable] == pytest.approx((found[0] - found[1]) / (2.0 * step), abs=1e-4)
