@@ -120,27 +120,6 @@ def fastest(
     )
 
 
-def slowed_values(cell: Cell, *, progress: Progress = silent) -> tuple[dict[str, object], float]:
-    """Values of the cell file with which its time laws keep all limits of joints and tools, and the factor of time.
-
-    Args:
-        cell: The cell.
-        progress: Called with the stage and the fraction done.
-
-    Raises:
-        InputError: The cell cannot be worked with, or a task has times that do not follow the clock.
-        NoSolutionError: There is no motion, or no time is long enough.
-    """
-    refuse_fixed_times(cell)
-
-    def solved(law: Law, values: dict[str, object], title: str) -> TimedProgram:
-        return TimedProgram.solved(cell, law, values, task=None, progress=_within(progress, title))
-
-    written = solved(Law.AS_WRITTEN, {}, "as written")
-    found = _by_time_laws(cell, written, solved)
-    return dict(found.values), found.cycle / written.cycle
-
-
 def _by_time_laws(base: Cell, written: TimedProgram, solved: SolvedAt) -> TimedProgram:
     """The program with which all limits hold and a step less would break one.
 

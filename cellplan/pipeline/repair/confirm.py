@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from cellplan.model.report import Check
 from cellplan.model.units import MM
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.repair.neat import changed_values, neat
-from cellplan.pipeline.repair.solved import TIMED, Solved, demanded_margin
+from cellplan.pipeline.repair.solved import LIMITS, TIMED, Solved, demanded_margin
 from cellplan.pipeline.solve import solve
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.objective import Demands, Effort, Room
@@ -66,7 +66,7 @@ def confirmed(ready: Prepared, x: Array, start: Array) -> Confirmed:
         values, cost = changed_values(ready, x, start), float(np.abs(x - variables.given) @ variables.cost)
         solved, reason = solved_cell(ready.cell, values)
         done = Confirmed(values=values, cost=cost, solved=solved, reason=reason, solves=solves)
-        tighter = _tightened(solved, demands, effort, problem.times) if solved is not None and reason else None
+        tighter = _tightened(solved, demands, effort) if solved is not None and reason else None
         if tighter is None:
             break
         demands, effort = tighter
@@ -84,19 +84,19 @@ def solved_cell(cell: Cell, values: Mapping[str, object]) -> tuple[Solved | None
     return solved, failed[0].message if failed else ""
 
 
-def _tightened(solved: Solved, demands: Demands, effort: Effort, times: Array) -> tuple[Demands, Effort] | None:
+def _tightened(solved: Solved, demands: Demands, effort: Effort) -> tuple[Demands, Effort] | None:
     """Demands that ask for what the verified motion lacks; None where it lacks something else."""
     failed = solved.failed
     names = {check.name for check in failed}
-    if not names <= {*TIMED, *DISTANCES, "joint_position", "joint_margin"}:
+    if not names <= {*LIMITS, *TIMED, *DISTANCES}:
         return None
     lacks = solved.lacks
     margin = demands.margin + np.where(lacks > 0.0, lacks + MORE_ANGLE, 0.0)
     near = [check for check in failed if check.name in DISTANCES]
     room = replace(effort.room, distance=effort.room.distance + _missing(near), time=effort.room.time + _late(failed))
-    at = [int(np.abs(times - check.at_s).argmin()) for check in near if check.at_s is not None]
-    keys = tuple(sorted({*effort.extra_keys, *at}))
-    return replace(demands, margin=margin), replace(effort, room=_most(room), extra_keys=keys)
+    at = (check.at_s for check in near if check.at_s is not None)
+    also_at = tuple(sorted({*effort.also_at, *at}))
+    return replace(demands, margin=margin), replace(effort, room=_most(room), also_at=also_at)
 
 
 def _missing(near: Sequence[Check]) -> float:
@@ -107,7 +107,7 @@ def _missing(near: Sequence[Check]) -> float:
 
 def _late(failed: Sequence[Check]) -> float:
     """Share of the time to ask for beyond what is asked for already."""
-    shares: list[Any] = [check.value / check.limit - 1.0 for check in failed if check.name in TIMED]
+    shares = [(check.value / check.limit) ** TIMED[check.name] - 1.0 for check in failed if check.name in TIMED]
     return max(shares) + MORE_TIME if shares else 0.0
 
 

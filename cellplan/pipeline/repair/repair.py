@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
@@ -21,13 +21,13 @@ from cellplan.pipeline.repair.attempts import (
 )
 from cellplan.pipeline.repair.prepare import ready_cell, start_posture
 from cellplan.pipeline.repair.record import Case, Tried, advice_record, remedy_values
-from cellplan.pipeline.repair.solved import LIMITS, TIMED
-from cellplan.pipeline.repair.trial import EFFORT, GIVEN, evaluate
+from cellplan.pipeline.repair.solved import LIMITS, TIMED, time_asked
+from cellplan.pipeline.repair.trial import EFFORT, FACTOR, GIVEN, evaluate
 from cellplan.report.record.advice import AdviceRecord
 from cellplan.search.programs.objective import Objective
 from cellplan.study.run import outcomes
-from cellplan.study.trial import Outcome, TrialStatus
-from cellplan.study.variants import Variant
+from cellplan.study.trial import Outcome, TrialStatus, Variant
+
 
 KINDS: Final = list(RemedyKind)
 WITH_LIMITS: Final = "quadratic_program"  # the method that keeps joints within their limits
@@ -143,16 +143,16 @@ def _first(ready: Prepared) -> list[Attempt]:
 
 
 def _about_limits(ready: Prepared, given: Outcome) -> list[Attempt]:
-    """Attempts where the verdict is about limits of joints alone."""
-    checks: object = given.figures.get("failed", ())
-    failed = {check["name"] for check in checks} if isinstance(checks, list) else set()
-    if not failed or not failed <= LIMITS:
-        return []
-    found = list(of_weights(ready.cell, ready.variables.settings))
-    if ready.cell.solver.method != WITH_LIMITS:
-        found.append(Attempt(kind=RemedyKind.METHOD, robots=(), values={"solver.method": WITH_LIMITS}))
-    if failed <= TIMED:
-        found.append(Attempt(kind=RemedyKind.DURATION, robots=()))
+    """Attempts where the verdict is about limits of joints, or what a slower motion keeps, alone."""
+    checks: Any = given.figures.get("failed", ())
+    failed = {check["name"] for check in checks}
+    found: list[Attempt] = []
+    if failed and failed <= LIMITS:
+        found += of_weights(ready.cell, ready.variables.settings)
+        if ready.cell.solver.method != WITH_LIMITS:
+            found.append(Attempt(kind=RemedyKind.METHOD, robots=(), values={"solver.method": WITH_LIMITS}))
+    if failed and failed <= TIMED.keys():
+        found.append(Attempt(kind=RemedyKind.DURATION, robots=(), values={FACTOR: time_asked(checks)}))
     return found
 
 

@@ -1,5 +1,6 @@
 """A motion solved and verified in full, as plain figures, and what it lacks of the demands of a repair."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -9,22 +10,20 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check
 from cellplan.model.units import DEG, MM
+from cellplan.pipeline.layout.finish import SLOWED
 from cellplan.pipeline.solution import Solution
 from cellplan.report.record.common import check_record, number
 
 ROUNDING: Final = 1e-9  # [rad] or [m] by which a margin may be missed
 MARGIN: Final = "joint_margin"  # a demanded margin among the checks
-TIMED: Final = frozenset(
-    {
-        "joint_velocity",
-        "joint_acceleration",
-        "joint_acceleration_assumed",
-        "joint_jerk",
-        "part_acceleration",
-        "tool_speed",
-    }
-)  # checks that a slower motion passes
-LIMITS: Final = frozenset({"joint_position", MARGIN, *TIMED})  # checks of limits of joints
+OF_JOINTS: Final[Mapping[str, float]] = {
+    "joint_velocity": 1.0,
+    "joint_acceleration": 1.0 / 2.0,
+    "joint_acceleration_assumed": 1.0 / 2.0,
+    "joint_jerk": 1.0 / 3.0,
+}  # limits of joints that a slower motion keeps: how the time that they ask for grows with their share
+TIMED: Final[Mapping[str, float]] = {**SLOWED, **OF_JOINTS}  # all checks that a slower motion passes
+LIMITS: Final = frozenset({"joint_position", MARGIN, *OF_JOINTS})  # checks of limits of joints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -119,3 +118,9 @@ def demanded_margin(cell: Cell) -> Array:
     if settings is None:
         return np.zeros(len(joints))
     return np.array([settings.margin if joint.is_revolute else settings.margin_sliding for joint in joints])
+
+
+def time_asked(failed: Iterable[Mapping[str, Any]]) -> float:
+    """How many times as long the motion must last for failed checks, as records, that a slower motion passes."""
+    shares = [(each["value"] / each["limit"], TIMED[each["name"]]) for each in failed if each["name"] in TIMED]
+    return max((share**order for share, order in shares), default=1.0)

@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.io.cell.changes import plain_values
-from cellplan.pipeline.fastest.shortest import slowed_values
+from cellplan.pipeline.fastest.scaling import refuse_fixed_times, scaled_values, whole_steps
 from cellplan.pipeline.layout.limits import standing_of
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.layout.request import LayoutRequest
@@ -17,18 +17,21 @@ from cellplan.pipeline.repair.at_start import StartFault, start_faults
 from cellplan.pipeline.repair.attempts import CONTINUOUS, Attempt, RemedyKind
 from cellplan.pipeline.repair.confirm import Confirmed, confirmed, solved_cell
 from cellplan.pipeline.repair.prepare import begins, ready_cell, start_posture, with_attempt
-from cellplan.pipeline.repair.solved import Solved
+from cellplan.pipeline.repair.solved import Solved, time_asked
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Effort
 from cellplan.search.variables.written import written_starts
-from cellplan.study.trial import Outcome, TrialStatus
-from cellplan.study.variants import Variant
+from cellplan.study.trial import Outcome, TrialStatus, Variant
+
 
 EFFORT: Final = Effort(iterations=25, keys=17)
 BEGINNINGS: Final = 3  # [-] from which the least change of a layout is sought
 FEWER: Final = 1  # [-] of other attempts
 SAME_START: Final = 1e-3  # [rad] or [m] by which start postures of one branch differ
 TENTHS: Final = 10.0  # [-] cost of a motion that lasts twice as long
+SLOWEST: Final = 100.0  # [-] times as long as the given motion
+FACTOR: Final = "factor"  # in the values of an attempt: how many times as long a motion is to last at least
+DIGITS: Final = 9  # of a time in [s]
 GIVEN: Final = "given"
 NO_MOTION: Final = "no layout nearby was found in which all tools follow their paths"
 
@@ -70,8 +73,7 @@ def _least(ready: Prepared, attempt: Attempt) -> Confirmed | str:
         case RemedyKind.FREE_SPIN:
             return _of_spin(ready, attempt)
         case RemedyKind.DURATION:
-            values, factor = slowed_values(ready.cell)
-            return _of_values(ready, values, TENTHS * (factor - 1.0))
+            return _slower(ready, float(attempt.values[FACTOR]))
         case kind if kind in CONTINUOUS:
             return _of_variables(with_attempt(ready, attempt), start_posture(ready)[0], attempt)
         case _:
@@ -134,6 +136,20 @@ def _of_spin(ready: Prepared, attempt: Attempt) -> Confirmed | str:
         return "a tool cannot follow its path"
     left = standing_of(opened.coarse, point, opened.demands(), EFFORT).violations()
     return left[0]["text"] if left else _of_values(ready, attempt.values, 0.0)
+
+
+def _slower(ready: Prepared, factor: float) -> Confirmed:
+    """The same motion so much slower, and more where that is not enough."""
+    cell, longer_than = ready.cell, 1.0
+    refuse_fixed_times(cell)
+    while True:
+        factor = whole_steps(cell, factor, longer_than=longer_than)
+        values = {key: round(float(str(value)), DIGITS) for key, value in scaled_values(cell, factor).items()}
+        done = _of_values(ready, values, TENTHS * (factor - 1.0))
+        asked = 1.0 if done.solved is None else time_asked(done.solved.figures["failed"])
+        if not done.reason or asked <= 1.0 or factor > SLOWEST:
+            return done
+        factor, longer_than = factor * asked, factor
 
 
 def _of_values(ready: Prepared, values: Mapping[str, object], cost: float) -> Confirmed:

@@ -131,7 +131,7 @@ def effects(given: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Effect
             found.append(_effect(check, old, new, unit, text))
             continue
         now = after.get((check["name"], subject))
-        name, unit, old = check["name"].removeprefix("joint_").replace("_", " "), check["unit"], check["value"]
+        name, unit, old = _short_name(check["name"]), check["unit"], check["value"]
         if name == "collision":
             found.append(_effect(check, old, 0.0, unit, f"{subject}: no contact"))
         elif now is not None and check["name"] in TIMED:
@@ -143,6 +143,11 @@ def effects(given: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Effect
                 _effect(check, old, now["value"], unit, f"{name} {subject} {old:.3g} -> {now['value']:.3g} {unit}")
             )
     return found
+
+
+def _short_name(check: str) -> str:
+    """The name of a check in words."""
+    return check.removeprefix("joint_").removesuffix("_assumed").replace("_", " ")
 
 
 def _effect(check: Mapping[str, Any], old: float, new: float, unit: str, text: str) -> EffectRecord:
