@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.collision.bodies import BodyPoses
 from cellplan.collision.continuous.motion_bound import Bends, Pair
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.transforms import Array, rotated
 from cellplan.scene.scene import Scene
 
 
@@ -50,7 +50,7 @@ class StraightMotion:
             steps=steps,
             poses=poses,
             bend={index: arms.chain(None, index).bend(steps) for index in bodies},
-            centres={index: poses.R[index] @ centres[index] + poses.p[index] for index in bodies},
+            centres={index: rotated(poses.R[index], centres[index]) + poses.p[index] for index in bodies},
         )
 
     def bends(self, pair: Pair) -> Bends:
@@ -66,7 +66,7 @@ class StraightMotion:
         first, second = pair
         R_AW = np.swapaxes(self.poses.R[first], 1, 2)
         apart = self.poses.p[second] - self.poses.p[first]
-        return R_AW @ self.poses.R[second], (R_AW @ apart[..., None])[..., 0]
+        return R_AW @ self.poses.R[second], np.einsum("nij,ni->nj", self.poses.R[first], apart)
 
     def sphere_bounds(self, pair: Pair) -> Array:
         """Lower bound of the distance of two bounding spheres in each step in [m], shape (n - 1,).

@@ -8,7 +8,7 @@ holds for every unit direction, however it was proposed, and equals the distance
 import numpy as np
 
 from cellplan.geometry.shapes import Mesh, Solid, support
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.transforms import Array, rotated_back
 
 SUPPORT_CHUNK = 500_000  # [-] products of a direction and a vertex worked out at once: 4 MB
 
@@ -54,4 +54,4 @@ def heights(shape: Solid, R: Array, p: Array, *, X_WS: Array) -> Array:
         X_WS: Pose of the half-space; everything below its xy plane is solid.
     """
     up = X_WS[:3, 2]
-    return p @ up - X_WS[:3, 3] @ up - supports(shape, -(up @ R))
+    return p @ up - X_WS[:3, 3] @ up - supports(shape, -rotated_back(R, up))

@@ -84,6 +84,16 @@ def rotation_about(axis: Array, angle: ArrayLike) -> Array:
     return np.eye(3) + np.sin(angle) * S + (1.0 - np.cos(angle)) * (S @ S)
 
 
+def rotated(R: Array, vector: Array) -> Array:
+    """One vector, shape (3,), turned by many rotations, shape (n, 3, 3), in one product, shape (n, 3)."""
+    return (np.ascontiguousarray(R).reshape(-1, 3) @ vector).reshape(-1, 3)
+
+
+def rotated_back(R: Array, vector: Array) -> Array:
+    """One vector, shape (3,), turned by the inverses of many rotations, shape (n, 3, 3), to shape (n, 3)."""
+    return np.einsum("i,nij->nj", vector, R)
+
+
 def rotation_vector(R: Array) -> Array:
     """Rotation vectors (axis times angle in [rad], angle in 0..pi) of rotation matrices, shape (..., 3).
 

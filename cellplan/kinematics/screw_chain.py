@@ -37,11 +37,11 @@ class ScrewChain:
         Returns:
             Displacements, shape (N, links + 1, 4, 4).
         """
-        D = np.empty((len(q), len(self._axes) + 1, 4, 4))
-        D[:, 0] = self._X_WB
+        D = np.empty((len(self._axes) + 1, len(q), 4, 4))
+        D[0] = self._X_WB
         for link, (axis, position) in enumerate(zip(self._axes, self._positions(q), strict=True)):
-            np.matmul(D[:, axis.parent + 1], screw_displacement(axis, position), out=D[:, link + 1])
-        return D
+            D[link + 1] = _carried_on(axis, position, D[axis.parent + 1])[0]
+        return np.moveaxis(D, 0, 1)
 
     def flange_poses(self, q: Array) -> Array:
         """Flange in the world, shape (N, 4, 4)."""
@@ -89,24 +89,17 @@ class ScrewChain:
         return np.concatenate([np.where(is_revolute, np.cross(s0, s), s), np.where(is_revolute, s, 0.0)], axis=-1)
 
     def tool_motion(self, q: Array) -> tuple[Array, Array]:
-        """`tool_poses` and `flange_screws` at once, for searches that need both many times.
-
-        With the matrix X of a unit screw ``A(q) = 1 + sin(q) X + (1 - cos(q)) X^2``, or ``1 + q X`` for a slide. What
-        the links before an axis give with X, X^2, its direction and its point is one product for all configurations.
-        """
+        """`tool_poses` and `flange_screws` at once, for searches that need both many times."""
         D, screws = np.tile(self._X_WB, (len(q), 1, 1)), np.zeros((len(q), 6, self._n))
         positions = self._positions(q)
         for link in self._links_to_flange:
-            axis, drive, position = self._axes[link], self._drives[link], positions[link][:, None, None]
-            carried = (D.reshape(-1, 4) @ _screw_factors(axis)).reshape(len(q), 4, 10)
-            s, s0 = carried[:, :3, 8], carried[:, :3, 9]
+            axis, drive = self._axes[link], self._drives[link]
+            D, s, s0 = _carried_on(axis, positions[link], D)
             if axis.is_revolute:
-                D = D + np.sin(position) * carried[:, :, :4] + (1.0 - np.cos(position)) * carried[:, :, 4:8]
                 for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
                     screws[:, i, drive.joint] += drive.ratio * (s0[:, j] * s[:, k] - s0[:, k] * s[:, j])
                 screws[:, 3:, drive.joint] += drive.ratio * s
             else:
-                D = D + position * carried[:, :, :4]
                 screws[:, :3, drive.joint] += drive.ratio * s
         return D @ self._X_BT, screws
 
@@ -130,6 +123,21 @@ def screw_displacement(axis: Joint | FollowerJoint, position: Array) -> Array:
         return pose_from(np.broadcast_to(np.eye(3), (len(position), 3, 3)), position[:, None] * axis.axis_B)
     R = rotation_about(axis.axis_B, position)
     return pose_from(R, axis.point_B - R @ axis.point_B)
+
+
+def _carried_on(axis: Joint | FollowerJoint, position: Array, D: Array) -> tuple[Array, Array, Array]:
+    """Displacements behind an axis, its direction and its point in the world, from the displacements D before it.
+
+    With the matrix X of a unit screw ``A(q) = 1 + sin(q) X + (1 - cos(q)) X^2``, or ``1 + q X`` for a slide. What D
+    gives with X, X^2, the direction and the point is one product for all configurations.
+    """
+    carried = (D.reshape(-1, 4) @ _screw_factors(axis)).reshape(len(D), 4, 10)
+    q = position[:, None, None]
+    if axis.is_revolute:
+        behind = D + np.sin(q) * carried[:, :, :4] + (1.0 - np.cos(q)) * carried[:, :, 4:8]
+    else:
+        behind = D + q * carried[:, :, :4]
+    return behind, carried[:, :3, 8], carried[:, :3, 9]
 
 
 def _screw_factors(axis: Joint | FollowerJoint) -> Array:

@@ -122,8 +122,9 @@ def carried_poses(bodies: Sequence[SceneBody], D: Mapping[str, Array]) -> BodyPo
             X = D[body.robot][:, body.link + 1]
             links[key] = np.ascontiguousarray(X[:, :3, :3]).reshape(-1, 3), X[:, :3, 3]
         rows, p_WL = links[key]  # the rows of all rotations: one product for all samples
-        R[index] = (rows @ body.X_BS[:3, :3]).reshape(count, 3, 3)
-        p[index] = (rows @ body.X_BS[:3, 3]).reshape(count, 3) + p_WL
+        np.matmul(rows, body.X_BS[:3, :3], out=R[index].reshape(-1, 3))
+        np.matmul(rows, body.X_BS[:3, 3], out=p[index].reshape(-1))
+        p[index] += p_WL
     return BodyPoses(R, p)
 
 

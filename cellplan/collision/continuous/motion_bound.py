@@ -33,6 +33,7 @@ from cellplan.collision.engine import Engine
 from cellplan.collision.separation import supports
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.shapes import Mesh
+from cellplan.geometry.transforms import rotated, rotated_back
 
 Pair = tuple[int, int]
 
@@ -84,8 +85,8 @@ class PairMotion:
         self._a, self._b = engine.bodies[first], engine.bodies[second]
         self._R_WA = motion.poses.R[first]
         self._R_AB, self._p_AB = motion.relative(pair)
-        R_BA = np.swapaxes(self._R_AB, 1, 2)
-        p_BA = -(R_BA @ self._p_AB[..., None])[..., 0]
+        R_BA = np.ascontiguousarray(np.swapaxes(self._R_AB, 1, 2))
+        p_BA = -np.einsum("nij,ni->nj", self._R_AB, self._p_AB)
         self._b_in_A, self._a_in_B = _Carried(self._b, self._R_AB, self._p_AB), _Carried(self._a, R_BA, p_BA)
         self._work = sum(len(body.hull.vertices) for body in (self._a, self._b) if isinstance(body.hull, Mesh))
         self._bends = motion.bends(pair)
@@ -148,8 +149,8 @@ class PairMotion:
         n_B = n_A @ self._R_AB[sample]
         R, p = self._R_AB[first : last + 1], self._p_AB[first : last + 1]
         a, b = self._a.hull, self._b.hull
-        in_A = p @ n_A - supports(a, n_A[None])[0] - supports(b, -(n_A @ R))
-        turning = R @ n_B
+        in_A = p @ n_A - supports(a, n_A[None])[0] - supports(b, -rotated_back(R, n_A))
+        turning = rotated(R, n_B)
         in_B = np.einsum("ij,ij->i", turning, p) - supports(a, turning) - supports(b, -n_B[None])[0]
         by_A = np.minimum(in_A[1:], in_A[:-1]) - self._strays_b[first:last]
         by_B = np.minimum(in_B[1:], in_B[:-1]) - self._strays_a[first:last]
@@ -163,7 +164,7 @@ class _Carried:
         """Carry both ends of the line along, or the centre; poses seen from the other, shapes (n, 3, 3) and (n, 3)."""
         is_slender = float(np.linalg.norm(body.ends[1] - body.ends[0])) > 2.0 * body.girth
         points, self._radius = (body.ends, body.girth) if is_slender else (body.centre[None], body.radius)
-        self._points = [R @ point + p for point in points]
+        self._points = [rotated(R, point) + p for point in points]
 
     def displacement(self, sample: int, others: slice | Indices, turn: Array) -> Array:
         """Farthest that a point of the body moved between a sample and m others, which turned it so far, shape (m,)."""

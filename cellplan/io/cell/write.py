@@ -52,6 +52,8 @@ def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> d
     if cell.program is not None:
         written = document["tasks"]
         document["tasks"] = {task.name: _in_sequence(written[task.name], task, cell) for task in cell.tasks}
+    if len(cell.tasks) != len(tasks) or str(cell.motion.mode) != document["motion"]["mode"]:
+        document.pop("layout", None)  # it may name other tasks, or choose between other modes
     document["motion"] = _motion(document["motion"], cell)
     document["solver"] = _solver(document["solver"], cell.solver)
     document["checks"] = _checks(document["checks"], cell.checks)

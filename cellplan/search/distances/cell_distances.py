@@ -17,10 +17,13 @@ from cellplan.collision.engine import Engine
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.transforms import pose
 from cellplan.kinematics.link_forest import WORLD
+from cellplan.model.cell import Cell
 from cellplan.model.mounting import Bracket
+from cellplan.scene.body_table import BodyTable
 from cellplan.scene.near_table import Found, NearTable, wrenches
 from cellplan.scene.scene import Scene
-from cellplan.search.distances.layout_pairs import LayoutPair, among, are_own, demands_of, layout_pairs
+from cellplan.search.distances.keep_out import keep_out_bodies
+from cellplan.search.distances.layout_pairs import LayoutPair, among, are_own, demands_of, layout_pairs, with_areas
 from cellplan.search.distances.moving_bodies import LayoutVariables, MovingBodies, Placed, far_away, supports
 from cellplan.search.kernel.job import Layouts
 
@@ -78,18 +81,36 @@ class CellDistances:
     """The pairs of a cell that its layouts keep apart.
 
     Attributes:
-        pairs: The pairs: those that the checks watch, then those of which they judge the depth.
+        pairs: The pairs: those that the checks watch, those of which they judge the depth, then areas of the floor with
+            the bases and columns that keep out of them.
     """
 
     def __init__(self, scene: Scene, variables: LayoutVariables) -> None:
         """Use ``of``."""
         self._scene, self._variables, self._cell = scene, variables, scene.cell
-        self._moving = MovingBodies(scene, variables)
+        self._moving = MovingBodies(scene)
         self.pairs, watched = layout_pairs(scene)
-        changed = {index for index, _ in self._moving.of_tools(variables.given)}
-        self._table = replace(scene.near_table, pairs=among(watched, _concerned(self.pairs, changed)))
+        areas, origins = keep_out_bodies(scene.cell)
+        carriers = [scene.carrier(index) for index in range(len(scene.engine.bodies))] + [*areas, *origins]
+        added = [prepare(each.name, each.shape) for each in (*areas, *origins)]  # type: ignore[arg-type] # no half-space
+        first = len(scene.engine.bodies)
+        at_base = {each.robot: first + len(areas) + place for place, each in enumerate(origins)}
+        ends = [
+            (first + area, body)
+            for area in range(len(areas))
+            for robot, origin in at_base.items()
+            for body in (origin, *([self._moving.columns[robot]] if robot in self._moving.columns else []))
+        ]
+        self.pairs, watched = with_areas(self.pairs, watched, ends, [each.name for each in carriers])
+        self._engine = Engine([*scene.engine.bodies, *added]) if added else scene.engine
+        changed = {index for index, _ in self._moving.of_tools(variables.placed(variables.given))}
+        self._table = replace(
+            scene.near_table,
+            bodies=BodyTable.of(scene.near_table.forest, carriers, self._engine.bodies),
+            pairs=among(watched, _concerned(self.pairs, changed)),
+            is_hull=np.append(scene.near_table.is_hull, [True] * len(added)).astype(bool),
+        )
         self._demands, self._own = demands_of(self.pairs), are_own(self.pairs)
-        carriers = [scene.carrier(index) for index in range(len(scene.engine.bodies))]
         index = {robot.name: place for place, robot in enumerate(self._cell.robots)}
         self._robots = np.array([-1 if each.robot is None else index[each.robot] for each in carriers], dtype=np.intp)
 
@@ -109,17 +130,19 @@ class CellDistances:
         }
         return cls(scene.moved(bare) if bare else scene, variables)
 
-    def near(self, x: Array, layout: Layouts, q: Array, within: float) -> LayoutDistances:
+    def near(self, x: Array, layout: Layouts, q: Array, within: float) -> LayoutDistances:  # noqa: ARG002
         """All pairs of one layout that are nearer than a distance.
 
         Args:
             x: The variables, shape (n,).
-            layout: The layout, a batch of one.
+            layout: The layout as the kernel has it. It does not say where bodies are: a part that lies elsewhere is
+                there a displacement of all bases.
             q: Stacked joint positions at the keys in [rad] or [m], shape (K, nq).
             within: The distance in [m].
         """
-        table, engine = self._placed(x, layout)
-        D = table.forest.displacements(q, layout.X_WB[0])
+        cell = self._variables.placed(x)
+        table, engine = self._placed(cell)
+        D = table.forest.displacements(q, _bases(cell))
         found = table.find(engine, D, within)
         return LayoutDistances(
             pairs=found.rows,
@@ -146,20 +169,20 @@ class CellDistances:
         found = (near.by_joints[:, None] @ dq[near.keys])[:, 0]
         return found + self._by_bases(near, x) + self._by_shapes(near, x)
 
-    def _placed(self, x: Array, layout: Layouts) -> tuple[NearTable, Engine]:
+    def _placed(self, cell: Cell) -> tuple[NearTable, Engine]:
         """The bodies as a layout has them."""
-        placed = {**dict(self._moving.of_bases(layout.X_WB[0])), **dict(self._moving.of_tools(x))}
-        bodies = self._scene.engine.bodies
+        placed = {**dict(self._moving.of_bases(_bases(cell))), **dict(self._moving.of_tools(cell))}
+        bodies = self._engine.bodies
         other = dict[int, CollisionBody]()
         for index, each in placed.items():
             if each.shape is not None and each.shape is not bodies[index].shape and each.shape != bodies[index].shape:
                 other[index] = prepare(bodies[index].name, each.shape)
         poses = {index: each.X_LS if each.shape is not None else far_away(index) for index, each in placed.items()}
-        return self._table.moved(poses, other), self._scene.engine.with_bodies(other) if other else self._scene.engine
+        return self._table.moved(poses, other), self._engine.with_bodies(other) if other else self._engine
 
     def _by_bases(self, near: LayoutDistances, x: Array) -> Array:
         """Derivatives while joints stand still, of what moves as a whole with the bases, shape (M, n)."""
-        base = self._variables.directions(x).base
+        base = self._variables.base_twists(x)
         X_WB = near.D[[self._scene.near_table.forest.place(robot.name) for robot in self._cell.robots], 0]
         twists = np.zeros((len(base) + 1, 6, base.shape[2]))  # at the world's origin; the last one for the world
         turns = np.swapaxes(base[:, 3:], 1, 2)
@@ -194,26 +217,16 @@ class CellDistances:
 
     def _changes(self, x: Array) -> Iterator[tuple[int, int, tuple[Placed, Placed]]]:
         """Variable, body and the body a step forward and back, for all that moves on its link or changes its shape."""
-        directions = self._variables.directions(x)
-        start = np.zeros((2 * len(x), self._cell.joint_count))
-        steps = STEP * np.concatenate([np.eye(len(x)), -np.eye(len(x))])
-        X_WB = self._variables.layouts(x + steps, start).X_WB
-        by_base = np.asarray(directions.base.any(axis=(0, 1)))
-        by_tool = np.asarray(directions.tool.any(axis=(0, 1)))
-        otherwise = by_base | by_tool | directions.start.any(axis=0) | directions.weights.any(axis=0)
-        for variable in range(len(x)):
-            if by_base[variable]:
-                sides = [dict(self._on_world(X_WB[place])) for place in (variable, variable + len(x))]
-                yield from _changed(variable, sides)
-            if by_tool[variable] or not otherwise[variable]:
-                sides = [dict(self._moving.of_tools(x + steps[place])) for place in (variable, variable + len(x))]
-                yield from _changed(variable, sides)
+        for variable, unit in enumerate(np.eye(len(x))):
+            sides = [self._shapes(self._variables.placed(x + step * unit)) for step in (STEP, -STEP)]
+            yield from _changed(variable, sides)
 
-    def _on_world(self, X_WB: Array) -> Iterator[tuple[int, Placed]]:
-        """Columns and their poses in the world."""
+    def _shapes(self, cell: Cell) -> dict[int, Placed]:
+        """What a layout moves on its link or gives another shape; columns as seen from the world."""
+        X_WB, found = _bases(cell), dict(self._moving.of_tools(cell))
         for index, placed in self._moving.of_bases(X_WB):
-            robot = self._robots[index]
-            yield index, Placed(placed.shape, X_WB[robot] @ placed.X_LS)
+            found[index] = Placed(placed.shape, X_WB[self._robots[index]] @ placed.X_LS)
+        return found
 
 
 def _changed(variable: int, sides: Sequence[Mapping[int, Placed]]) -> Iterator[tuple[int, int, tuple[Placed, Placed]]]:
@@ -228,6 +241,11 @@ def _concerned(pairs: Sequence[LayoutPair], changed: Set[int]) -> Flags:
     """Which pairs a layout can change: not those of one robot without a joint between them, unless it changes one."""
     is_free = [not (pair.is_own and pair.is_fixed) or not changed.isdisjoint(pair.ends) for pair in pairs]
     return np.array(is_free, dtype=bool)
+
+
+def _bases(cell: Cell) -> Array:
+    """Bases of a cell in the world, shape (robots, 4, 4)."""
+    return np.array([robot.X_WB for robot in cell.robots])
 
 
 def _raised(X_WB: Array) -> Array:

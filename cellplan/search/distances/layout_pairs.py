@@ -55,6 +55,23 @@ def layout_pairs(scene: Scene) -> tuple[tuple[LayoutPair, ...], WatchedPairs]:
     return tuple(found), pairs
 
 
+def with_areas(
+    pairs: Sequence[LayoutPair], watched: WatchedPairs, ends: Sequence[tuple[int, int]], names: Sequence[str]
+) -> tuple[tuple[LayoutPair, ...], WatchedPairs]:
+    """The pairs, and those of areas and what keeps out of them, by their places among the bodies of the given names."""
+    added = [
+        LayoutPair(names=(names[a], names[b]), ends=(a, b), demand=0.0, is_own=False, is_fixed=True) for a, b in ends
+    ]
+    count, first = len(watched.solids), len(pairs)
+    return (*pairs, *added), replace(
+        watched,
+        rows=np.insert(watched.rows, count, np.arange(first, first + len(added))),
+        solids=np.concatenate([watched.solids, _ends(ends)]),
+        demands=np.insert(watched.demands, count, np.zeros(len(added))),
+        once=np.insert(watched.once, count, np.ones(len(added), dtype=bool)),
+    )
+
+
 def demands_of(pairs: Sequence[LayoutPair]) -> Array:
     """Demanded distances in [m], shape (P,)."""
     return np.array([pair.demand for pair in pairs])

@@ -1,7 +1,7 @@
 """Bodies that a layout moves on their links or gives another shape: columns, tools and the part."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 import numpy as np
@@ -9,11 +9,9 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import Capsule, Cylinder, Solid, support
 from cellplan.geometry.transforms import inverse, pose
-from cellplan.model.cell import Cell, Part, Tool
+from cellplan.model.cell import Cell
 from cellplan.scene.bodies import Kind, part_body
 from cellplan.scene.scene import Scene
-from cellplan.search.kernel.job import Layouts
-from cellplan.search.kernel.screws import Directions
 
 FAR: Final = 1e5  # [m] height at which a body is put that a layout does not have
 ON_AXIS: Final = 1e-6  # [m] by which a tool tip may lie beside the axis of a round body
@@ -23,29 +21,16 @@ class LayoutVariables(Protocol):
     """Variables of a layout, as far as distances depend on them; n of them."""
 
     @property
-    def cell(self) -> Cell:
-        """The cell that is searched."""
-        ...
-
-    @property
     def given(self) -> Array:
         """Values of the cell as it is, shape (n,)."""
         ...
 
-    def layouts(self, x: Array, start: Array) -> Layouts:
-        """Bases, tool tips, start postures and weights of candidates, shape (K, n) and (K, nq)."""
+    def placed(self, x: Array) -> Cell:
+        """The cell at values of the variables: bases, tools with their solids, grasps, the part at rest."""
         ...
 
-    def directions(self, x: Array) -> Directions:
-        """Displacements of bases and tool tips, and changes of start and weights, by each variable."""
-        ...
-
-    def tools(self, x: Array) -> Mapping[str, Tool]:
-        """Tools of the robots whose tools vary, by the name of the robot."""
-        ...
-
-    def part(self, x: Array) -> Part:
-        """The part and its grasps; the very part of the cell where nothing of it varies."""
+    def base_twists(self, x: Array) -> Array:
+        """Velocity of the origin of each base in W and its angular velocity by each variable, shape (robots, 6, n)."""
         ...
 
 
@@ -60,9 +45,9 @@ class Placed:
 class MovingBodies:
     """The bodies that a layout moves on their links or gives another shape, by their places in the engine."""
 
-    def __init__(self, scene: Scene, variables: LayoutVariables) -> None:
+    def __init__(self, scene: Scene) -> None:
         """Find out which bodies these are."""
-        self._variables, self._cell, self._bodies = variables, scene.cell, scene.bodies
+        self._cell, self._bodies = scene.cell, scene.bodies
         self._solids = len(scene.engine.bodies) - len(scene.cut_from)
         self.columns = {str(body.robot): index for index, body in enumerate(scene.bodies) if body.kind is Kind.PEDESTAL}
         self._tools: dict[str, list[int]] = {}
@@ -79,32 +64,19 @@ class MovingBodies:
             solid = None if robot.pedestal is None else robot.pedestal.solid(X_WB[self._cell.index(name)])
             yield index, Placed(None, far_away(index)) if solid is None else Placed(*solid)
 
-    def of_tools(self, x: Array) -> Iterator[tuple[int, Placed]]:
-        """Bodies of tools that vary, what of them lies outside the contact zone, and the part where it varies."""
-        tools = self._variables.tools(x)
-        for name, tool in tools.items():
-            model = self._cell.robot(name).model
-            for index, body in zip(self._tools.get(name, []), tool.bodies, strict=True):
-                placed = Placed(body.shape, model.X_BF @ body.X_BS)
+    def of_tools(self, cell: Cell) -> Iterator[tuple[int, Placed]]:
+        """The part, and of tools that are not those of the scene their bodies and what of them is outside the zone."""
+        for robot in cell.robots:
+            if robot.tool is self._cell.robot(robot.name).tool:
+                continue
+            for index, body in zip(self._tools.get(robot.name, []), robot.tool.bodies, strict=True):
+                placed = Placed(body.shape, robot.model.X_BF @ body.X_BS)
                 yield index, placed
                 if index in self._cuts:
-                    tip = (inverse(body.X_BS) @ tool.X_FT)[:3, 3]
-                    yield self._cuts[index], _before(placed, tip, self._cell.checks.contact_zone, self._cuts[index])
-        part = self._variables.part(x)
-        holder = part.held_by[0].robot if part.held_by else None
-        if part is not self._cell.part or holder in tools:
-            cell = self._cell
-            if holder in tools:
-                robots = [
-                    replace(robot, tool=tools[robot.name]) if robot.name == holder else robot for robot in cell.robots
-                ]
-                cell = replace(cell, robots=tuple(robots))
-            yield self._part, Placed(part.shape, part_body(cell, part, *part.held_by[:1]).X_BS)
-
-    def names(self) -> Sequence[str]:
-        """Names of the engine's bodies."""
-        cut_from = {cut: body for body, cut in self._cuts.items()}
-        return [self._bodies[cut_from.get(index, index)].name for index in range(self._solids + len(self._cuts))]
+                    tip = (inverse(body.X_BS) @ robot.tool.X_FT)[:3, 3]
+                    yield self._cuts[index], _before(placed, tip, cell.checks.contact_zone, self._cuts[index])
+        if cell.part is not self._cell.part or cell.carrier is not None:
+            yield self._part, Placed(cell.part.shape, part_body(cell, cell.part, *cell.part.held_by[:1]).X_BS)
 
 
 def far_away(index: int) -> Array:

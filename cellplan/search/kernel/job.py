@@ -63,7 +63,7 @@ class Job:
 
     @classmethod
     def of(
-        cls, cell: Cell, schedule: Schedule, *, moving: Sequence[str], nodes: int, instants: Sequence[float] = ()
+        cls, cell: Cell, schedule: Schedule, *, moving: Sequence[str], nodes: int, denser: Sequence[float] = ()
     ) -> "Job":
         """Place nodes evenly between the times at which the desired motion is not smooth.
 
@@ -72,12 +72,12 @@ class Job:
             schedule: Its tasks on the common clock.
             moving: Names of the robots that may move.
             nodes: About how many nodes there are.
-            instants: Times in [s] about which there are more: the steps there are a third as long.
+            denser: Times in [s] about which there are more: the steps there are a third as long.
         """
         grasps = closures(cell, moving)
         relations: tuple[Relation, ...] = (*(path.task for path in schedule.paths), *grasps)
         desired_at = desired_motion(schedule.paths, grasps)
-        times, begins, ends = _nodes(schedule.jumps, nodes, instants)
+        times, begins, ends = _nodes(schedule.jumps, nodes, denser)
         X, V = desired_at(times, begins, ends)
         is_double = np.append(np.diff(times) == 0.0, False)
         is_smooth = np.abs(V[..., 1:] - V[..., :-1]).max(axis=(0, 1)) <= SAME_TWIST
@@ -157,24 +157,24 @@ class Layouts:
         return job.tasks.chains.placements(self.X_WB, self.X_FT)
 
 
-def _nodes(jumps: Array, count: int, instants: Sequence[float]) -> tuple[Array, Array, Array]:
+def _nodes(jumps: Array, count: int, denser: Sequence[float]) -> tuple[Array, Array, Array]:
     """Times of the nodes, both ends of every stretch included, and begin and end in [s] of the stretch of each."""
     parts = []
     for begin, end in pairwise(jumps.tolist()):
         intervals = max(ORDER, round((count - 1) * (end - begin) / float(jumps[-1] - jumps[0])))
-        times = _with_thirds(np.linspace(begin, end, intervals + 1), instants)
+        times = _with_thirds(np.linspace(begin, end, intervals + 1), denser)
         parts.append(np.stack([times, np.full_like(times, begin), np.full_like(times, end)]))
     times, begins, ends = np.concatenate(parts, axis=1)
     return times, begins, ends
 
 
-def _with_thirds(times: Array, instants: Sequence[float]) -> Array:
-    """Times with the steps next to some instants, and the one before and behind it, cut into thirds."""
+def _with_thirds(times: Array, denser: Sequence[float]) -> Array:
+    """Times with the steps next to some times, and the one before and behind it, cut into thirds."""
     concerned = {
         near
-        for instant in instants
-        if times[0] <= instant <= times[-1]
-        for near in range(int(np.searchsorted(times, instant)) - 2, int(np.searchsorted(times, instant)) + 1)
+        for time in denser
+        if times[0] <= time <= times[-1]
+        for near in range(int(np.searchsorted(times, time)) - 2, int(np.searchsorted(times, time)) + 1)
     }
     cut = np.array(sorted(near for near in concerned if 0 <= near < len(times) - 1), dtype=np.intp)
     step = times[cut + 1] - times[cut]

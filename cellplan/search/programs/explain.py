@@ -55,11 +55,11 @@ class Explanation:
 def explain(problem: Problem, point: Point, demands: Demands, effort: Effort) -> Explanation | None:
     """What binds at a point; None where the program there has no solution."""
     measures = Measures.of(problem, point, demands, effort)
-    program = Program.of(Linear.of(problem, measures), demands, effort.room, NEAR)
+    program = Program.of(Linear.of(problem, measures), demands, effort.room, NEAR).priced(1.0)
     found = program.solve()
     if found is None:
         return None
-    solved, unit = found[2], _unit(measures, demands)
+    solved, unit = found.solved, _unit(measures, demands)
     binding, gradient, at = list[Binding](), np.zeros(len(point.x)), 0
     for rows in program.rows:
         multipliers = solved.multipliers[at : at + len(rows.lacks)]

@@ -28,7 +28,6 @@ LEAST: Final = 1e-6  # [-] that a step must gain
 CORRECTIONS: Final = 1  # programs with the bends of the rows that a refused step has shown
 LOOKS_BACK: Final = 8  # [-] iterations over which the gain is judged
 GIVE_UP_AFTER: Final = 12  # programs: see ``Effort.give_up_above``
-GAINED: Final = 3e-3  # [-] share of the objective that so many must gain
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +122,7 @@ class _Climb:
     def __init__(self, problem: Problem, demands: Demands, effort: Effort) -> None:
         """Note what is improved."""
         self._problem, self._demands, self._effort = problem, demands, effort
-        self._trust = effort.trust
+        self._trust, self._price = effort.trust, 1.0
         self._history: list[Iteration] = []
 
     def from_point(self, first: Point) -> Improved:
@@ -153,27 +152,29 @@ class _Climb:
         if limit is not None and len(self._history) >= GIVE_UP_AFTER and here.objective > limit:
             return True
         before, now = self._history[-1 - LOOKS_BACK], self._history[-1]
-        return before.violation <= 0.0 and before.objective - now.objective < GAINED * self._unit(before.objective)
+        return before.violation <= 0.0 and before.objective - now.objective < self._effort.least_gain * self._unit(
+            before.objective
+        )
 
     def _step(self, here: _State, linear: Linear) -> _State | None:
         """The state after one program; None where its step is refused. Sets the next region."""
-        program = Program.of(linear, self._demands, self._effort.room, self._trust)
+        program = Program.of(linear, self._demands, self._effort.room, self._trust).priced(self._price)
+        self._price = program.price
         bends: Array | None = None
         for _ in range(1 + CORRECTIONS):
             found = program.solve(bends)
             if found is None:
                 break
-            z, expected, _ = found
-            there = self._at(here, linear, z)
+            there = self._at(here, linear, found.z)
             gain = -np.inf if there is None else self._gain(here, there)
             if there is None:
                 break
-            if gain > max(BORNE_OUT * expected, LEAST):
-                if gain > GOOD * expected:
+            if gain > max(BORNE_OUT * found.expected, LEAST):
+                if gain > GOOD * found.expected:
                     self._trust = min(WIDEST, GROWS * self._trust)
                 return there
-            bends = np.concatenate([each.bends(here.measures, there.measures, z) for each in program.rows])
-        reach = self._trust if found is None else float(np.abs(found[0]).max(initial=0.0))
+            bends = np.concatenate([each.bends(here.measures, there.measures, found.z) for each in program.rows])
+        reach = self._trust if found is None else float(np.abs(found.z).max(initial=0.0))
         self._trust = SHRINKS * min(self._trust, reach)
         return None
 
@@ -188,7 +189,7 @@ class _Climb:
     def _gain(self, here: _State, there: _State) -> float:
         """What a step gains: the merit of the program, true."""
         objective = (here.objective - there.objective) / self._unit(here.objective)
-        return objective + here.missed.cost - there.missed.cost
+        return objective + here.missed.cost(self._price) - there.missed.cost(self._price)
 
     def _unit(self, objective: float) -> float:
         """What counts as one in the objective of a program."""

@@ -41,64 +41,36 @@ class LayoutProblem:
     variables: Variables
     bodies: CellDistances
     acceleration: Array
+    names: tuple[str, ...] = field(init=False)
+    lower: Array = field(init=False)
+    upper: Array = field(init=False)
+    scale: Array = field(init=False)
+    cost: Array = field(init=False)
+    given: Array = field(init=False)
+    times: Array = field(init=False)
+    limits: JointLimits = field(init=False)
     is_accelerating: bool = field(init=False)
     most_demanded: float = field(init=False)
 
     def __post_init__(self) -> None:
-        """Note once whether accelerations count at all, and the largest distance that is demanded in [m]."""
+        """Note what the variables and the job know, whether accelerations count, and the largest demand in [m]."""
+        for name in ("names", "lower", "upper", "scale", "cost", "given"):
+            object.__setattr__(self, name, getattr(self.variables, name))
+        object.__setattr__(self, "times", self.job.times)
+        object.__setattr__(self, "limits", self.job.limits)
         object.__setattr__(self, "is_accelerating", bool(np.isfinite(self.acceleration).any()))
         object.__setattr__(self, "most_demanded", max((pair.demand for pair in self.bodies.pairs), default=0.0))
 
-    def finer(self, schedule: Schedule, *, nodes: int, instants: Sequence[float] = ()) -> Self:
+    def finer(self, schedule: Schedule, *, nodes: int, denser: Sequence[float] = ()) -> Self:
         """The same problem on more nodes.
 
         Args:
             schedule: The tasks on the common clock.
             nodes: About how many nodes there are, evenly.
-            instants: Times in [s] on the clock of the nodes about which there are more.
+            denser: Times in [s] on the clock of the nodes about which there are more.
         """
-        job = Job.of(self.job.cell, schedule, moving=self.job.moving, nodes=nodes, instants=instants)
+        job = Job.of(self.job.cell, schedule, moving=self.job.moving, nodes=nodes, denser=denser)
         return replace(self, job=job)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """See ``Problem``."""
-        return self.variables.names
-
-    @property
-    def lower(self) -> Array:
-        """See ``Problem``."""
-        return self.variables.lower
-
-    @property
-    def upper(self) -> Array:
-        """See ``Problem``."""
-        return self.variables.upper
-
-    @property
-    def scale(self) -> Array:
-        """See ``Problem``."""
-        return self.variables.scale
-
-    @property
-    def cost(self) -> Array:
-        """See ``Problem``."""
-        return self.variables.cost
-
-    @property
-    def given(self) -> Array:
-        """See ``Problem``."""
-        return self.variables.given
-
-    @property
-    def times(self) -> Array:
-        """See ``Problem``."""
-        return self.job.times
-
-    @property
-    def limits(self) -> JointLimits:
-        """See ``Problem``."""
-        return self.job.limits
 
     def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:
         """See ``Problem``."""

@@ -14,8 +14,8 @@ from cellplan.search.programs.problem import Distances, Point, Problem
 ANGLE: Final = 0.01  # [rad] of a lack that weighs as much as
 LENGTH: Final = 0.003  # [m] and as
 SHARE: Final = 0.01  # [-] of the duration
-SLACK: Final = 1.0  # [-] share of the objective that one unit costs: feasibility first
-IN_ROOM: Final = 0.02  # [-] likewise where only the room is missed that counts as kept
+IN_ROOM: Final = 0.02  # [-] of the price of a lack where only the room is missed that counts as kept
+ROUNDING: Final = 1e-6  # [-] usual units: 3 nm
 OWN_ROOM: Final = 0.1  # [-] share of the room that is asked of a robot's own bodies
 
 
@@ -154,13 +154,13 @@ class Missed:
 
     @property
     def violation(self) -> float:
-        """Sum of what does not count as kept."""
-        return float(np.maximum(self.lacks - self.allowed, 0.0).sum())
+        """Sum of what does not count as kept; what is left of rounding does."""
+        total = float(np.maximum(self.lacks - self.allowed, 0.0).sum())
+        return total if total > ROUNDING else 0.0
 
-    @property
-    def cost(self) -> float:
-        """What it costs in the merit of a point: feasibility first, then some of the room."""
-        return SLACK * self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum())
+    def cost(self, price: float) -> float:
+        """What it costs in the merit of a point, at the price of one unit: little where it counts as kept."""
+        return price * (self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum()))
 
 
 def rooms(distances: Distances, room: Room) -> Array:
@@ -169,7 +169,7 @@ def rooms(distances: Distances, room: Room) -> Array:
 
 
 def key_nodes(problem: Problem, effort: Effort) -> Indices:
-    """Nodes at which distances are asked: the ones nearest to even times, and to the instants given."""
+    """Nodes at which distances are asked: the ones nearest to even times, and to the times given."""
     times = problem.times
-    asked = np.append(np.linspace(times[0], times[-1], effort.keys), effort.instants)
+    asked = np.append(np.linspace(times[0], times[-1], effort.keys), effort.also_at)
     return np.unique(np.abs(times[:, None] - asked).argmin(axis=0)).astype(np.intp)

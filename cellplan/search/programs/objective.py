@@ -35,7 +35,6 @@ class Demands:
             objectives clearance and change need one.
         timing: How the motion is timed.
         clearance: Added to what the cell demands of every pair but those of one robot's own bodies, in [m].
-        smallest_singular_value: Of the cooperation Jacobian, in its units; None for no bound.
     """
 
     objective: Objective
@@ -43,10 +42,11 @@ class Demands:
     duration: float | None = None
     timing: Timing = Timing.LAWS
     clearance: float = 0.0
-    smallest_singular_value: float | None = None
 
     def __post_init__(self) -> None:
-        """Check at the door what the objective needs."""
+        """Check at the door what the objective needs, and what the programs know."""
+        if self.timing is Timing.RETIMED:
+            raise ValueError("demands: programs know the time laws of the cell only, not a retimed motion")
         if self.objective in (Objective.CLEARANCE, Objective.CHANGE) and self.duration is None:
             raise ValueError(f"demands: the objective '{self.objective}' needs a duration")
         if not np.all(self.margin >= 0.0):
@@ -77,17 +77,19 @@ class Effort:
     Attributes:
         iterations: Linear programs at most.
         keys: Configurations at which distances are asked, evenly over the motion.
-        instants: Times in [s] along the nodes at which they are asked as well.
+        also_at: Times in [s] along the nodes at which they are asked as well.
         within: Distance in [m] above what is demanded, within which pairs become rows.
         trust: First radius of the trust region, in usual steps of the variables.
         room: What the rows ask for beyond the demands.
+        least_gain: Share of the objective that ``LOOKS_BACK`` programs must gain to go on.
         give_up_above: Objective above which it is given up after ``GIVE_UP_AFTER`` programs; None for never.
     """
 
     iterations: int = 60
     keys: int = 9
-    instants: tuple[float, ...] = ()
+    also_at: tuple[float, ...] = ()
     within: float = 0.06
     trust: float = 0.5
     room: Room = field(default_factory=Room)
+    least_gain: float = 3e-3
     give_up_above: float | None = None

@@ -1,19 +1,42 @@
 """Program: the best step within the trust region for the linear rows of a point, slack on what is violated."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.search.programs.measures import IN_ROOM, SLACK
+from cellplan.search.programs.measures import IN_ROOM
 from cellplan.search.programs.objective import Demands, Objective, Room
 from cellplan.search.programs.rows import Linear, Rows
 from cellplan.search.programs.solver import Solved, least
 
+DEAREST: Final = 1e4  # [-] price of slack
+HIGHER: Final = 10.0  # [-] factor of the price
+SPARED: Final = 0.1  # [-] share of what could be mended that a price may leave
+MISSED: Final = 1e-9  # [-] usual units: nothing
 PROXIMAL: Final = 1e-3  # [-] weight of a step: of equal ones the shortest
 FARTHEST: Final = 1e6  # [-] by which the objective of one step may change
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Step:
+    """The solution of a program.
+
+    Attributes:
+        z: The step in usual steps of the variables, shape (n,).
+        expected: What it is expected to gain.
+        left: What is still missed after it, by the rows, in usual units.
+        before: What is missed before it.
+        solved: The whole solution.
+    """
+
+    z: Array
+    expected: float
+    left: float
+    before: float
+    solved: Solved
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -25,12 +48,14 @@ class Program:
         box: Lower and upper ends of the step in usual steps, shape (n,) each.
         demands: What is demanded.
         changed: Cost of the present change and of one usual step of each variable, shape (n,) each.
+        price: What a slack of one unit costs.
     """
 
     rows: Sequence[Rows]
     box: tuple[Array, Array]
     demands: Demands
     changed: tuple[Array, Array]
+    price: float = 1.0
 
     @classmethod
     def of(cls, linear: Linear, demands: Demands, room: Room, trust: float) -> "Program":
@@ -45,8 +70,21 @@ class Program:
             changed=((x - problem.given) * problem.cost, problem.cost * problem.scale),
         )
 
-    def solve(self, corrections: Array | None = None) -> tuple[Array, float, Solved] | None:
-        """The step in usual steps, what it is expected to gain, and the solution; None where the solver finds none.
+    def priced(self, price: float) -> "Program":
+        """The same at the least price, from a given one on, at which slack is nearly as small as it can be."""
+        program = replace(self, price=price)
+        while program.price < DEAREST:
+            found, dearer = program.solve(), replace(program, price=HIGHER * program.price)
+            if found is None or found.left <= MISSED:
+                break
+            least_left = replace(program, price=DEAREST).solve()
+            if least_left is None or found.left - least_left.left <= SPARED * (found.before - least_left.left):
+                break
+            program = dearer
+        return program
+
+    def solve(self, corrections: Array | None = None) -> Step | None:
+        """The best step; None where the solver finds none.
 
         Args:
             corrections: Added to the lacks of all rows, shape (M,): what a step was seen to miss beyond its rows.
@@ -63,7 +101,7 @@ class Program:
             A[is_loose, first + family[is_loose]] = -1.0
         asked = lacks if corrections is None else lacks + corrections
         top = np.concatenate([-asked, *self._changes(A[len(lacks) :], count + 1 + 2 * slacks)])
-        prices = np.repeat([IN_ROOM, SLACK, 1.0], [slacks, slacks, costs])
+        prices = np.repeat([IN_ROOM * self.price, self.price, 1.0], [slacks, slacks, costs])
         cost = np.concatenate([np.zeros(count), [self._weight], prices])
         lower = np.concatenate([self.box[0], [-FARTHEST], np.zeros(2 * slacks + costs)])
         upper = np.concatenate([self.box[1], [FARTHEST], free, most - free, np.full(costs, FARTHEST)])
@@ -71,7 +109,14 @@ class Program:
         if solved is None:
             return None
         now = np.concatenate([np.zeros(count), [0.0], free, most - free, np.abs(self.changed[0])[:costs]])
-        return solved.at[:count], float(cost @ (now - solved.at)), solved
+        out = slice(count + 1 + slacks, count + 1 + 2 * slacks)
+        return Step(
+            z=solved.at[:count],
+            expected=float(cost @ (now - solved.at)),
+            left=float(solved.at[out].sum()),
+            before=float(now[out].sum()),
+            solved=solved,
+        )
 
     def _stacked(self, parts: Sequence[Array]) -> Array:
         """Arrays of all rows, one after the other."""

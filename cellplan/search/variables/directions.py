@@ -8,17 +8,17 @@ from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import cross, inverse
 from cellplan.model.cell import Cell
 from cellplan.model.layout import VariableKind, VaryRange
-from cellplan.search.variables.state import State, pose_of
+from cellplan.search.variables.state import State, concerned, pose_of
 from cellplan.search.variables.twists import about_origin, at_point, carried, pose_twists, rod_twists
 
 
 def base_twists(state: State, cell: Cell, ranges: Sequence[VaryRange]) -> Array:
     """Motion of each base: velocity of its origin in W and angular velocity, shape (robots, 6, m)."""
     found = np.zeros((len(cell.robots), 6, len(ranges)))
-    for column, each in enumerate(ranges):
-        if each.kind is VariableKind.BASE:
-            robot = cell.index(each.name)
-            found[robot, :, column] = pose_twists(state.bases[robot, 3:])[each.index]
+    for robot, columns in _by_robot(cell, ranges, VariableKind.BASE).items():
+        twists = pose_twists(state.bases[robot, 3:])
+        for column in columns:
+            found[robot, :, column] = twists[ranges[column].index]
     return found
 
 
@@ -43,13 +43,24 @@ def part_twists(state: State) -> Array:
 def tip_twists(state: State, cell: Cell, ranges: Sequence[VaryRange]) -> Array:
     """Motion of each tool tip as the kernel sees it: of its origin in the flange frame, shape (robots, 6, m)."""
     found = np.zeros((len(cell.robots), 6, len(ranges)))
-    robots = {task.name: task.robot for task in cell.tasks}
-    for column, each in enumerate(ranges):
-        if each.kind in {VariableKind.TOOL, VariableKind.SPIN, VariableKind.GRASP}:
-            robot = cell.index(robots.get(each.name, each.name) if each.kind is VariableKind.SPIN else each.name)
-            tip = (state.tip(cell, robot) @ state.tip_shift(cell, robot))[:3, 3]
-            found[robot, :, column] = at_point(_tip_twist(state, cell, robot, each), tip)
+    kinds = (VariableKind.TOOL, VariableKind.SPIN, VariableKind.GRASP)
+    for robot, columns in _by_robot(cell, ranges, *kinds).items():
+        tip = (state.tip(cell, robot) @ state.tip_shift(cell, robot))[:3, 3]
+        for column in columns:
+            found[robot, :, column] = at_point(_tip_twist(state, cell, robot, ranges[column]), tip)
     return found
+
+
+def _by_robot(cell: Cell, ranges: Sequence[VaryRange], *kinds: VariableKind) -> dict[int, list[int]]:
+    """Places of the numbers of some kinds, by the robot that they belong to."""
+    return {
+        robot: [
+            column
+            for column, each in enumerate(ranges)
+            if each.kind in kinds and concerned(cell, [each], *kinds) == [robot]
+        ]
+        for robot in concerned(cell, ranges, *kinds)
+    }
 
 
 def _tip_twist(state: State, cell: Cell, robot: int, each: VaryRange) -> Array:

@@ -15,6 +15,8 @@ from cellplan.model.rod import Rod
 from cellplan.model.units import MM
 from cellplan.search.variables.twists import Z
 
+ROBOTS = (VariableKind.BASE, VariableKind.TOOL, VariableKind.WEIGHT, VariableKind.START)  # kinds of their own numbers
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class State:
@@ -104,9 +106,11 @@ class State:
                     found[row] = np.nan if start is None else start[each.index]
         return found
 
-    def cell(self, cell: Cell) -> Cell:
+    def cell(self, cell: Cell, ranges: Sequence[VaryRange]) -> Cell:
         """The cell with this layout, neither rounded nor validated; starts as far as they are among the numbers."""
-        robots = [self._robot(cell, index) for index in range(len(cell.robots))]
+        robots = list(cell.robots)
+        for index in concerned(cell, ranges, *ROBOTS):
+            robots[index] = self._robot(cell, index)
         held = tuple(
             replace(grasp, X_PT=pose_of(six)) for grasp, six in zip(cell.part.held_by, self.grasps, strict=True)
         )
@@ -122,16 +126,18 @@ class State:
         robot = cell.robots[index]
         columns = cell.columns(robot.name)
         start = self.starts[columns]
-        tool, rod = robot.tool, self.rods[index]
-        if rod is not None and rod != tool.rod:
-            tool = _with_rod(tool, rod)
         return replace(
             robot,
             X_WB=pose_of(self.bases[index]),
-            tool=tool,
+            tool=self.tool(cell, index),
             weights=self.weights[columns],
             start=robot.start if np.any(np.isnan(start)) else start,
         )
+
+    def tool(self, cell: Cell, index: int) -> Tool:
+        """The tool of a robot with its rod."""
+        tool, rod = cell.robots[index].tool, self.rods[index]
+        return tool if rod is None or rod == tool.rod else _with_rod(tool, rod)
 
     def base_shift(self, cell: Cell) -> Array:
         """What a part at rest that stands elsewhere does to all bases, seen from the part, shape (4, 4)."""
@@ -154,6 +160,16 @@ class State:
         """The tool tip of a robot in its flange frame, shape (4, 4)."""
         rod = self.rods[index]
         return cell.robots[index].tool.X_FT if rod is None else rod.X_FT
+
+
+def concerned(cell: Cell, ranges: Sequence[VaryRange], *kinds: VariableKind) -> list[int]:
+    """Indices of the robots that numbers of some kinds belong to; a part at rest concerns them all."""
+    found = [each for each in ranges if each.kind in kinds]
+    if any(each.kind is VariableKind.PART for each in found):
+        return list(range(len(cell.robots)))
+    doing = {task.name: task.robot for task in cell.tasks}
+    names = {doing[each.name] if each.kind is VariableKind.SPIN else each.name for each in found}
+    return [index for index, robot in enumerate(cell.robots) if robot.name in names]
 
 
 def pose_of(six: Array) -> Array:

@@ -29,7 +29,7 @@ def pose_twists(rpy: Array) -> Array:
 def rod_twists(rod: Rod) -> Array:
     """Motion of a rod by its length, tilt and roll: velocity at the centre of the flange, angular velocity, (3, 6).
 
-    A change of the length moves the tip only; see `cellplan.search.variables.displaced` for the points of the rod.
+    A change of the length moves the tip.
     """
     found = np.zeros((3, 6))
     found[0, :3] = rod.X_FT[:3, 2]

@@ -12,9 +12,8 @@ from cellplan.model.layout import LayoutSettings, VariableKind
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
 from cellplan.search.variables.directions import base_twists, effective_base_twists, tip_twists
-from cellplan.search.variables.displaced import DisplacedBody, displaced_bodies
 from cellplan.search.variables.pedestals import with_pedestals, with_room_below
-from cellplan.search.variables.state import State, pose_of
+from cellplan.search.variables.state import State, concerned, pose_of
 from cellplan.search.variables.ties import Tied
 from cellplan.search.variables.written import written_number, written_starts, written_weight
 
@@ -99,12 +98,12 @@ class Variables:
         Bases, tools with their solids, grasps, the part at rest, spins and weights are those of the layout, and so are
         start postures as far as they are among the variables.
         """
-        return self.state(x).cell(self.base)
+        return self.state(x).cell(self.base, self.tied.ranges)
 
     def tools(self, x: Array) -> dict[str, Tool]:
         """Tools at values of the variables, by robot, of those that change."""
-        names = {each.name for each in self.tied.ranges if each.kind is VariableKind.TOOL}
-        return {robot.name: robot.tool for robot in self.placed(x).robots if robot.name in names}
+        state, robots = self.state(x), concerned(self.base, self.tied.ranges, VariableKind.TOOL)
+        return {self.base.robots[robot].name: state.tool(self.base, robot) for robot in robots}
 
     def part(self, x: Array) -> Part:
         """The part at values of the variables: that of ``base`` itself where nothing of it changes."""
@@ -121,14 +120,18 @@ class Variables:
             x: Values of the variables, shape (K, n).
             start: Start postures in [rad] or [m], shape (K, nq); those among the variables are taken from x.
         """
-        states = [self.state(each) for each in x]
-        robots = range(len(self.base.robots))
+        base, states = self.base, [self.state(each) for each in x]
         chosen = np.array([state.starts for state in states])
+        X_WB = np.tile(np.array([robot.X_WB for robot in base.robots]), (len(x), 1, 1, 1))
+        X_FT = np.tile(np.array([robot.tool.X_FT for robot in base.robots]), (len(x), 1, 1, 1))
+        ranges = self.tied.ranges
+        for robot in concerned(base, ranges, VariableKind.BASE, VariableKind.PART):
+            X_WB[:, robot] = [state.base_shift(base) @ pose_of(state.bases[robot]) for state in states]
+        for robot in concerned(base, ranges, VariableKind.TOOL, VariableKind.GRASP, VariableKind.SPIN):
+            X_FT[:, robot] = [state.tip(base, robot) @ state.tip_shift(base, robot) for state in states]
         return Layouts(
-            X_WB=np.array([[state.base_shift(self.base) @ pose_of(six) for six in state.bases] for state in states]),
-            X_FT=np.array(
-                [[state.tip(self.base, i) @ state.tip_shift(self.base, i) for i in robots] for state in states]
-            ),
+            X_WB=X_WB,
+            X_FT=X_FT,
             start=np.where(np.isnan(chosen), start, chosen),
             weights=np.array([state.weights for state in states]),
         )
@@ -152,10 +155,6 @@ class Variables:
     def base_twists(self, x: Array) -> Array:
         """What each variable does to each base: velocity of its origin in W, angular velocity, shape (robots, 6, n)."""
         return base_twists(self.state(x), self.base, self.tied.ranges) @ self.tied.factors
-
-    def displaced(self, x: Array) -> tuple[DisplacedBody, ...]:
-        """Bodies that the variables move or reshape while all joints stand still, beside what moves with a base."""
-        return displaced_bodies(self.state(x), self.base, self.tied.ranges, self.tied.factors)
 
     def values(self, x: Array, start: Array) -> dict[str, object]:
         """What to write into the given cell file: values by address, rounded.

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,8 @@ import pytest
 
 from cellplan.geometry.shapes import Box, Capsule, Cylinder
 from cellplan.io.cell.load import load_cell
-from cellplan.io.cell.write import render_cell
-from cellplan.model.cell import Cell
+from cellplan.io.cell.write import render_cell, written_document
+from cellplan.model.cell import Cell, Mode
 from cellplan.model.layout import ChoiceKind
 
 Load = Callable[..., Cell]
@@ -264,3 +265,10 @@ def test_wrong_rods_are_one_located_line(refuse: Refuse, tool: str, message: str
 def test_spin_and_free_spin_exclude_each_other(refuse: Refuse) -> None:
     found = refuse(("    tool_axis: normal", "    spin_deg: 10\n    free: [spin]"))
     assert found == ["c:20: tasks.ring.spin_deg: unexpected key, the spin is free: leave out one of them"]
+
+
+def test_a_layout_is_not_written_for_other_tasks_or_modes(load: Load) -> None:
+    cell = load(with_layout("{vary: {motion.mode: [simultaneous, pairwise]}}"))
+    other = replace(cell, motion=replace(cell.motion, mode=Mode.PART_AT_REST))
+    assert "layout" in written_document(cell)
+    assert "layout" not in written_document(other)

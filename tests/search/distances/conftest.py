@@ -13,7 +13,6 @@ from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell, Part, Tool
 from cellplan.scene.scene import Scene
 from cellplan.search.kernel.job import Layouts
-from cellplan.search.kernel.screws import Directions
 
 CELL = Path(__file__).resolve().parents[3] / "cells" / "four_robots.yaml"
 BASES = [("kuka", 0), ("kuka", 1), ("kuka", 2), ("kuka", 5), ("abb", 1), ("abb", 2), ("abb", 3)]  # robot, component
@@ -30,18 +29,12 @@ class SomeVariables:
         return np.array([0.0] * len(BASES) + [0.15, 0.2, 0.3, 0.0])
 
     def layouts(self, x: Array, start: Array) -> Layouts:
-        cells = [self.at(each) for each in x]
-        return Layouts.of(cells, start)
+        return Layouts.of([self.placed(each) for each in x], start)
 
-    def directions(self, x: Array) -> Directions:
-        n, robots, nq = len(x), len(self.cell.robots), self.cell.joint_count
-        zeros = np.zeros((robots, 6, n))
-        found = Directions(base=zeros, tool=zeros.copy(), start=np.zeros((nq, n)), weights=np.zeros((nq, n)))
+    def base_twists(self, x: Array) -> Array:
+        found = np.zeros((len(self.cell.robots), 6, len(x)))
         for variable, (robot, component) in enumerate(BASES):
-            found.base[self.cell.index(robot), component, variable] = 1.0
-        kuka, first = self.cell.index("kuka"), len(BASES)
-        for variable in range(first, first + 3):
-            found.tool[kuka, :, variable] = 1.0  # not zero: what matters here
+            found[self.cell.index(robot), component, variable] = 1.0
         return found
 
     def tools(self, x: Array) -> Mapping[str, Tool]:
@@ -59,7 +52,7 @@ class SomeVariables:
         grasp = part.held_by[0]
         return replace(part, held_by=(replace(grasp, X_PT=grasp.X_PT @ pose((0.0, 0.0, -x[-1]))), *part.held_by[1:]))
 
-    def at(self, x: Array) -> Cell:
+    def placed(self, x: Array) -> Cell:
         tools, robots = self.tools(x), []
         for robot in self.cell.robots:
             twist = np.zeros(6)
@@ -74,7 +67,7 @@ class SomeVariables:
 @pytest.fixture(scope="session")
 def variables() -> SomeVariables:
     variables = SomeVariables(load_cell(CELL))
-    return SomeVariables(variables.at(variables.given))
+    return SomeVariables(variables.placed(variables.given))
 
 
 @pytest.fixture(scope="session")

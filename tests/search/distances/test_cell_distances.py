@@ -38,7 +38,7 @@ def test_distances_are_those_of_a_scene_built_from_the_changed_cell(
     distances: CellDistances, variables: SomeVariables, x: Array, q: Array
 ) -> None:
     near = near_at(distances, variables, x, q, WITHIN)
-    built = Scene.from_cell(variables.at(x))
+    built = Scene.from_cell(variables.placed(x))
     found = built.near(q, WITHIN)
     rules = {built.names(pair): pair.rule for pair in built.pairs}
     expected = {

@@ -1,6 +1,5 @@
 """What never moves but stands where a base is: each kind that stands in another fails the checks and is a distance."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,13 +10,13 @@ from cellplan.certify.certify import certify
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.geometry.shapes import Box, Shape
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell import Cell, Part, Robot, Tool
+from cellplan.model.cell import Cell, Part, Robot
+from cellplan.model.layout import KeepOut, LayoutSettings
 from cellplan.model.mounting import Pedestal
 from cellplan.model.robot import BASE
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
 from cellplan.search.kernel.job import Layouts
-from cellplan.search.kernel.screws import Directions
 
 COLUMN = Pedestal(radius=0.3, floor=0.0)
 HIGH, LOW = pose((0.0, 0.0, 0.5)), np.eye(4)
@@ -37,21 +36,14 @@ class BaseOfB:
         return np.zeros(3)
 
     def layouts(self, x: Array, start: Array) -> Layouts:
-        return Layouts.of([self.at(each) for each in x], start)
+        return Layouts.of([self.placed(each) for each in x], start)
 
-    def directions(self, x: Array) -> Directions:
+    def base_twists(self, x: Array) -> Array:
         base = np.zeros((2, 6, 3))
         base[1, :3] = np.eye(3)
-        empty = np.zeros((self.cell.joint_count, 3))
-        return Directions(base=base, tool=np.zeros((2, 6, 3)), start=empty, weights=empty)
+        return base
 
-    def tools(self, x: Array) -> Mapping[str, Tool]:
-        return {}
-
-    def part(self, x: Array) -> Part:
-        return self.cell.part
-
-    def at(self, x: Array) -> Cell:
+    def placed(self, x: Array) -> Cell:
         a, b = self.cell.robots
         return replace(self.cell, robots=(a, replace(b, X_WB=pose(tuple(x)) @ b.X_WB)))
 
@@ -152,8 +144,32 @@ def test_what_stands_in_another_thing_fails_the_checks_and_falls_short_of_its_di
         near = near_at(distances, variables, x, 0.1)
         short = near.distances < near.demands
         failing = [set(distances.pairs[row].names) for row in near.pairs[short].tolist()]
-        assert verdict(variables.at(x)) is (deep < 0.0)
+        assert verdict(variables.placed(x)) is (deep < 0.0)
         assert failing == ([names] if deep > 0.0 else [])
+
+
+@pytest.mark.parametrize(("height", "reach"), [(0.0, 0.0), (0.5, 0.3)])
+def test_bases_and_columns_keep_out_of_areas_by_their_footprints(height: float, reach: float) -> None:
+    area = KeepOut(name="aisle", shape=Box((0.4, 2.0, 1.0)), X_WS=pose((1.0, 0.0, 0.5)))
+    cell = cell_of(arm("a", LOW), arm("b", facing(pose((0.0, 0.0, height)), 2.0), pedestal=COLUMN))
+    cell = replace(cell, layout=LayoutSettings(ranges=(), keep_out=(area,)))
+    variables = BaseOfB(cell)
+    distances = CellDistances.of(Scene.from_cell(cell), variables)
+    for apart in (0.05, -0.04):
+        near = near_at(distances, variables, np.array([apart + reach - 0.8, 0.0, 0.0]), 0.1)
+        found = {
+            distances.pairs[pair].names[1]: (float(d), slope)
+            for pair, d, slope in zip(
+                near.pairs.tolist(),
+                near.distances,
+                distances.derivatives(near, np.zeros(3), np.zeros((1, 12, 3))),
+                strict=True,
+            )
+            if distances.pairs[pair].names[0] == "keep_out.aisle"
+        }
+        distance, slope = found["b/pedestal" if reach else "b/base"]
+        assert distance == pytest.approx(apart, abs=1e-5)
+        np.testing.assert_allclose(slope, (1.0, 0.0, 0.0), atol=1e-4)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -15,32 +15,32 @@ EXACT = Effort(within=20.0, room=Room(margin=0.0, distance=0.0, time=0.0))
 
 
 def explained(toy: Toy, demands: Demands) -> Explanation:
-    found = improve(toy, toy.given, np.zeros(2), demands, EXACT)
+    improved = improve(toy, toy.given, np.zeros(2), demands, EXACT)
+    assert improved is not None
+    found = explain(toy, improved.point, demands, EXACT)
     assert found is not None
-    told = explain(toy, found.point, demands, EXACT)
-    assert told is not None
-    return told
+    return found
 
 
 def test_two_joints_that_are_equally_fast_share_the_cycle() -> None:
-    told = explained(Toy(), Demands(objective=Objective.CYCLE, margin=np.zeros(2)))
-    shares = {each.names[1]: each.share for each in told.binding if each.kind is Kind.SPEED}
+    found = explained(Toy(), Demands(objective=Objective.CYCLE, margin=np.zeros(2)))
+    shares = {each.names[1]: each.share for each in found.binding if each.kind is Kind.SPEED}
     assert shares == pytest.approx({"joint_0": 2.0 / 3.0, "joint_1": 1.0 / 3.0}, abs=1e-3)
-    np.testing.assert_allclose(told.by_variable, 0.0, atol=1e-2)
+    np.testing.assert_allclose(found.by_variable, 0.0, atol=1e-2)
 
 
 def test_a_margin_that_binds_costs_what_its_limit_would_gain() -> None:
     near = replace(Toy(), upper_limit=3.5)
-    told = explained(near, Demands(objective=Objective.CYCLE, margin=np.zeros(2)))
-    limit = next(each for each in told.binding if each.kind is Kind.UPPER_LIMIT)
+    found = explained(near, Demands(objective=Objective.CYCLE, margin=np.zeros(2)))
+    limit = next(each for each in found.binding if each.kind is Kind.UPPER_LIMIT)
     assert limit.names == ("robot", "joint_0")
     assert limit.time == pytest.approx(2.0)
     assert limit.gain == pytest.approx(2.0, rel=1e-2)  # cycle 2 (6 - 2 x0) s at x0 = limit / 2
-    assert told.by_variable[0] == pytest.approx(-4.0, rel=1e-2)
+    assert found.by_variable[0] == pytest.approx(-4.0, rel=1e-2)
 
 
 def test_a_variable_at_its_bound_is_held_there() -> None:
     narrow = replace(Toy(), upper=np.array([1.5, 10.0]))
-    told = explained(narrow, Demands(objective=Objective.CYCLE, margin=np.zeros(2)))
-    assert told.held[0] == pytest.approx(4.0, rel=1e-2)
-    assert told.held[1] == pytest.approx(0.0, abs=1e-2)
+    found = explained(narrow, Demands(objective=Objective.CYCLE, margin=np.zeros(2)))
+    assert found.held[0] == pytest.approx(4.0, rel=1e-2)
+    assert found.held[1] == pytest.approx(0.0, abs=1e-2)

@@ -9,7 +9,7 @@ from builders.toy_problem import DEMAND, Toy
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room
 
-EXACT = Effort(iterations=40, within=20.0, room=Room(margin=0.0, distance=0.0, time=0.0))
+EXACT = Effort(iterations=40, within=20.0, least_gain=1e-7, room=Room(margin=0.0, distance=0.0, time=0.0))
 NONE = np.zeros(2)
 TOY = Toy()
 

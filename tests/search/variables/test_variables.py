@@ -103,7 +103,9 @@ def test_what_is_written_is_read_again(cell: Cell) -> None:
     for one, other in zip(placed.robots, written.robots, strict=True):
         assert np.abs(one.X_WB - other.X_WB).max() <= 1e-6
         assert np.abs(one.tool.X_FT - other.tool.X_FT).max() <= 1e-6
-        assert [body.name for body in one.tool.bodies] == [body.name for body in other.tool.bodies]
+        for body, twin in zip(one.tool.bodies, other.tool.bodies, strict=True):
+            assert body.name == twin.name
+            assert np.abs(body.X_BS - twin.X_BS).max() <= 1e-6
     assert np.abs(placed.part.held_by[0].X_PT - written.part.held_by[0].X_PT).max() <= 1e-6
     assert written.origin.changes == Variables.of(cell).cell(x, start_of(variables.base)).origin.changes
 
@@ -186,16 +188,8 @@ def test_a_part_at_rest_elsewhere_is_the_robots_the_other_way() -> None:
     q = motion_of(variables.base, variables.layouts(x[None], start[None]))
     written = variables.cell(x, q[0])
     assert np.abs(motion_of(written, Layouts.of([written], q[:1])) - q).max() <= 5e-6
-    (body,) = variables.displaced(x)
-    points = np.random.default_rng(1).uniform(-0.3, 0.3, (3, 3))
-    X_WP = variables.placed(x).part.X_WP
-    assert X_WP is not None
-    exact = body.velocity((X_WP @ np.c_[points, np.ones(3)].T).T[:, :3])
     found = variables.directions(x)
     for column, unit in enumerate(STEP * np.eye(2)):
-        ends = [variables.placed(x + sign * unit).part.X_WP for sign in (1.0, -1.0)]
-        rate = (ends[0] - ends[1]) / (2.0 * STEP)
-        assert np.abs((rate @ np.c_[points, np.ones(3)].T).T[:, :3] - exact[..., column]).max() <= 1e-8
         X = [variables.layouts((x + sign * unit)[None], start[None]).X_WB[0, 0] for sign in (1.0, -1.0, 0.0)]
         assert np.abs(twist(*X) - found.base[0, :, column]).max() <= 1e-8
 

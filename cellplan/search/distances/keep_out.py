@@ -1,0 +1,43 @@
+"""Areas of the floor that bases and what they stand on keep out of, as tall columns: heights do not count."""
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.shapes import Box, Cylinder, Solid, Sphere
+from cellplan.geometry.transforms import rotation_about
+from cellplan.model.cell import Cell
+from cellplan.model.layout import KeepOut
+from cellplan.model.robot import BASE
+from cellplan.scene.bodies import Kind, SceneBody
+
+TALL: Final = 100.0  # [m] of a column: the way out of it is sideways
+POINT: Final = 1e-6  # [m] radius of the ball that stands for the origin of a base
+
+
+def keep_out_bodies(cell: Cell) -> tuple[list[SceneBody], list[SceneBody]]:
+    """The areas of a cell as columns, and the origins of all bases."""
+    areas = () if cell.layout is None else cell.layout.keep_out
+    if not areas:
+        return [], []
+    origin = SceneBody(
+        name="", kind=Kind.LINK, shape=Sphere(POINT), robot=None, link=BASE, X_BS=np.eye(4), accuracy=None
+    )
+    return [_column(area) for area in areas], [
+        replace(origin, name=f"{robot.name}/base", robot=robot.name) for robot in cell.robots
+    ]
+
+
+def _column(area: KeepOut) -> SceneBody:
+    """A tall upright column on the footprint of an area."""
+    X_WS = np.eye(4)
+    X_WS[:2, 3] = area.X_WS[:2, 3]
+    X_WS[:3, :3] = rotation_about(np.array([0.0, 0.0, 1.0]), np.arctan2(area.X_WS[1, 0], area.X_WS[0, 0]))
+    shape: Solid = Cylinder(area.shape.radius, TALL) if isinstance(area.shape, Cylinder) else _tall(area.shape)
+    return SceneBody(name=f"keep_out.{area.name}", kind=Kind.OBSTACLE, shape=shape, robot=None, link=BASE, X_BS=X_WS)
+
+
+def _tall(box: Box) -> Box:
+    """A box as wide and as deep as another one."""
+    return Box((box.size[0], box.size[1], TALL))
