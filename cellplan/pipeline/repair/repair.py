@@ -28,7 +28,6 @@ from cellplan.search.programs.objective import Objective
 from cellplan.study.run import outcomes
 from cellplan.study.trial import Outcome, TrialStatus, Variant
 
-
 KINDS: Final = list(RemedyKind)
 WITH_LIMITS: Final = "quadratic_program"  # the method that keeps joints within their limits
 

@@ -23,7 +23,6 @@ from cellplan.search.programs.objective import Effort
 from cellplan.search.variables.written import written_starts
 from cellplan.study.trial import Outcome, TrialStatus, Variant
 
-
 EFFORT: Final = Effort(iterations=25, keys=17)
 BEGINNINGS: Final = 3  # [-] from which the least change of a layout is sought
 FEWER: Final = 1  # [-] of other attempts
