@@ -13,6 +13,7 @@ from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
 from cellplan.model.joint_limits import JointLimits
+from cellplan.model.joint_spline import JointSpline
 from cellplan.model.layout import LayoutSettings
 from cellplan.model.mounting import Mount
 from cellplan.model.origin import Origin
@@ -74,6 +75,7 @@ class Robot:
         pedestal: What the base stands on, hangs from or is fixed to; None for a base on the floor or on an obstacle.
         gripper: Names of link bodies of its model that make up a gripper, which may work on the part as a tool does.
         order: Names of its tasks and of marks in their order; empty for that of the cell's tasks.
+        path: Its joints over the whole clock; None where they follow from the tasks.
     """
 
     name: str
@@ -89,6 +91,7 @@ class Robot:
     pedestal: Mount | None = None
     gripper: tuple[str, ...] = ()
     order: tuple[str, ...] = ()
+    path: JointSpline | None = None
 
     @property
     def bodies_at_work(self) -> tuple[Body, ...]:

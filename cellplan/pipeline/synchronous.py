@@ -29,6 +29,9 @@ def refuse_other_jobs(cell: Cell, what: str) -> None:
         raise InputError(f"{at('motion.locked_joints')}: expected no failed joints for {what}")
     if motion.cyclic:
         raise InputError(f"{at('motion.cyclic')}: expected false for {what}, got true")
+    for robot in cell.robots:
+        if robot.path is not None:
+            raise InputError(f"{at(f'robots.{robot.name}.path')}: expected no given joint path for {what}: remove it")
     for key in solver.against_accurate:
         raise InputError(
             f"{at(f'solver.{key}')}: expected the weighted pseudo-inverse without goals, with constant weights, for "

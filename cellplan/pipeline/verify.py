@@ -17,7 +17,7 @@ from cellplan.model.motion import JointTable
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.pipeline.plan.demanded import DemandedProgram
-from cellplan.pipeline.plan.program import ProgramClock, moved_while_holding
+from cellplan.pipeline.plan.program import ProgramClock, moved_while_holding, off_given_path
 
 
 def verify(
@@ -51,6 +51,9 @@ def verify(
             raise InputError(
                 f"table of '{table.robot}': expected no motion in the phase '{phase.name}': it holds still"
             )
+    for robot, joints in ((cell.robot(table.robot), table.q) for table in own if table.robot in phase.roles):
+        if off_given_path(phase, robot, program.sigma, joints) is not None:
+            raise InputError(f"table of '{robot.name}': expected the joints of robots.{robot.name}.path, got others")
     with nothing_kept():  # a proof rests on the cell itself
         report = verify_tables(
             demanded.scenes(cell)[place], schedule, own, moving=phase.moving, idle=phase.idle, progress=progress

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
+from cellplan.model.clocked_path import distinct
 from cellplan.model.motion import Schedule
 from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.settling import settled, settling_joints
 from cellplan.planning.collocation.solver import Collocation, Indices, Precision, repeated
 from cellplan.planning.collocation.windows import Window, windows_between
+from cellplan.planning.tracking.given_path import GivenPath
 from cellplan.planning.tracking.motion_task import closures
 
 AT_ONCE: Final = 32  # candidates that are resolved together: enough for NumPy, and their arrays stay in the cache
@@ -153,6 +155,9 @@ class _Screen:
         self._precision = Precision(accuracy=accuracy, shortest=cell.motion.step)
         breaks, jumps = schedule.breaks, schedule.jumps
         self._at_start = self._desired_at(breaks[:1], breaks[:1], breaks[1:2])
+        self._given = GivenPath.of(cell, schedule, moving)
+        if self._given is not None:
+            jumps = distinct(np.concatenate([jumps, self._given.knots]))
         self._windows = windows_between(jumps, whole=float(breaks[-1]), knots=breaks, highest=FIRST_DEGREE)
         self._settling = settling_joints(cell, [path.task for path in schedule.paths])
         self._limits = cell.joint_limits
@@ -161,10 +166,14 @@ class _Screen:
         """Figures of one group of candidates; see `Candidates`."""
         placement = self._tasks.chains.placements(X_WB, X_FT)
         desired = repeated(self._at_start, len(start))
+        if self._given is not None:
+            start = start.copy()
+            start[:, self._given.columns] = self._given.spline.start
         q, arrived = settled(self._tasks, desired, placement, start.T, mobile=self._settling, accuracy=self._accuracy)
         found = Screening.unknown(q.T.copy())
         found.lost_at[arrived] = 0.0
-        collocation = Collocation(self._tasks, self._desired_at, placement, self._precision)
+        drift = None if self._given is None else self._given.speeds
+        collocation = Collocation(self._tasks, self._desired_at, placement, self._precision, drift=drift)
 
         def record(window: Window, cells: Indices, nodes: Array, errors: Array) -> None:
             everywhere = np.concatenate([nodes, nodes @ window.between.T], axis=2)

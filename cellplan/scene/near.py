@@ -14,7 +14,7 @@ from cellplan.model.cell import Cell
 from cellplan.scene.bodies import SceneBody
 from cellplan.scene.body_table import BodyTable
 from cellplan.scene.near_table import NearTable, WatchedPairs, counts_by_hull
-from cellplan.scene.pairs import Rule, ScenePair
+from cellplan.scene.pairs import Rule
 
 if TYPE_CHECKING:
     from cellplan.scene.scene import Scene
@@ -49,7 +49,7 @@ class NearPairs:
 
 def near_pairs(scene: "Scene", q: Array, within: float) -> NearPairs:
     """See ``Scene.near``."""
-    table = scene.near_table
+    table = near_table(scene)
     D = table.forest.displacements(q, np.array([robot.X_WB for robot in scene.cell.robots]))
     found = table.find(scene.engine, D, within)
     return NearPairs(
@@ -63,10 +63,16 @@ def near_pairs(scene: "Scene", q: Array, within: float) -> NearPairs:
     )
 
 
-def near_table(
-    cell: Cell, bodies: Sequence[SceneBody], pairs: Sequence[ScenePair], engine: Engine, cut_from: Sequence[int]
-) -> NearTable:
-    """The watched pairs of a scene as arrays; see ``Scene`` for the arguments."""
+def near_table(scene: "Scene") -> NearTable:
+    """Links, bodies and watched pairs of a scene as arrays; built once."""
+    if not scene.tables:
+        scene.tables.append(_built(scene))
+    return scene.tables[0]
+
+
+def _built(scene: "Scene") -> NearTable:
+    """The arrays of a scene."""
+    cell, bodies, pairs, engine, cut_from = scene.cell, scene.bodies, scene.pairs, scene.engine, scene.cut_from
     forest = LinkForest(cell.robots)
     solids = bodies[: len(engine.bodies) - len(cut_from)]
     carriers = [*solids, *(solids[index] for index in cut_from)]

@@ -27,7 +27,7 @@ class WatchedPairs:
         above: Solids of the others, shape (G,).
         planes: Poses of their half-spaces in the world, everything below the xy plane is solid, shape (G, 4, 4).
         demands: Distances in [m] that are demanded; down to them the hulls of a pair are enough, shape (P + G,).
-        once: Whether a pair is looked at in the first configuration only, shape (P + G,).
+        once: Whether a pair is examined in the first configuration only, shape (P + G,).
     """
 
     rows: Indices

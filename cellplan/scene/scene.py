@@ -43,6 +43,7 @@ class Scene:
         solid_rows: Indices of the pairs that the engine watches, shape (S,), ascending.
         solid_pairs: ``ScenePair.solids`` of each of them, shape (S, 2).
         ground_rows: Indices of the pairs of a solid and a half-space, shape (G,).
+        tables: What ``near_table`` has built of it; empty before it is first asked.
     """
 
     cell: Cell
@@ -56,7 +57,7 @@ class Scene:
     solid_rows: Indices = field(init=False)
     solid_pairs: Indices = field(init=False)
     ground_rows: Indices = field(init=False)
-    _near: list[NearTable] = field(init=False)  # built when it is first asked for
+    tables: list[NearTable] = field(init=False)
 
     def __post_init__(self) -> None:
         """Collect the indices of solids and half-spaces once: whole batches of pairs are bounded by them."""
@@ -65,7 +66,7 @@ class Scene:
         object.__setattr__(self, "solid_rows", np.array([row for row, _ in solids], dtype=np.intp))
         object.__setattr__(self, "solid_pairs", np.array([ends for _, ends in solids], dtype=np.intp).reshape(-1, 2))
         object.__setattr__(self, "ground_rows", np.array(ground, dtype=np.intp))
-        object.__setattr__(self, "_near", [])
+        object.__setattr__(self, "tables", [])
 
     @classmethod
     def from_cell(cls, cell: Cell) -> "Scene":
@@ -90,13 +91,6 @@ class Scene:
             engine=Engine([*solids, *found.outside]),
             cut_from=found.cut_from,
         )
-
-    @property
-    def near_table(self) -> NearTable:
-        """Links, bodies and watched pairs as arrays."""
-        if not self._near:
-            self._near.append(near_table(self.cell, self.bodies, self.pairs, self.engine, self.cut_from))
-        return self._near[0]
 
     @property
     def exclusions(self) -> tuple[tuple[str, str, str], ...]:
@@ -140,7 +134,7 @@ class Scene:
             object.__setattr__(other, "engine", self.engine.with_bodies(made))
         if placed:
             poses = {index: body.X_BS for index, body in placed.items()}
-            object.__setattr__(other, "_near", [self.near_table.moved(poses, made)])
+            object.__setattr__(other, "tables", [near_table(self).moved(poses, made)])
         return other
 
     def near(self, q: Array, within: float) -> NearPairs:

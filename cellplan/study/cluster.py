@@ -84,8 +84,11 @@ class Cluster(Executor):
             return
         try:
             inner: Future[Any] = call()
-        except Exception as error:  # noqa: BLE001 - the client was closed when it could not connect again
-            self._stop(outer, f"cannot be sent a trial: {error}")
+        except Exception as error:  # noqa: BLE001 - the client is closed, or the job is none that can be sent
+            if self._is_connected():
+                self._stop(outer, f"cannot be sent a trial: {error}")
+            else:
+                self._again.put((outer, call))
             return
         self._under_way[outer] = inner
         inner.add_done_callback(partial(self._arrived, outer, call))
@@ -172,7 +175,7 @@ def _connected(address: str) -> Any:
         from distributed import Client
     except ImportError:
         raise InputError(
-            "--scheduler: expected Dask, got no package 'distributed': pip install cellplan[cluster]"
+            '--scheduler: expected Dask, got no package distributed: pip install "cellplan[cluster]"'
         ) from None
     try:
         return Client(address, timeout=CONNECT_S, set_as_default=False)

@@ -52,6 +52,7 @@ class Study:
         best: What makes one trial better than another; part of the header. None for nothing.
         enough: Whether a trial ends the study; the trials after it do not count. None for never.
         noun: What a trial is called in texts.
+        total: Number of trials where they are given from the start, all in one round; None where rounds are proposed.
     """
 
     folder: Path
@@ -61,6 +62,7 @@ class Study:
     best: Best | None = None
     enough: Callable[[Trial], bool] | None = None
     noun: str = "trial"
+    total: int | None = None
 
     @classmethod
     def of_variants(cls, folder: Path, header: Mapping[str, Any], variants: Sequence[Variant]) -> Self:
@@ -69,7 +71,8 @@ class Study:
         def propose(finished: Sequence[Trial]) -> Sequence[Mapping[str, object]]:
             return [] if finished else [variant.values for variant in variants]
 
-        return cls(folder=folder, header=header, size=max(1, len(variants)), propose=propose, noun="variant")
+        count = len(variants)
+        return cls(folder=folder, header=header, size=max(1, count), propose=propose, noun="variant", total=count)
 
     def run(
         self,
@@ -99,13 +102,12 @@ class Study:
             StudyStoppedError: No further trial can be worked out or recorded.
             KeyboardInterrupt: It was interrupted; says how many trials are recorded.
         """
-        best = {"round_size": self.size, "best": self.best.record} if self.best else {}
         prepare_folder(self.folder, resume=resume)
-        journal = Journal(self.folder, {**self.header, **best}, resume=resume)
+        journal = Journal(self.folder, self._whole_header, resume=resume)
         state = RunningState(
             began=time.time(),
             done_before=len(journal.trials) + len(journal.ahead),
-            trials=stop.trials if self.best else self.size,
+            trials=stop.trials if stop.trials is not None else self.total,
             budget=stop.seconds,
         )
         record = Recorder(journal, state, progress, compared=self.best, enough=self.enough, noun=self.noun)
@@ -120,3 +122,10 @@ class Study:
                 ) from None
         trials = [trial.record for trial in journal.trials[: stop.trials]]
         return Finished(trials=trials, rounds=len(trials) // self.size, stopped_by=stopped_by)
+
+    @property
+    def _whole_header(self) -> dict[str, Any]:
+        """The header with what makes the rounds."""
+        if self.total is not None:
+            return dict(self.header)
+        return {**self.header, "round_size": self.size, "best": self.best.record if self.best else None}

@@ -97,9 +97,12 @@ def packed(evaluate: Evaluate) -> bytes:
         TypeError: It cannot be sent to another process.
     """
     try:
-        return pickle.dumps(evaluate)
+        found = pickle.dumps(evaluate)
     except (AttributeError, TypeError, pickle.PicklingError) as error:
         raise TypeError(f"evaluate: expected a function of a module, bound to plain data, got {error}") from None
+    if b"__main__" in found:
+        raise TypeError("evaluate: expected a function of a module, got one of the program that was started")
+    return found
 
 
 def outcome_in_child(evaluate: bytes, variant: Variant, limits: Limits) -> str | Lost:

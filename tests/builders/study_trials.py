@@ -2,9 +2,11 @@
 
 import ctypes
 import os
+import signal
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -89,3 +91,53 @@ def rounds(folder: Path, **changed: Any) -> Study:
     """A study in rounds of four."""
     given: dict[str, Any] = {"header": HEADER, "size": SIZE, "propose": from_the_best, "best": Best("length")}
     return Study(folder=folder, **{**given, **changed})
+
+
+@dataclass(frozen=True)
+class Killer:
+    """As ``halved``; trial 5 kills the parent of its process first, unless the mark is there.
+
+    Attributes:
+        mark: File that is made then.
+    """
+
+    mark: Path
+
+    def __call__(self, variant: Variant) -> Outcome:
+        if variant.number == 5 and not self.mark.exists():
+            self.mark.touch()
+            os.kill(os.getppid(), signal.SIGKILL)
+        return halved(variant)
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """As ``halved``, but with a figure that is too good in every process that was not started by a given one.
+
+    Attributes:
+        honest: Number of the process.
+    """
+
+    honest: int
+
+    def __call__(self, variant: Variant) -> Outcome:
+        right = halved(variant)
+        if os.getppid() == self.honest or right.status is not TrialStatus.PASSED:
+            return right
+        return Outcome(status=TrialStatus.PASSED, figures={"length": 0.001 * variant.number})
+
+
+@dataclass(frozen=True)
+class Noted:
+    """As ``halved`` after some work, more for some than for others; leaves the number of its process in a folder.
+
+    Attributes:
+        pids: The folder.
+    """
+
+    pids: Path
+
+    def __call__(self, variant: Variant) -> Outcome:
+        (self.pids / str(os.getpid())).touch()
+        assert sum(range(20_000 * (1 + 9 * (variant.number % 4 == 0)))) > 0
+        return halved(variant)

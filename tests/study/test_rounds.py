@@ -16,7 +16,7 @@ from cellplan.study.study import Finished, Stop, StoppedBy
 from cellplan.study.trial import Outcome, Trial, TrialStatus, Variant
 from cellplan.study.workers import Limits, Workers
 
-SHORT = Limits(seconds=1.0)
+SHORT = Limits(seconds=0.5)
 LENGTHS = [0.9, 0.95, 1 - 0.1 / 3, 0.975, 0.9 * 0.98, 0.9 * 0.9, 0.9 * 0.95]
 
 
@@ -87,12 +87,19 @@ def test_accidents_are_failed_trials_with_their_reasons(tmp_path: Path) -> None:
         2: "trial 2: its process crashed (exit status 5)",
         4: "trial 4: its process needed more than 16000 MB",
         5: "trial 5: its process crashed (SIGSEGV)",
-        6: "trial 6: its process took longer than 1 s",
+        6: "trial 6: its process took longer than 0.5 s",
         8: "expected finite numbers and other plain data as its figures, got something else",
     }
-    with Workers(1) as workers:
-        study.run(accident, workers=workers, stop=Stop(trials=6), limits=SHORT)
-    assert len(journal(tmp_path / "study").splitlines()) == 7
+
+
+@pytest.mark.slow
+def test_accidents_are_the_same_for_one_worker(tmp_path: Path) -> None:
+    for count in (1, 2, 4):
+        with Workers(count) as workers:
+            rounds(tmp_path / f"{count}").run(
+                accident, workers=workers, stop=Stop(trials=10), limits=Limits(seconds=2.0)
+            )
+    assert journal(tmp_path / "1") == journal(tmp_path / "2") == journal(tmp_path / "4")
 
 
 def test_an_evaluator_that_cannot_be_sent_is_refused(tmp_path: Path) -> None:

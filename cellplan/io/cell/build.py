@@ -12,6 +12,7 @@ from cellplan.io.cell.build_grips import grip_bodies, gripper_bodies
 from cellplan.io.cell.build_mounting import build_attachments, build_mount, rail_bodies, with_floor_height
 from cellplan.io.cell.build_program import build_order, written_program
 from cellplan.io.cell.build_tool import build_tool
+from cellplan.io.cell.path_rules import build_path
 from cellplan.io.cell.rules import needs_surface
 from cellplan.io.robots.build_controller import build_controller
 from cellplan.io.robots.rules import Given, configuration_in_si, home_configuration, start_posture
@@ -75,7 +76,8 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
     """
     entry = document.robots[name]
     weights = np.ones(len(model.joints)) if entry.weights is None else np.array(entry.weights)
-    start, home = start_posture(entry, model), home_configuration(entry, model)
+    path, home = build_path(entry.path, model), home_configuration(entry, model)
+    start = start_posture(entry, model) if path is None else path.start
     at_work = {task.robot for task in document.tasks.values()} | {grasp.robot for grasp in document.part.held_by}
     if name not in at_work and entry.home_deg is None and entry.home is None:
         home = start
@@ -86,6 +88,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         X_WB=pose_from_entry(entry.base),
         tool=build_tool(entry.tool, read_mesh),
         start=start,
+        path=path,
         weights=weights,
         home=home,
         acceleration=acceleration_rule(entry, document.acceleration, joints=len(model.joints)),

@@ -25,6 +25,7 @@ from cellplan.io.cell.build_program import build_program
 from cellplan.io.cell.build_solver import build_solver
 from cellplan.io.cell.build_srdf import apply_srdfs
 from cellplan.io.cell.changes import changed, plain_values
+from cellplan.io.cell.path_rules import path_findings
 from cellplan.io.cell.program_rules import posture_findings, program_findings, with_stand_offs
 from cellplan.io.cell.referenced_files import Sources
 from cellplan.io.cell.rules import rule_findings
@@ -133,6 +134,7 @@ def _read(source: CellFile) -> Cell:
         findings += robot_findings(name, valid.robots[name], model, document)
         findings += mounting_findings(name, model, valid, document)
     findings += posture_findings(valid, models, document)
+    findings += path_findings(valid, models, document)
     findings += grip_findings(valid, models, document)
     findings += acceleration_findings(valid, models, document)
     findings += _unknown_bodies(valid, models, document)

@@ -21,6 +21,7 @@ from cellplan.io.schema.common import (
 )
 from cellplan.io.schema.controller import ControllerEntry
 from cellplan.io.schema.gripper import GripperEntry
+from cellplan.io.schema.joint_path import JointPathEntry
 from cellplan.io.schema.mounting import AttachmentEntry, HangingEntry, PedestalEntry, RailBodyEntry, WallEntry
 from cellplan.io.schema.tool import HEAVIEST_KG, ToolEntry
 from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Quantity, Within
@@ -269,6 +270,11 @@ class RobotEntry(Entry):
         max_length=ORDER_LIMIT,
         description="Its tasks, and the marks of the program at which it waits, in their order; the order of the file, "
         "without marks, when absent. Only with program.",
+    )
+    path: JointPathEntry | None = Field(
+        default=None,
+        description="Path of its joints over the common clock, for the first holder of the part only, in the mode "
+        "simultaneous; the other robots then follow their tasks by themselves.",
     )
     weights: tuple[Weight, ...] | None = Field(
         default=None,

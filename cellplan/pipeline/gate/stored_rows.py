@@ -19,7 +19,7 @@ from cellplan.model.phase import NOT_IN_PROGRAM, Phase
 from cellplan.model.plan import rows_of
 from cellplan.pipeline.plan.demanded import DemandedProgram, others_than_first_cycle
 from cellplan.pipeline.plan.headers import left_out_of_program
-from cellplan.pipeline.plan.program import ProgramClock, moved_while_holding
+from cellplan.pipeline.plan.program import ProgramClock, moved_while_holding, off_given_path
 
 START_TOL: Final = 1e-9  # [rad] or [m] tables and cells have twelve decimals of a degree, millimetre or metre
 LENGTH_TOL: Final = 1e-6  # [mm] of path: rounding of the arithmetic on another processor
@@ -106,6 +106,21 @@ class StoredRows:
                         f"'{robot.name}' holds still, got another one"
                     )
 
+    def refuse_other_paths(self, cell: Cell) -> None:
+        """Refuse a robot that leaves the path that the cell gives for its joints.
+
+        Raises:
+            InputError: With file and line.
+        """
+        for robot in cell.robots if len(self.clock.plan.program) == 1 else ():
+            q, phase = self.tables[robot.name].q, self.clock.plan.program[0]
+            off = off_given_path(phase, robot, self.clock.sigma, q)
+            if off is not None:
+                raise InputError(
+                    f"{self.place(robot.name, off[0])}: {robot.model.joint_names[off[1]]}: expected the position of "
+                    f"robots.{robot.name}.path in the cell, got another one"
+                )
+
     def place(self, robot: str, row: int) -> str:
         """File and line of a row of a joint table."""
         return row_place(self.stored.tables[robot], self.stored.file("", f"tables/{robot}.csv"), row)
@@ -136,6 +151,7 @@ def read_rows(stored: StoredRun, cell: Cell, demanded: DemandedProgram) -> Store
     motion = Motion(times=written.table.times, sigma=written.table.sigma, q=q, plan=clock.plan)
     rows = StoredRows(stored=stored, program=demanded, clock=clock, tables=tables, motion=motion)
     rows.refuse_motion_in_hold(cell)
+    rows.refuse_other_paths(cell)
     rows.refuse_other_cycles(cell)
     return rows
 

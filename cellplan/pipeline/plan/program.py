@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.io.run.stored import CLOCK
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, Robot
 from cellplan.model.clock import Clock
 from cellplan.model.motion import ClockTable, JointTable, Motion, Schedule
 from cellplan.model.phase import Hold, Phase
@@ -166,6 +166,21 @@ def moved_while_holding(phase: Phase, robot: str, q: Array) -> tuple[int, int] |
     if not isinstance(phase.roles[robot], Hold):
         return None
     row, joint = np.nonzero(np.abs(q - q[0]) > STILL_TOL)
+    return (int(row[0]), int(joint[0])) if len(row) else None
+
+
+def off_given_path(phase: Phase, robot: Robot, sigma: Array, q: Array) -> tuple[int, int] | None:
+    """The first row and joint at which a robot is off the path that its cell gives; None where it keeps to it.
+
+    Args:
+        phase: The phase, which is the only one of its program.
+        robot: The robot.
+        sigma: Nominal times of the rows in [s], shape (N,).
+        q: Its joint positions in these rows in [rad] or [m], shape (N, joints).
+    """
+    if robot.path is None or isinstance(phase.roles[robot.name], Hold):
+        return None
+    row, joint = np.nonzero(np.abs(q - robot.path.at(np.clip(sigma / phase.end, 0.0, 1.0))) > STILL_TOL)
     return (int(row[0]), int(joint[0])) if len(row) else None
 
 

@@ -7,6 +7,7 @@ Only the columns of the positioner couple the operators, so that the work grows 
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
 
@@ -25,7 +26,16 @@ class ArrowInverse:
     invertible that cannot do their task alone; whoever calls corrects what it costs, as Newton's method does.
     """
 
-    def __init__(self, A: Array, C: Array, *, mobility: Array, coupling_weights: Array, idle: Array) -> None:
+    def __init__(
+        self,
+        A: Array,
+        C: Array,
+        *,
+        mobility: Array,
+        coupling_weights: Array,
+        idle: Array,
+        is_given: NDArray[np.bool_] | None = None,
+    ) -> None:
         """Factorise.
 
         Args:
@@ -35,8 +45,11 @@ class ArrowInverse:
             coupling_weights: Weights of the shared joints, shape (m, 1 or batch); columns of those that may not move
                 are 0.
             idle: 1 for components that a task leaves open, whose rows are 0, shape (6, tasks, 1).
+            is_given: Which shared joints have a given motion, shape (m,); they move the tools but never follow them.
         """
         self._A, self._C = A, C
+        if is_given is not None and is_given.any():
+            C = np.where(is_given[:, None, None], 0.0, C)
         self._mobile_A = A * mobility
         D = np.einsum("intb,jntb->ijtb", self._mobile_A, A)
         scale = np.einsum("iitb->tb", D) + np.einsum("imtb,imtb,mb->tb", C, C, 1.0 / coupling_weights)

@@ -54,7 +54,7 @@ class BatchTasks:
         self._own_columns = self.chains.columns[:, self._robots]
         self._shared_columns = self.chains.columns[:joints, self._holder or 0]
         self._weights = np.concatenate([robot.weights for robot in cell.robots])[:, None]
-        self._may_move = constraints.may_move
+        self._may_move, self._is_given = constraints.may_move, constraints.follows_path > 0.0
 
     def linearise(
         self, q: Array, desired: Desired, placement: Placement, *, mobile: Array, weights: Array | None = None
@@ -80,6 +80,7 @@ class BatchTasks:
             mobility=_padded(mobile[:, None] / weights)[self._own_columns] * self._own,
             coupling_weights=weights[self._shared_columns],
             idle=1.0 - self._kept,
+            is_given=self._is_given[self._shared_columns],
         )
         rows = seen.R_WR if self._is_whole else None
         errors = self._errors(seen, X)

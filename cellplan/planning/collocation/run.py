@@ -19,6 +19,7 @@ from cellplan.planning.collocation.solver import Collocation, Drift, Indices, Pr
 from cellplan.planning.collocation.start_offset import start_offset
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
 from cellplan.planning.euler.cycle_closing import SAME_POSE, drift_pace
+from cellplan.planning.tracking.given_path import GivenPath
 from cellplan.planning.tracking.locked_joints import locked_since
 from cellplan.planning.tracking.motion_task import MotionTask
 
@@ -70,7 +71,9 @@ class AccurateRun:
         self._tasks, self._placement, self._grasps, self._offset = tasks, placement, grasps, offset
         self._on_paths, self._desired_at = on_paths, desired_motion(schedule.paths, grasps, offset)
         self._locked_since, self._progress = locked_since(cell), progress
-        inner = np.concatenate([jumps, self._locked_since, *([] if offset is None else [until])])
+        self._given = GivenPath.of(cell, schedule, motion.moving)
+        knots = np.zeros(0) if self._given is None else self._given.knots
+        inner = np.concatenate([jumps, self._locked_since, knots, *([] if offset is None else [until])])
         self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
         self._knots = breaks
 
@@ -95,6 +98,8 @@ class AccurateRun:
             self._progress("planning", window.panels[-1].end / self.end)
 
         paced = None if drift is None else _paced(drift, begin, end)
+        if self._given is not None:
+            paced = self._given.speeds
         at = q[:, None].copy()
         for breaks in self._stretches(begin, end):
             mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)

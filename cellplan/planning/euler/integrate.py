@@ -57,8 +57,10 @@ def integrate(
             refuse_long_step(cell, q[k], step)
         except NoSolutionError as error:
             singular = singular_words(problem, k, q[k])
-            raise type(error)(f"{cell.origin.at('motion')}: at {problem.times[k]:.3f} s {error}{singular}") from None
-        q[k + 1], iterations[k], slack[k] = step.q, step.iterations, step.slack
+            key = next((f"robots.{robot.name}.path" for robot in cell.robots if robot.path is not None), "motion")
+            raise type(error)(f"{cell.origin.at(key)}: at {problem.times[k]:.3f} s {error}{singular}") from None
+        q[k + 1] = problem.given.placed(k + 1, step.q)
+        iterations[k], slack[k] = step.iterations, step.slack
         if k % PROGRESS_EVERY == 0:
             progress("planning", k / len(q))
     return Motion(times=problem.times[: last + 1], q=q, iterations=iterations, slack=slack)

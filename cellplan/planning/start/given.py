@@ -24,6 +24,8 @@ from cellplan.planning.tracking.task_constraints import constraint_rows
 
 def start_place(cell: Cell, robot: Robot) -> str:
     """Where a robot's start posture stands in the cell file, or would stand."""
+    if robot.path is not None:
+        return cell.origin.at(f"robots.{robot.name}.path")
     by_joint, as_list = f"robots.{robot.name}.start", f"robots.{robot.name}.start_deg"
     return cell.origin.at(by_joint if by_joint in cell.origin.lines else as_list)
 

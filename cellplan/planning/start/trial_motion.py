@@ -92,8 +92,12 @@ class StartTrials:
         """Choose a step that makes few samples of the whole motion, of which every path is gone through once."""
         self._order = NameOrder.of(scene.cell)
         once = self._order.cell
-        tasks = tuple(_first_cycle(task, once.motion.duration) for task in once.tasks)
-        self._once = replace(once, tasks=tasks, motion=replace(once.motion, duration=None))
+        tasks = once.tasks
+        if any(robot.path is not None for robot in once.robots):  # which is one over all cycles
+            self._once = once
+        else:
+            tasks = tuple(_first_cycle(task, once.motion.duration) for task in tasks)
+            self._once = replace(once, tasks=tasks, motion=replace(once.motion, duration=None))
         self._scene = scene
         self._paths = {task.name: _once_through(self._once, task, paths[task.name]) for task in tasks}
         end = clock_times(self._once, self._paths_of([task.name for task in tasks]))[-1]

@@ -14,6 +14,7 @@ from cellplan.model.cell import Cell, Grasp, Relation
 from cellplan.model.motion import Schedule
 from cellplan.planning.timing.common_cycles import common_cycles
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
+from cellplan.planning.tracking.given_path import GivenRows
 from cellplan.planning.tracking.joint_weights import JointWeights
 from cellplan.planning.tracking.locked_joints import locked_since
 from cellplan.planning.tracking.motion_task import MotionTask
@@ -91,6 +92,7 @@ class TrackingProblem:
         signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
         gain: Error feedback gain in [1/s].
         damping: Largest damping factor; None leaves it to the method.
+        given: Joints whose motion the cell gives, at the samples.
         drift: Joint velocities that are added at sample k and configuration q besides the tasks, shape (nq,): what
             closes a cycle.
     """
@@ -115,7 +117,10 @@ class TrackingProblem:
         self._settled = np.array([_settled_from(task) for task in tasks])
         self._weights = JointWeights(cell, self._model)
         self.cell, self.times, self.tasks = cell, schedule.times, tasks
-        self.signs = self.constraints.column_signs(self._model.carries_flange)
+        self.given = GivenRows.of(cell, schedule, motion.moving)
+        every = self.constraints.column_signs(self._model.carries_flange)
+        self.signs = every * (1.0 - self.constraints.follows_path)
+        self._given_signs = every * self.constraints.follows_path
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
         self.motion, self.drift = motion, drift
         self._goals = self._secondary_goals() if cell.solver.goals else None
@@ -130,8 +135,9 @@ class TrackingProblem:
         return self._model.state(q)
 
     def mobile(self, k: int) -> Array:
-        """1 for joints that may move at sample k, 0 for those that stand still or are locked, shape (nq,)."""
-        return self.constraints.may_move * (self.times[k] < self._locked_since)
+        """1 for joints that may move for the tasks at sample k, 0 for all others, shape (nq,)."""
+        free = self.constraints.may_move - self.constraints.follows_path
+        return free * (self.times[k] < self._locked_since)
 
     def rows(self, k: int, q: Array) -> list[Array]:
         """Rows of the cooperation Jacobian for each task at sample k and configuration q, shape (m, nq) each."""
@@ -154,19 +160,24 @@ class TrackingProblem:
         X_RT = inverse(state.X_WP if X_WR is None else X_WR) @ X_WT
         error = pose_errors(self.desired[k], X_RT, self.constraints.is_spin_free)
         self._refuse_lost_path(k, error)
-        rows, twist, errors = self._constrained(k, J, error)
+        twists = self.twists[k]
+        if self._given_signs.any() and k + 1 < len(self.times):
+            moved = self.given.placed(k + 1, q) - q
+            carried = cooperation_jacobian(state, X_WT[:, :3, 3], self._given_signs, X_WR=X_WR)
+            twists = twists - carried @ moved / self.step(k)
+        rows, twist, errors = self._constrained(k, J, error, twists)
         drift = self._drift(k, q)
         weights = self._weights.at(state, q, J=rows, xdot=twist + self.gain * errors, secondary=drift)
         return self._with_goals(k, q, state, FirstOrder(rows, twist, errors, weights, drift), signs=signs)
 
-    def _constrained(self, k: int, J: Array, error: Array) -> tuple[Array, Array, Array]:
+    def _constrained(self, k: int, J: Array, error: Array, twists: Array) -> tuple[Array, Array, Array]:
         """Rows, desired twists and errors of the components that the tasks and grasps constrain."""
         if self.constraints.is_whole:
-            return J.reshape(-1, J.shape[2]), self.twists[k].reshape(-1), error.reshape(-1)
+            return J.reshape(-1, J.shape[2]), twists.reshape(-1), error.reshape(-1)
         picks = [rows[k] for rows in self._rows]
         return (
             np.concatenate([pick @ block for pick, block in zip(picks, J, strict=True)]),
-            np.concatenate([pick @ twist for pick, twist in zip(picks, self.twists[k], strict=True)]),
+            np.concatenate([pick @ twist for pick, twist in zip(picks, twists, strict=True)]),
             np.concatenate([pick @ part for pick, part in zip(picks, error, strict=True)]),
         )
 

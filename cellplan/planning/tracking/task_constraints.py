@@ -38,6 +38,7 @@ class TaskConstraints:
         operator_signs: ``s_i``, 1 or 0, shape (tasks,).
         carrier_signs: ``c_i``, -1, 0 or 1, shape (tasks,).
         may_move: 1 for the joints of robots that may move, 0 for all others, shape (nq,).
+        follows_path: 1 for those of them whose motion is given, 0 for all others, shape (nq,).
     """
 
     tasks: tuple[Relation, ...]
@@ -49,6 +50,7 @@ class TaskConstraints:
     operator_signs: Array
     carrier_signs: Array
     may_move: Array
+    follows_path: Array
 
     @classmethod
     def of(cls, cell: Cell, tasks: Sequence[Relation], moving: Sequence[str]) -> "TaskConstraints":
@@ -62,6 +64,7 @@ class TaskConstraints:
         """
         operators = np.array([cell.index(task.robot) for task in tasks], dtype=np.intp)
         is_carrier = np.isin(operators, [] if cell.carrier is None else [cell.carrier])
+        may_move = np.concatenate([np.full(len(r.model.joints), float(r.name in moving)) for r in cell.robots])
         is_on_part = np.array([task.relative_to is Frame.PART for task in tasks], dtype=bool)
         return cls(
             tasks=tuple(tasks),
@@ -72,7 +75,9 @@ class TaskConstraints:
             kept=np.array([kept_components(task) for task in tasks], dtype=bool).reshape(-1, 6),
             operator_signs=np.where(is_carrier, 0.0, 1.0),
             carrier_signs=is_carrier.astype(float) - is_on_part,
-            may_move=np.concatenate([np.full(len(r.model.joints), float(r.name in moving)) for r in cell.robots]),
+            may_move=may_move,
+            follows_path=may_move
+            * np.concatenate([np.full(len(r.model.joints), float(r.path is not None)) for r in cell.robots]),
         )
 
     @property

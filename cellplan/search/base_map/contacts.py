@@ -8,6 +8,7 @@ import numpy as np
 from cellplan.certify.depths import mounted_depths
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.scene.moved import stands_by_link
+from cellplan.scene.near import near_table
 from cellplan.scene.scene import Scene
 
 KEYS: Final = (3, 9, 33)  # [-] nodes at which distances are asked, more and more while nothing is too near
@@ -63,7 +64,7 @@ def contacts(scene: Scene, robot: str, X_WB: Array, q: Array) -> list[Contact | 
 
 def _worst(scene: Scene, robot: str, X_WB: Array, q: Array) -> dict[int, Contact]:
     """The worst contact of motions of shape (K, nodes, nq), by motion and node, for those that have one."""
-    table, (count, nodes, joints) = scene.near_table, q.shape
+    table, (count, nodes, joints) = near_table(scene), q.shape
     bases = np.array([np.tile(each.X_WB, (count * nodes, 1, 1)) for each in scene.cell.robots])
     bases[scene.cell.index(robot)] = np.repeat(X_WB, nodes, axis=0)
     demands = np.zeros(len(scene.pairs))

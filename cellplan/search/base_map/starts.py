@@ -95,7 +95,7 @@ def starts_at(goal: StartGoal, places: Places, model: RobotModel, X_WB: Array, *
 
 
 def _within_reach(goal: StartGoal, X_WB: Array) -> Flags:
-    """Which bases, shape (K, 4, 4), are not too far from the start for any posture; all where position is not asked."""
+    """Which bases, shape (K, 4, 4), are near enough to the start; all where position is not asked."""
     X_WT = goal.X_WR @ goal.X_RT
     if np.linalg.matrix_rank(constraint_rows(goal.relation, goal.X_RT[None])[0][:, :3]) < 3:
         return np.ones(len(X_WB), dtype=bool)

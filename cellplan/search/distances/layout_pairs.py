@@ -7,6 +7,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.scene.bodies import is_ground
+from cellplan.scene.near import near_table
 from cellplan.scene.near_table import WatchedPairs
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -33,7 +34,7 @@ class LayoutPair:
 
 def layout_pairs(scene: Scene) -> tuple[tuple[LayoutPair, ...], WatchedPairs]:
     """All pairs of a scene, then those of which the depth is judged; and the same as arrays."""
-    bodies, known = scene.bodies, scene.near_table.pairs
+    bodies, known = scene.bodies, near_table(scene).pairs
     found = [
         _pair(scene, (each.first, each.second), each.demand if each.rule is Rule.CLEARANCE else 0.0)
         for each in scene.pairs
@@ -101,7 +102,7 @@ def among(pairs: WatchedPairs, kept: Flags) -> WatchedPairs:
 def _pair(scene: Scene, ends: tuple[int, int], demand: float) -> LayoutPair:
     """A pair of two bodies of the scene."""
     a, b = (scene.bodies[end] for end in ends)
-    forest = scene.near_table.forest
+    forest = near_table(scene).forest
     links = [forest.place(body.robot, body.link) for body in (a, b)]
     return LayoutPair(
         names=(a.name, b.name),

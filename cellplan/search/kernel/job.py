@@ -73,16 +73,35 @@ class Job:
             moving: Names of the robots that may move.
             nodes: About how many nodes there are.
             denser: Times in [s] about which there are more: the steps there are a third as long.
+
+        Raises:
+            ValueError: The cell gives a path of joints.
         """
-        grasps = closures(cell, moving)
-        relations: tuple[Relation, ...] = (*(path.task for path in schedule.paths), *grasps)
-        desired_at = desired_motion(schedule.paths, grasps)
+        if any(robot.path is not None for robot in cell.robots):
+            raise ValueError("job: expected joints that follow from the tasks, got a given path of the positioner's")
         times, begins, ends = _nodes(schedule.jumps, nodes, denser)
-        X, V = desired_at(times, begins, ends)
+        _, V = desired_motion(schedule.paths, closures(cell, moving))(times, begins, ends)
         is_double = np.append(np.diff(times) == 0.0, False)
         is_smooth = np.abs(V[..., 1:] - V[..., :-1]).max(axis=(0, 1)) <= SAME_TWIST
         kept = ~(is_double & np.append(is_smooth, False))
-        times, X, V = times[kept], np.ascontiguousarray(X[..., kept]), np.ascontiguousarray(V[..., kept])
+        return cls.at_nodes(cell, schedule, moving=moving, nodes=(times[kept], begins[kept], ends[kept]))
+
+    @classmethod
+    def at_nodes(
+        cls, cell: Cell, schedule: Schedule, *, moving: Sequence[str], nodes: tuple[Array, Array, Array]
+    ) -> "Job":
+        """The job at given nodes.
+
+        Args:
+            cell: The cell.
+            schedule: Its tasks on the common clock.
+            moving: Names of the robots that may move.
+            nodes: Times of the nodes in [s], never falling, and begin and end of the stretch of each, shape (N,) each.
+        """
+        grasps = closures(cell, moving)
+        relations: tuple[Relation, ...] = (*(path.task for path in schedule.paths), *grasps)
+        times, begins, ends = nodes
+        X, V = desired_motion(schedule.paths, grasps)(times, begins, ends)
         is_begin = np.append(True, np.diff(times) == 0.0)
         return cls(
             cell=cell,
@@ -227,5 +246,7 @@ def _stretches(is_begin: Array) -> Iterator[tuple[int, int]]:
 
 def _over_step(places: Array, step: float) -> Array:
     """Weights of values at places in [s] seen from a node: the integral of their polynomial over a step from it."""
+    if step == 0.0:  # from one side of a time to the other
+        return np.zeros(len(places))
     powers = np.arange(len(places))
     return np.linalg.solve((places / step) ** powers[:, None], step / (powers + 1.0))

@@ -11,11 +11,11 @@ from cellplan.search.starts.freedom import FIXED, drawn_within
 from cellplan.search.starts.problem import StartProblem
 from cellplan.search.starts.reaching import Placed, followed, matched, reached
 
-SETTINGS: Final = 400  # [-] postures of the holder that are drawn
+SETTINGS: Final = 400  # [-] configurations of the holder that are drawn
 MATCHED: Final = 150  # [-] of these, free of contact, that are compared by what operators reach of them
 MATCHES: Final = 300  # [-] configurations of each operator for that
 NEAR: Final = 0.5  # [rad] and half metres by which a configuration may miss a path's start and still speak for it
-HOLDER_RANGE: Final = 0.7  # share of each joint range that postures of the holder are drawn from: room to move
+HOLDER_RANGE: Final = 0.7  # share of each joint range that configurations of the holder are drawn from: room to move
 GIVEN_BASE: Final = 0.5  # share of the draws with the holder's base where it is given
 DRAWS: Final = 1500  # [-] bases of an operator
 CONFIGURATIONS: Final = 6  # [-] per base that are drawn; the best matching ones are taken

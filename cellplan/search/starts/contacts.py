@@ -1,4 +1,4 @@
-"""How far candidates fall short of demanded distances, many bases and postures in one call."""
+"""How far candidates fall short of demanded distances, many bases and configurations in one call."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -13,12 +13,12 @@ from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.layout_pairs import among, demands_of, layout_pairs
 
-AT_ONCE: Final = 192  # postures in one call: arrays of all pairs stay small
+AT_ONCE: Final = 192  # configurations in one call: arrays of all pairs stay small
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Shortfalls:
-    """By how much S postures fall short of what is demanded.
+    """By how much S configurations fall short of what is demanded.
 
     Attributes:
         worst: Largest shortfall of any pair in [m]; 0 or less where all keep their distance, shape (S,).
@@ -56,12 +56,14 @@ class Contacts:
             for pair, design, each in zip(self._pairs, is_design, owners, strict=True)
         ]
         watched = among(watched, np.array(kept, dtype=bool))
-        watched = replace(watched, once=np.zeros(len(watched.rows), dtype=bool))  # every posture is another layout
+        watched = replace(
+            watched, once=np.zeros(len(watched.rows), dtype=bool)
+        )  # every configuration is another layout
         self._table, self._engine = replace(scene.near_table, pairs=watched), scene.engine
         self._demands = demands_of(self._pairs)
 
     def shortfalls(self, X_WB: Array, q: Array) -> Shortfalls:
-        """By how much postures fall short.
+        """By how much configurations fall short.
 
         Args:
             X_WB: Bases of all robots, shape (S, robots, 4, 4).
@@ -75,7 +77,7 @@ class Contacts:
         return Shortfalls(worst=worst, pair=tuple(pair))
 
     def _of_group(self, X_WB: Array, q: Array) -> tuple[Array, list[tuple[str, str] | None]]:
-        """The same of a few postures."""
+        """The same of a few configurations."""
         worst, names = np.full(len(q), -np.inf), list[tuple[str, str] | None]([None] * len(q))
         rows = self._table.pairs.rows
         if not len(rows):

@@ -89,7 +89,9 @@ class StartGenerator:
     def at(self, index: int) -> Starts:
         """The starts of one number: 0 the given layout, then those of the engineer, then sampled and random ones."""
         if index == 0:
-            return self._of_layout(Origin.GIVEN, "the given layout", self._problem.variables.given, self._problem.start)
+            start = self._problem.given_start()[None]
+            x = self._problem.with_starts(self._problem.variables.given[None], start)[0]
+            return self._of_layout(Origin.GIVEN, "the given layout", x, start[0])
         if index <= len(self._tries):
             name, x, start = self._tries[index - 1]
             return self._of_layout(Origin.TRY, f"layout of {name}", x, start)
@@ -115,7 +117,7 @@ class StartGenerator:
         problem, reasons = self._problem, list[str]()
         places, drops = settings(problem, rng, SETTINGS_TRIED)
         if not places:
-            return Starts(found=(), reason=f"no posture of the holder can be used: {_words(drops)}")
+            return Starts(found=(), reason=f"no configuration of the holder can be used: {_words(drops)}")
         for setting in places:
             pools = self._pools(setting, rng, reasons)
             if pools is None:

@@ -60,7 +60,7 @@ def branch_starts(problem: StartProblem, x: Array, start: Array, rng: np.random.
         found = branches(problem, robot, x, start, rng)
         if not len(found):
             name = problem.cell.robots[robot].name
-            return *nothing, f"'{name}' follows its path from no posture with the part at rest"
+            return *nothing, f"'{name}' follows its path from no configuration with the part at rest"
         choices.append(found)
     while np.prod([len(each) for each in choices]) > COMBINATIONS:
         longest = max(range(len(choices)), key=lambda place: len(choices[place]))

@@ -1,17 +1,20 @@
 """What all starts of one cell share: its variables, its job at nodes, its bodies and the paths of its tools."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from cellplan.errors import StartNotFoundError
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell import Cell
-from cellplan.model.motion import Schedule
+from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.task import Frame
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.inverse_kinematics import finite_limits
+from cellplan.planning.start.search import choose_start
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.verdicts import acceleration_limits
@@ -33,7 +36,8 @@ class StartProblem:
         cell: The cell.
         variables: What is varied.
         freedom: Which of it places which robot.
-        start: Start postures near the given ones, in mid-range where none is given, in [rad] or [m], shape (nq,).
+        paths: Path of every task on the common clock, by its name.
+        start: Start postures of the given layout, in mid-range where none is given, in [rad] or [m], shape (nq,).
         margin: Demanded distance of each joint from its limits in [rad] or [m], shape (nq,).
         acceleration: Largest acceleration of each joint in [rad/s^2] or [m/s^2] as the checks judge it, shape (nq,).
         job: The tasks at the nodes of a motion.
@@ -48,6 +52,7 @@ class StartProblem:
     cell: Cell
     variables: StartVariables
     freedom: Freedom
+    paths: Mapping[str, ClockedPath]
     start: Array
     margin: Array
     acceleration: Array
@@ -71,13 +76,23 @@ class StartProblem:
         Raises:
             InputError: The paths or bodies of the cell are not usable.
         """
-        scene, (schedule, moving) = Scene.from_cell(cell), _first_phase(cell)
-        start = np.concatenate([_start_of(robot.start, *finite_limits(robot.model)) for robot in cell.robots])
+        scene, paths = (
+            Scene.from_cell(cell),
+            clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks]),
+        )
+        phase = plan_phases(cell).program[0]
+        schedule, moving = schedule_paths(cell, [paths[name] for name in phase.tasks]), tuple(phase.moving)
+        middles = [0.5 * np.add(*finite_limits(robot.model)) for robot in cell.robots]
+        starts = [
+            middle if each.start is None else each.start for each, middle in zip(cell.robots, middles, strict=True)
+        ]
+        start = np.concatenate(starts)
         holder = cell.positioners[:1]
         return cls(
             cell=cell,
             variables=variables,
             freedom=Freedom.of(cell, variables, start),
+            paths=paths,
             start=start,
             margin=np.broadcast_to(np.asarray(margin, dtype=float), (cell.joint_count,)),
             acceleration=acceleration_limits(scene),
@@ -89,6 +104,15 @@ class StartProblem:
             all_contacts=Contacts(scene, [robot.name for robot in cell.robots]),
             contacts=tuple(Contacts(scene, [robot.name], holder) for robot in cell.robots),
         )
+
+    def given_start(self) -> Array:
+        """The start posture of the given layout, what is not given found as by a solve; else in mid-range, (nq,)."""
+        if any(robot.start is None for robot in self.cell.robots):
+            try:
+                return choose_start(self.scene, self.paths).start
+            except StartNotFoundError:  # nothing starts here: that is what a search is for
+                pass
+        return self.start
 
     @property
     def operators(self) -> tuple[int, ...]:
@@ -135,15 +159,3 @@ class StartProblem:
         found, columns = x.copy(), self.freedom.columns
         found[:, columns[columns != FIXED]] = start[:, columns != FIXED]
         return found
-
-
-def _start_of(start: Array | None, lower: Array, upper: Array) -> Array:
-    """A start posture, in mid-range where none is given."""
-    return 0.5 * (lower + upper) if start is None else start
-
-
-def _first_phase(cell: Cell) -> tuple[Schedule, tuple[str, ...]]:
-    """The tasks of the first phase on their clock, and the robots that move in it."""
-    paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
-    phase = plan_phases(cell).program[0]
-    return schedule_paths(cell, [paths[name] for name in phase.tasks]), tuple(phase.moving)

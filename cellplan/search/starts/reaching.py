@@ -26,7 +26,7 @@ FAR: Final = 0.05  # [m, rad] far away
 LONGEST_MOVE: Final = 0.5  # [rad, m] largest change in one iteration
 DAMPING: Final = 1e-3  # keeps steps finite at singular configurations
 STEPS: Final = 5  # of Newton's method from node to node at most; one or two but at corners
-NEARLY: Final = 2e-3  # [m, rad] an error that one step more leaves nothing of
+NEARLY: Final = 1e-3  # [m, rad] an error that one step more leaves nothing of
 LOST: Final = 0.6  # [rad, m] a joint that moves more than this from one node to the next has jumped
 
 

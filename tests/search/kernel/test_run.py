@@ -1,14 +1,21 @@
 """Motions of many layouts against the accurate mode, and what a batch must not change."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from cellplan.io.cell.load import load_cell
 from cellplan.planning.layout_screening import Candidates, screen_layouts
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.search.kernel.figures import Figures
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.run import Motions, run, run_near
+
+CELL = Path(__file__).resolve().parents[3] / "cells" / "four_robots.yaml"
+NODES = 97
 
 
 @pytest.fixture(scope="module")
@@ -112,3 +119,20 @@ def test_layouts_that_do_not_belong_together_are_refused(
     parts[name] = parts[name][:1] if value is None else np.full_like(parts[name], value)
     with pytest.raises(ValueError, match=message):
         Layouts(**parts)
+
+
+def test_a_desired_twist_that_jumps_within_the_motion_is_followed_from_either_side() -> None:
+    cell = load_cell(CELL).with_values({"tasks.circle.time_law": "constant", "tasks.circle.duration_s": 2.0})
+    schedule = schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
+    moving = [robot.name for robot in cell.robots]
+    start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
+    job, layouts = Job.of(cell, schedule, moving=moving, nodes=NODES), Layouts.of([cell], start[None])
+
+    found = run(job, layouts)
+
+    exact = screen_layouts(cell, schedule, Candidates.of([cell], start[None]), moving=moving, accuracy=1e-7)
+    (jump,) = job.times[np.append(np.diff(job.times) == 0.0, False)]
+    assert jump == pytest.approx(2.0, abs=1e-9)
+    assert found.is_followed.all()
+    fastest = (np.abs(found.qd[0]) / job.limits.velocity).max()
+    assert fastest == pytest.approx(exact.speed_ratios.max(), rel=0.005)

@@ -1,0 +1,87 @@
+"""Given path: the motion of a positioner that the cell states, on the clock of a schedule."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.joint_spline import JointSpline
+from cellplan.model.motion import Schedule
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GivenPath:
+    """The joints of one robot over time, which the other robots only follow.
+
+    Attributes:
+        columns: Place of its joints in the stacked joint vector.
+        joint_count: Length of that vector.
+        spline: The joints over the share of the clock.
+        end: Nominal time in [s] at which the clock ends.
+    """
+
+    columns: slice
+    joint_count: int
+    spline: JointSpline
+    end: float
+
+    @classmethod
+    def of(cls, cell: Cell, schedule: Schedule, moving: Sequence[str]) -> "GivenPath | None":
+        """The one that a cell states for a robot that moves; None where there is none."""
+        end = float(schedule.times[-1] if schedule.clock is None else schedule.clock.sigma[-1])
+        return cls.over(cell, end, moving)
+
+    @classmethod
+    def over(cls, cell: Cell, end: float, moving: Sequence[str]) -> "GivenPath | None":
+        """The same on a clock that ends at a nominal time in [s]."""
+        for robot in cell.robots:
+            if robot.path is not None and robot.name in moving:
+                columns = cell.columns(robot.name)
+                return cls(columns=columns, joint_count=cell.joint_count, spline=robot.path, end=end)
+        return None
+
+    @property
+    def knots(self) -> Array:
+        """Nominal times in [s] at which two polynomials meet, shape (K,)."""
+        return self.spline.knots * self.end
+
+    def at(self, sigma: Array, derivative: int = 0) -> Array:
+        """Its joints, or their derivatives by the nominal time, at nominal times in [s] of shape (N,), (N, n)."""
+        shares = np.clip(np.asarray(sigma) / self.end, 0.0, 1.0)
+        return self.spline.at(shares, derivative) / self.end**derivative
+
+    def speeds(self, sigma: Array) -> Array:
+        """Speeds of all joints of the cell, those of the others zero, shape (nq, N)."""
+        speeds = np.zeros((self.joint_count, len(sigma)))
+        speeds[self.columns] = self.at(sigma, 1).T
+        return speeds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GivenRows:
+    """A given path at the samples of a clock; no joints where there is none.
+
+    Attributes:
+        columns: Place of its joints in the stacked joint vector.
+        q: Their positions, shape (N, n).
+    """
+
+    columns: slice
+    q: Array
+
+    @classmethod
+    def of(cls, cell: Cell, schedule: Schedule, moving: Sequence[str]) -> "GivenRows":
+        """The path that a cell states for a robot that moves, at the samples of a schedule."""
+        sigma = schedule.times if schedule.clock is None else schedule.clock.sigma
+        path = GivenPath.of(cell, schedule, moving)
+        if path is None:
+            return cls(columns=slice(0, 0), q=np.zeros((len(sigma), 0)))
+        return cls(columns=path.columns, q=path.at(sigma))
+
+    def placed(self, k: int, q: Array) -> Array:
+        """A configuration, shape (nq,), with these joints where they are at sample k."""
+        found = q.copy()
+        found[self.columns] = self.q[k]
+        return found

@@ -1,0 +1,53 @@
+"""The first path of a search: the positioner's own where the cell gives one, else that of the pseudo-inverse."""
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell import Cell
+from cellplan.model.joint_spline import JointSpline
+from cellplan.model.motion import Schedule
+from cellplan.search.kernel.job import Job, Layouts
+from cellplan.search.kernel.run import run
+
+NODES: Final = 193  # of the motion that is fitted
+SAMPLES: Final = 401  # of a given path that gets another number of coefficients
+
+
+def first_path(
+    cell: Cell, schedule: Schedule, layout: Layouts, *, count: int, degree: int
+) -> tuple[JointSpline, Array] | None:
+    """The path that a search begins with, and the start posture of all joints that goes with it, shape (nq,).
+
+    Args:
+        cell: The cell.
+        schedule: Its tasks on the common clock.
+        layout: The layout, a batch of one, with a start posture near the right one.
+        count: Number of coefficients of each joint.
+        degree: Degree of the spline.
+
+    Returns:
+        The path that is nearest to the motion by the weighted pseudo-inverse; None where a tool loses its path.
+    """
+    carrier = next(robot for robot in cell.robots if robot.name == cell.positioners[0])
+    start = layout.start[0]
+    if carrier.path is not None:
+        return _with_count(carrier.path, count, degree), start
+    free = replace(cell, robots=tuple(replace(robot, path=None) for robot in cell.robots))
+    job = Job.of(free, schedule, moving=[robot.name for robot in cell.robots], nodes=NODES)
+    motion = run(job, layout)
+    if not motion.is_followed[0]:
+        return None
+    once = np.append(np.diff(job.times) > 0.0, True)
+    times, q = job.times[once], motion.q[0, once][:, cell.columns(carrier.name)]
+    return JointSpline.fitted(times / times[-1], q, count=count, degree=degree), motion.q[0, 0]
+
+
+def _with_count(path: JointSpline, count: int, degree: int) -> JointSpline:
+    """A path with so many coefficients; the very path where it has them already."""
+    if (len(path.coefficients), path.degree) == (count, degree):
+        return path
+    shares = np.linspace(0.0, 1.0, SAMPLES)
+    return JointSpline.fitted(shares, path.at(shares), count=count, degree=degree)

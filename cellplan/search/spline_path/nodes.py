@@ -1,0 +1,142 @@
+"""Nodes of a motion along a spline: on its knots and on either side, so that no peak hides between two of them."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.geometry.curves.chebyshev import chebyshev
+from cellplan.model.cell import Cell
+from cellplan.model.clocked_path import distinct
+from cellplan.model.joint_spline import JointSpline, basis
+from cellplan.model.motion import Schedule
+from cellplan.search.kernel.job import Job
+
+LOWEST: Final = 4  # degree of the polynomials between two breaks
+HIGHEST: Final = 24
+SHORT: Final = 0.02  # share of the mean distance of breaks: nearer ones of the spline alone are left to their neighbour
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PathNodes:
+    """The job of a cell whose positioner goes along a spline, at Chebyshev points between breaks.
+
+    Breaks are the times at which desired twists jump and the knots of the spline; where two stretches meet, each has a
+    node of its own, which sees the desired motion from inside.
+
+    Attributes:
+        job: The job; the joints of the positioner are given, not resolved.
+        columns: Place of the positioner's joints in the stacked joint vector.
+        operators: Columns of the joints of each relation's robot, shape (T, 6).
+        count: Number of coefficients.
+        degree: Degree of the spline.
+        shares: What each coefficient contributes to a joint, its speed in [1/s] and its acceleration in [1/s^2] at the
+            nodes, shape (3, N, count).
+        rates: Derivatives by time in [1/s] at the nodes, of what is given at them: of the polynomial through the nodes
+            of a stretch, shape (N, N).
+    """
+
+    job: Job
+    columns: slice
+    operators: Indices
+    count: int
+    degree: int
+    shares: Array
+    rates: Array
+
+    @classmethod
+    def of(cls, cell: Cell, schedule: Schedule, *, count: int, degree: int, nodes: int) -> "PathNodes":
+        """Place nodes for a spline of so many coefficients.
+
+        Args:
+            cell: The cell.
+            schedule: Its tasks on the common clock.
+            count: Number of coefficients of each joint.
+            degree: Degree of the spline, 3 or 5.
+            nodes: About how many nodes there are.
+
+        Raises:
+            InputError: An operator's motion does not follow from its task and the positioner alone.
+        """
+        holder = _positioner(cell)
+        still = JointSpline(coefficients=np.zeros((count, len(cell.robots[holder].model.joints))), degree=degree)
+        robots = [replace(robot, path=still if index == holder else None) for index, robot in enumerate(cell.robots)]
+        cell = replace(cell, robots=tuple(robots))
+        end = float(schedule.times[-1])
+        times, begins, ends, rates = _panels(_breaks(schedule.jumps, still.knots * end), nodes)
+        moving = [robot.name for robot in cell.robots]
+        job = Job.at_nodes(cell, schedule, moving=moving, nodes=(times, begins, ends))
+        return cls(
+            job=job,
+            columns=cell.columns(cell.robots[holder].name),
+            operators=_operators(job),
+            count=count,
+            degree=degree,
+            shares=np.array([basis(times / end, count, degree, k) / end**k for k in range(3)]),
+            rates=rates,
+        )
+
+
+def _positioner(cell: Cell) -> int:
+    """Place of the robot that carries the part.
+
+    Raises:
+        InputError: There is none, or it has a task of its own.
+    """
+    if cell.carrier is None:
+        raise InputError(f"{cell.origin.at('part.held_by')}: expected a robot that holds the part and may have a path")
+    name = cell.robots[cell.carrier].name
+    for task in cell.tasks:
+        if task.robot == name:
+            raise InputError(f"{task.where('robot')}: expected no task of '{name}', whose path is to be found")
+    return cell.carrier
+
+
+def _operators(job: Job) -> Indices:
+    """Columns of the joints of each relation's robot.
+
+    Raises:
+        InputError: A task leaves components open, or its robot has a joint too many or too few.
+    """
+    found = []
+    for relation, kept, operator in zip(job.relations, job.constraints.kept, job.constraints.operators, strict=True):
+        robot = job.cell.robots[operator]
+        columns = job.cell.columns(robot.name)
+        if not kept.all() or columns.stop - columns.start != 6:
+            where = job.cell.origin.at(f"robots.{robot.name}")
+            raise InputError(
+                f"{where}: expected a robot of six joints whose task '{relation.name}' states all six components, for "
+                "a search of joint paths; its motion would not follow from that of the positioner alone"
+            )
+        found.append(np.arange(columns.start, columns.stop))
+    return np.array(found, dtype=np.intp).reshape(-1, 6)
+
+
+def _breaks(jumps: Array, knots: Array) -> Array:
+    """Times in [s] at which stretches meet; a knot of the spline next to a jump is left out."""
+    near = SHORT * float(jumps[-1] - jumps[0]) / (len(jumps) + len(knots))
+    own = knots[np.abs(knots[:, None] - jumps).min(axis=1, initial=np.inf) > near]
+    return distinct(np.concatenate([jumps, own]))
+
+
+def _panels(breaks: Array, count: int) -> tuple[Array, Array, Array, Array]:
+    """Times, begins and ends of the stretches of all nodes, and derivatives at the nodes from values at them."""
+    parts, blocks = [], []
+    for begin, end in pairwise(breaks.tolist()):
+        share = count * (end - begin) / float(breaks[-1] - breaks[0])
+        points = chebyshev(int(np.clip(round(share) - 1, LOWEST, HIGHEST)))
+        times = begin + (end - begin) * points.nodes
+        times[-1] = end
+        parts.append(np.stack([times, np.full_like(times, begin), np.full_like(times, end)]))
+        blocks.append(points.derivative / (end - begin))
+    times, begins, ends = np.concatenate(parts, axis=1)
+    rates = np.zeros((len(times), len(times)))
+    first = 0
+    for block in blocks:
+        last = first + len(block)
+        rates[first:last, first:last] = block
+        first = last
+    return times, begins, ends, rates

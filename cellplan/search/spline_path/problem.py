@@ -1,0 +1,165 @@
+"""The path problem: the spline of a positioner and, besides, what a layout may vary; operators follow their tasks."""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.model.cell import joint_at
+from cellplan.model.joint_limits import JointLimits
+from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
+from cellplan.search.kernel.job import Layouts
+from cellplan.search.kernel.screws import Directions
+from cellplan.search.programs.problem import Distances, Point, PointDerivatives
+from cellplan.search.spline_path.derivatives import path_derivatives
+from cellplan.search.spline_path.followed import continued, followed
+from cellplan.search.spline_path.nodes import PathNodes
+from cellplan.search.spline_path.variables import PathVariables
+
+
+class LayoutVariables(Protocol):
+    """What a path problem needs of the variables of the layout, of which there may be none; see ``Problem``."""
+
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    scale: Array
+    cost: Array
+    given: Array
+
+    def layouts(self, x: Array, start: Array) -> Layouts:
+        """The layouts at some values, shape (K, n), with start postures near the right ones, shape (K, nq)."""
+
+    def directions(self, x: Array) -> Directions:
+        """What each variable displaces at some values, shape (n,)."""
+
+    def values(self, x: Array, start: Array) -> dict[str, object]:
+        """What to write into the cell file, by address."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Found:
+    """Near pairs and the nodes that their keys are."""
+
+    near: LayoutDistances
+    nodes: Indices
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PathProblem:
+    """See ``Problem``: the coefficients of the path are the first variables, those of the layout the others.
+
+    Attributes:
+        nodes: The job at its nodes.
+        path: The coefficients.
+        layout: What else may vary.
+        bodies: The bodies of the cell.
+        acceleration: See ``Problem``.
+    """
+
+    nodes: PathNodes
+    path: PathVariables
+    layout: LayoutVariables
+    bodies: CellDistances
+    acceleration: Array
+    names: tuple[str, ...] = field(init=False)
+    lower: Array = field(init=False)
+    upper: Array = field(init=False)
+    scale: Array = field(init=False)
+    cost: Array = field(init=False)
+    given: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Put the variables one after the other."""
+        path, layout = self.path, self.layout
+        object.__setattr__(self, "names", (*path.names, *layout.names))
+        object.__setattr__(self, "given", np.concatenate([path.given.coefficients.ravel(), layout.given]))
+        for name in ("lower", "upper", "scale", "cost"):
+            object.__setattr__(self, name, np.concatenate([getattr(path, name), getattr(layout, name)]))
+
+    @property
+    def times(self) -> Array:
+        """See ``Problem``."""
+        return self.nodes.job.times
+
+    @property
+    def limits(self) -> JointLimits:
+        """See ``Problem``."""
+        return self.nodes.job.limits
+
+    def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:
+        """See ``Problem``."""
+        own, others = self._split(x)
+        coefficients = self.path.spline(own).coefficients
+        placement = self.layout.layouts(others[None], start[None]).placement(self.nodes.job)
+        q = continued(self.nodes, placement, coefficients, start) if near is None else near.q
+        found = None if q is None else followed(self.nodes, placement, coefficients, q)
+        if found is None:
+            return None
+        q, qd = found
+        qdd = self.nodes.rates @ qd
+        qdd[:, self.nodes.columns] = self.nodes.shares[2] @ coefficients
+        return Point(x=x, start=q[0], q=q, qd=qd, qdd=qdd)
+
+    def derivatives(self, point: Point) -> PointDerivatives:
+        """See ``Problem``."""
+        _, others = self._split(point.x)
+        return path_derivatives(
+            self.nodes,
+            self._layout_at(point),
+            point.q,
+            point.qd,
+            self.layout.directions(others),
+            is_accelerating=bool(np.isfinite(self.acceleration).any()),
+        )
+
+    def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
+        """See ``Problem``."""
+        _, others = self._split(point.x)
+        near = self.bodies.near(others, self._layout_at(point), point.q[nodes], within)
+        return Distances(
+            pairs=near.pairs,
+            nodes=nodes[near.keys],
+            values=near.distances,
+            demands=near.demands,
+            is_own=near.is_own,
+            found=_Found(near=near, nodes=nodes),
+        )
+
+    def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:
+        """See ``Problem``."""
+        if not isinstance(found.found, _Found):
+            raise TypeError("distance_derivatives: expected distances of this problem")
+        near, own, (_, others) = found.found.near, len(self.path.names), self._split(point.x)
+        dq = by_joints.q[found.found.nodes]
+        by_path = (near.by_joints[:, None] @ dq[near.keys][..., :own])[:, 0]
+        if not len(others):
+            return by_path
+        return np.concatenate([by_path, self.bodies.derivatives(near, others, dq[..., own:])], axis=1)
+
+    def pair_names(self, pair: int) -> tuple[str, str]:
+        """See ``Problem``."""
+        return self.bodies.pairs[pair].names
+
+    def joint_names(self, column: int) -> tuple[str, str]:
+        """See ``Problem``."""
+        return joint_at(self.nodes.job.cell, column)
+
+    def values(self, x: Array, start: Array) -> dict[str, object]:
+        """What to write into the cell file, by address: the path in place of the start posture of its robot."""
+        own, others = self._split(x)
+        found, robot = self.layout.values(others, start), f"robots.{self.path.robot}"
+        for key in ("start", "start_deg"):
+            found[f"{robot}.{key}"] = None
+        found[f"{robot}.path"] = self.path.written(self.nodes.job.cell, own)
+        return found
+
+    def _split(self, x: Array) -> tuple[Array, Array]:
+        """The coefficients, and the variables of the layout."""
+        own = len(self.path.names)
+        return x[:own], x[own:]
+
+    def _layout_at(self, point: Point) -> Layouts:
+        """The layout at a point."""
+        return self.layout.layouts(self._split(point.x)[1][None], point.start[None])

@@ -1,0 +1,82 @@
+"""Coefficients of a positioner's path as variables of a search."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell import Cell
+from cellplan.model.joint_spline import JointSpline
+from cellplan.model.units import joint_unit
+
+DECIMALS: Final = 6  # of a degree or a millimetre, as coefficients are written
+USUAL_ANGLE: Final = float(np.radians(10.0))  # [rad] of a step, and of a change that costs 1
+USUAL_LENGTH: Final = 0.1  # [m] likewise
+BEYOND: Final = 0.5  # share of the range by which a coefficient may lie outside it: the path goes past it
+FARTHEST: Final = float(np.radians(1080.0))  # [rad] or [m] of a coefficient of a joint without limits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PathVariables:
+    """The coefficients, one configuration after the other.
+
+    Attributes:
+        robot: Name of the positioner.
+        given: The path that is searched from.
+        names: Addresses in the cell file, n of them.
+        lower: Lowest values in [rad] or [m], shape (n,).
+        upper: Highest values, shape (n,).
+        scale: A usual step of each, shape (n,).
+        cost: Cost of a change by one unit of each, shape (n,): 1 for a change of the whole path by a usual step.
+    """
+
+    robot: str
+    given: JointSpline
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    scale: Array
+    cost: Array
+
+    @classmethod
+    def of(cls, cell: Cell, robot: str, given: JointSpline) -> "PathVariables":
+        """Those of a robot's path, searched from a given one."""
+        model, rows = cell.robot(robot).model, len(given.coefficients)
+        turning = np.array([joint.is_revolute for joint in model.joints])
+        scale = np.where(turning, USUAL_ANGLE, USUAL_LENGTH)
+        with np.errstate(invalid="ignore"):
+            room = np.where(np.isfinite(model.upper - model.lower), BEYOND * (model.upper - model.lower), FARTHEST)
+        lower, upper = np.maximum(model.lower, -FARTHEST) - room, np.minimum(model.upper, FARTHEST) + room
+        lower = np.minimum(lower, given.coefficients.min(axis=0))
+        upper = np.maximum(upper, given.coefficients.max(axis=0))
+        key = "coefficients_deg" if turning.all() else "coefficients"
+        joints = [
+            f"[{index}]" if turning.all() else f".{joint.name}_{joint_unit(is_revolute=joint.is_revolute).name}"
+            for index, joint in enumerate(model.joints)
+        ]
+        return cls(
+            robot=robot,
+            given=given,
+            names=tuple(f"robots.{robot}.path.{key}[{row}]{joint}" for row in range(rows) for joint in joints),
+            lower=np.tile(lower, rows),
+            upper=np.tile(upper, rows),
+            scale=np.tile(scale, rows),
+            cost=np.tile(1.0 / (scale * rows), rows),
+        )
+
+    def spline(self, x: Array) -> JointSpline:
+        """The path at values of the variables, shape (n,)."""
+        return JointSpline(coefficients=x.reshape(self.given.coefficients.shape), degree=self.given.degree)
+
+    def written(self, cell: Cell, x: Array) -> dict[str, object]:
+        """The path as the cell file writes it."""
+        units = [joint_unit(is_revolute=joint.is_revolute) for joint in cell.robot(self.robot).model.joints]
+        rows = x.reshape(self.given.coefficients.shape) * np.array([unit.scale for unit in units])
+        values = [[round(float(value), DECIMALS) + 0.0 for value in row] for row in rows]
+        if all(joint.is_revolute for joint in cell.robot(self.robot).model.joints):
+            return {"degree": self.given.degree, "coefficients_deg": values}
+        keys = [
+            f"{joint.name}_{unit.name}" for joint, unit in zip(cell.robot(self.robot).model.joints, units, strict=True)
+        ]
+        return {"degree": self.given.degree, "coefficients": [dict(zip(keys, row, strict=True)) for row in values]}

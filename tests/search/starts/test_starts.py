@@ -1,0 +1,110 @@
+"""Starts of a search: repeatable, spread, judged as the cell is, and with a reason where there is none."""
+
+import numpy as np
+import pytest
+
+from cellplan import load_cell, solve
+from cellplan.model.seeds import generator
+from cellplan.search.starts.combined import judged
+from cellplan.search.starts.contacts import Contacts
+from cellplan.search.starts.generator import Origin, StartGenerator
+from cellplan.search.starts.problem import StartProblem
+from cellplan.search.variables.variables import Variables
+from tests.search.starts.conftest import CELLS, DRAWS, prepared
+
+
+@pytest.fixture
+def sampled(turntable):
+    return StartGenerator(turntable, seed=3).at(1)
+
+
+def test_a_sampled_start_without_violation_passes_solve_and_is_the_same_again(turntable, sampled):
+    again, other = (StartGenerator(turntable, seed=seed).at(1) for seed in (3, 4))
+    best = sampled.found[0]
+
+    assert best.origin is Origin.SAMPLED
+    assert best.violation == 0.0
+    assert solve(turntable.variables.cell(best.x, best.start)).passed
+    assert [start.x.tobytes() for start in again] == [start.x.tobytes() for start in sampled]
+    assert [start.start.tobytes() for start in again] == [start.start.tobytes() for start in sampled]
+    assert other.found[0].x.tobytes() != best.x.tobytes()
+
+
+def test_the_given_layout_is_the_first_start(turntable):
+    (given,) = StartGenerator(turntable, seed=0).at(0)
+
+    assert given.origin is Origin.GIVEN
+    assert given.violation == 0.0
+    np.testing.assert_allclose(given.x, turntable.variables.given, atol=1e-9)
+
+
+def test_a_layout_beyond_its_limits_has_a_violation_and_is_a_start_all_the_same(four_robots):
+    (given,) = StartGenerator(four_robots, seed=0).at(0)
+
+    assert given.violation > 0.0
+
+
+def test_a_layout_of_another_file_is_a_start(four_robots):
+    other = load_cell(CELLS / "four_robots.yaml")
+    x = four_robots.variables.read_from(other)
+    start = np.concatenate([robot.start for robot in other.robots])
+    (tried,) = StartGenerator(four_robots, seed=0, tries=[("four_robots.yaml", x, start)]).at(1)
+
+    assert tried.origin is Origin.TRY
+    assert tried.text == "layout of four_robots.yaml"
+
+
+def test_what_reaches_nothing_is_named_with_the_reason():
+    cell = load_cell(CELLS / "turntable.yaml")
+    (operator, *_) = [robot.name for robot in cell.robots if robot.name not in cell.positioners]
+    away = {f"robots.{operator}.base.x_mm": 9000.0, "layout": {"vary": {f"{operator}.base": {"x_mm": [8900, 9100]}}}}
+    problem = prepared(cell.with_values(away))
+    found = StartGenerator(problem, seed=0).at(1)
+
+    assert found.found == ()
+    assert (
+        f"'{operator}' follows its path from none of {DRAWS} bases: does not reach the start of its path ({DRAWS})"
+        in (found.reason)
+    )
+
+
+def test_first_distances_are_those_of_the_moved_scene(four_robots):
+    problem, rng = four_robots, generator("contacts")
+    names = [robot.name for robot in problem.cell.robots]
+    contacts, scene = Contacts(problem.scene, names), problem.scene
+    for _ in range(3):
+        X_WB = np.array([robot.X_WB for robot in problem.cell.robots])
+        X_WB[1:, :2, 3] += rng.uniform(-0.2, 0.2, (len(names) - 1, 2))
+        found = contacts.shortfalls(X_WB[None], problem.start[None])
+        near = scene.moved(dict(zip(names, X_WB, strict=True))).near(problem.start[None], 0.01)
+        short = [
+            scene.pairs[row].demand - distance
+            for row, distance in zip(near.rows, near.distances, strict=True)
+            if scene.pairs[row].rule == "clearance"
+        ]
+        assert max(0.0, found.worst[0]) == pytest.approx(max([0.0, *short]), abs=1e-6)
+
+
+def test_candidates_that_lose_their_path_are_dropped(four_robots):
+    start = np.tile(four_robots.start, (2, 1))
+    x = np.tile(four_robots.variables.given, (2, 1))
+    x[1, four_robots.variables.names.index("robots.kuka.base.x_mm")] += 10.0
+    found = judged(four_robots, x, start)
+
+    assert len(found.x) == 1
+    assert found.drops["loses a path"] == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["real_arms_corners", "real_arms_tight"])
+def test_real_arms_find_a_layout_from_the_corners_of_the_floor(name, shared_robots, tmp_path):
+    file = tmp_path / "cell.yaml"
+    text = (CELLS.parent / "benchmarks" / "cells" / f"{name}.yaml").read_text()
+    file.write_text(text.replace("{robots}", str(shared_robots)))
+    variables = Variables.of(load_cell(file, allow_dirs=[shared_robots]))
+    problem = StartProblem.of(variables.base, variables, margin=variables.margin)
+    starts = StartGenerator(problem, seed=2)
+
+    assert starts.at(0).found == ()
+    assert starts.at(0).reason.startswith("the given layout: 'abb' follows its path from no posture")
+    assert starts.at(1).found[0].violation == 0.0

@@ -1,0 +1,153 @@
+"""Studies on a Dask cluster of processes of this machine."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from builders.study_trials import Killer, Wrong, halved, rounds
+
+from cellplan.errors import InputError, StudyStoppedError
+from cellplan.study.cluster import Cluster
+from cellplan.study.folder import JOURNAL
+from cellplan.study.study import Stop
+from cellplan.study.workers import Workers
+
+TRIALS = Stop(trials=14)
+
+
+class LocalCluster:
+    """A scheduler and its workers, each a process."""
+
+    def __init__(self) -> None:
+        self.processes: list[subprocess.Popen[str]] = []
+        self.address = ""
+
+    def start_scheduler(self, port: str = "0") -> None:
+        """Start it and read its address from its log."""
+        scheduler = self._started("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
+        assert scheduler.stderr is not None
+        line = next(line for line in scheduler.stderr if "Scheduler at:" in line)
+        self.address = line.split()[-1]
+
+    def start_worker(self) -> None:
+        """Start a worker of one thread and wait for it to be registered."""
+        worker = self._started("worker", self.address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+        assert worker.stderr is not None
+        assert any("Registered to" in line for line in worker.stderr)
+
+    def end(self, number: signal.Signals = signal.SIGKILL) -> None:
+        """End all processes."""
+        while self.processes:
+            process = self.processes.pop()
+            process.send_signal(number)
+            process.communicate()
+
+    def _started(self, kind: str, *arguments: str) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.dask_{kind}", *arguments],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        )
+        self.processes.append(process)
+        return process
+
+
+@pytest.fixture
+def cluster() -> Iterator[LocalCluster]:
+    """A scheduler with two workers."""
+    pytest.importorskip("distributed")
+    started = LocalCluster()
+    try:
+        started.start_scheduler()
+        for _ in range(2):
+            started.start_worker()
+        yield started
+    finally:
+        started.end()
+
+
+def on_cluster(cluster: LocalCluster, folder: Path, evaluate: Any = halved, **given: Any) -> bytes:
+    """The journal of a study on the cluster."""
+    with Cluster(cluster.address) as executor:
+        rounds(folder).run(evaluate, workers=executor, stop=TRIALS, **given)
+    return (folder / JOURNAL).read_bytes()
+
+
+def here(folder: Path, evaluate: Any = halved) -> bytes:
+    """The journal of a study in a worker process of this machine."""
+    with Workers(1) as workers:
+        rounds(folder).run(evaluate, workers=workers, stop=TRIALS)
+    return (folder / JOURNAL).read_bytes()
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_the_same_study_although_a_worker_is_killed(cluster: LocalCluster, tmp_path: Path) -> None:
+    found = on_cluster(cluster, tmp_path / "cluster", Killer(tmp_path / "mark"))
+    assert [process.poll() for process in cluster.processes].count(-signal.SIGKILL) == 1
+    assert found == here(tmp_path / "here", Killer(tmp_path / "mark"))
+
+
+@pytest.mark.slow
+def test_results_that_count_are_worked_out_again_here(cluster: LocalCluster, tmp_path: Path) -> None:
+    found = on_cluster(cluster, tmp_path / "cluster", Wrong(os.getpid()))
+    assert found == here(tmp_path / "here", Wrong(os.getpid()))  # every wrong one would have been the best
+
+
+@pytest.mark.slow
+def test_a_lost_connection_is_made_again(cluster: LocalCluster, tmp_path: Path) -> None:
+    port = cluster.address.rsplit(":", 1)[1]
+    begun_again: list[str] = []
+
+    def restart(stage: str, _share: float) -> None:
+        if stage.startswith("trial 6 ") and not begun_again:
+            begun_again.append(stage)
+            cluster.end()
+            cluster.start_scheduler(port)
+            cluster.start_worker()
+
+    assert on_cluster(cluster, tmp_path / "cluster", progress=restart) == here(tmp_path / "here")
+    assert begun_again
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_stays_away_ends_the_study_and_loses_nothing(
+    cluster: LocalCluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cellplan.study.cluster.RECONNECT_S", 1.0)
+
+    def end(stage: str, _share: float) -> None:
+        if stage.startswith("trial 6 "):
+            cluster.end(signal.SIGTERM)
+
+    with pytest.raises(StudyStoppedError, match=r"--scheduler tcp://\S+: does not answer any more for 1 s; --resume"):
+        on_cluster(cluster, tmp_path / "cluster", progress=end)
+    whole = here(tmp_path / "here")
+    assert len((tmp_path / "cluster" / JOURNAL).read_bytes().splitlines()) >= 7
+    with Workers(1) as workers:
+        rounds(tmp_path / "cluster").run(halved, workers=workers, stop=TRIALS, resume=True)
+    assert (tmp_path / "cluster" / JOURNAL).read_bytes() == whole
+
+
+def test_without_dask_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError) as raised:
+        Cluster("tcp://127.0.0.1:1")
+    assert str(raised.value) == (
+        '--scheduler: expected Dask, got no package distributed: pip install "cellplan[cluster]"'
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense:", "http://127.0.0.1:80"])
+def test_an_address_where_nothing_answers_is_named(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("cellplan.study.cluster.CONNECT_S", 0.5)
+    with pytest.raises(InputError, match="expected the address of a Dask scheduler that answers, got: "):
+        Cluster(address)
