@@ -11,7 +11,6 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.pipeline.layout.bodies import PlacedVariables, SearchedVariables
 from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.planning.modes import plan_phases
@@ -72,7 +71,7 @@ class Prepared:
             cell=cell,
             variables=variables,
             scene=scene,
-            bodies=CellDistances.of(scene, PlacedVariables(variables)),
+            bodies=CellDistances.of(scene, variables),
             schedule=schedule_paths(variables.base, [paths[name] for name in phase.tasks]),
             moving=tuple(phase.moving),
         )
@@ -109,7 +108,7 @@ class Prepared:
     @cached_property
     def starts(self) -> StartGenerator:
         """Starts of the search: the given layout with other branches, then sampled ones."""
-        problem = StartProblem.of(self.variables.base, SearchedVariables(self.variables), margin=self.variables.margin)
+        problem = StartProblem.of(self.variables.base, self.variables, margin=self.variables.margin)
         return StartGenerator(problem, seed=self.request.seed)
 
     @property

@@ -15,13 +15,17 @@ from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.repair.neat import changed_values, neat
 from cellplan.pipeline.repair.solved import LIMITS, TIMED, Solved, demanded_margin
 from cellplan.pipeline.solve import solve
-from cellplan.search.programs.improve import improve
+from cellplan.search.programs.improve import Improved, improve
+from cellplan.search.programs.measures import rooms
 from cellplan.search.programs.objective import Demands, Effort, Room
+from cellplan.search.programs.problem import Problem
 
 SOLVES: Final = 4  # [-] times that a layout is corrected and solved before it is given up
 NODES: Final = 129  # [-] of a correction
 KEYS: Final = 33  # [-] configurations at which it asks for distances
 ITERATIONS: Final = 20
+KEPT: Final = 0.5  # [-] share of the room beyond a demanded distance that every node is to have
+REFINEMENTS: Final = 4  # [-] local optimisations until no distance between the configurations is too small
 MORE_ANGLE: Final = float(np.radians(0.05))  # [rad] asked for beyond what is missed
 MORE_LENGTH: Final = 0.0005  # [m] likewise
 MORE_TIME: Final = 0.002  # [-] likewise
@@ -59,7 +63,7 @@ def confirmed(ready: Prepared, x: Array, start: Array) -> Confirmed:
     effort = Effort(iterations=ITERATIONS, keys=KEYS, trust=0.2)
     done = Confirmed(values={}, cost=0.0, solved=None, reason="a tool cannot follow its path", solves=0)
     for solves in range(1, SOLVES + 1):
-        found = improve(problem, x, start, demands, effort)
+        found, effort = _refined(problem, (x, start), demands, effort)
         if found is None or not (found.is_conforming or solves == 1):
             break
         x, start = neat(ready, found.x, found.start)
@@ -71,6 +75,29 @@ def confirmed(ready: Prepared, x: Array, start: Array) -> Confirmed:
             break
         demands, effort = tighter
     return done
+
+
+def _refined(
+    problem: Problem, begin: tuple[Array, Array], demands: Demands, effort: Effort
+) -> tuple[Improved | None, Effort]:
+    """A local optimum with a little more than the demanded distances at every node, and the effort that this takes."""
+    x, start = begin
+    found: Improved | None = None
+    for _ in range(REFINEMENTS):
+        found = improve(problem, x, start, demands, effort)
+        if found is None:
+            break
+        near = problem.distances(found.point, np.arange(len(problem.times), dtype=np.intp), effort.room.distance)
+        lacks = near.demands + KEPT * rooms(near, effort.room) - near.values
+        worst = {int(near.pairs[row]): int(near.nodes[row]) for row in np.argsort(lacks) if lacks[row] > 0.0}
+        if not worst:
+            break
+        instants = {float(problem.times[node]) for node in worst.values()}
+        effort, (x, start) = (
+            replace(effort, also_at=tuple(sorted({*effort.also_at, *instants}))),
+            (found.x, found.start),
+        )
+    return found, effort
 
 
 def solved_cell(cell: Cell, values: Mapping[str, object]) -> tuple[Solved | None, str]:

@@ -12,7 +12,6 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.layout import LayoutSettings
 from cellplan.model.units import DEG, MM
-from cellplan.pipeline.layout.bodies import PlacedVariables
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
 from cellplan.pipeline.repair.attempts import Attempt
@@ -112,7 +111,7 @@ def _among(ready: Prepared, addresses: frozenset[str]) -> Prepared:
         tied=tied,
         conversion=with_pedestals(ready.cell, settings)[0],
     )
-    return replace(ready, variables=variables, bodies=CellDistances.of(ready.scene, PlacedVariables(variables)))
+    return replace(ready, variables=variables, bodies=CellDistances.of(ready.scene, variables))
 
 
 def _restricted(settings: LayoutSettings, addresses: frozenset[str]) -> LayoutSettings:

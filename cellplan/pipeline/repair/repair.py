@@ -10,6 +10,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.limits import standing_of
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.repair.at_start import StartFault, start_faults
 from cellplan.pipeline.repair.attempts import (
     Attempt,
     RemedyKind,
@@ -24,10 +25,13 @@ from cellplan.pipeline.repair.record import Case, Tried, advice_record, remedy_v
 from cellplan.pipeline.repair.solved import LIMITS, TIMED, time_asked
 from cellplan.pipeline.repair.trial import EFFORT, FACTOR, GIVEN, evaluate
 from cellplan.report.record.advice import AdviceRecord
+from cellplan.report.record.layout import LimitRecord
 from cellplan.search.programs.objective import Objective
+from cellplan.search.programs.problem import Point
 from cellplan.study.run import outcomes
 from cellplan.study.trial import Outcome, TrialStatus, Variant
 
+FEW: Final = 6  # [-] attempts that take less time than further processes to start
 KINDS: Final = list(RemedyKind)
 WITH_LIMITS: Final = "quadratic_program"  # the method that keeps joints within their limits
 
@@ -64,18 +68,19 @@ def repair(request: LayoutRequest, *, workers: int = 1, progress: Progress = sil
     """
     sought = replace(request, objective=Objective.CHANGE)
     ready = ready_cell(sought)
-    work = _Work(request=sought, workers=workers, progress=progress)
-    work.try_all(ready, _seems_sound(ready))
+    start, reason = start_posture(ready)
+    point = None if reason else ready.coarse.evaluate(ready.variables.given, start)
+    faults = () if point is None else start_faults(ready, point)
+    work = _Work(request=sought, workers=workers, progress=progress, faults=faults)
+    work.try_all(ready, point is not None and not _violations(ready, point))
     case = Case(ready=ready, given=work.given, remedies=work.remedies, failures=work.failures)
     best = ready.cell.with_values(remedy_values(case.remedies[0][1])) if case.remedies else None
     return Repair(record=advice_record(case), given=ready.cell, best=best)
 
 
-def _seems_sound(ready: Prepared) -> bool:
-    """Whether the given layout keeps all demands at the nodes of a search."""
-    start, reason = start_posture(ready)
-    point = None if reason else ready.coarse.evaluate(ready.variables.given, start)
-    return point is not None and not standing_of(ready.coarse, point, ready.demands(), EFFORT).violations()
+def _violations(ready: Prepared, point: Point) -> list[LimitRecord]:
+    """What a motion breaks at the nodes of a search."""
+    return standing_of(ready.coarse, point, ready.demands(), EFFORT).violations()
 
 
 @dataclass(slots=True, kw_only=True)
@@ -86,6 +91,7 @@ class _Work:
         request: What is repaired.
         workers: Number of processes.
         progress: Called with the stage and the fraction done.
+        faults: What the given start posture misses already.
         given: What came of the cell as it is given.
         tried: What came of the attempts.
     """
@@ -93,6 +99,7 @@ class _Work:
     request: LayoutRequest
     workers: int
     progress: Progress
+    faults: Sequence[StartFault] = ()
     given: Outcome = field(default_factory=lambda: Outcome(status=TrialStatus.FAILED, figures={}))
     tried: list[Tried] = field(default_factory=list)
 
@@ -111,17 +118,23 @@ class _Work:
 
     def _run(self, attempts: Sequence[Attempt | None]) -> None:
         """Make some attempts; None stands for the cell as it is given."""
-        variants = [
-            Variant(place, {"kind": GIVEN} if each is None else each.record) for place, each in enumerate(attempts)
-        ]
-        with outcomes(variants, partial(evaluate, self.request), self.workers) as every:
-            for place, (attempt, outcome) in enumerate(zip(attempts, every, strict=True)):
+        jobs: list[Attempt | None] = []
+        for each in attempts:
+            fault = None if each is None else next((it for it in self.faults if it.excludes(each)), None)
+            if each is None or fault is None:
+                jobs.append(each)
+            else:
+                self.tried.append((each, Outcome(status=TrialStatus.FAILED, reason=fault.text, figures={})))
+        variants = [Variant(place, {"kind": GIVEN} if each is None else each.record) for place, each in enumerate(jobs)]
+        workers = self.workers if len(jobs) > FEW else 1
+        with outcomes(variants, partial(evaluate, self.request), workers) as every:
+            for place, (attempt, outcome) in enumerate(zip(jobs, every, strict=True)):
                 if attempt is None:
                     self.given = outcome
                 else:
                     self.tried.append((attempt, outcome))
                 words = "cell as given" if attempt is None else attempt.text
-                self.progress(f"{words}, {place + 1} of {len(attempts)}", (place + 1) / len(attempts))
+                self.progress(f"{words}, {place + 1} of {len(jobs)}", (place + 1) / len(jobs))
 
     @property
     def remedies(self) -> list[Tried]:

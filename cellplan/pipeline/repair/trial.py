@@ -1,7 +1,6 @@
 """One attempt of a repair: the least change that it takes, solved and verified in full."""
 
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +12,6 @@ from cellplan.pipeline.fastest.scaling import refuse_fixed_times, scaled_values,
 from cellplan.pipeline.layout.limits import standing_of
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.layout.request import LayoutRequest
-from cellplan.pipeline.repair.at_start import StartFault, start_faults
 from cellplan.pipeline.repair.attempts import CONTINUOUS, Attempt, RemedyKind
 from cellplan.pipeline.repair.confirm import Confirmed, confirmed, solved_cell
 from cellplan.pipeline.repair.prepare import begins, ready_cell, start_posture, with_attempt
@@ -46,22 +44,10 @@ def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
     if variant.values.get("kind") == GIVEN:
         return _outcome(_of_values(ready, {}, 0.0))
     attempt = Attempt.from_record(variant.values)
-    fault = next((each for each in _start_faults(request) if each.excludes(attempt)), None)
-    if fault is not None:
-        return Outcome(status=TrialStatus.FAILED, reason=fault.text, figures={})
     try:
         return _outcome(_least(ready, attempt))
     except (InputError, NoSolutionError) as error:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
-
-
-@lru_cache(maxsize=1)
-def _start_faults(request: LayoutRequest) -> tuple[StartFault, ...]:
-    """What the start posture of the given cell misses; none where there is no motion."""
-    ready = ready_cell(request)
-    start, reason = start_posture(ready)
-    point = None if reason else ready.coarse.evaluate(ready.variables.given, start)
-    return () if point is None else start_faults(ready, point)
 
 
 def _least(ready: Prepared, attempt: Attempt) -> Confirmed | str:

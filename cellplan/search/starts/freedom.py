@@ -9,6 +9,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell import Cell
 from cellplan.search.distances.moving_bodies import LayoutVariables
+from cellplan.search.kernel.job import Layouts
 
 PROBE: Final = 0.1  # of a variable's range or usual step: far above rounding
 COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "yaw_deg")  # of a base that a start chooses so that its tool comes there
@@ -36,6 +37,10 @@ class StartVariables(LayoutVariables, Protocol):
     @property
     def scale(self) -> Array:
         """A usual step of each, shape (n,)."""
+        ...
+
+    def layouts(self, x: Array, start: Array) -> Layouts:
+        """What the kernel needs of the layouts at x, shape (K, n), with start postures, shape (K, nq)."""
         ...
 
 
