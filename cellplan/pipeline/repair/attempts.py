@@ -114,12 +114,9 @@ def of_layout(cell: Cell, settings: LayoutSettings, size: int) -> Iterator[Attem
     owned, groups = owners(cell, settings), tied(settings)
     for names in islice(combinations(owned, size), MOST_SUBSETS):
         together = {address for name in names for address in owned[name]}
-        addresses = tuple(
-            address
-            for name in names
-            for address in owned[name]
-            if all(together.issuperset(group) for group in groups if address in group)
-        )
+        while broken := {address for group in groups if not together.issuperset(group) for address in group} & together:
+            together -= broken
+        addresses = tuple(address for name in names for address in owned[name] if address in together)
         if addresses:
             yield Attempt(kind=RemedyKind.LAYOUT, robots=names, addresses=addresses)
 
