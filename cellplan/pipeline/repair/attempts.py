@@ -28,6 +28,7 @@ class RemedyKind(StrEnum):
     FREE_SPIN = "free_spin"  # that angle left open
     WEIGHTS = "weights"  # joint weights of one robot
     METHOD = "method"  # a method that knows the limits
+    STEP = "step"  # rows in shorter steps
     TOOL = "tool"  # length, tilt and roll of one rod
     DURATION = "duration"  # a longer cycle
 
@@ -90,6 +91,8 @@ class Attempt:
         if self.kind is RemedyKind.LAYOUT:
             what = listed_names(list(dict.fromkeys(map(_what, self.addresses))))
             return "place of the part at rest" if self.robots == (PART,) else f"{what} of {names}"
+        if self.kind is RemedyKind.STEP:
+            return f"rows every {self.values['motion.step_s']:g} s"
         if self.kind is RemedyKind.METHOD:
             return f"method {self.values['solver.method']}"
         return f"{WORDS[self.kind]} {names}".rstrip()

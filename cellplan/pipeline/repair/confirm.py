@@ -13,7 +13,7 @@ from cellplan.model.report import Check
 from cellplan.model.units import MM
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.repair.neat import changed_values, neat
-from cellplan.pipeline.repair.solved import LIMITS, TIMED, Solved, demanded_margin
+from cellplan.pipeline.repair.solved import DISTANCES, LIMITS, TIMED, Solved, demanded_margin
 from cellplan.pipeline.solve import solve
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.measures import rooms
@@ -29,7 +29,6 @@ REFINEMENTS: Final = 4  # [-] local optimisations until no distance between the 
 MORE_ANGLE: Final = float(np.radians(0.05))  # [rad] asked for beyond what is missed
 MORE_LENGTH: Final = 0.0005  # [m] likewise
 MORE_TIME: Final = 0.002  # [-] likewise
-DISTANCES: Final = ("clearance", "collision", "tool_depth")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -22,7 +22,7 @@ from cellplan.pipeline.repair.attempts import (
 )
 from cellplan.pipeline.repair.prepare import ready_cell, start_posture
 from cellplan.pipeline.repair.record import Case, Tried, advice_record, remedy_values
-from cellplan.pipeline.repair.solved import LIMITS, TIMED, time_asked
+from cellplan.pipeline.repair.solved import BETWEEN, DISTANCES, LIMITS, TIMED, step_asked, time_asked
 from cellplan.pipeline.repair.trial import EFFORT, FACTOR, GIVEN, evaluate
 from cellplan.report.record.advice import AdviceRecord
 from cellplan.report.record.layout import LimitRecord
@@ -109,8 +109,11 @@ class _Work:
             self._run([None])
             if self.given.status is TrialStatus.PASSED:
                 return
-        self._run([*([] if seems_sound else [None]), *_first(ready)])
-        for size in range(2, len(owners(ready.cell, ready.variables.settings)) + 1):
+        names = {check["name"] for check in _failed(self.given)}
+        can_help = not seems_sound or bool(names & {*LIMITS, *DISTANCES})  # a search knows of nothing else
+        self._run([*([] if seems_sound else [None]), *(_first(ready) if can_help else [])])
+        sizes = range(2, len(owners(ready.cell, ready.variables.settings)) + 1) if can_help else ()
+        for size in sizes:
             if any(attempt.kind is RemedyKind.LAYOUT for attempt, _ in self.remedies):
                 break
             self._run(list(of_layout(ready.cell, ready.variables.settings, size)))
@@ -156,16 +159,25 @@ def _first(ready: Prepared) -> list[Attempt]:
 
 def _about_limits(ready: Prepared, given: Outcome) -> list[Attempt]:
     """Attempts where the verdict is about limits of joints, or what a slower motion keeps, alone."""
-    checks: Any = given.figures.get("failed", ())
+    checks, step = _failed(given), ready.cell.motion.step
     failed = {check["name"] for check in checks}
     found: list[Attempt] = []
     if failed and failed <= LIMITS:
         found += of_weights(ready.cell, ready.variables.settings)
         if ready.cell.solver.method != WITH_LIMITS:
             found.append(Attempt(kind=RemedyKind.METHOD, robots=(), values={"solver.method": WITH_LIMITS}))
+    if failed and failed <= BETWEEN and ready.cell.motion.grid is None:
+        values = {"motion.step_s": step_asked(checks, step)}
+        found.append(Attempt(kind=RemedyKind.STEP, robots=(), values=values))
     if failed and failed <= TIMED.keys():
         found.append(Attempt(kind=RemedyKind.DURATION, robots=(), values={FACTOR: time_asked(checks)}))
     return found
+
+
+def _failed(given: Outcome) -> list[dict[str, Any]]:
+    """Failed checks of the cell as it is given."""
+    found: Any = given.figures.get("failed", ())
+    return list(found)
 
 
 def _size(each: Tried) -> tuple[bool, int, float, int]:

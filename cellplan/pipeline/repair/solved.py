@@ -1,5 +1,6 @@
 """A motion solved and verified in full, as plain figures, and what it lacks of the demands of a repair."""
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -14,6 +15,7 @@ from cellplan.pipeline.layout.finish import SLOWED
 from cellplan.pipeline.solution import Solution
 from cellplan.report.record.common import check_record, number
 
+MORE_ERROR: Final = 1.1  # [-] times the error that a shorter step is to mend
 ROUNDING: Final = 1e-9  # [rad] or [m] by which a margin may be missed
 MARGIN: Final = "joint_margin"  # a demanded margin among the checks
 OF_JOINTS: Final[Mapping[str, float]] = {
@@ -23,7 +25,9 @@ OF_JOINTS: Final[Mapping[str, float]] = {
     "joint_jerk": 1.0 / 3.0,
 }  # limits of joints that a slower motion keeps: how the time that they ask for grows with their share
 TIMED: Final[Mapping[str, float]] = {**SLOWED, **OF_JOINTS}  # all checks that a slower motion passes
+BETWEEN: Final = frozenset(name for name in SLOWED if name.endswith("_between_rows"))  # what shorter steps keep
 LIMITS: Final = frozenset({"joint_position", MARGIN, *OF_JOINTS})  # checks of limits of joints
+DISTANCES: Final = frozenset({"clearance", "collision", "tool_depth"})  # checks of what is too near
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -124,3 +128,9 @@ def time_asked(failed: Iterable[Mapping[str, Any]]) -> float:
     """How many times as long the motion must last for failed checks, as records, that a slower motion passes."""
     shares = [(each["value"] / each["limit"], TIMED[each["name"]]) for each in failed if each["name"] in TIMED]
     return max((share**order for share, order in shares), default=1.0)
+
+
+def step_asked(failed: Iterable[Mapping[str, Any]], step: float) -> float:
+    """Time between rows in [s], halved until failed checks, as records, pass: an error grows with its square."""
+    asked = max((each["value"] / each["limit"] for each in failed if each["name"] in BETWEEN), default=1.0)
+    return step / 2.0 ** math.ceil(0.5 * math.log2(max(1.0, MORE_ERROR * asked)))

@@ -31,8 +31,8 @@ def change_text(cell: Cell, attempt: Attempt, values: Mapping[str, Any]) -> str:
             return texts[0] if texts else "all times of the tasks longer"
         case RemedyKind.FREE_SPIN:
             return f"free the spin of the tool of {listed_names(attempt.robots)}, if the process allows it"
-        case RemedyKind.METHOD:
-            return f"method {values['solver.method']}"
+        case RemedyKind.METHOD | RemedyKind.STEP:
+            return attempt.text
         case RemedyKind.BRANCH:
             return f"another start branch of {listed_names(attempt.robots)}"
         case _:
@@ -136,7 +136,7 @@ def effects(given: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Effect
             found.append(_effect(check, old, 0.0, unit, f"{subject}: no contact"))
         elif now is not None and check["name"] in TIMED:
             shares = [100.0 * each["value"] / each["limit"] for each in (check, now)]
-            text = f"{subject.replace('/', ' ')} {name} {shares[0]:.3g} % -> {shares[1]:.3g} % of its limit"
+            text = f"{subject.replace('/', ' ')} {name} {shares[0]:.4g} % -> {shares[1]:.4g} % of its limit"
             found.append(_effect(check, shares[0], shares[1], "%", text))
         elif now is not None:
             found.append(

@@ -14,7 +14,7 @@ from cellplan.pipeline.repair.at_start import StartFault
 from cellplan.pipeline.repair.attempts import Attempt, RemedyKind, of_branches, of_layout, of_tools, of_weights, owners
 from cellplan.pipeline.repair.neat import changed_values, neat, written_at
 from cellplan.pipeline.repair.prepare import ready_cell, start_posture, with_attempt
-from cellplan.pipeline.repair.solved import time_asked
+from cellplan.pipeline.repair.solved import step_asked, time_asked
 from cellplan.pipeline.repair.wording import change_text
 from cellplan.search.programs.objective import Objective
 
@@ -101,13 +101,18 @@ def test_the_time_that_a_check_asks_for(name: str, share: float, factor: float) 
     assert time_asked([{"name": name, "value": 5.0 * share, "limit": 5.0}]) == pytest.approx(factor)
 
 
+def test_rows_are_halved_until_their_errors_fit() -> None:
+    errors = [{"name": "position_error_between_rows", "value": value, "limit": 0.01} for value in (0.02, 0.1)]
+    assert step_asked(errors, 0.02) == 0.005  # a quarter of the step, a sixteenth of the error: 0.00625
+
+
 def test_changes_are_round_and_only_what_differs_is_written(cells: Path) -> None:
     request = LayoutRequest(cell=cells / "four_robots_initial.yaml", objective=Objective.CHANGE)
     ready = ready_cell(request)
     (attempt,) = [each for each in of_layout(ready.cell, ready.variables.settings, 1) if each.robots == ("staubli",)]
     only, start = with_attempt(ready, attempt), start_posture(ready)[0]
     assert only.variables.names == attempt.addresses
-    x = only.variables.given + [0.0123456, 0.00004, -0.1, np.radians(1.23456)]
+    x = only.variables.given + np.array([0.0123456, 0.00004, -0.1, np.radians(1.23456)])
     x, start = neat(only, x, start)
     values = changed_values(only, x, start)
     assert values["robots.staubli.base.x_mm"] == 1450.0 + 12.3
