@@ -17,6 +17,7 @@ class Point:
         q: Joint positions at the nodes in [rad] or [m], shape (N, nq).
         qd: Their speeds, shape (N, nq).
         qdd: Their accelerations, shape (N, nq).
+        rates: How the speeds change with the joints at their node, shape (N, nq, nq); None where that is not known.
     """
 
     x: Array
@@ -24,6 +25,7 @@ class Point:
     q: Array
     qd: Array
     qdd: Array
+    rates: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,11 +36,13 @@ class PointDerivatives:
         q: Of the joint positions at the nodes, shape (N, nq, n).
         qd: Of their speeds, shape (N, nq, n).
         qdd: Of their accelerations, shape (N, nq, n); None where no joint has a limit of acceleration.
+        rates: See ``Point``.
     """
 
     q: Array
     qd: Array
     qdd: Array | None
+    rates: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
