@@ -38,11 +38,11 @@ def start_posture(ready: Prepared) -> tuple[Array, str]:
     try:
         return ready.given_start, ""
     except NoSolutionError as error:
-        postures = []
+        starts = []
         for robot in ready.variables.base.robots:
             lower, upper = finite_limits(robot.model)
-            postures.append(0.5 * (lower + upper) if robot.start is None else robot.start)
-        return np.concatenate(postures), str(error).splitlines()[0]
+            starts.append(0.5 * (lower + upper) if robot.start is None else robot.start)
+        return np.concatenate(starts), str(error).splitlines()[0]
 
 
 def with_attempt(ready: Prepared, attempt: Attempt) -> Prepared:
