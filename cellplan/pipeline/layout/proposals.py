@@ -14,6 +14,7 @@ from cellplan.study.trial import Trial
 SIZE: Final = 4  # [-] trials of a round
 WIDE: Final = (1.0, 1.0, 1.5)  # [-] usual steps of perturbations of the given layout, in turn
 NARROW: Final = (0.7, 1.0, 0.4)  # [-] and of the best ones
+SLIGHT: Final = 0.2  # [-] and of the given one where the first layout that conforms ends the search
 GIVEN_UP: Final = 1.25  # [-] cycle as a multiple of the best one above which a trial is given up on its way
 ADDED: Final = (0.010, 0.025, 0.005, 0.050)  # [m] clearance beyond the demand of trials for the front, in turn
 SAME: Final = 5e-3  # [-] share by which the objectives of two layouts differ that are not one
@@ -72,6 +73,8 @@ class Proposals:
             {"kind": "given"},
             *({"kind": "attempt", "index": k} for k in range(len(self.request.attempts))),
         ]
+        if self.request.seed and self.request.objective is Objective.CONFORMING:
+            listed[0] = {"kind": "perturbed", "of": None, "spread": SLIGHT}  # another seed, another layout
         options: list[dict[str, Any]] = [{**each, "choice": choice} for choice in self.combinations for each in listed]
         rest = [self._perturbed(None, WIDE[0], 0), self._perturbed(None, WIDE[1], 1), self._sampled(0, 0)]
         return [*options, *rest[: -len(options) % SIZE]]

@@ -11,7 +11,7 @@ from typing import Any, Final
 from cellplan.io.cell.load import load_cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals
 from cellplan.pipeline.layout.record import head_of, layout_record
 from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
@@ -151,7 +151,9 @@ def search_layout(
     with ExitStack() as opened:
         pool = workers
         if isinstance(workers, int):
-            pool = opened.enter_context(Workers(workers, modules=MODULES))
+            first = partial(prepared, request.anywhere)
+            at_once = 1 if request.objective is Objective.CONFORMING else None  # mostly its first trial is the last
+            pool = opened.enter_context(Workers(workers, modules=MODULES, first=first, at_once=at_once))
         ready = Prepared.of(request, searched_cell(request))
         for path in request.attempts:
             load_cell(path, allow_dirs=request.allow_dirs)  # what is wrong with it is said before anything is tried
