@@ -84,6 +84,9 @@ Scheduler = Annotated[
         "the cell file under the same path.",
     ),
 ]
+Repair = Annotated[
+    bool, typer.Option("--repair", help="Find the smallest change with which the cell passes, and other remedies.")
+]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue the search in the folder.")]
 Status = Annotated[bool, typer.Option("--status", help="Say how far the search in the folder is, and do nothing.")]
 
@@ -105,6 +108,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     seed: Seed = 0,
     workers: WorkerCount = None,
     scheduler: Scheduler = None,
+    repair: Repair = False,
     resume: Resume = False,
     status: Status = False,
     as_json: AsJson = False,
@@ -125,7 +129,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
             return
         request = read_request(
             cell,
-            objective=objective,
+            objective="change" if repair else objective,
             timing=timing,
             duration=duration,
             clearance=clearance,
@@ -137,6 +141,10 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
             seed=seed,
             allow_dirs=tuple(allow_dir or ()),
         )
+        if repair:
+            from cellplan.cli.layout_repair import run_repair
+
+            run_repair(request, output, workers=workers, as_json=as_json, quiet=quiet)
         stop = read_stop(budget, trials)
         with progress_listener(quiet=quiet) as progress:
             try:

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import product
+from dataclasses import dataclass
 from typing import Any, Final
 
 from cellplan.pipeline.layout.request import LayoutRequest
@@ -32,12 +31,14 @@ class Proposals:
 
     Attributes:
         request: What is searched for.
-        choices: Discrete choices, each by address with its options; every combination is tried in turn.
+        choices: Combinations of discrete choices, values by address, the present one first; tried in turn.
+        branches: Other start postures of the given layout, each with its variables: the keys ``x`` and ``start``.
         rejected: Trials that are no candidates any more.
     """
 
     request: LayoutRequest
-    choices: Mapping[str, Sequence[object]] = field(default_factory=dict)
+    choices: Sequence[Mapping[str, object]] = ({},)
+    branches: Sequence[Mapping[str, Any]] = ()
     rejected: frozenset[int] = frozenset()
 
     def __call__(self, finished: Sequence[Trial]) -> list[dict[str, Any]]:
@@ -62,20 +63,17 @@ class Proposals:
         limit = GIVEN_UP * (BESTS[Objective.CYCLE].value(following[0]) or math.inf)
         return [each if "clearance_m" in each else each | {"give_up_above_s": limit} for each in proposed]
 
-    @property
-    def combinations(self) -> list[dict[str, object]]:
-        """All combinations of the discrete choices; one without any."""
-        return [dict(zip(self.choices, each, strict=True)) for each in product(*self.choices.values())]
-
     def _first(self) -> list[dict[str, Any]]:
-        """The given layout and those of the user, then perturbations of the given one and samples."""
+        """The given layout and those of the user with all choices, then perturbations of the given one and samples."""
         listed: list[dict[str, Any]] = [
             {"kind": "given"},
             *({"kind": "attempt", "index": k} for k in range(len(self.request.attempts))),
         ]
         if self.request.seed and self.request.objective is Objective.CONFORMING:
             listed[0] = {"kind": "perturbed", "of": None, "spread": SLIGHT}  # another seed, another layout
-        options: list[dict[str, Any]] = [{**each, "choice": choice} for choice in self.combinations for each in listed]
+        options: list[dict[str, Any]] = [{**each, "choice": choice} for choice in self.choices for each in listed]
+        options += [{"kind": "branch", **each, "choice": self.choices[0]} for each in self.branches]
+        options += [self._sampled(0, number) for number in range(1, len(self.choices))]
         rest = [self._perturbed(None, WIDE[0], 0), self._perturbed(None, WIDE[1], 1), self._sampled(0, 0)]
         return [*options, *rest[: -len(options) % SIZE]]
 
@@ -97,7 +95,7 @@ class Proposals:
     def _perturbed(self, trial: Trial | None, spread: float, number: int) -> dict[str, Any]:
         """A trial near the end of another one; None for the given layout."""
         if trial is None:
-            choices = self.combinations
+            choices = self.choices
             return {"kind": "perturbed", "of": None, "spread": spread, "choice": choices[number % len(choices)]}
         figures, values = trial.outcome.figures, trial.variant.values
         return {
@@ -111,8 +109,7 @@ class Proposals:
 
     def _sampled(self, index: int, number: int) -> dict[str, Any]:
         """A trial anywhere within the bounds."""
-        choices = self.combinations
-        return {"kind": "sampled", "index": index, "choice": choices[number % len(choices)]}
+        return {"kind": "sampled", "index": index, "choice": self.choices[number % len(self.choices)]}
 
     def _fourth(self, best: Trial | None, number: int, *, is_conforming: bool) -> dict[str, Any]:
         """In turn a sample, the given layout perturbed, and the best one asked for more clearance than is demanded.
@@ -135,6 +132,8 @@ def origin_text(values: Mapping[str, Any]) -> str:
             text = "the given layout"
         case "attempt":
             text = f"layout {values['index'] + 1} of --try"
+        case "branch":
+            text = "the given layout, another branch"
         case "sampled":
             text = f"sample {values['index']}"
         case "improved":
@@ -142,5 +141,10 @@ def origin_text(values: Mapping[str, Any]) -> str:
         case _:
             of = "the given layout" if values["of"] is None else f"trial {values['of']}"
             text = f"{of}, perturbed"
-    chosen = ", ".join(f"{address} = {value}" for address, value in (values.get("choice") or {}).items())
+    chosen = choice_text(values.get("choice") or {})
     return f"{text} ({chosen})" if chosen else text
+
+
+def choice_text(choice: Mapping[str, object]) -> str:
+    """A combination of discrete choices in words; starts that are to be found anew go without saying."""
+    return ", ".join(f"{address} = {value}" for address, value in choice.items() if value != "auto")

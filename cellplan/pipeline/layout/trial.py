@@ -33,8 +33,8 @@ def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
         variant: Number of the trial, and where it begins; see ``proposed``.
     """
     values = variant.values
-    ready = prepared(request, _mapping(values.get("choice")))
     try:
+        ready = prepared(request, _mapping(values.get("choice")))
         begin = _begin(ready, variant)
     except (InputError, NoSolutionError) as error:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
@@ -60,11 +60,11 @@ def _begin(ready: Prepared, variant: Variant) -> Begin | None:
         return _attempt(ready, int(str(values["index"])))
     if kind == "sampled":
         return _sampled(ready, int(str(values["index"])))
-    if values.get("of") is None:
+    if kind == "perturbed" and values["of"] is None:
         x, start = _given(ready)
     else:
         x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
-    if kind == "improved":
+    if kind in {"improved", "branch"}:
         return x, start
     rng = generator(f"layout/{variant.number}", ready.request.seed)
     point = perturbed(ready.coarse, x, start, rng, size=float(str(values["spread"])))
