@@ -35,6 +35,7 @@ SLOWED: Final = {
 }  # checks that pass when the motion is slow enough: how the time that they ask for grows with their value
 MORE_ANGLE: Final = np.radians(0.05)  # [rad] asked for beyond what was missed
 MORE_LENGTH: Final = 0.0005  # [m] likewise
+MORE_OWN: Final = 0.00002  # [m] and of a robot's own bodies
 MORE_TIME: Final = 0.002  # [-] likewise
 ROUNDING: Final = 1e-9  # [deg] by which a margin may be missed: of printed numbers
 
@@ -74,12 +75,12 @@ class Certified:
     @property
     def clearance(self) -> float | None:
         """Smallest certified distance in [mm]; None without pairs."""
-        return None if self.program is None else _clearance(self.program, is_apart=False)
+        return None if self.program is None else _clearance(self.program)
 
     @property
     def apart(self) -> float | None:
         """The same of bodies that do not belong to one robot."""
-        return None if self.program is None else _clearance(self.program, is_apart=True)
+        return None if self.program is None else _clearance(self.program, is_own=False)
 
 
 @dataclass(slots=True)
@@ -88,6 +89,7 @@ class _Room:
 
     angle: float = Room().margin
     length: float = Room().distance
+    own: float = Room().own
     time: float = Room().time
     nodes: int = NODES
     keys: int = KEYS
@@ -95,7 +97,7 @@ class _Room:
     @property
     def effort(self) -> Effort:
         """As the local optimisation is asked."""
-        room = Room(margin=self.angle, distance=self.length, time=self.time)
+        room = Room(margin=self.angle, distance=self.length, own=self.own, time=self.time)
         return Effort(iterations=ITERATIONS, keys=self.keys, room=room, trust=0.2)
 
 
@@ -246,10 +248,14 @@ def _enlarged(room: _Room, program: TimedProgram, demands: Demands) -> bool:
     if margin is not None and margin < demanded:
         room.angle += np.radians(demanded - margin) + MORE_ANGLE
         is_asked = True
-    clearance = _clearance(program, is_apart=False)
     required = MM * program.solution.cell.checks.clearance
-    if clearance is not None and clearance < required:
-        room.length += (required - clearance) / MM + MORE_LENGTH
+    found = (_clearance(program, is_own=each) for each in (False, True))
+    others, own = (required if each is None else each for each in found)
+    if others < required:
+        room.length += (required - others) / MM + MORE_LENGTH
+    if own < required:
+        room.own += (required - own) / MM + MORE_OWN
+    if min(others, own) < required:
         room.keys = 2 * room.keys - 1
         is_asked = True
     if _load(program) > 1.0:
@@ -265,12 +271,12 @@ def _margin(program: TimedProgram) -> float | None:
     return DEG * min(found) if found else None
 
 
-def _clearance(program: TimedProgram, *, is_apart: bool) -> float | None:
-    """Smallest certified distance in [mm]; None without pairs."""
+def _clearance(program: TimedProgram, *, is_own: bool | None = None) -> float | None:
+    """Smallest certified distance in [mm], of a robot's own bodies or of others only if asked; None without pairs."""
     found = [
         minimum.minimum
         for run in program.solution.runs
         for kind, minimum in run.report.clearance.minima.items()
-        if minimum.minimum is not None and not (is_apart and kind is ClearanceClass.SELF)
+        if minimum.minimum is not None and is_own in {None, kind is ClearanceClass.SELF}
     ]
     return MM * min(found) if found else None

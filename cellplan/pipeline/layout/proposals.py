@@ -13,6 +13,7 @@ from cellplan.study.trial import Trial
 SIZE: Final = 4  # [-] trials of a round
 WIDE: Final = (1.0, 1.0, 1.5)  # [-] usual steps of perturbations of the given layout, in turn
 NARROW: Final = (0.7, 1.0, 0.4)  # [-] and of the best ones
+SLIGHT: Final = 0.2  # [-] and of the given one where the first layout that conforms ends the search
 GIVEN_UP: Final = 1.25  # [-] cycle as a multiple of the best one above which a trial is given up on its way
 ADDED: Final = (0.010, 0.025, 0.005, 0.050)  # [m] clearance beyond the demand of trials for the front, in turn
 SAME: Final = 5e-3  # [-] share by which the objectives of two layouts differ that are not one
@@ -68,6 +69,8 @@ class Proposals:
             {"kind": "given"},
             *({"kind": "attempt", "index": k} for k in range(len(self.request.attempts))),
         ]
+        if self.request.seed and self.request.objective is Objective.CONFORMING:
+            listed[0] = {"kind": "perturbed", "of": None, "spread": SLIGHT}  # another seed, another layout
         options: list[dict[str, Any]] = [{**each, "choice": choice} for choice in self.choices for each in listed]
         options += [{"kind": "branch", **each, "choice": self.choices[0]} for each in self.branches]
         options += [self._sampled(0, number) for number in range(1, len(self.choices))]

@@ -151,7 +151,9 @@ def search_layout(
     with ExitStack() as opened:
         pool = workers
         if isinstance(workers, int):
-            pool = opened.enter_context(Workers(workers, modules=MODULES))
+            first = partial(prepared, request.anywhere)
+            at_once = 1 if request.objective is Objective.CONFORMING else None  # mostly its first trial is the last
+            pool = opened.enter_context(Workers(workers, modules=MODULES, first=first, at_once=at_once))
         ready = prepared(request)
         for path in request.attempts:
             load_cell(path, allow_dirs=request.allow_dirs)  # what is wrong with it is said before anything is tried

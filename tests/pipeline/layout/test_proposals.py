@@ -5,6 +5,7 @@ from typing import Any
 
 from cellplan import LayoutRequest
 from cellplan.pipeline.layout.proposals import SIZE, Proposals, origin_text
+from cellplan.search.programs.objective import Objective
 from cellplan.study.trial import Outcome, Trial, TrialStatus, Variant
 
 REQUEST = LayoutRequest(cell=Path("cell.yaml"))
@@ -25,7 +26,8 @@ def test_the_first_round_begins_with_the_given_layout_and_those_of_the_user() ->
 
 
 def test_every_combination_of_choices_is_tried_from_the_given_layout() -> None:
-    choices = {"motion.mode": ["simultaneous", "part_at_rest"], "tasks.a.robot": ["one", "two", "three"]}
+    modes, robots = ("simultaneous", "part_at_rest"), ("one", "two", "three")
+    choices = [{"motion.mode": mode, "tasks.a.robot": robot} for mode in modes for robot in robots]
     proposals = Proposals(request=REQUEST, choices=choices)
 
     tried: list[dict[str, Any]] = []
@@ -33,9 +35,7 @@ def test_every_combination_of_choices_is_tried_from_the_given_layout() -> None:
         tried += proposals([ended(number, 1.0) for number in range(len(tried))])
 
     given = [tuple(each["choice"].values()) for each in tried if each["kind"] == "given"]
-    assert sorted(given) == sorted(
-        (mode, robot) for mode in choices["motion.mode"] for robot in choices["tasks.a.robot"]
-    )
+    assert sorted(given) == sorted((mode, robot) for mode in modes for robot in robots)
     assert len(tried) == 2 * SIZE
 
 
@@ -57,6 +57,15 @@ def test_while_nothing_conforms_every_round_has_a_sample() -> None:
 
     assert ["sampled" in {each["kind"] for each in tried} for tried in rounds] == [True, True, True]
     assert not any("give_up_above_s" in each for tried in rounds for each in tried)
+
+
+def test_another_seed_begins_a_search_for_any_conforming_layout_elsewhere() -> None:
+    begins = [
+        Proposals(request=LayoutRequest(cell=Path("cell.yaml"), objective=Objective.CONFORMING, seed=seed))([])[0]
+        for seed in (0, 1)
+    ]
+
+    assert [each["kind"] for each in begins] == ["given", "perturbed"]
 
 
 def test_a_rejected_trial_is_not_built_on() -> None:
