@@ -1,7 +1,8 @@
 """``cellplan layout``: search the placement of all robots, and all else that may change, for the whole job at once."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -154,6 +155,11 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
                 )
             except KeyboardInterrupt as error:
                 raise InterruptedWorkError(str(error) or "interrupted") from None
+    _show(record, folder, as_json=as_json)
+
+
+def _show(record: Mapping[str, Any], folder: Path, *, as_json: bool) -> NoReturn:
+    """Show what a search has come to, and end the command."""
     statuses = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}
     outcome = statuses.get(record["status"], ExitStatus.CHECK_FAILED)
     if as_json:

@@ -140,7 +140,8 @@ def read_attempts(request: LayoutRequest, cell: Cell) -> list[Cell]:
 
 def _varied(cell: Cell, request: LayoutRequest) -> dict[str, Any]:
     """What may change: as the cell says, or as it is by default, with the options of the request."""
-    vary = {_short(key): _plain(value) for key, value in written_vary(cell).items()}
+    written = written_vary(cell) or (_by_default(cell) if request.fixed and not request.vary else {})
+    vary = {_short(key): _plain(value) for key, value in written.items()}
     for text in request.vary:
         key, sign, ranges = text.partition("=")
         vary[_short(key.strip())] = read_setting(f"{key.strip()}={ranges}", option="--vary")[1] if sign else True
@@ -166,6 +167,19 @@ def written_vary(cell: Cell) -> Mapping[str, Any]:
     """What the cell file says may change; empty where it says nothing."""
     written = cell.origin.source.written if cell.origin.source is not None else {}
     return dict((written.get("layout") or {}).get("vary") or {})
+
+
+def _by_default(cell: Cell) -> Mapping[str, Any]:
+    """What may change of a cell that says nothing of it, as the file would say it."""
+    vary: dict[str, Any] = {}
+    for each in () if cell.layout is None else cell.layout.ranges:
+        entry, _, component = each.address.rpartition(".")
+        if component in COMPONENTS:
+            scale = DEG if each.is_angle else MM
+            vary.setdefault(entry, {})[component] = [round(scale * each.lower, 9), round(scale * each.upper, 9)]
+        else:
+            vary[each.address.partition("[")[0]] = True
+    return vary
 
 
 def _keys(vary: Mapping[str, Any]) -> Iterable[str]:
