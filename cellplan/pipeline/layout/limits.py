@@ -175,9 +175,9 @@ def _of_factor(standing: Standing, by: PointDerivatives) -> Array:
     problem, measures = standing.problem, standing.measures
     if measures.pace is not None:
         asked = replace(standing.demands, objective=Objective.CYCLE, duration=None)
-        told = explain(problem, measures.point, asked, Effort())
+        optimum = explain(problem, measures.point, asked, Effort())
         span = float(problem.times[-1] - problem.times[0])
-        return np.full(by.q.shape[-1], np.nan) if told is None else told.by_variable / span
+        return np.full(by.q.shape[-1], np.nan) if optimum is None else optimum.by_variable / span
     rates = np.sqrt(measures.accelerations.value)
     if by.qdd is not None and rates.max() > measures.speeds.value.max():
         found = _highest(measures.accelerations, by.qdd, problem.acceleration, measures.accelerations.value)

@@ -67,18 +67,8 @@ class Measures:
     def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":
         """Measure a point."""
         times, limits = problem.times, problem.limits
-        span, pace = float(times[-1] - times[0]), None
-        if demands.timing is Timing.RETIMED:
-            pace = Pace.of(problem, point)
-            factor = pace.seconds / span
-            reached = pace.reached(point.qd, point.qdd)
-            speeds, accelerations = (
-                Crests.of(times, share * factor**order) for order, share in enumerate(reached, start=1)
-            )
-        else:
-            speeds = Crests.of(times, point.qd / limits.velocity, in_magnitude=True)
-            accelerations = Crests.of(times, point.qdd / problem.acceleration, in_magnitude=True)
-            factor = max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
+        pace = Pace.of(problem, point) if demands.timing is Timing.RETIMED else None
+        speeds, accelerations, factor = _loads(problem, point) if pace is None else _paced(problem, point, pace)
         distances = problem.distances(point, key_nodes(problem, effort), effort.within + demands.clearance)
         added = np.where(distances.is_own, 0.0, demands.clearance)
         return cls(
@@ -91,7 +81,7 @@ class Measures:
             lacks=distances.demands + added - distances.values,
             within=effort.within,
             factor=factor,
-            cycle=factor * span,
+            cycle=factor * float(times[-1] - times[0]),
             pace=pace,
         )
 
@@ -180,6 +170,23 @@ class Missed:
     def cost(self, price: float) -> float:
         """What it costs in the merit of a point, at the price of one unit: little where it counts as kept."""
         return price * (self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum()))
+
+
+def _loads(problem: Problem, point: Point) -> tuple[Crests, Crests, float]:
+    """Speeds and accelerations under the laws, and how many times as long as the nodes they must last."""
+    speeds = Crests.of(problem.times, point.qd / problem.limits.velocity, in_magnitude=True)
+    accelerations = Crests.of(problem.times, point.qdd / problem.acceleration, in_magnitude=True)
+    return speeds, accelerations, max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
+
+
+def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[Crests, Crests, float]:
+    """The same of a retimed motion: at its nodes, as nothing is an extreme between them."""
+    factor = pace.seconds / float(problem.times[-1] - problem.times[0])
+    speeds, accelerations = (
+        Crests(value=share * factor**order, shares=np.tile([0.0, 1.0, 0.0], (*share.shape, 1)))
+        for order, share in enumerate(pace.reached(point.qd, point.qdd), start=1)
+    )
+    return speeds, accelerations, factor
 
 
 def rooms(distances: Distances, room: Room) -> Array:
