@@ -75,6 +75,18 @@ WorkerCount = Annotated[
     int | None,
     typer.Option("--workers", metavar="N", min=1, help="Processes that search (default: one for each processor)."),
 ]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers search, such as tcp://10.0.0.5:8786 (extra: cellplan[cluster]). They read "
+        "the cell file under the same path.",
+    ),
+]
+Repair = Annotated[
+    bool, typer.Option("--repair", help="Find the smallest change with which the cell passes, and other remedies.")
+]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue the search in the folder.")]
 Status = Annotated[bool, typer.Option("--status", help="Say how far the search in the folder is, and do nothing.")]
 
@@ -95,6 +107,8 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     trials: Trials = None,
     seed: Seed = 0,
     workers: WorkerCount = None,
+    scheduler: Scheduler = None,
+    repair: Repair = False,
     resume: Resume = False,
     status: Status = False,
     as_json: AsJson = False,
@@ -108,14 +122,14 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     passed, 2 bad input, 3 no start at all, 130 interrupted (--resume goes on).
     """
     with json_failure(SCHEMA, desired=as_json):
-        from cellplan.cli.layout_options import read_request, read_stop, run_search, status_lines
+        from cellplan.cli.layout_options import read_request, read_stop, read_workers, run_search, status_lines
 
         if status:
             say("\n".join(status_lines(cell, output)))
             return
         request = read_request(
             cell,
-            objective=objective,
+            objective="change" if repair else objective,
             timing=timing,
             duration=duration,
             clearance=clearance,
@@ -127,11 +141,16 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
             seed=seed,
             allow_dirs=tuple(allow_dir or ()),
         )
+        if repair:
+            from cellplan.cli.layout_repair import run_repair
+
+            run_repair(request, output, workers=workers, as_json=as_json, quiet=quiet)
         stop = read_stop(budget, trials)
         with progress_listener(quiet=quiet) as progress:
             try:
+                searchers = read_workers(workers, scheduler)
                 record, folder = run_search(
-                    request, output, stop=stop, workers=workers, resume=resume, progress=progress
+                    request, output, stop=stop, workers=searchers, resume=resume, progress=progress
                 )
             except KeyboardInterrupt as error:
                 raise InterruptedWorkError(str(error) or "interrupted") from None

@@ -106,5 +106,5 @@ def test_real_arms_find_a_layout_from_the_corners_of_the_floor(name, shared_robo
     starts = StartGenerator(problem, seed=2)
 
     assert starts.at(0).found == ()
-    assert starts.at(0).reason.startswith("the given layout: 'abb' follows its path from no posture")
+    assert starts.at(0).reason.startswith("the given layout: 'abb' follows its path from no configuration")
     assert starts.at(1).found[0].violation == 0.0
