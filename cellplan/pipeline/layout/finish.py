@@ -74,12 +74,19 @@ class Certified:
     @property
     def clearance(self) -> float | None:
         """Smallest certified distance in [mm]; None without pairs."""
-        return None if self.program is None else _clearance(self.program, is_apart=False)
+        return self._smallest(False, True)
 
     @property
     def apart(self) -> float | None:
         """The same of bodies that do not belong to one robot."""
-        return None if self.program is None else _clearance(self.program, is_apart=True)
+        return self._smallest(False)
+
+    def _smallest(self, *is_own: bool) -> float | None:
+        """Smallest certified distance of some classes in [mm]; None without pairs."""
+        if self.program is None:
+            return None
+        smallest = min(_clearance(self.program, is_own=each) for each in is_own)
+        return smallest if np.isfinite(smallest) else None
 
 
 @dataclass(slots=True)
@@ -88,6 +95,7 @@ class _Room:
 
     angle: float = Room().margin
     length: float = Room().distance
+    own: float = Room().own
     time: float = Room().time
     nodes: int = NODES
     keys: int = KEYS
@@ -95,7 +103,7 @@ class _Room:
     @property
     def effort(self) -> Effort:
         """As the local optimisation is asked."""
-        room = Room(margin=self.angle, distance=self.length, time=self.time)
+        room = Room(margin=self.angle, distance=self.length, own=self.own, time=self.time)
         return Effort(iterations=ITERATIONS, keys=self.keys, room=room, trust=0.2)
 
 
@@ -168,7 +176,7 @@ class Finish:
         """The program of a layout, solved and verified in full, and why it is rejected."""
         self.solves += 1
         try:
-            cell = self.ready.variables.cell(x, start)
+            cell = self.ready.cell_at(x, start)
             program = self._timed(cell, standing.measures.cycle).certified(self.progress)
         except (InputError, NoSolutionError) as error:
             return None, str(error).splitlines()[0]
@@ -245,10 +253,11 @@ def _enlarged(room: _Room, program: TimedProgram, demands: Demands) -> bool:
     if margin is not None and margin < demanded:
         room.angle += np.radians(demanded - margin) + MORE_ANGLE
         is_asked = True
-    clearance = _clearance(program, is_apart=False)
+    apart, own = (_clearance(program, is_own=is_own) for is_own in (False, True))
     required = MM * program.solution.cell.checks.clearance
-    if clearance is not None and clearance < required:
-        room.length += (required - clearance) / MM + MORE_LENGTH
+    if min(apart, own) < required:
+        room.length += max(0.0, required - apart) / MM + MORE_LENGTH * (apart < required)
+        room.own += max(0.0, required - own) / MM + MORE_LENGTH * (own < required)
         room.keys = 2 * room.keys - 1
         is_asked = True
     if _load(program) > 1.0:
@@ -264,12 +273,12 @@ def _margin(program: TimedProgram) -> float | None:
     return DEG * min(found) if found else None
 
 
-def _clearance(program: TimedProgram, *, is_apart: bool) -> float | None:
-    """Smallest certified distance in [mm]; None without pairs."""
+def _clearance(program: TimedProgram, *, is_own: bool) -> float:
+    """Smallest certified distance in [mm], of a robot's own bodies or of all others; infinite without pairs."""
     found = [
         minimum.minimum
         for run in program.solution.runs
         for kind, minimum in run.report.clearance.minima.items()
-        if minimum.minimum is not None and not (is_apart and kind is ClearanceClass.SELF)
+        if minimum.minimum is not None and (kind is ClearanceClass.SELF) is is_own
     ]
-    return MM * min(found) if found else None
+    return MM * min(found, default=np.inf)

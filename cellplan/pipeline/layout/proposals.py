@@ -97,6 +97,7 @@ class Proposals:
             "x": figures["x"],
             "start": figures["start"],
             "choice": values.get("choice", {}),
+            **({"unled": figures["unled"]} if "unled" in figures else {}),
         }
 
     def _sampled(self, index: int, number: int) -> dict[str, Any]:

@@ -16,7 +16,6 @@ LENGTH: Final = 0.003  # [m] and as
 SHARE: Final = 0.01  # [-] of the duration
 IN_ROOM: Final = 0.02  # [-] of the price of a lack where only the room is missed that counts as kept
 ROUNDING: Final = 1e-6  # [-] usual units: 3 nm
-OWN_ROOM: Final = 0.1  # [-] share of the room that is asked of a robot's own bodies
 
 
 class Kind(StrEnum):
@@ -165,7 +164,7 @@ class Missed:
 
 def rooms(distances: Distances, room: Room) -> Array:
     """What is asked of near pairs beyond their demands in [m], shape (M,)."""
-    return np.where(distances.is_own, OWN_ROOM, 1.0) * room.distance
+    return np.where(distances.is_own, room.own, room.distance)
 
 
 def key_nodes(problem: Problem, effort: Effort) -> Indices:

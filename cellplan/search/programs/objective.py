@@ -61,12 +61,14 @@ class Room:
 
     Attributes:
         margin: In [rad] or [m].
-        distance: In [m]; of a robot's own bodies a tenth, as their distances are often its design.
+        distance: In [m], of bodies that do not belong to one robot.
+        own: In [m], of a robot's own bodies: little, as their distances are often its design.
         time: Share of the duration.
     """
 
     margin: float = float(np.radians(0.15))
     distance: float = 0.0025
+    own: float = 0.00025
     time: float = 0.002
 
 
