@@ -72,6 +72,18 @@ WorkerCount = Annotated[
     int | None,
     typer.Option("--workers", metavar="N", min=1, help="Processes that search (default: one for each processor)."),
 ]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers search, such as tcp://10.0.0.5:8786 (extra: cellplan[cluster]). They read "
+        "the cell file under the same path.",
+    ),
+]
+Repair = Annotated[
+    bool, typer.Option("--repair", help="Find the smallest change with which the cell passes, and other remedies.")
+]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue the search in the folder.")]
 Status = Annotated[bool, typer.Option("--status", help="Say how far the search in the folder is, and do nothing.")]
 
@@ -92,6 +104,8 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     trials: Trials = None,
     seed: Seed = 0,
     workers: WorkerCount = None,
+    scheduler: Scheduler = None,
+    repair: Repair = False,
     resume: Resume = False,
     status: Status = False,
     as_json: AsJson = False,
@@ -105,14 +119,21 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     passed, 2 bad input, 3 no start at all, 130 interrupted (--resume goes on).
     """
     with json_failure(SCHEMA, desired=as_json):
-        from cellplan.cli.layout_options import Work, read_request, read_stop, search_and_say, status_lines
+        from cellplan.cli.layout_options import (
+            Work,
+            read_request,
+            read_stop,
+            read_workers,
+            search_and_say,
+            status_lines,
+        )
 
         if status:
             say("\n".join(status_lines(cell, output)))
             return
         request = read_request(
             cell,
-            objective=objective,
+            objective="change" if repair else objective,
             timing=timing,
             duration=duration,
             clearance=clearance,
@@ -124,5 +145,10 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
             seed=seed,
             allow_dirs=tuple(allow_dir or ()),
         )
+        if repair:
+            from cellplan.cli.layout_repair import run_repair
+
+            run_repair(request, output, workers=workers, as_json=as_json, quiet=quiet)
         stop = read_stop(budget, trials)
-        search_and_say(request, output, Work(stop, workers, resume), as_json=as_json, quiet=quiet)
+        work = Work(stop, read_workers(workers, scheduler), resume)
+        search_and_say(request, output, work, as_json=as_json, quiet=quiet)

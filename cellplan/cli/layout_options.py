@@ -1,6 +1,8 @@
 """Options of ``cellplan layout`` as the search takes them."""
 
 from collections.abc import Mapping
+from concurrent.futures import Executor
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -20,6 +22,7 @@ from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.search import search_layout
 from cellplan.report.text.layout import layout_lines
 from cellplan.search.programs.objective import Objective, Timing
+from cellplan.study.cluster import Cluster
 from cellplan.study.status import read_status
 from cellplan.study.study import Stop
 
@@ -31,12 +34,12 @@ class Work(NamedTuple):
 
     Attributes:
         stop: Where the search ends; None for what is usual.
-        workers: Number of processes; None for one for each processor.
+        workers: Number of processes, or the address of a scheduler.
         resume: Whether an earlier search in the folder goes on.
     """
 
     stop: Stop | None
-    workers: int | None
+    workers: int | str
     resume: bool
 
 
@@ -69,6 +72,17 @@ def read_stop(budget: str | None, trials: int | None) -> Stop | None:
     return Stop(trials=trials, seconds=None if budget is None else read_time("--budget", budget))
 
 
+def read_workers(workers: int | None, scheduler: str | None) -> int | str:
+    """Who searches: a number of processes, or the address of a scheduler.
+
+    Raises:
+        InputError: Both are given.
+    """
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers: unexpected beside --scheduler, whose workers search; leave one of them out")
+    return scheduler or workers or processors()
+
+
 def search_and_say(
     request: LayoutRequest,
     output: Path | None,
@@ -85,13 +99,15 @@ def search_and_say(
         Exit: Always, at the end.
     """
     folder = output or default_folder(request.cell, request.allow_dirs, is_free=bool(request.free))
-    with progress_listener(quiet=quiet) as progress:
+    with progress_listener(quiet=quiet) as progress, ExitStack() as opened:
         try:
+            by = work.workers
+            pool: int | Executor = opened.enter_context(Cluster(by)) if isinstance(by, str) else by
             record = search_layout(
                 request,
                 folder,
                 stop=work.stop,
-                workers=work.workers or processors(),
+                workers=pool,
                 resume=work.resume,
                 progress=progress,
             ).record

@@ -58,10 +58,12 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.background_plots import BackgroundPlots
 
         plots = BackgroundPlots(background)  # the child imports matplotlib while this process imports the rest
+        from cellplan.cli.repair_line import repair_line
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
         from cellplan.pipeline.solve import solve_with_plots
+        from cellplan.pipeline.synchronous import is_searchable
         from cellplan.pipeline.write_run import write_run
         from cellplan.report.text.run import summary_lines
 
@@ -89,4 +91,6 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         say("\n".join(summary_lines(record, folder)))
         if solution.remark:
             say(solution.remark)
+        if not solution.passed and task is None and is_searchable(changed):
+            say(repair_line(cell, changed.origin.changes, allow_dir or ()))
     raise typer.Exit(status)

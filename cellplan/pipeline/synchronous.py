@@ -40,3 +40,12 @@ def refuse_other_jobs(cell: Cell, what: str, *, paths: Collection[str] = ()) -> 
             f"{at(f'solver.{key}')}: expected the weighted pseudo-inverse without goals, with constant weights, for "
             f"{what}"
         )
+
+
+def is_searchable(cell: Cell) -> bool:
+    """Whether the job is one that a search can judge; see ``refuse_other_jobs``."""
+    try:
+        refuse_other_jobs(cell, "a search")
+    except InputError:
+        return False
+    return True

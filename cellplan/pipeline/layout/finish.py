@@ -120,7 +120,7 @@ class Finish:
     ready: Prepared
     progress: Progress
     solves: int = 0
-    _problems: dict[int, Any] = field(default_factory=dict)
+    _problems: dict[tuple[Prepared, int], Any] = field(default_factory=dict)
 
     def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:
         """A layout of the search, certified or with the reason why not.
@@ -168,15 +168,16 @@ class Finish:
 
     def _problem(self, nodes: int) -> Any:
         """The layout problem at about so many nodes."""
-        if nodes not in self._problems:
-            self._problems[nodes] = self.ready.problem(nodes)
-        return self._problems[nodes]
+        key = (self.ready, nodes)
+        if key not in self._problems:
+            self._problems[key] = self.ready.problem(nodes)
+        return self._problems[key]
 
     def _solved(self, x: Array, start: Array, standing: Standing) -> tuple[TimedProgram | None, str]:
         """The program of a layout, solved and verified in full, and why it is rejected."""
         self.solves += 1
         try:
-            cell = self.ready.cell_at(x, start)
+            cell = self.ready.variables.given_cell.with_values(self.ready.values(x, start))
             program = self._timed(cell, standing.measures.cycle).certified(self.progress)
         except (InputError, NoSolutionError) as error:
             return None, str(error).splitlines()[0]

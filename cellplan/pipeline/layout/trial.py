@@ -1,7 +1,7 @@
 """One trial of a layout search: from a start to a local optimum and its figures."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -22,9 +22,11 @@ from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.starts.generator import Starts
 from cellplan.study.trial import Outcome, TrialStatus, Variant
 
-EFFORT: Final = Effort()
+EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to
+STAGE: Final = Effort(iterations=6)  # of motions that joint paths begin with
+STAGES: Final = 4
+STILL: Final = Effort(iterations=0)
 PATH: Final = Effort(least_gain=1e-3)  # many coefficients gain little each, but for long
-UNLED: Final = Effort(iterations=40)  # for motions that joint paths begin with
 NOT_FOLLOWED: Final = "a tool cannot follow its path"
 
 Begin = tuple[Array, Array]  # variables, shape (n,), and start posture, shape (nq,)
@@ -53,18 +55,17 @@ def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
         variant: Number of the trial, and where it begins; see ``proposed``.
     """
     values = variant.values
-    ready = prepared(request, _mapping(values.get("choice")))
     try:
+        ready = prepared(request, _mapping(values.get("choice")))
         begin = _begin(ready, values, variant.number)
     except (InputError, NoSolutionError) as error:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
     added = float(str(values.get("clearance_m", 0.0)))
     demands = ready.demands(clearance=added)
-    found = (
-        None
-        if begin is None
-        else improve(ready.coarse, begin.x, begin.start, demands, EFFORT if ready.unled is None else PATH)
-    )
+    limit = values.get("give_up_above_s")
+    effort = EFFORT if ready.unled is None else PATH
+    effort = effort if limit is None else replace(effort, give_up_above=float(str(limit)))
+    found = None if begin is None else improve(ready.coarse, begin.x, begin.start, demands, effort)
     if begin is None or found is None:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
     return _outcome(ready, found, begin.unled)
@@ -101,13 +102,30 @@ def _path(ready: Prepared, unled: Prepared, values: Mapping[str, Any], number: i
         point = perturbed_path(ready.coarse, x, start, rng, size=float(values["spread"]))
         return None if point is None else _Begin(point.x, point.start)
     begin = _layout(unled, {**values, **(known or {})}, number)
-    if begin is not None and values["kind"] != "given":
-        better = improve(unled.coarse, *begin, unled.demands(), UNLED)
-        begin = begin if better is None else (better.x, better.start)
-    found = None if begin is None else search.fitted(*begin)
-    if begin is None or found is None:
-        return None
-    return _Begin(search.variables(found[0], search.beside(begin[0])), found[1], unled=begin)
+    return None if begin is None else _led(ready, unled, begin, 1 if values["kind"] == "given" else STAGES)
+
+
+def _led(ready: Prepared, unled: Prepared, begin: Begin, stages: int) -> _Begin | None:
+    """The path nearest to a motion by the pseudo-inverse, improved in stages: the stage whose path is the fastest.
+
+    A motion may be at its best where an operator just passes a singularity, which a path beside it does not survive.
+    """
+    search, best, least = ready.path_search, None, np.inf
+    for stage in range(stages):
+        if stage:
+            better = improve(unled.coarse, *begin, unled.demands(), STAGE)
+            if better is None:
+                break
+            begin = better.x, better.start
+        found = search.fitted(*begin)
+        if found is None:
+            break
+        x = search.variables(found[0], search.beside(begin[0]))
+        stands = improve(ready.coarse, x, found[1], ready.demands(), STILL)
+        if stands is not None and stands.cycle * (1.0 + stands.violation) < least:
+            least = stands.cycle * (1.0 + stands.violation)
+            best = _Begin(x, found[1], unled=begin)
+    return best
 
 
 def _layout(ready: Prepared, values: Mapping[str, object], number: int) -> Begin | None:
@@ -119,11 +137,11 @@ def _layout(ready: Prepared, values: Mapping[str, object], number: int) -> Begin
         return _attempt(ready, int(str(values["index"])))
     if kind == "sampled":
         return _sampled(ready, int(str(values["index"])))
-    if values.get("of") is None:
+    if kind == "perturbed" and values["of"] is None:
         x, start = _given(ready)
     else:
         x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
-    if kind == "improved":
+    if kind in {"improved", "branch"}:
         return x, start
     rng = generator(f"layout/{number}", ready.request.seed)
     point = perturbed(ready.coarse, x, start, rng, size=float(str(values["spread"])))
