@@ -8,7 +8,8 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.search.kernel.figures import Crests
-from cellplan.search.programs.objective import Demands, Effort, Objective, Room
+from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
+from cellplan.search.programs.pace import Pace
 from cellplan.search.programs.problem import Distances, Point, Problem
 
 ANGLE: Final = 0.01  # [rad] of a lack that weighs as much as
@@ -26,6 +27,7 @@ class Kind(StrEnum):
     SPEED = "speed"
     ACCELERATION = "acceleration"
     DISTANCE = "distance"
+    DURATION = "duration"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,14 +38,16 @@ class Measures:
         point: The point.
         lower: Distances of the joints from their lower limits, the demanded margin off, negative, shape (N, nq).
         upper: Likewise from their upper limits.
-        speeds: Speeds as shares of their limits, shape (N, nq).
-        accelerations: Roots of the accelerations as shares of their limits, shape (N, nq): the motion must last so many
-            times as long as the nodes do.
+        speeds: Speeds as shares of their limits, shape (N, nq); of a retimed motion those of its shortest cycle, as if
+            it lasted as long as the nodes do.
+        accelerations: Accelerations likewise, shape (N, nq): the motion must last as many times as long as the nodes do
+            as the root of them says.
         distances: Near pairs at the keys.
         lacks: By how much pairs miss what is demanded of them, in [m], negative where they keep it, shape (M,).
         within: Distance in [m] beyond what is demanded, from which on pairs are not near.
         factor: How many times as long as the nodes the motion must last for all speeds and accelerations.
         cycle: Shortest cycle in [s].
+        pace: The motion as fast as the limits allow everywhere; None where it is timed by the laws of the cell.
     """
 
     point: Point
@@ -56,14 +60,24 @@ class Measures:
     within: float
     factor: float
     cycle: float
+    pace: Pace | None = None
 
     @classmethod
     def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":
         """Measure a point."""
         times, limits = problem.times, problem.limits
-        speeds = Crests.of(times, point.qd / limits.velocity, in_magnitude=True)
-        accelerations = Crests.of(times, point.qdd / problem.acceleration, in_magnitude=True)
-        factor = max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
+        span, pace = float(times[-1] - times[0]), None
+        if demands.timing is Timing.RETIMED:
+            pace = Pace.of(problem, point)
+            factor = pace.seconds / span
+            reached = pace.reached(point.qd, point.qdd)
+            speeds, accelerations = (
+                Crests.of(times, share * factor**order) for order, share in enumerate(reached, start=1)
+            )
+        else:
+            speeds = Crests.of(times, point.qd / limits.velocity, in_magnitude=True)
+            accelerations = Crests.of(times, point.qdd / problem.acceleration, in_magnitude=True)
+            factor = max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
         distances = problem.distances(point, key_nodes(problem, effort), effort.within + demands.clearance)
         added = np.where(distances.is_own, 0.0, demands.clearance)
         return cls(
@@ -76,7 +90,8 @@ class Measures:
             lacks=distances.demands + added - distances.values,
             within=effort.within,
             factor=factor,
-            cycle=factor * float(times[-1] - times[0]),
+            cycle=factor * span,
+            pace=pace,
         )
 
     def missed(self, problem: Problem, demands: Demands, room: Room) -> "Missed":
@@ -93,7 +108,9 @@ class Measures:
         allowed.append(most)
         if demands.duration is not None and demands.objective is not Objective.CYCLE:
             whole = demands.duration / self.span / (1.0 + room.time)
-            loads = np.concatenate([self.speeds.value.max(axis=0), np.sqrt(self.accelerations.value.max(axis=0))])
+            loads = np.array([self.factor])
+            if self.pace is None:
+                loads = np.concatenate([self.speeds.value.max(axis=0), np.sqrt(self.accelerations.value.max(axis=0))])
             lacks.append((loads / whole - 1.0) / SHARE)
             allowed.append(np.full(len(loads), 0.5 * room.time / SHARE))
         return Missed(lacks=np.concatenate(lacks), allowed=np.concatenate(allowed))
@@ -109,6 +126,8 @@ class Measures:
                 return self.speeds.value[nodes, subjects]
             case Kind.ACCELERATION:
                 return np.sqrt(self.accelerations.value[nodes, subjects])
+            case Kind.DURATION:
+                return np.full(len(nodes), self.factor)
             case Kind.DISTANCE:
                 found = self.distances
                 places = zip(found.pairs.tolist(), found.nodes.tolist(), strict=True)
