@@ -1,8 +1,8 @@
 """What a layout search may change of a cell, in SI units."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Container, Mapping
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from cellplan.geometry.shapes import Box, Cylinder
@@ -140,6 +140,14 @@ class LayoutSettings:
     margin_sliding: float = 0.0
     cost: Mapping[str, float] = field(default_factory=dict)
     is_default: bool = True
+
+    def without(self, addresses: Container[str]) -> "LayoutSettings":
+        """The same without some numbers, which stay as they are, and what has one value with them."""
+        return replace(
+            self,
+            ranges=tuple(each for each in self.ranges if each.address not in addresses),
+            equal=tuple(each for each in self.equal if not any(address in addresses for address in each)),
+        )
 
 
 def mirror_image(pair: Mirrored, index: int) -> tuple[float, float]:

@@ -171,7 +171,7 @@ class Finish:
         """The program of a layout, solved and verified in full, and why it is rejected."""
         self.solves += 1
         try:
-            cell = self.ready.variables.cell(x, start)
+            cell = self.ready.variables.given_cell.with_values(self.ready.values(x, start))
             program = self._timed(cell, standing.measures.cycle).certified(self.progress)
         except (InputError, NoSolutionError) as error:
             return None, str(error).splitlines()[0]

@@ -11,6 +11,7 @@ from cellplan.io.cell.load import load_cell
 from cellplan.io.input.findings import did_you_mean, listed, shown
 from cellplan.model.cell import Cell
 from cellplan.model.units import DEG, MM
+from cellplan.pipeline.layout.free_motion import freed
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.synchronous import refuse_other_jobs
 from cellplan.search.programs.objective import Objective, Timing
@@ -36,6 +37,7 @@ class LayoutRequest:
         vary: Keys that may change beside those of the cell, each as ``KEY`` or ``KEY=RANGES``.
         fixed: Keys that may not change.
         attempts: Cell files whose layouts are tried first.
+        free: Words for what alone may change, whatever the cell says, while bases and tools stay; see ``freed``.
         seed: Seed of starts and perturbations.
     """
 
@@ -50,6 +52,7 @@ class LayoutRequest:
     vary: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
     attempts: tuple[Path, ...] = ()
+    free: tuple[str, ...] = ()
     seed: int = 0
 
     @property
@@ -70,6 +73,7 @@ class LayoutRequest:
             "settings": list(self.settings),
             "vary": list(self.vary),
             "fix": list(self.fixed),
+            "free": list(self.free),
             "try": [path.name for path in self.attempts],
             "seed": self.seed,
         }
@@ -91,10 +95,14 @@ def searched_cell(request: LayoutRequest) -> Cell:
     values: dict[str, object] = {}
     if request.margin is not None:
         values["layout.margin_deg"] = request.margin
-    if request.vary or request.fixed:
+    if request.free:
+        margins = {key: value for key, value in _written_layout(cell).items() if key.startswith("margin_")}
+        values = {"layout": {**margins, "vary": freed(cell, request.free)}, **values}
+    elif request.vary or request.fixed:
         values["layout.vary"] = _varied(cell, request)
     changed = cell.with_values(values) if values else cell
-    refuse_other_jobs(changed, "a layout search")
+    paths = () if changed.layout is None else [each.robot for each in changed.layout.paths]
+    refuse_other_jobs(changed, "a layout search", paths=paths)
     _refuse_margins(changed)
     return changed
 
@@ -141,11 +149,11 @@ def read_attempts(request: LayoutRequest, cell: Cell) -> list[Cell]:
 def _varied(cell: Cell, request: LayoutRequest) -> dict[str, Any]:
     """What may change: as the cell says, or as it is by default, with the options of the request."""
     written = written_vary(cell) or (_by_default(cell) if request.fixed and not request.vary else {})
-    vary = {_short(key): _plain(value) for key, value in written.items()}
+    vary = {short_key(key): _plain(value) for key, value in written.items()}
     for text in request.vary:
         key, sign, ranges = text.partition("=")
-        vary[_short(key.strip())] = read_setting(f"{key.strip()}={ranges}", option="--vary")[1] if sign else True
-    for key in map(_short, request.fixed):
+        vary[short_key(key.strip())] = read_setting(f"{key.strip()}={ranges}", option="--vary")[1] if sign else True
+    for key in map(short_key, request.fixed):
         entry, _, component = key.rpartition(".")
         if key in vary:
             del vary[key]
@@ -165,8 +173,13 @@ def _varied(cell: Cell, request: LayoutRequest) -> dict[str, Any]:
 
 def written_vary(cell: Cell) -> Mapping[str, Any]:
     """What the cell file says may change; empty where it says nothing."""
+    return dict(_written_layout(cell).get("vary") or {})
+
+
+def _written_layout(cell: Cell) -> Mapping[str, Any]:
+    """The section ``layout`` of the cell file; empty where there is none."""
     written = cell.origin.source.written if cell.origin.source is not None else {}
-    return dict((written.get("layout") or {}).get("vary") or {})
+    return written.get("layout") or {}
 
 
 def _by_default(cell: Cell) -> Mapping[str, Any]:
@@ -190,7 +203,7 @@ def _keys(vary: Mapping[str, Any]) -> Iterable[str]:
             yield from (f"{key}.{component}" for component in value)
 
 
-def _short(key: str) -> str:
+def short_key(key: str) -> str:
     """A key without ``robots.``, which may be left out."""
     return key.removeprefix(PREFIX)
 

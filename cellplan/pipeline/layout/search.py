@@ -164,7 +164,7 @@ def search_layout(
             progress=progress,
             finish=Finish(ready=ready, progress=progress),
             choices=tuple(Choices.of(ready.cell).values()),
-            branches=ready.branches(),
+            branches=(ready.unled or ready).branches(),
         )
         finished, best = search.run(resume=resume)
         progress("writing the result", 1.0)
