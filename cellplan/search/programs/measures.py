@@ -1,6 +1,6 @@
 """Measures: how a point stands to all demands, without any derivative."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
@@ -61,16 +61,22 @@ class Measures:
     @classmethod
     def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":
         """Measure a point."""
-        times, limits = problem.times, problem.limits
+        times, limits, allowance = problem.times, problem.limits, demands.allowance
         speeds = Crests.of(times, point.qd / limits.velocity, in_magnitude=True)
         accelerations = Crests.of(times, point.qdd / problem.acceleration, in_magnitude=True)
+        margin, most = demands.margin, demands.clearance
+        if allowance is not None:
+            speeds, accelerations = _raised(speeds, allowance.speed), _raised(accelerations, allowance.acceleration)
+            margin, most = margin + allowance.margin, most + float(allowance.distance.max(initial=0.0))
         factor = max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
-        distances = problem.distances(point, key_nodes(problem, effort), effort.within + demands.clearance)
+        distances = problem.distances(point, key_nodes(problem, effort), effort.within + most)
         added = np.where(distances.is_own, 0.0, demands.clearance)
+        if allowance is not None:
+            added = added + allowance.distance[distances.pairs]
         return cls(
             point=point,
-            lower=Crests.of(times, limits.lower + demands.margin - point.q),
-            upper=Crests.of(times, point.q - limits.upper + demands.margin),
+            lower=Crests.of(times, limits.lower + margin - point.q),
+            upper=Crests.of(times, point.q - limits.upper + margin),
             speeds=speeds,
             accelerations=accelerations,
             distances=distances,
@@ -161,6 +167,11 @@ class Missed:
     def cost(self, price: float) -> float:
         """What it costs in the merit of a point, at the price of one unit: little where it counts as kept."""
         return price * (self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum()))
+
+
+def _raised(crests: Crests, by: Array) -> Crests:
+    """Values of functions that may be larger by so much, shape (N, n)."""
+    return replace(crests, value=crests.value + by)
 
 
 def rooms(distances: Distances, room: Room) -> Array:
