@@ -75,6 +75,15 @@ WorkerCount = Annotated[
     int | None,
     typer.Option("--workers", metavar="N", min=1, help="Processes that search (default: one for each processor)."),
 ]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers search, such as tcp://10.0.0.5:8786 (extra: cellplan[cluster]). They read "
+        "the cell file under the same path.",
+    ),
+]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue the search in the folder.")]
 Status = Annotated[bool, typer.Option("--status", help="Say how far the search in the folder is, and do nothing.")]
 
@@ -95,6 +104,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     trials: Trials = None,
     seed: Seed = 0,
     workers: WorkerCount = None,
+    scheduler: Scheduler = None,
     resume: Resume = False,
     status: Status = False,
     as_json: AsJson = False,
@@ -108,7 +118,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     passed, 2 bad input, 3 no start at all, 130 interrupted (--resume goes on).
     """
     with json_failure(SCHEMA, desired=as_json):
-        from cellplan.cli.layout_options import read_request, read_stop, run_search, status_lines
+        from cellplan.cli.layout_options import read_request, read_stop, read_workers, run_search, status_lines
 
         if status:
             say("\n".join(status_lines(cell, output)))
@@ -130,8 +140,9 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
         stop = read_stop(budget, trials)
         with progress_listener(quiet=quiet) as progress:
             try:
+                searchers = read_workers(workers, scheduler)
                 record, folder = run_search(
-                    request, output, stop=stop, workers=workers, resume=resume, progress=progress
+                    request, output, stop=stop, workers=searchers, resume=resume, progress=progress
                 )
             except KeyboardInterrupt as error:
                 raise InterruptedWorkError(str(error) or "interrupted") from None

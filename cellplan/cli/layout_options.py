@@ -1,5 +1,7 @@
 """Options of ``cellplan layout`` as the search takes them."""
 
+from concurrent.futures import Executor
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +16,7 @@ from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.search import search_layout
 from cellplan.report.record.common import Record
 from cellplan.search.programs.objective import Objective, Timing
+from cellplan.study.cluster import Cluster
 from cellplan.study.status import read_status
 from cellplan.study.study import Stop
 
@@ -49,19 +52,31 @@ def read_stop(budget: str | None, trials: int | None) -> Stop | None:
     return Stop(trials=trials, seconds=None if budget is None else read_time("--budget", budget))
 
 
+def read_workers(workers: int | None, scheduler: str | None) -> int | str:
+    """Who searches: a number of processes, or the address of a scheduler.
+
+    Raises:
+        InputError: Both are given.
+    """
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers: unexpected beside --scheduler, whose workers search; leave one of them out")
+    return scheduler or workers or processors()
+
+
 def run_search(
     request: LayoutRequest,
     output: Path | None,
     *,
     stop: Stop | None,
-    workers: int | None,
+    workers: int | str,
     resume: bool,
     progress: Progress,
 ) -> tuple[Record, Path]:
     """The record of the search and its folder; arguments as the options give them."""
     folder = output or default_folder(request.cell, request.allow_dirs)
-    count = workers or processors()
-    found = search_layout(request, folder, stop=stop, workers=count, resume=resume, progress=progress)
+    with ExitStack() as opened:
+        pool: int | Executor = opened.enter_context(Cluster(workers)) if isinstance(workers, str) else workers
+        found = search_layout(request, folder, stop=stop, workers=pool, resume=resume, progress=progress)
     return found.record, folder
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -23,7 +24,7 @@ RIGID_TOL: Final = 1e-9  # [-] by which a rotation may fail to be one
 FLAT_PADDING: Final = 1e-6  # [m] thickness given to the box round a flat surface
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class CollisionBody:
     """One solid and the simpler shapes that stand for it.
 
@@ -33,8 +34,7 @@ class CollisionBody:
         hull: A convex solid that holds it: the solid itself, or the convex hull of its mesh.
         looseness: What points of the solid may stick out of the hull in [m], by rounding.
         is_convex: Whether ``hull`` is the solid and not only a bound.
-        core: A surface; the solid is everything within ``inflation`` of it.
-        inflation: In [m]; a capsule is an inflated line, a sphere an inflated point.
+        inflation: By how much in [m] the solid reaches beyond ``core``.
         centre: Centre of a sphere that holds the solid, in its own frame in [m], shape (3,).
         radius: Radius of that sphere in [m].
         ends: Ends of a line in [m], shape (2, 3); the solid is within ``girth`` of the line.
@@ -47,13 +47,20 @@ class CollisionBody:
     hull: Solid
     looseness: float
     is_convex: bool
-    core: Mesh
     inflation: float
     centre: Array
     radius: float
     ends: Array
     girth: float
     witnesses: Array
+
+    @cached_property
+    def core(self) -> Mesh:
+        """A surface; the solid is everything within ``inflation`` of it: a capsule is an inflated line.
+
+        It is made when it is first needed: a search gives bodies other sizes and never asks for it.
+        """
+        return _core(self.shape)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +79,6 @@ class BodyPoses:
 def prepare(name: str, shape: Solid) -> CollisionBody:
     """Make a solid ready for distance questions."""
     hull, is_convex = _hull(shape)
-    core, inflation = _core(shape)
     centre, radius = bounding_sphere(shape)
     ends, girth = bounding_capsule(shape)
     return CollisionBody(
@@ -81,8 +87,7 @@ def prepare(name: str, shape: Solid) -> CollisionBody:
         hull=hull,
         looseness=0.0 if is_convex else HULL_TOL * radius,
         is_convex=is_convex,
-        core=core,
-        inflation=inflation,
+        inflation=shape.radius if isinstance(shape, Sphere | Capsule) else 0.0,
         centre=centre,
         radius=radius,
         ends=ends,
@@ -170,19 +175,19 @@ def _box_round(mesh: Mesh) -> Mesh:
     return Mesh(vertices=box.vertices + 0.5 * (low + high), faces=box.faces, source=mesh.source, is_closed=True)
 
 
-def _core(shape: Solid) -> tuple[Mesh, float]:
-    """A surface and the distance by which it must be inflated to give the shape."""
+def _core(shape: Solid) -> Mesh:
+    """A surface; what is left of spheres and capsules when they are shrunk by their radius."""
     match shape:
-        case Sphere(radius):
-            return _thin_triangle(0.0), radius
-        case Capsule(radius, length):
-            return _thin_triangle(length), radius
+        case Sphere():
+            return _thin_triangle(0.0)
+        case Capsule():
+            return _thin_triangle(shape.length)
         case Cylinder(radius):
-            return tessellate(shape, fine_segments(radius)), 0.0
+            return tessellate(shape, fine_segments(radius))
         case Box():
-            return tessellate(shape), 0.0
+            return tessellate(shape)
         case Mesh():
-            return shape, 0.0
+            return shape
 
 
 def fine_segments(radius: float) -> int:

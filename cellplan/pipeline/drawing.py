@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.geometry.shapes import support_point
+from cellplan.geometry.shapes import Box, Cylinder, support_point
 from cellplan.model.motion import Schedule
 from cellplan.model.task import Frame
 from cellplan.model.units import MM
@@ -56,6 +56,19 @@ def drawing(scene: Scene, start: Array, schedule: Schedule) -> dict[str, Any]:
         for robot in cell.robots
     ]
     return {"robots": robots, "outlines": outlines, "paths": paths}
+
+
+def footprint(shape: Box | Cylinder, X_WS: Array) -> list[list[float]]:
+    """Outline in [mm] from above of an upright box or cylinder.
+
+    Args:
+        shape: The solid.
+        X_WS: Its pose in the world, shape (4, 4).
+    """
+    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    points = 0.5 * corners * np.array(shape.size[:2]) if isinstance(shape, Box) else shape.radius * AROUND[:, :2]
+    found: list[list[float]] = _rounded(points @ X_WS[:2, :2].T + X_WS[:2, 3])
+    return found
 
 
 def swept_area(scene: Scene, q: Array) -> dict[str, Any]:

@@ -172,7 +172,6 @@ def _piece(body: CollisionBody, group: np.ndarray) -> CollisionBody:
         hull=surface,
         looseness=0.0,
         is_convex=len(group) == 1,
-        core=surface,
         inflation=0.0,
         centre=centre,
         radius=radius,

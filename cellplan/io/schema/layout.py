@@ -66,8 +66,10 @@ class MirroredEntry(Entry):
 class KeepOutBoxEntry(Entry):
     """A box seen from above."""
 
-    size_mm: tuple[Size, Size] | tuple[Size, Size, Size] = Field(
-        description="Edge lengths along x and y; one along z may follow, and does not count."
+    size_mm: tuple[Size, ...] = Field(
+        min_length=2,
+        max_length=3,
+        description="Edge lengths along x and y; one along z may follow, and does not count.",
     )
 
 

@@ -112,7 +112,7 @@ class Finish:
     ready: Prepared
     progress: Progress
     solves: int = 0
-    _problems: dict[int, Any] = field(default_factory=dict)
+    _problems: dict[tuple[Prepared, int], Any] = field(default_factory=dict)
 
     def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:
         """A layout of the search, certified or with the reason why not.
@@ -160,9 +160,10 @@ class Finish:
 
     def _problem(self, nodes: int) -> Any:
         """The layout problem at about so many nodes."""
-        if nodes not in self._problems:
-            self._problems[nodes] = self.ready.problem(nodes)
-        return self._problems[nodes]
+        key = (self.ready, nodes)
+        if key not in self._problems:
+            self._problems[key] = self.ready.problem(nodes)
+        return self._problems[key]
 
     def _solved(self, x: Array, start: Array, standing: Standing) -> tuple[TimedProgram | None, str]:
         """The program of a layout, solved and verified in full, and why it is rejected."""

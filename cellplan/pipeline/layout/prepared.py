@@ -1,18 +1,21 @@
 """A cell made ready for a layout search: its variables, its bodies, and its job at as many nodes as are asked for."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, Final
 
 import numpy as np
 
+from cellplan.errors import NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
+from cellplan.model.layout import VariableKind
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
 from cellplan.pipeline.plan.start import chosen_start
+from cellplan.pipeline.synchronous import refuse_other_jobs
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
@@ -24,6 +27,7 @@ from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Objective
 from cellplan.search.starts.generator import StartGenerator
 from cellplan.search.starts.problem import StartProblem
+from cellplan.search.variables.choices import Choices
 from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
@@ -41,6 +45,7 @@ class Prepared:
         bodies: Their distances, wherever the layout puts them.
         schedule: The tasks on the common clock.
         moving: Names of the robots that move.
+        found_start: The start posture of the given layout where it was found before all else, shape (nq,).
     """
 
     request: LayoutRequest
@@ -50,6 +55,7 @@ class Prepared:
     bodies: CellDistances
     schedule: Schedule
     moving: tuple[str, ...]
+    found_start: Array | None = None
 
     @classmethod
     def of(cls, request: LayoutRequest, cell: Cell) -> "Prepared":
@@ -66,7 +72,7 @@ class Prepared:
         scene = Scene.from_cell(variables.base)
         paths = clock_paths(variables.base, [build_toolpath(task, cell.part) for task in cell.tasks])
         phase = plan_phases(variables.base).program[0]
-        return cls(
+        found = cls(
             request=request,
             cell=cell,
             variables=variables,
@@ -75,6 +81,19 @@ class Prepared:
             schedule=schedule_paths(variables.base, [paths[name] for name in phase.tasks]),
             moving=tuple(phase.moving),
         )
+        is_found = any(each.kind is VariableKind.START and each.given is None for each in variables.tied.ranges)
+        return found._with_found_start() if is_found else found
+
+    def _with_found_start(self) -> "Prepared":
+        """The same with the start posture that a solve finds as what is given; unchanged where it finds none."""
+        try:
+            start = self.given_start
+        except NoSolutionError:
+            return self
+        base, variables = self.variables.base, self.variables
+        robots = [replace(each, start=start[base.columns(each.name)]) for each in base.robots]
+        given = variables.read_from(replace(base, robots=tuple(robots)))
+        return replace(self, variables=replace(variables, given=given), found_start=start)
 
     def problem(self, nodes: int = NODES) -> LayoutProblem:
         """The layout problem at about so many nodes."""
@@ -88,14 +107,27 @@ class Prepared:
         """The layout problem of the trials."""
         return self.problem()
 
-    @cached_property
+    @property
     def given_start(self) -> Array:
         """The start posture of the given layout in [rad] or [m], shape (nq,); found where the cell gives none.
 
         Raises:
             NoSolutionError: There is none.
         """
-        return self.start_of(self.variables.base)
+        found = self._given_start
+        if isinstance(found, NoSolutionError):
+            raise found
+        return found
+
+    @cached_property
+    def _given_start(self) -> Array | NoSolutionError:
+        """See ``given_start``; or why there is none."""
+        if self.found_start is not None:
+            return self.found_start
+        try:
+            return self.start_of(self.variables.base)
+        except NoSolutionError as error:
+            return error
 
     def start_of(self, cell: Cell, progress: Progress = silent) -> Array:
         """The start posture of a cell with this job; see ``given_start``."""
@@ -110,6 +142,20 @@ class Prepared:
         """Starts of the search: the given layout with other branches, then sampled ones."""
         problem = StartProblem.of(self.variables.base, self.variables, margin=self.variables.margin)
         return StartGenerator(problem, seed=self.request.seed)
+
+    def branches(self) -> list[dict[str, list[float]]]:
+        """Other start postures of the given layout from which all tools follow their paths, with their variables.
+
+        Those of the robots whose branch may change; none where the given layout has no start.
+        """
+        robots = frozenset(Choices.of(self.variables.base).branches)
+        if not robots:
+            return []
+        try:
+            x, start = self.starts.branches(robots, self.given_start)
+        except NoSolutionError:
+            return []
+        return [{"x": each.tolist(), "start": own.tolist()} for each, own in zip(x, start, strict=True)]
 
     @property
     def duration(self) -> float:
@@ -143,8 +189,11 @@ def prepared(request: LayoutRequest, choice: Mapping[str, object] | None = None)
     return _prepared(request, tuple(sorted((choice or {}).items())))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def _prepared(request: LayoutRequest, choice: tuple[tuple[str, object], ...]) -> Prepared:
     """See ``prepared``."""
     cell = searched_cell(request)
-    return Prepared.of(request, cell.with_values(dict(choice)) if choice else cell)
+    if choice:
+        cell = cell.with_values(dict(choice))
+        refuse_other_jobs(cell, "a layout search")
+    return Prepared.of(request, cell)

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -11,11 +12,11 @@ from cellplan.geometry.arrays import Array
 from cellplan.io.cell.changes import plain_values
 from cellplan.kinematics.reach import arm_reach
 from cellplan.model.units import DEG, MM
-from cellplan.pipeline.drawing import drawing, swept_area
+from cellplan.pipeline.drawing import drawing, footprint, swept_area
 from cellplan.pipeline.layout.finish import Certified, certified_cell
 from cellplan.pipeline.layout.limits import Standing, effects, standing_of
-from cellplan.pipeline.layout.prepared import Prepared
-from cellplan.pipeline.layout.proposals import BESTS, SIZE, origin_text
+from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.proposals import BESTS, SIZE, choice_text, origin_text
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.trial import EFFORT
 from cellplan.pipeline.write_run import versions
@@ -23,6 +24,7 @@ from cellplan.report.record.common import number
 from cellplan.report.record.layout import (
     SCHEMA,
     CandidateRecord,
+    ChoiceRecord,
     DroppedRecord,
     GivenRecord,
     LayoutRecord,
@@ -30,6 +32,7 @@ from cellplan.report.record.layout import (
     VariableRecord,
 )
 from cellplan.report.text.layout import verdict_line
+from cellplan.search.variables.choices import Choices
 from cellplan.study.study import Finished
 from cellplan.study.trial import TrialStatus
 
@@ -58,6 +61,7 @@ def layout_record(
     listed = list(_candidates(ready, finished, tried))
     given = _given_standing(ready)
     standing = given if best is None else best.standing
+    of_best = ready if best is None else _prepared_of(ready, next(_of_number(finished, best.trial)))
     is_free = request.objective == "cycle"
     return {
         "schema": SCHEMA,
@@ -81,8 +85,9 @@ def layout_record(
         "top": listed[:TOP],
         "front": _front(listed),
         "binding": best.standing.binding() if best else [],
-        "variables": _variables(ready, standing, best),
+        "variables": _variables(of_best, standing, best),
         "convergence": _convergence(finished),
+        "choices": _choices(ready, finished, tried),
         "dropped": _dropped(finished),
         "remarks": list(ready.variables.remarks),
         "drawing": _drawing(ready, best) if best else {},
@@ -131,7 +136,7 @@ def _is_same(one: CandidateRecord, other: CandidateRecord) -> bool:
 
 def _candidate(ready: Prepared, trial: Mapping[str, Any], certified: Certified | None) -> CandidateRecord:
     """One layout."""
-    figures = trial["figures"]
+    figures, ready = trial["figures"], _prepared_of(ready, trial)
     x, start = np.array(figures["x"]), np.array(figures["start"])
     status, reason = "conforming" if trial["status"] == TrialStatus.PASSED else "violating", ""
     shown = {key: figures[key] for key in ("cycle_s", "margin_deg", "clearance_mm", "change")}
@@ -262,6 +267,45 @@ def _dropped(finished: Finished) -> list[DroppedRecord]:
     return [{"reason": reason, "count": count, "trial": first[reason]} for reason, count in ordered]
 
 
+def _choices(ready: Prepared, finished: Finished, tried: Mapping[int, Certified]) -> list[ChoiceRecord]:
+    """What came of every combination of discrete choices, in the order in which they were tried; none without any."""
+    combinations = list(Choices.of(ready.cell).values())
+    if len(combinations) == 1:
+        return []
+    found: list[ChoiceRecord] = []
+    for choice in combinations:
+        own = [trial for trial in finished.trials if (trial["values"].get("choice") or {}) == choice]
+        solved = [tried[trial["trial"]] for trial in own if trial["trial"] in tried]
+        passed = [trial["figures"]["cycle_s"] for trial in own if trial["status"] == TrialStatus.PASSED]
+        reasons = [each.reason for each in solved if each.reason] or [
+            each["reason"] for each in _dropped(replace(finished, trials=own))
+        ]
+        is_certified = any(each.passed for each in solved)
+        status = "certified" if is_certified else "conforming" if passed else "dropped" if own else "not_tried"
+        found.append(
+            {
+                "choice": choice_text(choice) or "as given",
+                "status": status,
+                "trials": len(own),
+                "conforming": len(passed),
+                "cycle_s": number(round(min(passed), FINE)) if passed else None,
+                "reason": reasons[0] if reasons and not is_certified else "",
+            }
+        )
+    return found
+
+
+def _prepared_of(ready: Prepared, trial: Mapping[str, Any]) -> Prepared:
+    """The cell with the discrete choices of a trial."""
+    choice = trial["values"].get("choice")
+    return prepared(ready.request, choice) if choice else ready
+
+
+def _of_number(finished: Finished, number: int) -> Iterator[Mapping[str, Any]]:
+    """The trial with a number."""
+    return (trial for trial in finished.trials if trial["trial"] == number)
+
+
 def _no_result(finished: Finished) -> str:
     """Why there is no best layout."""
     is_started = any(trial["figures"] for trial in finished.trials)
@@ -292,7 +336,7 @@ def _drawing(ready: Prepared, best: Certified) -> dict[str, Any]:
             )
             for robot in cell.robots
         },
-        "keep_out": {},
+        "keep_out": {area.name: footprint(area.shape, area.X_WS) for area in ready.variables.settings.keep_out},
     }
 
 

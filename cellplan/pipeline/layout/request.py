@@ -1,7 +1,7 @@
 """Request: what a layout search is asked for, as plain data, and the cell that it searches."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -50,6 +50,12 @@ class LayoutRequest:
     fixed: tuple[str, ...] = ()
     attempts: tuple[Path, ...] = ()
     seed: int = 0
+
+    @property
+    def anywhere(self) -> "LayoutRequest":
+        """The same request for processes that run in other folders."""
+        attempts, folders = (tuple(path.absolute() for path in each) for each in (self.attempts, self.allow_dirs))
+        return replace(self, cell=self.cell.absolute(), attempts=attempts, allow_dirs=folders)
 
     @property
     def record(self) -> dict[str, Any]:

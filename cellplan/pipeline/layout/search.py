@@ -1,6 +1,6 @@
 """Layout search: trials in rounds, the best of them finished and certified, and all of it in one folder."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -11,16 +11,17 @@ from typing import Any, Final
 from cellplan.io.cell.load import load_cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals
 from cellplan.pipeline.layout.record import head_of, layout_record
-from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
+from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.result_file import file_records, result_files
 from cellplan.pipeline.layout.trial import evaluate
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.layout import layout_files
 from cellplan.report.record.layout import LayoutRecord
 from cellplan.search.programs.objective import Objective
+from cellplan.search.variables.choices import Choices
 from cellplan.study.folder import write_results
 from cellplan.study.study import Finished, Stop, Study
 from cellplan.study.trial import Trial, TrialStatus
@@ -56,13 +57,15 @@ class _Search:
     stop: Stop
     progress: Progress
     finish: Finish
+    choices: Sequence[Mapping[str, object]]
+    branches: Sequence[Mapping[str, Any]]
     tried: dict[int, Certified] = field(default_factory=dict)
 
     def run(self, *, resume: bool) -> tuple[Finished, Certified | None]:
         """Rounds and finish; a search for any conforming layout goes on where the first one is rejected."""
         while True:
             finished = self._study().run(
-                partial(evaluate, self.request),
+                partial(evaluate, self.request.anywhere),
                 workers=self.workers,
                 stop=self.stop,
                 limits=Limits(seconds=TRIAL_LIMIT),
@@ -76,7 +79,7 @@ class _Search:
     def _study(self) -> Study:
         """The study, without the candidates that were rejected."""
         rejected = frozenset(self.tried)
-        proposals = Proposals(request=self.request, choices=choices_of(self.ready))
+        proposals = Proposals(request=self.request, choices=self.choices, branches=self.branches)
         is_enough = partial(_is_enough, rejected) if self.request.objective is Objective.CONFORMING else None
         cell = self.ready.cell
         header = {
@@ -95,10 +98,7 @@ class _Search:
             number = trial["trial"]
             if number not in self.tried:
                 self.progress(f"certifying trial {number}", 1.0)
-                choice = trial["values"].get("choice") or {}
-                self.finish.ready = (
-                    Prepared.of(self.request, self.ready.cell.with_values(choice)) if choice else self.ready
-                )
+                self.finish.ready = prepared(self.request, trial["values"].get("choice"))
                 self.tried[number] = self.finish.certified(number, trial["figures"])
             if self.tried[number].passed:
                 return self.tried[number]
@@ -152,7 +152,7 @@ def search_layout(
         pool = workers
         if isinstance(workers, int):
             pool = opened.enter_context(Workers(workers, modules=MODULES))
-        ready = Prepared.of(request, searched_cell(request))
+        ready = prepared(request)
         for path in request.attempts:
             load_cell(path, allow_dirs=request.allow_dirs)  # what is wrong with it is said before anything is tried
         search = _Search(
@@ -163,16 +163,12 @@ def search_layout(
             stop=stop or Stop(seconds=BUDGET),
             progress=progress,
             finish=Finish(ready=ready, progress=progress),
+            choices=tuple(Choices.of(ready.cell).values()),
+            branches=ready.branches(),
         )
         finished, best = search.run(resume=resume)
         progress("writing the result", 1.0)
         return _written(search, finished, best)
-
-
-def choices_of(ready: Prepared) -> dict[str, Sequence[object]]:
-    """Discrete choices of a cell that are values of its file, by address."""
-    settings = ready.variables.settings
-    return {choice.address: choice.options for choice in settings.choices if choice.options}
 
 
 def _written(search: _Search, finished: Finished, best: Certified | None) -> LayoutResult:

@@ -1,6 +1,7 @@
 """One trial of a layout search: from a start to a local optimum and its figures."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -18,7 +19,7 @@ from cellplan.search.programs.perturb import perturbed
 from cellplan.search.starts.generator import Starts
 from cellplan.study.trial import Outcome, TrialStatus, Variant
 
-EFFORT: Final = Effort()
+EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to
 NOT_FOLLOWED: Final = "a tool cannot follow its path"
 
 Begin = tuple[Array, Array]  # variables, shape (n,), and start posture, shape (nq,)
@@ -32,8 +33,8 @@ def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
         variant: Number of the trial, and where it begins; see ``proposed``.
     """
     values = variant.values
-    ready = prepared(request, _mapping(values.get("choice")))
     try:
+        ready = prepared(request, _mapping(values.get("choice")))
         begin = _begin(ready, variant)
     except (InputError, NoSolutionError) as error:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
@@ -41,7 +42,9 @@ def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
     added = float(str(values.get("clearance_m", 0.0)))
     demands = ready.demands(clearance=added)
-    found = improve(ready.coarse, *begin, demands, EFFORT)
+    limit = values.get("give_up_above_s")
+    effort = EFFORT if limit is None else replace(EFFORT, give_up_above=float(str(limit)))
+    found = improve(ready.coarse, *begin, demands, effort)
     if found is None:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
     return _outcome(ready, found)
@@ -57,11 +60,11 @@ def _begin(ready: Prepared, variant: Variant) -> Begin | None:
         return _attempt(ready, int(str(values["index"])))
     if kind == "sampled":
         return _sampled(ready, int(str(values["index"])))
-    if values.get("of") is None:
+    if kind == "perturbed" and values["of"] is None:
         x, start = _given(ready)
     else:
         x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
-    if kind == "improved":
+    if kind in {"improved", "branch"}:
         return x, start
     rng = generator(f"layout/{variant.number}", ready.request.seed)
     point = perturbed(ready.coarse, x, start, rng, size=float(str(values["spread"])))

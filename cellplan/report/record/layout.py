@@ -44,6 +44,17 @@ class VariableRecord(TypedDict):
     clearance_mm: Annotated[Number, "effect on the smallest distance of bodies"]
 
 
+class ChoiceRecord(TypedDict):
+    """A combination of discrete choices, and what came of it."""
+
+    choice: Annotated[str, "what differs from the given cell"]
+    status: Annotated[str, "`certified`, `conforming` by the search, `dropped`, or `not_tried`"]
+    trials: Annotated[int, "number of its trials"]
+    conforming: Annotated[int, "number of these that ended at a conforming layout"]
+    cycle_s: Annotated[Number, "shortest cycle of these, by the search; null without one"]
+    reason: Annotated[str, "why there is none, or why solve rejected it: the most frequent reason; else empty"]
+
+
 class DroppedRecord(TypedDict):
     """Trials that led to no conforming layout, for one reason."""
 
@@ -103,6 +114,7 @@ class LayoutRecord(TypedDict):
     binding: Annotated[list[LimitRecord], "what holds the best layout back"]
     variables: Annotated[list[VariableRecord], "the variables with what they do at the best layout"]
     convergence: Annotated[list[ProgressRecord], "the search, trial after trial"]
+    choices: Annotated[list[ChoiceRecord], "every combination of discrete choices; empty without any"]
     dropped: Annotated[list[DroppedRecord], "trials without a conforming layout, by reason"]
     remarks: Annotated[list[str], "what else the user should know, as pedestals that move with their robots"]
     drawing: Annotated[dict[str, Any], "floor plan in mm: the given and the best layout from above"]

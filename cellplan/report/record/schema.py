@@ -4,6 +4,7 @@ import types
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints, is_typeddict
 
+from cellplan.report.record.layout import LayoutRecord
 from cellplan.report.record.run import RunRecord
 from cellplan.report.record.summary import SummaryRecord
 
@@ -34,6 +35,19 @@ def report_schema(*, closed: bool = False) -> dict[str, Any]:
     }
 
 
+def layout_schema() -> dict[str, Any]:
+    """The JSON Schema of ``study.json`` of a layout search."""
+    definitions: dict[str, dict[str, Any]] = {}
+    form = _schema(LayoutRecord, definitions, closed=False)
+    return {
+        "$schema": DIALECT,
+        "title": "cellplan.layout/1",
+        "description": "study.json of a layout search",
+        **form,
+        "$defs": definitions,
+    }
+
+
 def _schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) -> dict[str, Any]:
     """The schema of one type; records are added to the definitions."""
     if is_typeddict(form):
@@ -51,7 +65,7 @@ def _schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) 
         return {"type": "array", "items": _schema(arguments[0], definitions, closed=closed)}
     if origin is dict:
         return {"type": "object", "additionalProperties": _schema(arguments[1], definitions, closed=closed)}
-    return {"type": TYPES[form]}
+    return {} if form is Any else {"type": TYPES[form]}
 
 
 def _record_schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) -> dict[str, Any]:

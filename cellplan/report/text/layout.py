@@ -30,6 +30,7 @@ def layout_lines(record: Record, folder: Path) -> list[str]:
         rejected = [each for each in record["top"] if each["status"] == "rejected"]
         lines += [f"  rejected by solve: {each['reason']}" for each in rejected[:MOST]]
         lines += [f"  {each['reason']} ({_trials(each['count'])})" for each in record["dropped"][:MOST]]
+    lines += [f"  {line}" for line in map(_choice, record["choices"])]
     lines += [f"  {remark}" for remark in record["remarks"]]
     lines.append(f"  {_trials(record['trials'])} in {record['rounds']} rounds, {record['solves']} solved in full")
     if record["best"] is not None:
@@ -80,6 +81,13 @@ def _changes(record: Record) -> Iterator[str]:
             f"{name.removesuffix('_mm').removesuffix('_deg')} {each['given']:.5g} -> {each['best']:.5g}{unit}"
         )
     yield from (f"{entry}: {', '.join(texts)}" for entry, texts in groups.items())
+
+
+def _choice(each: Record) -> str:
+    """A combination of discrete choices in one line."""
+    cycle = "" if each["cycle_s"] is None else f", cycle {each['cycle_s']:.4g} s"
+    reason = f": {each['reason']}" if each["reason"] else ""
+    return f"{each['choice']}: {each['status'].replace('_', ' ')} ({_trials(each['trials'])}{cycle}){reason}"
 
 
 def _trials(count: int) -> str:

@@ -6,7 +6,7 @@ of the support functions at a fixed normal: for a body that moves as a whole, th
 the normal; for one whose shape changes, the change of its reach in that direction.
 """
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -15,7 +15,7 @@ import numpy as np
 from cellplan.collision.bodies import CollisionBody, prepare
 from cellplan.collision.engine import Engine
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.geometry.transforms import pose
+from cellplan.geometry.transforms import pose, rotation_about
 from cellplan.kinematics.link_forest import WORLD
 from cellplan.model.cell import Cell
 from cellplan.model.mounting import Bracket
@@ -25,12 +25,13 @@ from cellplan.scene.near_table import Found, NearTable, wrenches
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.keep_out import keep_out_bodies
 from cellplan.search.distances.layout_pairs import LayoutPair, among, are_own, demands_of, layout_pairs, with_areas
-from cellplan.search.distances.moving_bodies import LayoutVariables, MovingBodies, Placed, far_away, supports
+from cellplan.search.distances.moving_bodies import LayoutVariables, MovingBodies, Placed, far_away, reaches
 from cellplan.search.kernel.job import Layouts
 
 STEP: Final = (
     1e-6  # [m] and [rad] to either side, by which the reach of a body that changes its shape is differentiated
 )
+TURNS: Final = 3  # place of the first of the rotations among the components of a twist
 RAISED: Final = 0.1  # [m] by which a base on the floor is raised so that its column exists
 
 
@@ -167,8 +168,13 @@ class CellDistances:
             x: The variables, shape (n,).
             dq: Derivatives of the joints at the keys by the variables, shape (K, nq, n).
         """
-        found = (near.by_joints[:, None] @ dq[near.keys])[:, 0]
-        return found + self._by_bases(near, x) + self._by_shapes(near, x)
+        found, base = np.empty((len(near.pairs), dq.shape[2])), self._variables.base_twists(x)
+        for key in range(len(dq)):
+            rows = near.keys == key
+            found[rows] = near.by_joints[rows] @ dq[key]
+        self._add_by_bases(found, near, base)
+        self._add_by_shapes(found, near, x, base)
+        return found
 
     def _placed(self, cell: Cell) -> tuple[NearTable, Engine]:
         """The bodies as a layout has them."""
@@ -181,9 +187,8 @@ class CellDistances:
         poses = {index: each.X_LS if each.shape is not None else far_away(index) for index, each in placed.items()}
         return self._table.moved(poses, other), self._engine.with_bodies(other) if other else self._engine
 
-    def _by_bases(self, near: LayoutDistances, x: Array) -> Array:
-        """Derivatives while joints stand still, of what moves as a whole with the bases, shape (M, n)."""
-        base = self._variables.base_twists(x)
+    def _add_by_bases(self, found: Array, near: LayoutDistances, base: Array) -> None:
+        """Add derivatives while joints stand still, of what moves as a whole with the bases, shape (M, n)."""
         X_WB = near.D[[near_table(self._scene).forest.place(robot.name) for robot in self._cell.robots], 0]
         twists = np.zeros((len(base) + 1, 6, base.shape[2]))  # at the world's origin; the last one for the world
         turns = np.swapaxes(base[:, 3:], 1, 2)
@@ -192,50 +197,66 @@ class CellDistances:
         robots = np.append(self._robots, -1)  # -1 for a half-space as well
         robots[list(self._moving.columns.values())] = -1  # they do not lean with their bases
         ends = robots[near.bodies]
-        concerned = np.flatnonzero(ends[:, 0] != ends[:, 1])
-        found = np.zeros((len(near.pairs), base.shape[2]))
-        relative = twists[ends[concerned, 1]] - twists[ends[concerned, 0]]
-        found[concerned] = (wrenches(near.found)[concerned, None] @ relative)[:, 0]
-        return found
+        forces = wrenches(near.found)
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            for robot in range(len(base)):
+                rows = (ends[:, side] == robot) & (ends[:, 1 - side] != robot)
+                found[rows] += sign * forces[rows] @ twists[robot]
 
-    def _by_shapes(self, near: LayoutDistances, x: Array) -> Array:
-        """Derivatives while links stand still, of what moves on its link or changes its shape, shape (M, n)."""
-        found = np.zeros((len(near.pairs), len(x)))
-        for variable, index, sides in self._changes(x):
-            for side, sign in ((0, 1.0), (1, -1.0)):
-                rows = np.flatnonzero(near.bodies[:, side] == index)
-                if not len(rows):
-                    continue
-                link = self._link(index)
-                L = near.D[link, near.keys[rows]]
-                reach = [supports(each, L[:, :3, :3], L[:, :3, 3], sign * near.normals[rows]) for each in sides]
-                found[rows, variable] -= (reach[0] - reach[1]) / (2.0 * STEP)
-        return found
+    def _add_by_shapes(self, found: Array, near: LayoutDistances, x: Array, base: Array) -> None:
+        """Add derivatives while links stand still, of what moves on its link or changes its shape, shape (M, n)."""
+        directions = dict[int, tuple[Indices, Array]]()
+        for index, by, forward, back in self._changes(near, x, base):
+            if index not in directions:
+                directions[index] = self._directions(near, index)
+            rows, n = directions[index]
+            if len(rows):
+                change = (reaches(back, n) - reaches(forward, n)) / (2.0 * STEP)
+                columns = np.flatnonzero(by)
+                found[rows[:, None], columns] += change[:, None] * by[columns]
 
-    def _link(self, index: int) -> int:
-        """The link that a body is seen from: a column from the world, all others from what carries them."""
-        return WORLD if index in self._moving.columns.values() else int(self._table.bodies.links[index])
+    def _column(self, name: str, X_WB: Array) -> Placed:
+        """The column of a robot at its base, as seen from the world."""
+        column = self._moving.of_base(name, X_WB)
+        return Placed(column.shape, X_WB @ column.X_LS)
 
-    def _changes(self, x: Array) -> Iterator[tuple[int, int, tuple[Placed, Placed]]]:
-        """Variable, body and the body a step forward and back, for all that moves on its link or changes its shape."""
-        for variable, unit in enumerate(np.eye(len(x))):
-            sides = [self._shapes(self._variables.placed(x + step * unit)) for step in (STEP, -STEP)]
-            yield from _changed(variable, sides)
+    def _directions(self, near: LayoutDistances, index: int) -> tuple[Indices, Array]:
+        """The pairs of a body, and where the others are, seen from its link: unit directions of shape (M, 3).
 
-    def _shapes(self, cell: Cell) -> dict[int, Placed]:
-        """What a layout moves on its link or gives another shape; columns as seen from the world."""
-        X_WB, found = _bases(cell), dict(self._moving.of_tools(cell))
-        for index, placed in self._moving.of_bases(X_WB):
-            found[index] = Placed(placed.shape, X_WB[self._robots[index]] @ placed.X_LS)
-        return found
+        A column is seen from the world, all other bodies from what carries them. No body is in a pair with itself.
+        """
+        link = WORLD if index in self._moving.columns.values() else int(self._table.bodies.links[index])
+        rows, sides = np.nonzero(near.bodies == index)
+        n = near.normals[rows] * np.where(sides == 0, 1.0, -1.0)[:, None]
+        return rows, (n[:, None] @ near.D[link, near.keys[rows], :3, :3])[:, 0]
+
+    def _changes(self, near: LayoutDistances, x: Array, base: Array) -> Iterator[tuple[int, Array, Placed, Placed]]:
+        """Bodies a step forward and back of one number, and by how much that grows with each variable, (n,)."""
+        forest = near_table(self._scene).forest
+        for name, index in self._moving.columns.items():
+            if index not in near.bodies:
+                continue
+            X_WB, by = near.D[forest.place(name), 0], base[self._cell.index(name)]
+            for component in np.flatnonzero(by.any(axis=1)).tolist():
+                forward, back = (self._column(name, _displaced(X_WB, component, step)) for step in (STEP, -STEP))
+                yield index, by[component], forward, back
+        for each in self._variables.beside(x, STEP):
+            moved = (self._moving.of_part(cell) for cell in each.sides)
+            if (name := each.robot) is not None:
+                moved = (self._moving.of_tool(cell, name) for cell in each.sides)
+            for (index, forward), (_, back) in zip(*moved, strict=True):
+                if forward.shape != back.shape or not np.array_equal(forward.X_LS, back.X_LS):
+                    yield index, each.by, forward, back
 
 
-def _changed(variable: int, sides: Sequence[Mapping[int, Placed]]) -> Iterator[tuple[int, int, tuple[Placed, Placed]]]:
-    """The bodies that are not the same on both sides."""
-    for index, forward in sides[0].items():
-        back = sides[1][index]
-        if forward.shape != back.shape or not np.array_equal(forward.X_LS, back.X_LS):
-            yield variable, index, (forward, back)
+def _displaced(X: Array, component: int, step: float) -> Array:
+    """A frame moved along an axis of the world, or turned about one through its origin."""
+    found = X.copy()
+    if component < TURNS:
+        found[component, 3] += step
+    else:
+        found[:3, :3] = rotation_about(np.eye(3)[component - TURNS], step) @ X[:3, :3]
+    return found
 
 
 def _concerned(pairs: Sequence[LayoutPair], changed: Set[int]) -> Flags:

@@ -1,6 +1,6 @@
 """Bodies that a layout moves on their links or gives another shape: columns, tools and the part."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -33,6 +33,25 @@ class LayoutVariables(Protocol):
         """Velocity of the origin of each base in W and its angular velocity by each variable, shape (robots, 6, n)."""
         ...
 
+    def beside(self, x: Array, step: float) -> "Iterable[Beside]":
+        """Cells in which a tool or the part is a step to either side; all that variables do to these."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Beside:
+    """Two cells in which one number of a tool or of the part is a step in [m] or [rad] greater, and less.
+
+    Attributes:
+        robot: The robot of which the solids of the tool differ; None where it is the place of the part.
+        by: By how much the number grows with each variable, shape (n,).
+        sides: The cell with the greater number, and that with the smaller one; the rest of them does not count.
+    """
+
+    robot: str | None
+    by: Array
+    sides: tuple[Cell, Cell]
+
 
 @dataclass(frozen=True, slots=True)
 class Placed:
@@ -60,23 +79,36 @@ class MovingBodies:
     def of_bases(self, X_WB: Array) -> Iterator[tuple[int, Placed]]:
         """Columns below or above bases in the world, shape (robots, 4, 4)."""
         for name, index in self.columns.items():
-            robot = self._cell.robot(name)
-            solid = None if robot.pedestal is None else robot.pedestal.solid(X_WB[self._cell.index(name)])
-            yield index, Placed(None, far_away(index)) if solid is None else Placed(*solid)
+            yield index, self.of_base(name, X_WB[self._cell.index(name)])
+
+    def of_base(self, name: str, X_WB: Array) -> Placed:
+        """The column of a robot that has one, at its base in the world, shape (4, 4)."""
+        robot = self._cell.robot(name)
+        solid = None if robot.pedestal is None else robot.pedestal.solid(X_WB)
+        return Placed(None, far_away(self.columns[name])) if solid is None else Placed(*solid)
 
     def of_tools(self, cell: Cell) -> Iterator[tuple[int, Placed]]:
         """The part, and of tools that are not those of the scene their bodies and what of them is outside the zone."""
         for robot in cell.robots:
-            if robot.tool is self._cell.robot(robot.name).tool:
-                continue
-            for index, body in zip(self._tools.get(robot.name, []), robot.tool.bodies, strict=True):
-                placed = Placed(body.shape, robot.model.X_BF @ body.X_BS)
-                yield index, placed
-                if index in self._cuts:
-                    tip = (inverse(body.X_BS) @ robot.tool.X_FT)[:3, 3]
-                    yield self._cuts[index], _before(placed, tip, cell.checks.contact_zone, self._cuts[index])
+            yield from self.of_tool(cell, robot.name)
         if cell.part is not self._cell.part or cell.carrier is not None:
-            yield self._part, Placed(cell.part.shape, part_body(cell, cell.part, *cell.part.held_by[:1]).X_BS)
+            yield from self.of_part(cell)
+
+    def of_tool(self, cell: Cell, name: str) -> Iterator[tuple[int, Placed]]:
+        """Likewise of the tool of one robot; none where it is that of the scene."""
+        robot = cell.robot(name)
+        if robot.tool is self._cell.robot(name).tool:
+            return
+        for index, body in zip(self._tools.get(name, []), robot.tool.bodies, strict=True):
+            placed = Placed(body.shape, robot.model.X_BF @ body.X_BS)
+            yield index, placed
+            if index in self._cuts:
+                tip = (inverse(body.X_BS) @ robot.tool.X_FT)[:3, 3]
+                yield self._cuts[index], _before(placed, tip, cell.checks.contact_zone, self._cuts[index])
+
+    def of_part(self, cell: Cell) -> Iterator[tuple[int, Placed]]:
+        """The part."""
+        yield self._part, Placed(cell.part.shape, part_body(cell, cell.part, *cell.part.held_by[:1]).X_BS)
 
 
 def far_away(index: int) -> Array:
@@ -84,20 +116,11 @@ def far_away(index: int) -> Array:
     return pose((0.0, 0.0, FAR * (index + 1)))
 
 
-def supports(placed: Placed, R: Array, p: Array, n: Array) -> Array:
-    """How far a body reaches along directions in the world in [m], shape (M,).
-
-    Args:
-        placed: The body on its link.
-        R: Rotations of the link, shape (M, 3, 3).
-        p: Its positions in [m], shape (M, 3).
-        n: Unit directions, shape (M, 3).
-    """
+def reaches(placed: Placed, n: Array) -> Array:
+    """How far a body reaches from the origin of its link along unit directions there, shape (M, 3), in [m], (M,)."""
     if placed.shape is None:
         return np.zeros(len(n))
-    on_link = (np.swapaxes(R, 1, 2) @ n[:, :, None])[..., 0]
-    reach = support(placed.shape, on_link @ placed.X_LS[:3, :3])
-    return reach + on_link @ placed.X_LS[:3, 3] + np.einsum("mi,mi->m", n, p)
+    return support(placed.shape, n @ placed.X_LS[:3, :3]) + n @ placed.X_LS[:3, 3]
 
 
 def _before(placed: Placed, tip: Array, zone: float, index: int) -> Placed:

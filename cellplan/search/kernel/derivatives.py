@@ -31,10 +31,12 @@ class MotionDerivatives:
     Attributes:
         q: Of the joint positions at the nodes, shape (N, nq, p).
         qd: Of their speeds, shape (N, nq, p).
+        rates: Of the speeds by the joints at the same node, where the tools stay on their paths, shape (N, nq, nq).
     """
 
     q: Array
     qd: Array
+    rates: Array
 
 
 def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Directions) -> MotionDerivatives:
@@ -63,7 +65,7 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
             for back, weight in enumerate(steps[node][1:], start=1):
                 if weight:
                     at += weight * found[node - back, nq:]
-    return MotionDerivatives(q=found[:, :nq], qd=found[:, nq:])
+    return MotionDerivatives(q=found[:, :nq], qd=found[:, nq:], rates=np.ascontiguousarray(rates.by_joints[:, nq:]))
 
 
 def equations(job: Job, layout: Layouts, q: Array, qd: Array, directions: Directions) -> tuple[Array, Array]:

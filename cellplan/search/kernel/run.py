@@ -121,7 +121,7 @@ class _March:
         return repeated((self._job.X[..., node : node + 1], self._job.V[..., node : node + 1]), self._count)
 
 
-def run_near(job: Job, layouts: Layouts, q: Array) -> Motions:
+def run_near(job: Job, layouts: Layouts, q: Array, rates: Array | None = None) -> Motions:
     """The motions of a few candidates that are known to be near given ones: all nodes at once.
 
     Picard's iteration finds the integral of the speeds, Newton's method the paths, both in one pass over all nodes; the
@@ -132,6 +132,8 @@ def run_near(job: Job, layouts: Layouts, q: Array) -> Motions:
         job: The tasks at their nodes.
         layouts: The candidates.
         q: Joint positions at the nodes that are nearly right in [rad] or [m], shape (K, N, nq).
+        rates: How the joint speeds change with the joints near them, see ``MotionDerivatives``, shape (N, nq, nq); a
+            few passes less are needed with them.
     """
     keep_freed_memory()
     count, nodes, _ = q.shape
@@ -143,7 +145,7 @@ def run_near(job: Job, layouts: Layouts, q: Array) -> Motions:
         placement, desired = own.repeated(nodes), repeated((job.X, job.V), count)
         weights = np.repeat(layouts.weights.T, nodes, axis=1)
         for _ in range(MOST_PASSES):
-            change, speeds, errors = _pass(job, at, start, placement, desired=desired, weights=weights)
+            change, speeds, errors = _pass(job, at, start, placement, desired=desired, weights=weights, rates=rates)
             at = at + change
             is_settled = np.abs(change).max(axis=(0, 2)) <= PASSED
             if is_settled.all():
@@ -152,7 +154,14 @@ def run_near(job: Job, layouts: Layouts, q: Array) -> Motions:
 
 
 def _pass(
-    job: Job, at: Array, start: Array, placement: Placement, *, desired: Desired, weights: Array
+    job: Job,
+    at: Array,
+    start: Array,
+    placement: Placement,
+    *,
+    desired: Desired,
+    weights: Array,
+    rates: Array | None,
 ) -> tuple[Array, Array, Array]:
     """Corrections and speeds of one pass, shape (nq, K, N) both, and tool errors before it, shape (K,)."""
     nq, count, nodes = at.shape
@@ -160,8 +169,26 @@ def _pass(
     linear = job.tasks.linearise(flat, desired, placement, mobile=np.ones(nq), weights=weights)
     speeds = linear.speeds().reshape(at.shape)
     picard = (start[:, :, None] + speeds @ job.integral.T - at).reshape(nq, -1)
-    change = (picard + linear.correction(picard)).reshape(at.shape)
-    return change, speeds, np.abs(linear.errors).max(axis=(0, 1)).reshape(count, nodes).max(axis=1)
+    change = picard + linear.correction(picard)
+    if rates is not None:
+        change = _with_consequences(job, change.reshape(at.shape), rates).reshape(nq, -1)
+        change += linear.correction(change)
+    return change.reshape(at.shape), speeds, np.abs(linear.errors).max(axis=(0, 1)).reshape(count, nodes).max(axis=1)
+
+
+def _with_consequences(job: Job, change: Array, rates: Array) -> Array:
+    """Changes of the joints, shape (nq, K, N), and what the other speeds there add to them later, by Heun's rule."""
+    found = np.ascontiguousarray(np.moveaxis(change, 2, 0))
+    added, speed = np.zeros_like(found[0]), rates[0] @ found[0]
+    for at, rate, step in zip(found[1:], rates[1:], np.diff(job.times).tolist(), strict=True):
+        at += added
+        ahead = rate @ (at + step * speed)
+        speed += ahead
+        speed *= 0.5 * step
+        added += speed
+        at += speed
+        speed = rate @ at
+    return np.moveaxis(found, 0, 2)
 
 
 def _completed(job: Job, layouts: Layouts, at: Array, speeds: Array, *, is_settled: NDArray[np.bool_]) -> Motions:

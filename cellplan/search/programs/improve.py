@@ -182,7 +182,7 @@ class _Climb:
         """The state after a step, in usual steps; None where a tool cannot follow."""
         problem, point = self._problem, here.measures.point
         dx = np.clip(point.x + z * problem.scale, problem.lower, problem.upper) - point.x
-        near = replace(point, q=point.q + linear.derivatives.q @ dx)
+        near = replace(point, q=point.q + linear.derivatives.q @ dx, rates=linear.derivatives.rates)
         motion = problem.evaluate(point.x + dx, point.start, near)
         return None if motion is None else self._state(motion)
 

@@ -85,7 +85,7 @@ class LayoutProblem:
     def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:
         """See ``Problem``."""
         layout = self.variables.layouts(x[None], start[None])
-        motion = run(self.job, layout) if near is None else run_near(self.job, layout, near.q[None])
+        motion = run(self.job, layout) if near is None else run_near(self.job, layout, near.q[None], near.rates)
         if not motion.is_followed[0]:
             return None
         q, qd = (np.ascontiguousarray(part[0]) for part in (motion.q, motion.qd))
@@ -99,7 +99,7 @@ class LayoutProblem:
         qdd = None
         if self.is_accelerating:
             qdd = (self.job.rates @ found.qd.reshape(nodes, -1)).reshape(nodes, nq, count)
-        return PointDerivatives(q=found.q, qd=found.qd, qdd=qdd)
+        return PointDerivatives(q=found.q, qd=found.qd, qdd=qdd, rates=found.rates)
 
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
         """See ``Problem``."""

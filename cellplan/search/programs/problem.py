@@ -17,6 +17,7 @@ class Point:
         q: Joint positions at the nodes in [rad] or [m], shape (N, nq).
         qd: Their speeds, shape (N, nq).
         qdd: Their accelerations, shape (N, nq).
+        rates: How the speeds change with the joints at their node, shape (N, nq, nq); None where that is not known.
     """
 
     x: Array
@@ -24,6 +25,7 @@ class Point:
     q: Array
     qd: Array
     qdd: Array
+    rates: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,11 +36,13 @@ class PointDerivatives:
         q: Of the joint positions at the nodes, shape (N, nq, n).
         qd: Of their speeds, shape (N, nq, n).
         qdd: Of their accelerations, shape (N, nq, n); None where no joint has a limit of acceleration.
+        rates: See ``Point``.
     """
 
     q: Array
     qd: Array
     qdd: Array | None
+    rates: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,8 +66,8 @@ class Distances:
     found: object
 
 
-class Problem(Protocol):
-    """What sequential programs improve.
+class Varied(Protocol):
+    """The variables of a problem, n of them.
 
     Attributes:
         names: Names of the variables.
@@ -72,9 +76,6 @@ class Problem(Protocol):
         scale: A usual step of each, shape (n,).
         cost: Cost of a change by one unit of each, shape (n,).
         given: Values from which a change is counted, shape (n,).
-        times: Times of the nodes in [s], from 0 to the end, shape (N,); two nodes may share one where speeds jump.
-        limits: Limits of the joints.
-        acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,).
     """
 
     @property
@@ -100,6 +101,16 @@ class Problem(Protocol):
     @property
     def given(self) -> Array:
         """See the class."""
+
+
+class Problem(Varied, Protocol):
+    """What sequential programs improve.
+
+    Attributes:
+        times: Times of the nodes in [s], from 0 to the end, shape (N,); two nodes may share one where speeds jump.
+        limits: Limits of the joints.
+        acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,).
+    """
 
     @property
     def times(self) -> Array:

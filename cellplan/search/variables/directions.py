@@ -46,21 +46,18 @@ def tip_twists(state: State, cell: Cell, ranges: Sequence[VaryRange]) -> Array:
     kinds = (VariableKind.TOOL, VariableKind.SPIN, VariableKind.GRASP)
     for robot, columns in _by_robot(cell, ranges, *kinds).items():
         tip = (state.tip(cell, robot) @ state.tip_shift(cell, robot))[:3, 3]
-        for column in columns:
-            found[robot, :, column] = at_point(_tip_twist(state, cell, robot, ranges[column]), tip)
+        twists = np.array([_tip_twist(state, cell, robot, ranges[column]) for column in columns]).reshape(-1, 6)
+        found[robot][:, columns] = at_point(twists, tip).T
     return found
 
 
 def _by_robot(cell: Cell, ranges: Sequence[VaryRange], *kinds: VariableKind) -> dict[int, list[int]]:
     """Places of the numbers of some kinds, by the robot that they belong to."""
-    return {
-        robot: [
-            column
-            for column, each in enumerate(ranges)
-            if each.kind in kinds and concerned(cell, [each], *kinds) == [robot]
-        ]
-        for robot in concerned(cell, ranges, *kinds)
-    }
+    found: dict[int, list[int]] = {robot: [] for robot in concerned(cell, ranges, *kinds)}
+    for column, each in enumerate(ranges):
+        if each.kind in kinds and len(robots := concerned(cell, [each], *kinds)) == 1:
+            found[robots[0]].append(column)
+    return found
 
 
 def _tip_twist(state: State, cell: Cell, robot: int, each: VaryRange) -> Array:

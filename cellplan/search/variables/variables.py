@@ -1,6 +1,6 @@
 """Variables of a layout search: numbers of a cell file that may change, for the kernel and for the file."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,8 +9,10 @@ from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell, Part, Tool
 from cellplan.model.layout import LayoutSettings, VariableKind
+from cellplan.search.distances.moving_bodies import Beside
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
+from cellplan.search.variables.beside import cells_beside
 from cellplan.search.variables.directions import base_twists, effective_base_twists, tip_twists
 from cellplan.search.variables.pedestals import with_pedestals, with_room_below
 from cellplan.search.variables.state import State, concerned, pose_of
@@ -155,6 +157,15 @@ class Variables:
     def base_twists(self, x: Array) -> Array:
         """What each variable does to each base: velocity of its origin in W, angular velocity, shape (robots, 6, n)."""
         return base_twists(self.state(x), self.base, self.tied.ranges) @ self.tied.factors
+
+    def beside(self, x: Array, step: float) -> Iterator[Beside]:
+        """Cells with the numbers of each tool and of the part a step to either side; see ``Beside``.
+
+        Args:
+            x: Values of the variables, shape (n,).
+            step: In [m] or [rad].
+        """
+        return cells_beside(self.state(x), self.base, self.tied, step)
 
     def values(self, x: Array, start: Array) -> dict[str, object]:
         """What to write into the given cell file: values by address, rounded.

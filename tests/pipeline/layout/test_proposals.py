@@ -45,8 +45,18 @@ def test_later_rounds_go_on_from_the_best_trial_of_finished_rounds() -> None:
     following = Proposals(request=REQUEST)(finished)
 
     assert (following[0]["kind"], following[0]["of"], following[0]["x"]) == ("perturbed", 1, [1.0])
-    assert following[1]["kind"] == "sampled"
+    assert (following[1]["kind"], following[1]["of"]) == ("perturbed", None)
+    assert {each.get("give_up_above_s") for each in following} == {1.25}
     assert Proposals(request=REQUEST)(finished) == following
+
+
+def test_while_nothing_conforms_every_round_has_a_sample() -> None:
+    failed = [ended(number, 2.0, TrialStatus.FAILED) for number in range(3 * SIZE)]
+
+    rounds = [Proposals(request=REQUEST)(failed[: SIZE * count]) for count in (1, 2, 3)]
+
+    assert ["sampled" in {each["kind"] for each in tried} for tried in rounds] == [True, True, True]
+    assert not any("give_up_above_s" in each for tried in rounds for each in tried)
 
 
 def test_a_rejected_trial_is_not_built_on() -> None:

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 
 from cellplan import LayoutRequest, LayoutResult, Stop, load_cell, search_layout, solve
+from cellplan.report.record.schema import layout_schema
 from cellplan.report.text.layout import layout_lines
 
 CELL = Path(__file__).resolve().parents[3] / "cells" / "planar_pair.yaml"
@@ -71,6 +73,14 @@ def test_record_page_and_console_say_the_same(found: LayoutResult, folder: Path)
     assert lines[0].partition(": ")[2] in page
     assert lines[-2] == f"next: cellplan solve {folder / 'study' / 'best.yaml'}"
     assert page.count("<svg") >= 2
+
+
+def test_the_record_is_of_its_schema_without_further_keys(found: LayoutResult) -> None:
+    schema = layout_schema()
+
+    errors = [error.message for error in Draft202012Validator(schema).iter_errors(found.record)]
+    assert errors == []
+    assert set(found.record) == set(schema["$defs"]["LayoutRecord"]["properties"])
 
 
 def test_effects_of_the_variables_are_derivatives_of_the_cycle(found: LayoutResult) -> None:

@@ -1,6 +1,6 @@
 """A cell with columns, rods and a held part, and variables that move them all."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from cellplan.geometry.transforms import Array, pose, rotation_exp
 from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell, Part, Tool
 from cellplan.scene.scene import Scene
+from cellplan.search.distances.moving_bodies import Beside
 from cellplan.search.kernel.job import Layouts
 
 CELL = Path(__file__).resolve().parents[3] / "cells" / "four_robots.yaml"
@@ -51,6 +52,12 @@ class SomeVariables:
         part = self.cell.part
         grasp = part.held_by[0]
         return replace(part, held_by=(replace(grasp, X_PT=grasp.X_PT @ pose((0.0, 0.0, -x[-1]))), *part.held_by[1:]))
+
+    def beside(self, x: Array, step: float) -> Iterator[Beside]:
+        for unit in np.eye(len(x)):
+            sides = (self.placed(x + step * unit), self.placed(x - step * unit))
+            for robot in ("kuka", None):
+                yield Beside(robot=robot, by=unit, sides=sides)
 
     def placed(self, x: Array) -> Cell:
         tools, robots = self.tools(x), []

@@ -1,5 +1,6 @@
 """What never moves but stands where a base is: each kind that stands in another fails the checks and is a distance."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from cellplan.model.mounting import Pedestal
 from cellplan.model.robot import BASE
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
+from cellplan.search.distances.moving_bodies import Beside
 from cellplan.search.kernel.job import Layouts
 
 COLUMN = Pedestal(radius=0.3, floor=0.0)
@@ -42,6 +44,9 @@ class BaseOfB:
         base = np.zeros((2, 6, 3))
         base[1, :3] = np.eye(3)
         return base
+
+    def beside(self, x: Array, step: float) -> Iterator[Beside]:
+        return iter(())
 
     def placed(self, x: Array) -> Cell:
         a, b = self.cell.robots

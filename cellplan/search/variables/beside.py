@@ -1,0 +1,39 @@
+"""Cells in which one number of a tool or of the part is a step to either side, for derivatives by differences."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from cellplan.model.cell import Cell
+from cellplan.model.layout import VariableKind
+from cellplan.search.distances.moving_bodies import Beside
+from cellplan.search.variables.state import State
+from cellplan.search.variables.ties import Tied
+
+
+def cells_beside(state: State, cell: Cell, tied: Tied, step: float) -> Iterator[Beside]:
+    """All that numbers do to the solids of tools and to the place of the part.
+
+    Args:
+        state: The layout.
+        cell: The cell that is searched.
+        tied: The numbers.
+        step: In [m] or [rad].
+    """
+    for each, by in zip(tied.ranges, tied.factors, strict=True):
+        if each.kind not in {VariableKind.TOOL, VariableKind.GRASP, VariableKind.PART}:
+            continue
+        values = state.numbers(cell, [each])
+        sides = [state.changed(cell, [each], values + change) for change in (step, -step)]
+        if each.kind is VariableKind.TOOL:
+            forward, back = (_with_tool(side, cell, cell.index(each.name)) for side in sides)
+            yield Beside(robot=each.name, by=by, sides=(forward, back))
+        if each.kind is not VariableKind.TOOL or cell.index(each.name) == cell.carrier:
+            forward, back = (side.cell(cell, tied.ranges) for side in sides)
+            yield Beside(robot=None, by=by, sides=(forward, back))
+
+
+def _with_tool(state: State, cell: Cell, index: int) -> Cell:
+    """The cell with the tool of one robot."""
+    robots = list(cell.robots)
+    robots[index] = replace(robots[index], tool=state.tool(cell, index))
+    return replace(cell, robots=tuple(robots))
