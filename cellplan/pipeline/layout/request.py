@@ -31,6 +31,7 @@ class LayoutRequest:
             the cycle itself.
         clearance: Demanded distance in [mm]; None for that of the cell.
         margin: Demanded distance of turning joints from their limits in [deg]; None for that of the cell.
+        misplacement: By how much every base may be off in [mm] and [deg]; None for what the cell says.
         settings: Values set in the cell, each as ``KEY=VALUE``.
         vary: Keys that may change beside those of the cell, each as ``KEY`` or ``KEY=RANGES``.
         fixed: Keys that may not change.
@@ -45,6 +46,7 @@ class LayoutRequest:
     duration: float | None = None
     clearance: float | None = None
     margin: float | None = None
+    misplacement: tuple[float, float] | None = None
     settings: tuple[str, ...] = ()
     vary: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
@@ -66,6 +68,7 @@ class LayoutRequest:
             "duration_s": self.duration,
             "clearance_mm": self.clearance,
             "margin_deg": self.margin,
+            "misplacement": None if self.misplacement is None else list(self.misplacement),
             "settings": list(self.settings),
             "vary": list(self.vary),
             "fix": list(self.fixed),
@@ -90,6 +93,9 @@ def searched_cell(request: LayoutRequest) -> Cell:
     values: dict[str, object] = {}
     if request.margin is not None:
         values["layout.margin_deg"] = request.margin
+    if request.misplacement is not None:
+        position, orientation = request.misplacement
+        values["layout.misplacement"] = {"position_mm": position, "orientation_deg": orientation}
     if request.vary or request.fixed:
         values["layout.vary"] = _varied(cell, request)
     changed = cell.with_values(values) if values else cell

@@ -61,7 +61,7 @@ def judged(problem: GuardedProblem, d: Array, start: Array, demands: Demands, ef
             continue
         q, qd = motions.q[place], motions.qd[place]
         point = Point(x=d[place], start=q[0], q=q, qd=qd, qdd=problem.job.rates @ qd)
-        found.append(_measured(problem, Measures.of(problem, point, demands, effort), demands))
+        found.append(_measured(problem, Measures.of(problem, point, demands, effort)))
     return found
 
 
@@ -71,7 +71,7 @@ def _lost(problem: GuardedProblem, d: Array, start: Array) -> Corner:
     return Corner(d=d, start=start, cycle=np.inf, margins=margins, rooms=rooms, first="a tool cannot follow its path")
 
 
-def _measured(problem: GuardedProblem, measures: Measures, demands: Demands) -> Corner:
+def _measured(problem: GuardedProblem, measures: Measures) -> Corner:
     """A layout whose motion is known."""
     rooms = np.full(problem.pair_count, np.inf)
     np.minimum.at(rooms, measures.distances.pairs, -measures.lacks)

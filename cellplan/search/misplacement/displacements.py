@@ -10,6 +10,7 @@ from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import inverse
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.layout import Misplacement
+from cellplan.search.distances.moving_bodies import Beside
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
 from cellplan.search.variables.variables import Variables
@@ -121,6 +122,10 @@ class BaseDisplacements:
             found[robot, TWIST_ROWS[component], column] = 1.0
         return found
 
+    def beside(self, d: Array, step: float) -> tuple[Beside, ...]:  # noqa: ARG002 - of the protocol
+        """Nothing: a displaced base changes no tool and no grasp."""
+        return ()
+
     def placed(self, d: Array) -> Cell:
         """The cell with displaced bases, shape (m,), neither rounded nor validated: quick, for scenes."""
         cell = self.variables.placed(self.x)
@@ -129,7 +134,7 @@ class BaseDisplacements:
         return replace(cell, robots=robots)
 
     def cell(self, d: Array, start: Array) -> Cell:
-        """The cell of the file with displaced bases, shape (m,), and a start posture, shape (nq,); see ``Variables``."""
+        """The cell of the file with displaced bases, shape (m,), and a start posture, (nq,); see ``Variables``."""
         values = self.variables.values(self.x, start)
         bases = self.variables.state(self.x).bases
         for name, robot, component, by in zip(self.names, self.robots, self.components, d.tolist(), strict=True):

@@ -140,4 +140,3 @@ def _least(job: Job, q: Array, arms: tuple[int, ...]) -> Array:
     J = np.concatenate([linear, np.where(turning, axes, 0.0)], axis=-1)
     least = np.linalg.eigvalsh(np.swapaxes(J, -1, -2) @ J)[..., 0]
     return np.sqrt(np.maximum(least, 0.0))
-

@@ -13,9 +13,9 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.search.misplacement.corners import Corner, judged
+from cellplan.search.misplacement.guarded import GuardedProblem
 from cellplan.search.misplacement.worst import worst
 from cellplan.search.programs.improve import Improved, improve
-from cellplan.search.misplacement.guarded import GuardedProblem
 from cellplan.search.programs.objective import Allowance, Demands, Effort, Objective
 
 SEEDED: Final = 128  # [-] corners
@@ -133,9 +133,7 @@ def seeded_signs(rng: np.random.Generator, count: int) -> Array:
     return rng.choice([-1.0, 1.0], (SEEDED, count))
 
 
-def _with_corners(
-    problem: GuardedProblem, found: Improved, demands: Demands, effort: Effort, signs: Array
-) -> Robust:
+def _with_corners(problem: GuardedProblem, found: Improved, demands: Demands, effort: Effort, signs: Array) -> Robust:
     """A layout with all its corners planned anew."""
     amounts = problem.upper
     listed = worst(problem, replace(found.point, x=problem.given), demands, effort).corners

@@ -61,7 +61,7 @@ def worst(problem: GuardedProblem, point: Point, demands: Demands, effort: Effor
 
 
 def _of_pairs(problem: GuardedProblem, measures: Measures, taken: Array) -> Array:
-    """What is taken from each pair where that leaves least; from pairs that are not near what is taken from the rest."""
+    """What is taken from each pair where that leaves least; from pairs that are not near the median of the others."""
     found, rows = np.full(problem.pair_count, np.median(taken) if len(taken) else 0.0), measures.distances
     for row in np.argsort(measures.lacks + taken, kind="stable").tolist():
         found[rows.pairs[row]] = taken[row]

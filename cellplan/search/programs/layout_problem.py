@@ -14,8 +14,8 @@ from cellplan.search.distances.cell_distances import CellDistances, LayoutDistan
 from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.run import run, run_near
-from cellplan.search.programs.problem import Distances, Point, PointDerivatives
 from cellplan.search.kernel.screws import Directions
+from cellplan.search.programs.problem import Distances, Point, PointDerivatives
 
 
 class KernelVariables(Protocol):
