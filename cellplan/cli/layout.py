@@ -39,6 +39,15 @@ Margin = Annotated[
     str | None,
     typer.Option("--margin", metavar="ANGLE", help="Demanded margin of all turning joints, such as 15deg."),
 ]
+Displaced = Annotated[
+    str | None,
+    typer.Option(
+        "--misplacement",
+        metavar="LENGTH,ANGLE",
+        help="The layout must pass, in one cycle and with its motion planned anew, with every base off by so much "
+        "along each axis and about the vertical, such as 10mm,1deg.",
+    ),
+]
 Vary = Annotated[
     list[str] | None,
     typer.Option(
@@ -96,6 +105,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     duration: Duration = None,
     clearance: Distance = None,
     margin: Margin = None,
+    misplacement: Displaced = None,
     vary: Vary = None,
     fix: Fix = None,
     settings: Settings = None,
@@ -138,6 +148,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
             duration=duration,
             clearance=clearance,
             margin=margin,
+            misplacement=misplacement,
             vary=tuple(vary or ()),
             fixed=tuple(fix or ()),
             settings=tuple(settings or ()),

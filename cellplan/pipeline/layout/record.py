@@ -89,6 +89,7 @@ def layout_record(
         "convergence": _convergence(finished),
         "choices": _choices(ready, finished, tried),
         "dropped": _dropped(finished),
+        "misplacement": None,
         "remarks": list(ready.variables.remarks),
         "drawing": _drawing(ready, best) if best else {},
         "files": [],

@@ -33,6 +33,7 @@ class LayoutRequest:
             the cycle itself.
         clearance: Demanded distance in [mm]; None for that of the cell.
         margin: Demanded distance of turning joints from their limits in [deg]; None for that of the cell.
+        misplacement: By how much every base may be off in [mm] and [deg]; None for what the cell says.
         settings: Values set in the cell, each as ``KEY=VALUE``.
         vary: Keys that may change beside those of the cell, each as ``KEY`` or ``KEY=RANGES``.
         fixed: Keys that may not change.
@@ -48,6 +49,7 @@ class LayoutRequest:
     duration: float | None = None
     clearance: float | None = None
     margin: float | None = None
+    misplacement: tuple[float, float] | None = None
     settings: tuple[str, ...] = ()
     vary: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
@@ -70,6 +72,7 @@ class LayoutRequest:
             "duration_s": self.duration,
             "clearance_mm": self.clearance,
             "margin_deg": self.margin,
+            "misplacement": None if self.misplacement is None else list(self.misplacement),
             "settings": list(self.settings),
             "vary": list(self.vary),
             "fix": list(self.fixed),
@@ -95,6 +98,9 @@ def searched_cell(request: LayoutRequest) -> Cell:
     values: dict[str, object] = {}
     if request.margin is not None:
         values["layout.margin_deg"] = request.margin
+    if request.misplacement is not None:
+        position, orientation = request.misplacement
+        values["layout.misplacement"] = {"position_mm": position, "orientation_deg": orientation}
     if request.free:
         margins = {key: value for key, value in _written_layout(cell).items() if key.startswith("margin_")}
         values = {"layout": {**margins, "vary": freed(cell, request.free)}, **values}
@@ -104,7 +110,23 @@ def searched_cell(request: LayoutRequest) -> Cell:
     paths = () if changed.layout is None else [each.robot for each in changed.layout.paths]
     refuse_other_jobs(changed, "a layout search", paths=paths)
     _refuse_margins(changed)
+    _refuse_misplacement(request, changed)
     return changed
+
+
+def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:
+    """Refuse misplaced bases where the motions of all corners are not those of one time law.
+
+    Raises:
+        InputError: The motion is retimed, or the positioner's joint path is given.
+    """
+    if cell.layout is None or cell.layout.misplacement is None:
+        return
+    key = "--misplacement" if request.misplacement is not None else cell.origin.at("layout.misplacement")
+    if request.timing is Timing.RETIMED:
+        raise InputError(f"{key}: expected a motion by the time laws, got --timing retimed: leave one of them out")
+    if cell.layout.paths or any(robot.path is not None for robot in cell.robots):
+        raise InputError(f"{key}: expected no joint path of a positioner (robots.ROBOT.path): leave one of them out")
 
 
 def _refuse_margins(cell: Cell) -> None:
