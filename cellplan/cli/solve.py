@@ -1,7 +1,8 @@
 """``cellplan solve``: plan a cell, check the result and write joint tables, report and plots."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +21,9 @@ from cellplan.cli.options import (
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
+
+if TYPE_CHECKING:
+    from cellplan.model.cell import Cell
 
 SCHEMA = "cellplan.solve/1"
 
@@ -58,12 +62,10 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.background_plots import BackgroundPlots
 
         plots = BackgroundPlots(background)  # the child imports matplotlib while this process imports the rest
-        from cellplan.cli.repair_line import repair_line
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
         from cellplan.pipeline.solve import solve_with_plots
-        from cellplan.pipeline.synchronous import is_searchable
         from cellplan.pipeline.write_run import write_run
         from cellplan.report.text.run import summary_lines
 
@@ -91,6 +93,15 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         say("\n".join(summary_lines(record, folder)))
         if solution.remark:
             say(solution.remark)
-        if not solution.passed and task is None and is_searchable(changed):
-            say(repair_line(cell, changed.origin.changes, allow_dir or ()))
+        if not solution.passed and task is None:
+            _say_what_repairs(cell, changed, allow_dir or ())
     raise typer.Exit(status)
+
+
+def _say_what_repairs(path: Path, cell: "Cell", allow_dirs: Sequence[Path]) -> None:
+    """Print the line to type for a cell that fails, if repairs know cells of its kind."""
+    from cellplan.cli.repair_line import repair_line
+    from cellplan.pipeline.synchronous import is_searchable
+
+    if is_searchable(cell):
+        say(repair_line(path, cell.origin.changes, allow_dirs))
