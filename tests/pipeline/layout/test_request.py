@@ -54,6 +54,14 @@ def test_a_quantity_is_read_with_its_unit(read, text, value):  # type: ignore[no
             "clearance or change",
         ),
         (
+            ["--try", str(PAIR)],
+            f"error: --try {PAIR}: expected the robots of the cell (reis, kuka, abb, staubli), got left, right",
+        ),
+        (
+            ["--vary", "kuka.base={x_mm: [5, "],
+            "--vary kuka.base:2: not valid YAML: did not find expected node content",
+        ),
+        (
             ["--fix", "kuka.basis"],
             "error: --fix: expected a key that may change (abb.base, abb.base.x_mm, abb.base.y_mm, abb.base.yaw_deg, "
             "abb.base.z_mm, abb.tool, abb.tool.length_mm, abb.tool.roll_deg, abb.tool.tilt_deg, kuka.base, "
@@ -103,3 +111,10 @@ def test_keys_are_added_and_fixed() -> None:
     assert set(vary["staubli.base"]) == {"x_mm", "y_mm", "yaw_deg"}
     assert {"abb.base", "kuka.tool"}.isdisjoint(vary)
     assert cell.origin.changes["layout.margin_deg"] == 7.0
+
+
+def test_a_margin_that_leaves_no_room_is_refused() -> None:
+    with pytest.raises(
+        CellplanError, match=r"layout\.margin_deg: expected less than \S+, half of the range of \S+ of "
+    ):
+        searched_cell(LayoutRequest(cell=FOUR, margin=179.0))
