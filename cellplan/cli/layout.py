@@ -1,14 +1,16 @@
 """``cellplan layout``: search the placement of all robots, and all else that may change, for the whole job at once."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, NoReturn
 
 import typer
 
 from cellplan.cli.errors import InterruptedWorkError
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
-from cellplan.cli.output import json_failure, say
+from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
+from cellplan.errors import ExitStatus
 
 SCHEMA = "cellplan.layout/1"
 
@@ -121,7 +123,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     passed, 2 bad input, 3 no start at all, 130 interrupted (--resume goes on).
     """
     with json_failure(SCHEMA, desired=as_json):
-        from cellplan.cli.layout_options import read_request, read_stop, run_search, say_result, status_lines
+        from cellplan.cli.layout_options import read_request, read_stop, read_workers, run_search, status_lines
 
         if status:
             say("\n".join(status_lines(cell, output)))
@@ -147,10 +149,24 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
         stop = read_stop(budget, trials)
         with progress_listener(quiet=quiet) as progress:
             try:
-                searchers = (workers, scheduler)
+                searchers = read_workers(workers, scheduler)
                 record, folder = run_search(
-                    request, output, stop=stop, searchers=searchers, resume=resume, progress=progress
+                    request, output, stop=stop, workers=searchers, resume=resume, progress=progress
                 )
             except KeyboardInterrupt as error:
                 raise InterruptedWorkError(str(error) or "interrupted") from None
-    raise typer.Exit(say_result(record, folder, as_json=as_json))
+    _show(record, folder, as_json=as_json)
+
+
+def _show(record: Mapping[str, Any], folder: Path, *, as_json: bool) -> NoReturn:
+    """Show what a search has come to, and end the command."""
+    statuses = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}
+    outcome = statuses.get(record["status"], ExitStatus.CHECK_FAILED)
+    if as_json:
+        place = {"folder": str(folder), "report_path": str(folder / "study.html")}
+        say_json({"schema": SCHEMA, "exit": int(outcome), **place, "study": record})
+    else:
+        from cellplan.report.text.layout import layout_lines
+
+        say("\n".join(layout_lines(record, folder)))
+    raise typer.Exit(outcome)

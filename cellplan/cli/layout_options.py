@@ -6,8 +6,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, TypeVar
 
-from cellplan.cli.output import say, say_json
-from cellplan.errors import ExitStatus, InputError
+from cellplan.errors import InputError
 from cellplan.guard import processors
 from cellplan.io.cell.load import load_cell
 from cellplan.io.input.findings import did_you_mean, listed, shown
@@ -16,8 +15,6 @@ from cellplan.pipeline.layout.quantities import read_angle, read_length, read_ti
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.search import search_layout
 from cellplan.report.record.common import Record
-from cellplan.report.record.layout import SCHEMA
-from cellplan.report.text.layout import layout_lines
 from cellplan.search.programs.objective import Objective, Timing
 from cellplan.study.cluster import Cluster
 from cellplan.study.status import read_status
@@ -71,12 +68,11 @@ def run_search(
     output: Path | None,
     *,
     stop: Stop | None,
-    searchers: tuple[int | None, str | None],
+    workers: int | str,
     resume: bool,
     progress: Progress,
 ) -> tuple[Record, Path]:
     """The record of the search and its folder; arguments as the options give them."""
-    workers = read_workers(*searchers)
     folder = output or default_folder(request.cell, request.allow_dirs)
     with ExitStack() as opened:
         pool: int | Executor = opened.enter_context(Cluster(workers)) if isinstance(workers, str) else workers
@@ -101,15 +97,3 @@ def _word(option: str, text: str, kind: type[Choice]) -> Choice:
     if text not in known:
         raise InputError(f"{option}: expected one of {listed(known)}, got {shown(text)}{did_you_mean(text, known)}")
     return kind(text)
-
-
-def say_result(record: Record, folder: Path, *, as_json: bool) -> ExitStatus:
-    """Print what the search came to; the exit status that says the same."""
-    statuses = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}
-    outcome = statuses.get(record["status"], ExitStatus.CHECK_FAILED)
-    if as_json:
-        place = {"folder": str(folder), "report_path": str(folder / "study.html")}
-        say_json({"schema": SCHEMA, "exit": int(outcome), **place, "study": record})
-    else:
-        say("\n".join(layout_lines(record, folder)))
-    return outcome

@@ -1,8 +1,7 @@
 """``cellplan solve``: plan a cell, check the result and write joint tables, report and plots."""
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -21,9 +20,6 @@ from cellplan.cli.options import (
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
-
-if TYPE_CHECKING:
-    from cellplan.model.cell import Cell
 
 SCHEMA = "cellplan.solve/1"
 
@@ -62,6 +58,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.background_plots import BackgroundPlots
 
         plots = BackgroundPlots(background)  # the child imports matplotlib while this process imports the rest
+        from cellplan.cli.repair_line import repair_lines
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
@@ -90,18 +87,8 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         place = {"folder": str(folder), "report_path": str(folder / "report.html")}
         say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "report": record})
     else:
-        say("\n".join(summary_lines(record, folder)))
+        further = [] if solution.passed or task is not None else repair_lines(cell, changed, allow_dir or ())
+        say("\n".join([*summary_lines(record, folder), *further]))
         if solution.remark:
             say(solution.remark)
-        if not solution.passed and task is None:
-            _say_what_repairs(cell, changed, allow_dir or ())
     raise typer.Exit(status)
-
-
-def _say_what_repairs(path: Path, cell: "Cell", allow_dirs: Sequence[Path]) -> None:
-    """Print the line to type for a cell that fails, if repairs know cells of its kind."""
-    from cellplan.cli.repair_line import repair_line
-    from cellplan.pipeline.synchronous import is_searchable
-
-    if is_searchable(cell):
-        say(repair_line(path, cell.origin.changes, allow_dirs))

@@ -179,11 +179,13 @@ class Finish:
 
     def _timed(self, cell: Cell, cycle: float) -> TimedProgram:
         """The program at the shortest cycle, or at the duration of the cell."""
-        if self.ready.request.objective is not Objective.CYCLE:
-            return TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=self.progress)
+        is_cycle = self.ready.request.objective is Objective.CYCLE
         if self.ready.request.timing is Timing.RETIMED:
-            values: dict[str, object] = {"motion.timing": "fastest"}
-            return TimedProgram.solved(cell, Law.COMMON_SPEED, values, task=None, progress=self.progress)
+            timing: object = "fastest" if is_cycle else {"cycle_s": self.ready.duration}
+            law = Law.COMMON_SPEED if is_cycle else Law.REDUCED_SPEED
+            return TimedProgram.solved(cell, law, {"motion.timing": timing}, task=None, progress=self.progress)
+        if not is_cycle:
+            return TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=self.progress)
         factor = whole_steps(cell, cycle / self.ready.duration)
         for _ in range(DURATIONS):
             program = self._at(cell, factor)

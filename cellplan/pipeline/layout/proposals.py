@@ -58,6 +58,11 @@ class Proposals:
             self._perturbed(second, NARROW[(number + 1) % len(NARROW)], number),
             self._fourth(best, number, is_conforming=bool(following)),
         ]
+        lost = [trial.variant.values.get("choice", {}) for trial in finished if _leads_nowhere(trial)]
+        for place, each in enumerate(proposed):
+            if each["kind"] == "sampled" or (each["kind"] == "perturbed" and each["of"] is None):
+                if each["choice"] in lost:
+                    proposed[place] = {**self._sampled(len(finished) + place, 0), "choice": each["choice"]}
         if not following or self.request.objective is not Objective.CYCLE:
             return proposed
         limit = GIVEN_UP * (BESTS[Objective.CYCLE].value(following[0]) or math.inf)
@@ -123,6 +128,11 @@ class Proposals:
             return self._perturbed(None, WIDE[(number + 1) % len(WIDE)], number)
         more = self._perturbed(best, 0.0, number) | {"kind": "improved"}
         return more | {"clearance_m": ADDED[number // 4 % len(ADDED)]}
+
+
+def _leads_nowhere(trial: Trial) -> bool:
+    """Whether a trial is the given layout and no motion begins there."""
+    return trial.variant.values["kind"] == "given" and "x" not in trial.outcome.figures
 
 
 def origin_text(values: Mapping[str, Any]) -> str:

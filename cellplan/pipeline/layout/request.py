@@ -10,6 +10,7 @@ from cellplan.io.cell.changes import read_setting
 from cellplan.io.cell.load import load_cell
 from cellplan.io.input.findings import did_you_mean, listed, shown
 from cellplan.model.cell import Cell
+from cellplan.model.units import DEG, MM
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.synchronous import refuse_other_jobs
 from cellplan.search.programs.objective import Objective, Timing
@@ -94,15 +95,56 @@ def searched_cell(request: LayoutRequest) -> Cell:
         values["layout.vary"] = _varied(cell, request)
     changed = cell.with_values(values) if values else cell
     refuse_other_jobs(changed, "a layout search")
+    _refuse_margins(changed)
     return changed
+
+
+def _refuse_margins(cell: Cell) -> None:
+    """Refuse demanded margins that leave a joint no room.
+
+    Raises:
+        InputError: A joint cannot keep so far from both of its limits.
+    """
+    if cell.layout is None:
+        return
+    for robot in cell.robots:
+        for joint in robot.model.joints:
+            margin = cell.layout.margin if joint.is_revolute else cell.layout.margin_sliding
+            room = 0.5 * (joint.upper - joint.lower)
+            if margin >= room > 0.0:
+                key, scale = ("margin_deg", DEG) if joint.is_revolute else ("margin_mm", MM)
+                raise InputError(
+                    f"{cell.origin.at(f'layout.{key}')}: expected less than {scale * room:.6g}, half of the range of "
+                    f"{joint.name} of '{robot.name}', got {scale * margin:.6g}"
+                )
+
+
+def read_attempts(request: LayoutRequest, cell: Cell) -> list[Cell]:
+    """The cells whose layouts are tried too.
+
+    Args:
+        request: What is searched for.
+        cell: The cell that is searched.
+
+    Raises:
+        InputError: One cannot be read or has other robots.
+    """
+    names = [robot.name for robot in cell.robots]
+    found = [load_cell(path, allow_dirs=request.allow_dirs) for path in request.attempts]
+    for path, other in zip(request.attempts, found, strict=True):
+        own = [robot.name for robot in other.robots]
+        if own != names or other.joint_count != cell.joint_count:
+            raise InputError(f"--try {path}: expected the robots of the cell ({listed(names)}), got {listed(own)}")
+    return found
 
 
 def _varied(cell: Cell, request: LayoutRequest) -> dict[str, Any]:
     """What may change: as the cell says, or as it is by default, with the options of the request."""
-    vary = {_short(key): _plain(value) for key, value in written_vary(cell).items()}
+    written = written_vary(cell) or (_by_default(cell) if request.fixed and not request.vary else {})
+    vary = {_short(key): _plain(value) for key, value in written.items()}
     for text in request.vary:
         key, sign, ranges = text.partition("=")
-        vary[_short(key.strip())] = read_setting(f"{key.strip()}={ranges}")[1] if sign else True
+        vary[_short(key.strip())] = read_setting(f"{key.strip()}={ranges}", option="--vary")[1] if sign else True
     for key in map(_short, request.fixed):
         entry, _, component = key.rpartition(".")
         if key in vary:
@@ -125,6 +167,19 @@ def written_vary(cell: Cell) -> Mapping[str, Any]:
     """What the cell file says may change; empty where it says nothing."""
     written = cell.origin.source.written if cell.origin.source is not None else {}
     return dict((written.get("layout") or {}).get("vary") or {})
+
+
+def _by_default(cell: Cell) -> Mapping[str, Any]:
+    """What may change of a cell that says nothing of it, as the file would say it."""
+    vary: dict[str, Any] = {}
+    for each in () if cell.layout is None else cell.layout.ranges:
+        entry, _, component = each.address.rpartition(".")
+        if component in COMPONENTS:
+            scale = DEG if each.is_angle else MM
+            vary.setdefault(entry, {})[component] = [round(scale * each.lower, 9), round(scale * each.upper, 9)]
+        else:
+            vary[each.address.partition("[")[0]] = True
+    return vary
 
 
 def _keys(vary: Mapping[str, Any]) -> Iterable[str]:

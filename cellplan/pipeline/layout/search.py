@@ -8,13 +8,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from cellplan.io.cell.load import load_cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
 from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals
 from cellplan.pipeline.layout.record import head_of, layout_record
-from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.request import LayoutRequest, read_attempts
 from cellplan.pipeline.layout.result_file import file_records, result_files
 from cellplan.pipeline.layout.trial import evaluate
 from cellplan.pipeline.write_run import versions
@@ -155,8 +154,7 @@ def search_layout(
             at_once = 1 if request.objective is Objective.CONFORMING else None  # mostly its first trial is the last
             pool = opened.enter_context(Workers(workers, modules=MODULES, first=first, at_once=at_once))
         ready = prepared(request)
-        for path in request.attempts:
-            load_cell(path, allow_dirs=request.allow_dirs)  # what is wrong with it is said before anything is tried
+        read_attempts(request, ready.cell)  # what is wrong with one is said before anything is tried
         search = _Search(
             request=request,
             folder=folder,

@@ -118,6 +118,6 @@ class LayoutRecord(TypedDict):
     dropped: Annotated[list[DroppedRecord], "trials without a conforming layout, by reason"]
     remarks: Annotated[list[str], "what else the user should know, as pedestals that move with their robots"]
     drawing: Annotated[dict[str, Any], "floor plan in mm: the given and the best layout from above"]
-    files: Annotated[list[FileRecord], "files beside `best.yaml` that it names"]
+    files: Annotated[list[FileRecord], "`best.yaml` and the files that it names"]
     inputs: Annotated[dict[str, str], "SHA-256 of every input file, by name"]
     versions: Annotated[dict[str, str], "versions of cellplan and of the packages that the numbers depend on"]

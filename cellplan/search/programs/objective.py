@@ -44,9 +44,7 @@ class Demands:
     clearance: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check at the door what the objective needs, and what the programs know."""
-        if self.timing is Timing.RETIMED:
-            raise ValueError("demands: programs know the time laws of the cell only, not a retimed motion")
+        """Check at the door what the objective needs."""
         if self.objective in (Objective.CLEARANCE, Objective.CHANGE) and self.duration is None:
             raise ValueError(f"demands: the objective '{self.objective}' needs a duration")
         if not np.all(self.margin >= 0.0):
