@@ -19,7 +19,7 @@ from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.units import in_si
 from cellplan.io.shapes import pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.layout import Choice, KeepOut, LayoutSettings, PathRange, VariableKind, VaryRange
+from cellplan.model.layout import Choice, KeepOut, LayoutSettings, Misplacement, PathRange, VariableKind, VaryRange
 from cellplan.model.robot import RobotModel
 from cellplan.model.units import MM
 
@@ -65,6 +65,7 @@ def read_layout(
         margin=entry.margin_deg.si,
         margin_sliding=entry.margin_mm.si,
         cost=ties.cost(),
+        misplacement=_misplacement(entry),
         is_default=entry.vary is None,
     )
     return settings, found.findings
@@ -139,6 +140,13 @@ def _keep_on_floor(entry: LayoutEntry, found: _Found, document: YamlDocument) ->
                 f"got {MM * lower:g} to {MM * upper:g}"
             )
             found.findings.append(document.finding(("layout", "floor", f"{SIDES[each.index]}_mm"), text))
+
+
+def _misplacement(entry: LayoutEntry) -> Misplacement | None:
+    """By how much every base may be off."""
+    if entry.misplacement is None:
+        return None
+    return Misplacement(position=entry.misplacement.position_mm.si, orientation=entry.misplacement.orientation_deg.si)
 
 
 def _floor(entry: LayoutEntry) -> Array | None:

@@ -60,9 +60,9 @@ class Proposals:
         ]
         lost = [trial.variant.values.get("choice", {}) for trial in finished if _leads_nowhere(trial)]
         for place, each in enumerate(proposed):
-            if each["kind"] == "sampled" or (each["kind"] == "perturbed" and each["of"] is None):
-                if each["choice"] in lost:
-                    proposed[place] = {**self._sampled(len(finished) + place, 0), "choice": each["choice"]}
+            is_far = each["kind"] == "sampled" or (each["kind"] == "perturbed" and each["of"] is None)
+            if is_far and each["choice"] in lost:
+                proposed[place] = {**self._sampled(len(finished) + place, 0), "choice": each["choice"]}
         if not following or self.request.objective is not Objective.CYCLE:
             return proposed
         limit = GIVEN_UP * (BESTS[Objective.CYCLE].value(following[0]) or math.inf)
@@ -110,6 +110,7 @@ class Proposals:
             "x": figures["x"],
             "start": figures["start"],
             "choice": values.get("choice", {}),
+            **({"unled": figures["unled"]} if "unled" in figures else {}),
         }
 
     def _sampled(self, index: int, number: int) -> dict[str, Any]:
