@@ -54,7 +54,8 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
     nq, steps, begins = q.shape[1], job.steps.tolist(), job.is_begin.tolist()
     found, at = np.empty((len(q), 2 * nq, directions.count)), rates.start(directions.start)
     for node, (taking, adding) in enumerate(zip(rates.by_joints, rates.by_layout, strict=True)):
-        found[node] = taking @ at + adding
+        np.matmul(taking, at, out=found[node])
+        found[node] += adding
         if node and begins[node - 1]:  # as in ``run``: once more with the mean of both rates
             at = found[node - 1, :nq] + 0.5 * (job.times[node] - job.times[node - 1]) * found[
                 node - 1 : node + 1, nq:
@@ -100,13 +101,18 @@ class _Rates:
         forces = np.swapaxes(inverse, 1, 2) @ (weights * qd)[:, :, None]  # the multipliers, as W qd = J^T lambda
         bent = mobility[:, None] * changes.forces(forces[..., 0])
         bent[:, :, nq:] -= (directions.weights / weights[:, None]) * qd[:, :, None]
-        rates = bent - inverse @ (changes.twists() + J @ bent)
+        twists = changes.twists()
+        twists += J @ bent
+        bent -= inverse @ twists
         beside = -changes.in_rows(np.swapaxes(screws.based + screws.tooled, -1, -2))
         self._beside = beside.reshape(len(q), -1, directions.count)
-        kept, closed = np.eye(nq) - inverse @ J, inverse @ self._beside
-        by_joints = rates[:, :, :nq]
-        self.by_joints = np.concatenate([kept, by_joints @ kept], axis=1)
-        self.by_layout = np.concatenate([closed, by_joints @ closed + rates[:, :, nq:]], axis=1)
+        by_joints = np.ascontiguousarray(bent[:, :, :nq])
+        self.by_joints, self.by_layout = (np.empty((len(q), 2 * nq, width)) for width in (nq, directions.count))
+        kept, closed = self.by_joints[:, :nq], self.by_layout[:, :nq]
+        np.subtract(np.eye(nq), inverse @ J, out=kept)
+        np.matmul(inverse, self._beside, out=closed)
+        np.matmul(by_joints, kept, out=self.by_joints[:, nq:])
+        np.add(by_joints @ closed, bent[:, :, nq:], out=self.by_layout[:, nq:])
 
     def start(self, start: Array) -> Array:
         """Change of the start posture, shape (nq, p), once the tools are back at the starts of their paths."""

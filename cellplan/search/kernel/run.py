@@ -142,10 +142,16 @@ def run_near(job: Job, layouts: Layouts, q: Array, rates: Array | None = None) -
         first = repeated((job.X[..., :1], job.V[..., :1]), count)
         own = layouts.placement(job)
         start, arrived = settled(job.tasks, first, own, start, mobile=job.settling, accuracy=START_TOL)
-        placement, desired = own.repeated(nodes), repeated((job.X, job.V), count)
-        weights = np.repeat(layouts.weights.T, nodes, axis=1)
+        passes = _Passes(
+            job=job,
+            start=start[:, :, None],
+            placement=own.repeated(nodes),
+            desired=repeated((job.X, job.V), count),
+            weights=np.repeat(layouts.weights.T, nodes, axis=1),
+            rates=rates,
+        )
         for _ in range(MOST_PASSES):
-            change, speeds, errors = _pass(job, at, start, placement, desired=desired, weights=weights, rates=rates)
+            change, speeds, errors = passes.once(at)
             at = at + change
             is_settled = np.abs(change).max(axis=(0, 2)) <= PASSED
             if is_settled.all():
@@ -153,34 +159,51 @@ def run_near(job: Job, layouts: Layouts, q: Array, rates: Array | None = None) -
     return _completed(job, layouts, at, speeds, is_settled=is_settled & arrived & (errors <= LOST))
 
 
-def _pass(
-    job: Job,
-    at: Array,
-    start: Array,
-    placement: Placement,
-    *,
-    desired: Desired,
-    weights: Array,
-    rates: Array | None,
-) -> tuple[Array, Array, Array]:
-    """Corrections and speeds of one pass, shape (nq, K, N) both, and tool errors before it, shape (K,)."""
-    nq, count, nodes = at.shape
-    flat = at.reshape(nq, -1)
-    linear = job.tasks.linearise(flat, desired, placement, mobile=np.ones(nq), weights=weights)
-    speeds = linear.speeds().reshape(at.shape)
-    picard = (start[:, :, None] + speeds @ job.integral.T - at).reshape(nq, -1)
-    change = picard + linear.correction(picard)
-    if rates is not None:
-        change = _with_consequences(job, change.reshape(at.shape), rates).reshape(nq, -1)
-        change += linear.correction(change)
-    return change.reshape(at.shape), speeds, np.abs(linear.errors).max(axis=(0, 1)).reshape(count, nodes).max(axis=1)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Passes:
+    """What passes over all nodes of some candidates have in common; see ``run_near``.
+
+    Attributes:
+        job: The tasks at their nodes.
+        start: Start postures, shape (nq, K, 1).
+        placement: Where the robots stand.
+        desired: The desired motion.
+        weights: Joint weights, shape (nq, K N).
+        rates: How speeds change with the joints, shape (N, nq, nq); None where that is not known.
+    """
+
+    job: Job
+    start: Array
+    placement: Placement
+    desired: Desired
+    weights: Array
+    rates: Array | None
+
+    def once(self, at: Array) -> tuple[Array, Array, Array]:
+        """Corrections and speeds at joints, shape (nq, K, N) all three, and tool errors before them, shape (K,)."""
+        nq, count, nodes = at.shape
+        linear = self.job.tasks.linearise(
+            at.reshape(nq, -1), self.desired, self.placement, mobile=np.ones(nq), weights=self.weights
+        )
+        speeds = linear.speeds().reshape(at.shape)
+        picard = (self.start + speeds @ self.job.integral.T - at).reshape(nq, -1)
+        change = picard + linear.correction(picard)
+        if self.rates is not None:
+            change = _with_consequences(self.job, change.reshape(at.shape), self.rates).reshape(nq, -1)
+            change += linear.correction(change)
+        return (
+            change.reshape(at.shape),
+            speeds,
+            np.abs(linear.errors).max(axis=(0, 1)).reshape(count, nodes).max(axis=1),
+        )
 
 
 def _with_consequences(job: Job, change: Array, rates: Array) -> Array:
     """Changes of the joints, shape (nq, K, N), and what the other speeds there add to them later, by Heun's rule."""
     found = np.ascontiguousarray(np.moveaxis(change, 2, 0))
     added, speed = np.zeros_like(found[0]), rates[0] @ found[0]
-    for at, rate, step in zip(found[1:], rates[1:], np.diff(job.times).tolist(), strict=True):
+    for node, step in enumerate(np.diff(job.times).tolist(), start=1):
+        at, rate = found[node], rates[node]
         at += added
         ahead = rate @ (at + step * speed)
         speed += ahead

@@ -10,9 +10,11 @@ from cellplan.io.cell.load import load_cell
 from cellplan.planning.layout_screening import Candidates, screen_layouts
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.figures import Figures
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.run import Motions, run, run_near
+from cellplan.search.kernel.screws import Directions
 
 CELL = Path(__file__).resolve().parents[3] / "cells" / "four_robots.yaml"
 NODES = 97
@@ -90,6 +92,15 @@ def test_all_nodes_at_once_settle_near_the_motion_and_the_lost_are_run_again(
     np.testing.assert_allclose(found.q[1], motions.q[number], atol=3e-3)
     speed = np.abs(motions.qd[number]).max()
     np.testing.assert_allclose(found.qd[0], motions.qd[number], atol=0.005 * speed)
+
+
+def test_rates_change_the_way_to_a_motion_but_not_the_motion(reference: SimpleNamespace, motions: Motions) -> None:
+    number, job = int(np.flatnonzero(motions.is_followed)[0]), reference.job
+    alone = reference.layouts.of_places(slice(number, number + 1))
+    q, qd = (np.ascontiguousarray(part[number]) for part in (motions.q, motions.qd))
+    rates = differentiate(job, alone, q, qd, Directions.none(job, 1)).rates
+    given = (q + 0.01)[None]
+    np.testing.assert_allclose(run_near(job, alone, given, rates).q, run_near(job, alone, given).q, atol=1e-6)
 
 
 def test_rules_are_exact_for_polynomials(reference: SimpleNamespace) -> None:
