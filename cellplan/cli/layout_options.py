@@ -18,7 +18,6 @@ from cellplan.io.input.findings import did_you_mean, listed, shown
 from cellplan.pipeline.layout.quantities import read_angle, read_length, read_misplacement, read_time
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.search import search_layout
-from cellplan.report.record.common import Record
 from cellplan.report.text.layout import layout_lines
 from cellplan.search.programs.objective import Objective, Timing
 from cellplan.study.cluster import Cluster
@@ -120,7 +119,14 @@ def search_and_say(
             ).record
         except KeyboardInterrupt as error:
             raise InterruptedWorkError(str(error) or "interrupted") from None
-    raise typer.Exit(say_result(record, folder, as_json=as_json))
+    statuses = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}
+    outcome = statuses.get(record["status"], ExitStatus.CHECK_FAILED)
+    if as_json:
+        place = {"folder": str(folder), "report_path": str(folder / "study.html")}
+        say_json({"schema": record["schema"], "exit": int(outcome), **place, "study": record})
+    else:
+        say("\n".join(layout_lines(record, folder)))
+    raise typer.Exit(outcome)
 
 
 def default_folder(cell: Path, allow_dirs: tuple[Path, ...] = (), *, is_free: bool = False) -> Path:
@@ -140,15 +146,3 @@ def _word(option: str, text: str, kind: type[Choice]) -> Choice:
     if text not in known:
         raise InputError(f"{option}: expected one of {listed(known)}, got {shown(text)}{did_you_mean(text, known)}")
     return kind(text)
-
-
-def say_result(record: Record, folder: Path, *, as_json: bool) -> ExitStatus:
-    """Print what the search came to; the exit status that says the same."""
-    statuses = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}
-    outcome = statuses.get(record["status"], ExitStatus.CHECK_FAILED)
-    if as_json:
-        place = {"folder": str(folder), "report_path": str(folder / "study.html")}
-        say_json({"schema": record["schema"], "exit": int(outcome), **place, "study": record})
-    else:
-        say("\n".join(layout_lines(record, folder)))
-    return outcome

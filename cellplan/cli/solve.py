@@ -1,7 +1,7 @@
 """``cellplan solve``: plan a cell, check the result and write joint tables, report and plots."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -20,9 +20,6 @@ from cellplan.cli.options import (
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
-
-if TYPE_CHECKING:
-    pass
 
 SCHEMA = "cellplan.solve/1"
 
