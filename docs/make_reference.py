@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cellplan.io.schema import errors_schema, json_schema, robot_table_schema
-from cellplan.report.record.schema import layout_schema, report_schema
+from cellplan.report.record.schema import advice_schema, layout_schema, report_schema
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 PAGE, ERRORS_PAGE, REPORT_PAGE = FOLDER / "cell-file.md", FOLDER / "errors-file.md", FOLDER / "report-json.md"
@@ -89,7 +89,7 @@ bytes.
   samples: `cellplan verify` derives everything else from the tables again and leaves these as they are.
 """
 LAYOUT_INTRODUCTION = """\
-# study.json of a layout search
+# study.json and advice.json of a layout search
 
 This page is made from the types of the record by `docs/make_reference.py`; do not edit it by hand. `cellplan schema
 --layout` prints the same as a JSON Schema (draft 2020-12).
@@ -107,6 +107,9 @@ is the best layout as a cell file. The guide is [Find a layout](../guides/find-a
 
 `study.jsonl` beside it is the journal: a header, then one line for each finished trial in order, each written to disk
 before the next. It is what `--resume` reads, and no interface: its keys may change with any version.
+
+`cellplan layout CELL --repair` writes `advice.json` (`cellplan.advice/1`) with the record [Advice](#advice); the guide
+is [Repair a cell](../guides/repair-a-cell.md).
 """
 SERIES = """
 In the mode `pairwise` every task has a folder with a report of its own. The `report.json` above them is the
@@ -190,7 +193,7 @@ def report_reference() -> str:
 
 def layout_reference() -> str:
     """Text of the page about ``study.json`` of a layout search."""
-    definitions = layout_schema()["$defs"]
+    definitions = layout_schema()["$defs"] | advice_schema()["$defs"]
     return "".join([LAYOUT_INTRODUCTION, *(record_section(name, form) for name, form in definitions.items())])
 
 

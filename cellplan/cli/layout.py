@@ -5,11 +5,8 @@ from typing import Annotated
 
 import typer
 
-from cellplan.cli.errors import InterruptedWorkError
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
-from cellplan.cli.progress import progress_listener
-from cellplan.errors import ExitStatus
+from cellplan.cli.output import json_failure, say
 
 SCHEMA = "cellplan.layout/1"
 
@@ -41,6 +38,15 @@ Distance = Annotated[
 Margin = Annotated[
     str | None,
     typer.Option("--margin", metavar="ANGLE", help="Demanded margin of all turning joints, such as 15deg."),
+]
+Displaced = Annotated[
+    str | None,
+    typer.Option(
+        "--misplacement",
+        metavar="LENGTH,ANGLE",
+        help="The layout must pass, in one cycle and with its motion planned anew, with every base off by so much "
+        "along each axis and about the vertical, such as 10mm,1deg.",
+    ),
 ]
 Vary = Annotated[
     list[str] | None,
@@ -99,6 +105,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     duration: Duration = None,
     clearance: Distance = None,
     margin: Margin = None,
+    misplacement: Displaced = None,
     vary: Vary = None,
     fix: Fix = None,
     settings: Settings = None,
@@ -122,7 +129,14 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     passed, 2 bad input, 3 no start at all, 130 interrupted (--resume goes on).
     """
     with json_failure(SCHEMA, desired=as_json):
-        from cellplan.cli.layout_options import read_request, read_stop, read_workers, run_search, status_lines
+        from cellplan.cli.layout_options import (
+            Work,
+            read_request,
+            read_stop,
+            read_workers,
+            search_and_say,
+            status_lines,
+        )
 
         if status:
             say("\n".join(status_lines(cell, output)))
@@ -134,6 +148,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
             duration=duration,
             clearance=clearance,
             margin=margin,
+            misplacement=misplacement,
             vary=tuple(vary or ()),
             fixed=tuple(fix or ()),
             settings=tuple(settings or ()),
@@ -146,21 +161,5 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
 
             run_repair(request, output, workers=workers, as_json=as_json, quiet=quiet)
         stop = read_stop(budget, trials)
-        with progress_listener(quiet=quiet) as progress:
-            try:
-                searchers = read_workers(workers, scheduler)
-                record, folder = run_search(
-                    request, output, stop=stop, workers=searchers, resume=resume, progress=progress
-                )
-            except KeyboardInterrupt as error:
-                raise InterruptedWorkError(str(error) or "interrupted") from None
-    statuses = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}
-    outcome = statuses.get(record["status"], ExitStatus.CHECK_FAILED)
-    if as_json:
-        place = {"folder": str(folder), "report_path": str(folder / "study.html")}
-        say_json({"schema": SCHEMA, "exit": int(outcome), **place, "study": record})
-    else:
-        from cellplan.report.text.layout import layout_lines
-
-        say("\n".join(layout_lines(record, folder)))
-    raise typer.Exit(outcome)
+        work = Work(stop, read_workers(workers, scheduler), resume)
+        search_and_say(request, output, work, as_json=as_json, quiet=quiet)

@@ -1,20 +1,26 @@
 """Options of ``cellplan layout`` as the search takes them."""
 
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
-from cellplan.errors import InputError
+import typer
+
+from cellplan.cli.errors import InterruptedWorkError
+from cellplan.cli.output import say, say_json
+from cellplan.cli.progress import progress_listener
+from cellplan.errors import ExitStatus, InputError
 from cellplan.guard import processors
 from cellplan.io.cell.load import load_cell
 from cellplan.io.input.findings import did_you_mean, listed, shown
-from cellplan.model.progress import Progress
-from cellplan.pipeline.layout.quantities import read_angle, read_length, read_time
+from cellplan.pipeline.layout.free_motion import FREE
+from cellplan.pipeline.layout.quantities import read_angle, read_length, read_misplacement, read_time
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.search import search_layout
-from cellplan.report.record.common import Record
+from cellplan.report.text.layout import layout_lines
 from cellplan.search.programs.objective import Objective, Timing
 from cellplan.study.cluster import Cluster
 from cellplan.study.status import read_status
@@ -23,8 +29,29 @@ from cellplan.study.study import Stop
 Choice = TypeVar("Choice", bound=StrEnum)
 
 
+class Work(NamedTuple):
+    """How much is searched, by how many.
+
+    Attributes:
+        stop: Where the search ends; None for what is usual.
+        workers: Number of processes, or the address of a scheduler.
+        resume: Whether an earlier search in the folder goes on.
+    """
+
+    stop: Stop | None
+    workers: int | str
+    resume: bool
+
+
 def read_request(
-    cell: Path, *, objective: str, timing: str, clearance: str | None, margin: str | None, **others: Any
+    cell: Path,
+    *,
+    objective: str,
+    timing: str,
+    clearance: str | None,
+    margin: str | None,
+    misplacement: str | None = None,
+    **others: Any,
 ) -> LayoutRequest:
     """The request of the options.
 
@@ -37,6 +64,7 @@ def read_request(
         timing=_word("--timing", timing, Timing),
         clearance=None if clearance is None else read_length("--clearance", clearance),
         margin=None if margin is None else read_angle("--margin", margin),
+        misplacement=None if misplacement is None else read_misplacement("--misplacement", misplacement),
         **others,
     )
 
@@ -63,26 +91,68 @@ def read_workers(workers: int | None, scheduler: str | None) -> int | str:
     return scheduler or workers or processors()
 
 
-def run_search(
+def search_and_say(
     request: LayoutRequest,
     output: Path | None,
+    work: Work,
     *,
-    stop: Stop | None,
-    workers: int | str,
-    resume: bool,
-    progress: Progress,
-) -> tuple[Record, Path]:
-    """The record of the search and its folder; arguments as the options give them."""
-    folder = output or default_folder(request.cell, request.allow_dirs)
-    with ExitStack() as opened:
-        pool: int | Executor = opened.enter_context(Cluster(workers)) if isinstance(workers, str) else workers
-        found = search_layout(request, folder, stop=stop, workers=pool, resume=resume, progress=progress)
-    return found.record, folder
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Search, write the folder, say what came of it, and leave with the exit status; arguments as the options say.
+
+    Raises:
+        InputError: The cell cannot be searched.
+        InterruptedWorkError: The search was interrupted.
+        Exit: Always, at the end.
+    """
+    folder = output or default_folder(request.cell, request.allow_dirs, is_free=bool(request.free))
+    with progress_listener(quiet=quiet) as progress, ExitStack() as opened:
+        try:
+            by = work.workers
+            pool: int | Executor = opened.enter_context(Cluster(by)) if isinstance(by, str) else by
+            record = search_layout(
+                request,
+                folder,
+                stop=work.stop,
+                workers=pool,
+                resume=work.resume,
+                progress=progress,
+            ).record
+        except KeyboardInterrupt as error:
+            raise InterruptedWorkError(str(error) or "interrupted") from None
+    statuses = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}
+    outcome = statuses.get(record["status"], ExitStatus.CHECK_FAILED)
+    if as_json:
+        place = {"folder": str(folder), "report_path": str(folder / "study.html")}
+        say_json({"schema": record["schema"], "exit": int(outcome), **place, "study": record})
+    else:
+        say("\n".join(layout_lines(record, folder)))
+    raise typer.Exit(outcome)
 
 
-def default_folder(cell: Path, allow_dirs: tuple[Path, ...] = ()) -> Path:
+def default_folder(cell: Path, allow_dirs: tuple[Path, ...] = (), *, is_free: bool = False) -> Path:
     """Where the study of a cell is written unless the user says otherwise."""
-    return Path("outputs") / f"{load_cell(cell, allow_dirs=allow_dirs).name}-layout"
+    return Path("outputs") / f"{load_cell(cell, allow_dirs=allow_dirs).name}-{'fastest' if is_free else 'layout'}"
+
+
+def read_free(text: str, not_meant: Mapping[str, object]) -> tuple[str, ...]:
+    """The words of ``--free``.
+
+    Args:
+        text: Words with commas between them.
+        not_meant: Values of options that do not go with it, by option; None where not given.
+
+    Raises:
+        InputError: One of these options is given, or there is no word.
+    """
+    for option, value in not_meant.items():
+        if value is not None:
+            raise InputError(f"{option}: expected not together with --free, which searches the whole job; leave it out")
+    words = tuple(word.strip() for word in text.split(",") if word.strip())
+    if not words:
+        raise InputError(f"--free: expected some of {listed(FREE)}, got {shown(text)}")
+    return words
 
 
 def status_lines(cell: Path, output: Path | None) -> list[str]:

@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.io.yaml.writer import flow_text
+from cellplan.model.cell import Cell
+from cellplan.pipeline.synchronous import is_searchable
 
 OPTIONS: Final = {"motion.duration_s": "--duration", "checks.clearance_mm": "--clearance"}  # by address
 
@@ -25,3 +27,8 @@ def repair_line(cell: Path, changes: Mapping[str, object], allow_dirs: Sequence[
     for folder in allow_dirs:
         words += ["--allow-dir", str(folder)]
     return f"next: {shlex.join(words)}"
+
+
+def repair_lines(cell: Path, solved: Cell, allow_dirs: Sequence[Path] = ()) -> list[str]:
+    """The same for a job that can be searched; nothing for others."""
+    return [repair_line(cell, solved.origin.changes, allow_dirs)] if is_searchable(solved) else []

@@ -58,12 +58,11 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.background_plots import BackgroundPlots
 
         plots = BackgroundPlots(background)  # the child imports matplotlib while this process imports the rest
-        from cellplan.cli.repair_line import repair_line
+        from cellplan.cli.repair_line import repair_lines
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
         from cellplan.pipeline.solve import solve_with_plots
-        from cellplan.pipeline.synchronous import is_searchable
         from cellplan.pipeline.write_run import write_run
         from cellplan.report.text.run import summary_lines
 
@@ -88,9 +87,8 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         place = {"folder": str(folder), "report_path": str(folder / "report.html")}
         say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "report": record})
     else:
-        say("\n".join(summary_lines(record, folder)))
+        further = [] if solution.passed or task is not None else repair_lines(cell, changed, allow_dir or ())
+        say("\n".join([*summary_lines(record, folder), *further]))
         if solution.remark:
             say(solution.remark)
-        if not solution.passed and task is None and is_searchable(changed):
-            say(repair_line(cell, changed.origin.changes, allow_dir or ()))
     raise typer.Exit(status)

@@ -13,11 +13,13 @@ from cellplan.model.cell import Cell
 from cellplan.model.layout import VariableKind
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.layout.joint_path import PathSearch, resolving, without_path
 from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.synchronous import refuse_other_jobs
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.verdicts import acceleration_limits
@@ -25,12 +27,14 @@ from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Job
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Objective
+from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.starts.generator import StartGenerator
 from cellplan.search.starts.problem import StartProblem
 from cellplan.search.variables.choices import Choices
 from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
+MORE_NODES: Final = 64  # [-] of a motion along a spline: some at each knot
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,6 +49,8 @@ class Prepared:
         bodies: Their distances, wherever the layout puts them.
         schedule: The tasks on the common clock.
         moving: Names of the robots that move.
+        unled: The same search without the joint path that varies: motions by the pseudo-inverse, which paths begin
+            with; None where no path varies.
         found_start: The start posture of the given layout where it was found before all else, shape (nq,).
     """
 
@@ -55,6 +61,7 @@ class Prepared:
     bodies: CellDistances
     schedule: Schedule
     moving: tuple[str, ...]
+    unled: "Prepared | None" = None
     found_start: Array | None = None
 
     @classmethod
@@ -68,7 +75,8 @@ class Prepared:
         Raises:
             InputError: The paths, bodies or variables of the cell are not usable.
         """
-        variables = Variables.of(cell)
+        unled = without_path(cell)
+        variables = Variables.of(cell, without=() if unled is None else resolving(cell))
         scene = Scene.from_cell(variables.base)
         paths = clock_paths(variables.base, [build_toolpath(task, cell.part) for task in cell.tasks])
         phase = plan_phases(variables.base).program[0]
@@ -80,6 +88,7 @@ class Prepared:
             bodies=CellDistances.of(scene, variables),
             schedule=schedule_paths(variables.base, [paths[name] for name in phase.tasks]),
             moving=tuple(phase.moving),
+            unled=None if unled is None else cls.of(request, unled),
         )
         is_found = any(each.kind is VariableKind.START and each.given is None for each in variables.tied.ranges)
         return found._with_found_start() if is_found else found
@@ -95,17 +104,38 @@ class Prepared:
         given = variables.read_from(replace(base, robots=tuple(robots)))
         return replace(self, variables=replace(variables, given=given), found_start=start)
 
-    def problem(self, nodes: int = NODES) -> LayoutProblem:
-        """The layout problem at about so many nodes."""
-        job = Job.of(self.variables.base, self.schedule, moving=self.moving, nodes=nodes)
-        return LayoutProblem(
-            job=job, variables=self.variables, bodies=self.bodies, acceleration=acceleration_limits(self.scene)
-        )
+    def problem(self, nodes: int = NODES) -> LayoutProblem | PathProblem:
+        """The problem at about so many nodes: of the layout, or of the joint path and whatever else varies."""
+        variables, acceleration = self.variables, acceleration_limits(self.scene)
+        if self.unled is None:
+            job = Job.of(variables.base, self.schedule, moving=self.moving, nodes=nodes)
+            return LayoutProblem(job=job, variables=variables, bodies=self.bodies, acceleration=acceleration)
+        return self.path_search.problem(nodes + MORE_NODES, bodies=self.bodies, acceleration=acceleration)
 
     @cached_property
-    def coarse(self) -> LayoutProblem:
-        """The layout problem of the trials."""
+    def coarse(self) -> LayoutProblem | PathProblem:
+        """The problem of the trials."""
         return self.problem()
+
+    def values(self, x: Array, start: Array) -> dict[str, object]:
+        """What to write into the given cell file: values by address, rounded."""
+        problem = self.coarse
+        return (problem if isinstance(problem, PathProblem) else self.variables).values(x, start)
+
+    @cached_property
+    def path_search(self) -> PathSearch:
+        """Joint paths of this search.
+
+        Raises:
+            ValueError: No joint path may change.
+        """
+        if self.unled is None:
+            raise ValueError("expected a cell whose joint path may change")
+        try:
+            start = self.given_start
+        except NoSolutionError:
+            start = np.concatenate([0.5 * np.add(*finite_limits(robot.model)) for robot in self.variables.base.robots])
+        return PathSearch(own=self.variables, unled=self.unled.variables, schedule=self.schedule, start=start)
 
     @property
     def given_start(self) -> Array:
@@ -165,7 +195,7 @@ class Prepared:
     @property
     def has_accelerations(self) -> bool:
         """Whether any joint is judged by its acceleration."""
-        return self.coarse.is_accelerating
+        return bool(np.isfinite(acceleration_limits(self.scene)).any())
 
     def demands(self, **changes: Any) -> Demands:
         """What is demanded of a layout."""

@@ -13,6 +13,7 @@ from cellplan.study.trial import Trial
 SIZE: Final = 4  # [-] trials of a round
 WIDE: Final = (1.0, 1.0, 1.5)  # [-] usual steps of perturbations of the given layout, in turn
 NARROW: Final = (0.7, 1.0, 0.4)  # [-] and of the best ones
+SLIGHT: Final = 0.2  # [-] and of the given one where the first layout that conforms ends the search
 GIVEN_UP: Final = 1.25  # [-] cycle as a multiple of the best one above which a trial is given up on its way
 ADDED: Final = (0.010, 0.025, 0.005, 0.050)  # [m] clearance beyond the demand of trials for the front, in turn
 SAME: Final = 5e-3  # [-] share by which the objectives of two layouts differ that are not one
@@ -59,8 +60,8 @@ class Proposals:
         ]
         lost = [trial.variant.values.get("choice", {}) for trial in finished if _leads_nowhere(trial)]
         for place, each in enumerate(proposed):
-            is_anew = each["kind"] == "sampled" or (each["kind"] == "perturbed" and each["of"] is None)
-            if is_anew and each["choice"] in lost:
+            is_far = each["kind"] == "sampled" or (each["kind"] == "perturbed" and each["of"] is None)
+            if is_far and each["choice"] in lost:
                 proposed[place] = {**self._sampled(len(finished) + place, 0), "choice": each["choice"]}
         if not following or self.request.objective is not Objective.CYCLE:
             return proposed
@@ -73,6 +74,8 @@ class Proposals:
             {"kind": "given"},
             *({"kind": "attempt", "index": k} for k in range(len(self.request.attempts))),
         ]
+        if self.request.seed and self.request.objective is Objective.CONFORMING:
+            listed[0] = {"kind": "perturbed", "of": None, "spread": SLIGHT}  # another seed, another layout
         options: list[dict[str, Any]] = [{**each, "choice": choice} for choice in self.choices for each in listed]
         options += [{"kind": "branch", **each, "choice": self.choices[0]} for each in self.branches]
         options += [self._sampled(0, number) for number in range(1, len(self.choices))]
@@ -107,6 +110,7 @@ class Proposals:
             "x": figures["x"],
             "start": figures["start"],
             "choice": values.get("choice", {}),
+            **({"unled": figures["unled"]} if "unled" in figures else {}),
         }
 
     def _sampled(self, index: int, number: int) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from cellplan.pipeline.layout.limits import Standing, effects, standing_of
 from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, choice_text, origin_text
 from cellplan.pipeline.layout.request import LayoutRequest
-from cellplan.pipeline.layout.trial import EFFORT
+from cellplan.pipeline.layout.trial import EFFORT, change_of
 from cellplan.pipeline.write_run import versions
 from cellplan.report.record.common import number
 from cellplan.report.record.layout import (
@@ -60,7 +60,7 @@ def layout_record(
     request, cell = ready.request, ready.cell
     listed = list(_candidates(ready, finished, tried))
     given = _given_standing(ready)
-    standing = given if best is None else best.standing
+    standing = best.standing if best else None if ready.unled else given
     of_best = ready if best is None else _prepared_of(ready, next(_of_number(finished, best.trial)))
     is_free = request.objective == "cycle"
     return {
@@ -89,6 +89,7 @@ def layout_record(
         "convergence": _convergence(finished),
         "choices": _choices(ready, finished, tried),
         "dropped": _dropped(finished),
+        "misplacement": None,
         "remarks": list(ready.variables.remarks),
         "drawing": _drawing(ready, best) if best else {},
         "files": [],
@@ -148,9 +149,9 @@ def _candidate(ready: Prepared, trial: Mapping[str, Any], certified: Certified |
                 "cycle_s": certified.program.cycle,
                 "margin_deg": certified.margin,
                 "clearance_mm": certified.clearance,
-                "change": float((np.abs(x - ready.variables.given) * ready.variables.cost).sum()),
+                "change": change_of(ready, x),
             }
-    settings = plain_values({**(trial["values"].get("choice") or {}), **ready.variables.values(x, start)})
+    settings = plain_values({**(trial["values"].get("choice") or {}), **ready.values(x, start)})
     rounded = {key: None if value is None else number(round(value, FINE)) for key, value in shown.items()}
     return {
         "trial": trial["trial"],
@@ -179,8 +180,10 @@ def _front(listed: list[CandidateRecord]) -> list[CandidateRecord]:
 
 def _given_standing(ready: Prepared) -> Standing | None:
     """How the given layout stands; None where a tool cannot follow."""
+    if ready.unled is not None and not ready.path_search.is_given:
+        return _given_standing(ready.unled)
     try:
-        point = ready.coarse.evaluate(ready.variables.given, ready.given_start)
+        point = ready.coarse.evaluate(ready.coarse.given, ready.given_start)
     except NoSolutionError:
         return None
     return None if point is None else standing_of(ready.coarse, point, ready.demands(), EFFORT)
@@ -191,7 +194,10 @@ def _given(standing: Standing | None, ready: Prepared) -> GivenRecord:
     if standing is None:
         return {"status": "violating", "cycle_s": None, "margin_deg": None, "clearance_mm": None, "violations": []}
     at_duration = standing_of(
-        ready.coarse, standing.measures.point, ready.demands(objective="conforming", duration=ready.duration), EFFORT
+        standing.problem,
+        standing.measures.point,
+        ready.demands(objective="conforming", duration=ready.duration),
+        EFFORT,
     )
     violations = at_duration.violations()
     return {
@@ -206,9 +212,10 @@ def _given(standing: Standing | None, ready: Prepared) -> GivenRecord:
 def _variables(ready: Prepared, standing: Standing | None, best: Certified | None) -> list[VariableRecord]:
     """The variables in the units of the file, with their effects."""
     variables, names = ready.variables, ready.variables.names
+    before = len(ready.coarse.names) - len(names)  # coefficients of a joint path have no rows
     units = [_unit(name) for name in names]
     steps = np.array([{"mm": LENGTH_STEP, "deg": ANGLE_STEP, "": float(np.log(2.0))}[unit] for unit in units])
-    of = effects(standing, steps) if standing is not None else {}
+    of = effects(standing, np.append(np.zeros(before), steps)) if standing is not None else {}
     shown: list[VariableRecord] = []
     for place, (name, unit) in enumerate(zip(names, units, strict=True)):
         values = (variables.lower, variables.upper, variables.given)
@@ -220,11 +227,11 @@ def _variables(ready: Prepared, standing: Standing | None, best: Certified | Non
                 "lower": lower,
                 "upper": upper,
                 "given": given,
-                "best": None if best is None else _in_file_units(float(best.x[place]), unit),
+                "best": None if best is None else _in_file_units(float(best.x[before + place]), unit),
                 "step": {"mm": MM * LENGTH_STEP, "deg": DEG * ANGLE_STEP, "": 2.0}[unit],
-                "cycle_s": of["cycle_s"][place] if of else None,
-                "margin_deg": of["margin_deg"][place] if of else None,
-                "clearance_mm": of["clearance_mm"][place] if of else None,
+                "cycle_s": of["cycle_s"][before + place] if of else None,
+                "margin_deg": of["margin_deg"][before + place] if of else None,
+                "clearance_mm": of["clearance_mm"][before + place] if of else None,
             }
         )
     return shown

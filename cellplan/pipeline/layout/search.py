@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
+from cellplan.pipeline.layout.misplacement import MisplacedFinish
 from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals
 from cellplan.pipeline.layout.record import head_of, layout_record
@@ -150,7 +151,9 @@ def search_layout(
     with ExitStack() as opened:
         pool = workers
         if isinstance(workers, int):
-            pool = opened.enter_context(Workers(workers, modules=MODULES))
+            first = partial(prepared, request.anywhere)
+            at_once = 1 if request.objective is Objective.CONFORMING else None  # mostly its first trial is the last
+            pool = opened.enter_context(Workers(workers, modules=MODULES, first=first, at_once=at_once))
         ready = prepared(request)
         read_attempts(request, ready.cell)  # what is wrong with one is said before anything is tried
         search = _Search(
@@ -160,18 +163,28 @@ def search_layout(
             workers=pool,
             stop=stop or Stop(seconds=BUDGET),
             progress=progress,
-            finish=Finish(ready=ready, progress=progress),
+            finish=finish_of(ready, progress),
             choices=tuple(Choices.of(ready.cell).values()),
-            branches=ready.branches(),
+            branches=(ready.unled or ready).branches(),
         )
         finished, best = search.run(resume=resume)
         progress("writing the result", 1.0)
         return _written(search, finished, best)
 
 
+def finish_of(ready: Prepared, progress: Progress) -> Finish:
+    """The finish of the layouts of a cell, with displaced bases where they are asked for."""
+    misplacement = ready.variables.settings.misplacement
+    if misplacement is None:
+        return Finish(ready=ready, progress=progress)
+    return MisplacedFinish(ready=ready, progress=progress, misplacement=misplacement)
+
+
 def _written(search: _Search, finished: Finished, best: Certified | None) -> LayoutResult:
     """The record and all files."""
     record = layout_record(search.ready, finished, tried=search.tried, best=best, solves=search.finish.solves)
+    if isinstance(search.finish, MisplacedFinish) and best is not None:
+        record["misplacement"] = search.finish.records[best.trial]
     beside: dict[str, bytes] = {}
     if best is not None:
         head = head_of(record, search.request)

@@ -91,11 +91,8 @@ def _refined(
         worst = {int(near.pairs[row]): int(near.nodes[row]) for row in np.argsort(lacks) if lacks[row] > 0.0}
         if not worst:
             break
-        instants = {float(problem.times[node]) for node in worst.values()}
-        effort, (x, start) = (
-            replace(effort, also_at=tuple(sorted({*effort.also_at, *instants}))),
-            (found.x, found.start),
-        )
+        also_at = {*effort.also_at, *(float(problem.times[node]) for node in worst.values())}
+        effort, x, start = replace(effort, also_at=tuple(sorted(also_at))), found.x, found.start
     return found, effort
 
 

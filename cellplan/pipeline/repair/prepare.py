@@ -18,6 +18,7 @@ from cellplan.pipeline.repair.attempts import Attempt
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.run import run
+from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.variables.pedestals import with_pedestals
 from cellplan.search.variables.ties import Tied
 
@@ -38,11 +39,11 @@ def start_posture(ready: Prepared) -> tuple[Array, str]:
     try:
         return ready.given_start, ""
     except NoSolutionError as error:
-        postures = []
+        starts = []
         for robot in ready.variables.base.robots:
             lower, upper = finite_limits(robot.model)
-            postures.append(0.5 * (lower + upper) if robot.start is None else robot.start)
-        return np.concatenate(postures), str(error).splitlines()[0]
+            starts.append(0.5 * (lower + upper) if robot.start is None else robot.start)
+        return np.concatenate(starts), str(error).splitlines()[0]
 
 
 def with_attempt(ready: Prepared, attempt: Attempt) -> Prepared:
@@ -82,12 +83,14 @@ def begins(ready: Prepared, start: Array, *, seed: int, count: int) -> Iterator[
 
 def _near(ready: Prepared, start: Array, rng: np.random.Generator) -> Begin | None:
     """The layout of least change among draws in which all tools follow their paths; None without one."""
-    variables = ready.variables
+    variables, problem = ready.variables, ready.coarse
+    if isinstance(problem, PathProblem):
+        return None
     for spread in SPREADS:
         steps = spread * variables.scale * rng.standard_normal((DRAWS, len(variables.names)))
         x = np.clip(variables.given + steps, variables.lower, variables.upper)
         starts = np.tile(start, (DRAWS, 1))
-        followed = np.flatnonzero(run(ready.coarse.job, variables.layouts(x, starts)).is_followed)
+        followed = np.flatnonzero(run(problem.job, variables.layouts(x, starts)).is_followed)
         if len(followed):
             cost = np.abs(x[followed] - variables.given) @ variables.cost
             return x[followed[int(cost.argmin())]], start

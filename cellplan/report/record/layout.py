@@ -3,6 +3,7 @@
 from typing import Annotated, Any, Final, TypedDict
 
 from cellplan.report.record.common import Number
+from cellplan.report.record.misplacement import MisplacementRecord
 
 SCHEMA: Final = "cellplan.layout/1"
 
@@ -116,6 +117,9 @@ class LayoutRecord(TypedDict):
     convergence: Annotated[list[ProgressRecord], "the search, trial after trial"]
     choices: Annotated[list[ChoiceRecord], "every combination of discrete choices; empty without any"]
     dropped: Annotated[list[DroppedRecord], "trials without a conforming layout, by reason"]
+    misplacement: Annotated[
+        MisplacementRecord | None, "the layout with every base off its place; null where it was not asked for"
+    ]
     remarks: Annotated[list[str], "what else the user should know, as pedestals that move with their robots"]
     drawing: Annotated[dict[str, Any], "floor plan in mm: the given and the best layout from above"]
     files: Annotated[list[FileRecord], "`best.yaml` and the files that it names"]

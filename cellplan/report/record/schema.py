@@ -4,6 +4,7 @@ import types
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints, is_typeddict
 
+from cellplan.report.record.advice import AdviceRecord
 from cellplan.report.record.layout import LayoutRecord
 from cellplan.report.record.run import RunRecord
 from cellplan.report.record.summary import SummaryRecord
@@ -37,15 +38,19 @@ def report_schema(*, closed: bool = False) -> dict[str, Any]:
 
 def layout_schema() -> dict[str, Any]:
     """The JSON Schema of ``study.json`` of a layout search."""
+    return _whole(LayoutRecord, "cellplan.layout/1", "study.json of a layout search")
+
+
+def advice_schema() -> dict[str, Any]:
+    """The JSON Schema of ``advice.json``."""
+    return _whole(AdviceRecord, "cellplan.advice/1", "advice.json of a repair")
+
+
+def _whole(form: Any, title: str, description: str) -> dict[str, Any]:
+    """The schema of a file with one record."""
     definitions: dict[str, dict[str, Any]] = {}
-    form = _schema(LayoutRecord, definitions, closed=False)
-    return {
-        "$schema": DIALECT,
-        "title": "cellplan.layout/1",
-        "description": "study.json of a layout search",
-        **form,
-        "$defs": definitions,
-    }
+    top = _schema(form, definitions, closed=False)
+    return {"$schema": DIALECT, "title": title, "description": description, **top, "$defs": definitions}
 
 
 def _schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) -> dict[str, Any]:

@@ -31,6 +31,7 @@ def layout_lines(record: Record, folder: Path) -> list[str]:
         lines += [f"  rejected by solve: {each['reason']}" for each in rejected[:MOST]]
         lines += [f"  {each['reason']} ({_trials(each['count'])})" for each in record["dropped"][:MOST]]
     lines += [f"  {line}" for line in map(_choice, record["choices"])]
+    lines += [f"  {line}" for line in _misplaced(record)]
     lines += [f"  {remark}" for remark in record["remarks"]]
     lines.append(f"  {_trials(record['trials'])} in {record['rounds']} rounds, {record['solves']} solved in full")
     if record["best"] is not None:
@@ -60,6 +61,20 @@ def changed_variables(record: Record) -> Entries:
         for each in record["variables"]
         if None not in (each["given"], each["best"]) and abs(each["best"] - each["given"]) > SAME
     ]
+
+
+def _misplaced(record: Record) -> Iterator[str]:
+    """What was sampled with displaced bases."""
+    found = record["misplacement"]
+    if found is None:
+        return
+    by = f"{found['position_mm']:g} mm and {found['orientation_deg']:g} deg"
+    yield f"with every base off by {by}, sampled, motion planned anew, in this one cycle:"
+    yield (
+        f"  {found['seeded_kept']} of {found['seeded']} seeded corners, {found['by_derivatives_kept']} of "
+        f"{found['by_derivatives']} worst corners by derivatives, {found['ends_kept']} of {found['ends']} single "
+        f"displacements keep all demands; {len(found['solved'])} of them solved in full"
+    )
 
 
 def _given(record: Record) -> str:

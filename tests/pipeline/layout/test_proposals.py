@@ -5,6 +5,7 @@ from typing import Any
 
 from cellplan import LayoutRequest
 from cellplan.pipeline.layout.proposals import SIZE, Proposals, choice_text, origin_text
+from cellplan.search.programs.objective import Objective
 from cellplan.study.trial import Outcome, Trial, TrialStatus, Variant
 
 REQUEST = LayoutRequest(cell=Path("cell.yaml"))
@@ -65,6 +66,15 @@ def test_while_nothing_conforms_every_round_has_a_sample() -> None:
 
     assert ["sampled" in {each["kind"] for each in tried} for tried in rounds] == [True, True, True]
     assert not any("give_up_above_s" in each for tried in rounds for each in tried)
+
+
+def test_another_seed_begins_a_search_for_any_conforming_layout_elsewhere() -> None:
+    begins = [
+        Proposals(request=LayoutRequest(cell=Path("cell.yaml"), objective=Objective.CONFORMING, seed=seed))([])[0]
+        for seed in (0, 1)
+    ]
+
+    assert [each["kind"] for each in begins] == ["given", "perturbed"]
 
 
 def test_where_the_given_layout_leads_nowhere_samples_take_its_place() -> None:
