@@ -60,8 +60,8 @@ class Proposals:
         ]
         lost = [trial.variant.values.get("choice", {}) for trial in finished if _leads_nowhere(trial)]
         for place, each in enumerate(proposed):
-            is_anew = each["kind"] == "sampled" or (each["kind"] == "perturbed" and each["of"] is None)
-            if is_anew and each["choice"] in lost:
+            is_far = each["kind"] == "sampled" or (each["kind"] == "perturbed" and each["of"] is None)
+            if is_far and each["choice"] in lost:
                 proposed[place] = {**self._sampled(len(finished) + place, 0), "choice": each["choice"]}
         if not following or self.request.objective is not Objective.CYCLE:
             return proposed
