@@ -1,7 +1,7 @@
 """``cellplan fastest``: the shortest cycle of a cell, its production curve, and the calmest program for a demand."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -76,7 +76,7 @@ def fastest(  # noqa: PLR0913, PLR0917 - the options of the command
     if free is not None:
         words = read_words(free, {"--demand": demand, "--task": task})
         chosen = [f"{key}={value}" for key, value in (("motion.mode", mode), ("solver.method", method)) if value]
-        options: dict[str, object] = {
+        options: dict[str, Any] = {
             "timing": timing,
             "clearance": clearance,
             "margin": margin,
