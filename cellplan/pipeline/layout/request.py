@@ -100,6 +100,11 @@ def searched_cell(request: LayoutRequest) -> Cell:
         values["layout.vary"] = _varied(cell, request)
     changed = cell.with_values(values) if values else cell
     refuse_other_jobs(changed, "a layout search")
+    if request.timing is Timing.RETIMED and changed.layout is not None and changed.layout.misplacement is not None:
+        raise InputError(
+            "--timing: expected 'laws' where bases may be off their places, got 'retimed': leave out --misplacement or "
+            "--timing"
+        )
     return changed
 
 
