@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from cellplan.cli.layout import SCHEMA as LAYOUT
+from cellplan.cli.fastest_free import read_words, search_free
 from cellplan.cli.layout import Budget, Distance, HowTimed, Margin, Resume, Seed, Trials
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Method, Mode, Quiet, Settings
 from cellplan.cli.output import json_failure, say, say_json
@@ -74,32 +74,11 @@ def fastest(  # noqa: PLR0913, PLR0917 - the options of the command
     folder of cellplan layout is written, with the fastest cell as best.yaml.
     """
     if free is not None:
-        with json_failure(LAYOUT, desired=as_json):
-            from cellplan.cli.layout_options import (
-                Work,
-                read_free,
-                read_request,
-                read_stop,
-                read_workers,
-                search_and_say,
-            )
-
-            extra = [f"{key}={value}" for key, value in (("motion.mode", mode), ("solver.method", method)) if value]
-            request = read_request(
-                cell,
-                objective="cycle",
-                timing=timing,
-                clearance=clearance,
-                margin=margin,
-                free=read_free(free, {"--demand": demand, "--task": task}),
-                settings=(*(settings or ()), *extra),
-                seed=seed,
-                allow_dirs=tuple(allow_dir or ()),
-            )
-            stop = read_stop(budget, trials)
-            search_and_say(
-                request, output, Work(stop, read_workers(workers, None), resume), as_json=as_json, quiet=quiet
-            )
+        words = read_words(free, {"--demand": demand, "--task": task})
+        chosen = [f"{key}={value}" for key, value in (("motion.mode", mode), ("solver.method", method)) if value]
+        options = {"timing": timing, "clearance": clearance, "margin": margin, "seed": seed, "free": words}
+        options |= {"settings": (*(settings or ()), *chosen), "allow_dirs": tuple(allow_dir or ())}
+        search_free(cell, output, options, (budget, trials, workers, resume), as_json=as_json, quiet=quiet)
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.guard import processors
         from cellplan.io.cell.load import load_cell

@@ -1,6 +1,5 @@
 """Options of ``cellplan layout`` as the search takes them."""
 
-from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from enum import StrEnum
@@ -16,7 +15,6 @@ from cellplan.errors import ExitStatus, InputError
 from cellplan.guard import processors
 from cellplan.io.cell.load import load_cell
 from cellplan.io.input.findings import did_you_mean, listed, shown
-from cellplan.pipeline.layout.free_motion import FREE
 from cellplan.pipeline.layout.quantities import read_angle, read_length, read_misplacement, read_time
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.search import search_layout
@@ -134,25 +132,6 @@ def search_and_say(
 def default_folder(cell: Path, allow_dirs: tuple[Path, ...] = (), *, is_free: bool = False) -> Path:
     """Where the study of a cell is written unless the user says otherwise."""
     return Path("outputs") / f"{load_cell(cell, allow_dirs=allow_dirs).name}-{'fastest' if is_free else 'layout'}"
-
-
-def read_free(text: str, not_meant: Mapping[str, object]) -> tuple[str, ...]:
-    """The words of ``--free``.
-
-    Args:
-        text: Words with commas between them.
-        not_meant: Values of options that do not go with it, by option; None where not given.
-
-    Raises:
-        InputError: One of these options is given, or there is no word.
-    """
-    for option, value in not_meant.items():
-        if value is not None:
-            raise InputError(f"{option}: expected not together with --free, which searches the whole job; leave it out")
-    words = tuple(word.strip() for word in text.split(",") if word.strip())
-    if not words:
-        raise InputError(f"--free: expected some of {listed(FREE)}, got {shown(text)}")
-    return words
 
 
 def status_lines(cell: Path, output: Path | None) -> list[str]:

@@ -15,7 +15,7 @@ from cellplan.model.units import DEG, MM
 from cellplan.pipeline.fastest.scaling import scaled_values, whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.limits import Standing, standing_of
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import Prepared, values_of
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
 
@@ -171,7 +171,7 @@ class Finish:
         """The program of a layout, solved and verified in full, and why it is rejected."""
         self.solves += 1
         try:
-            cell = self.ready.variables.given_cell.with_values(self.ready.values(x, start))
+            cell = self.ready.variables.given_cell.with_values(values_of(self.ready, x, start))
             program = self._timed(cell, standing.measures.cycle).certified(self.progress)
         except (InputError, NoSolutionError) as error:
             return None, str(error).splitlines()[0]

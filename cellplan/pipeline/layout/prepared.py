@@ -91,18 +91,7 @@ class Prepared:
             unled=None if unled is None else cls.of(request, unled),
         )
         is_found = any(each.kind is VariableKind.START and each.given is None for each in variables.tied.ranges)
-        return found._with_found_start() if is_found else found
-
-    def _with_found_start(self) -> "Prepared":
-        """The same with the start posture that a solve finds as what is given; unchanged where it finds none."""
-        try:
-            start = self.given_start
-        except NoSolutionError:
-            return self
-        base, variables = self.variables.base, self.variables
-        robots = [replace(each, start=start[base.columns(each.name)]) for each in base.robots]
-        given = variables.read_from(replace(base, robots=tuple(robots)))
-        return replace(self, variables=replace(variables, given=given), found_start=start)
+        return _with_found_start(found) if is_found else found
 
     def problem(self, nodes: int = NODES) -> LayoutProblem | PathProblem:
         """The problem at about so many nodes: of the layout, or of the joint path and whatever else varies."""
@@ -116,11 +105,6 @@ class Prepared:
     def coarse(self) -> LayoutProblem | PathProblem:
         """The problem of the trials."""
         return self.problem()
-
-    def values(self, x: Array, start: Array) -> dict[str, object]:
-        """What to write into the given cell file: values by address, rounded."""
-        problem = self.coarse
-        return (problem if isinstance(problem, PathProblem) else self.variables).values(x, start)
 
     @cached_property
     def path_search(self) -> PathSearch:
@@ -207,6 +191,30 @@ class Prepared:
             "timing": self.request.timing,
         }
         return Demands(**(values | changes))
+
+
+def values_of(ready: Prepared, x: Array, start: Array) -> dict[str, object]:
+    """What to write into the given cell file for a point of its problem: values by address, rounded.
+
+    Args:
+        ready: The cell.
+        x: The variables, shape (n,).
+        start: Start posture in [rad] or [m], shape (nq,).
+    """
+    problem = ready.coarse
+    return (problem if isinstance(problem, PathProblem) else ready.variables).values(x, start)
+
+
+def _with_found_start(ready: Prepared) -> Prepared:
+    """The same with the start posture that a solve finds as what is given; unchanged where it finds none."""
+    try:
+        start = ready.given_start
+    except NoSolutionError:
+        return ready
+    base, variables = ready.variables.base, ready.variables
+    robots = [replace(each, start=start[base.columns(each.name)]) for each in base.robots]
+    given = variables.read_from(replace(base, robots=tuple(robots)))
+    return replace(ready, variables=replace(variables, given=given), found_start=start)
 
 
 def prepared(request: LayoutRequest, choice: Mapping[str, object] | None = None) -> Prepared:

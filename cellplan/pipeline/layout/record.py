@@ -15,7 +15,7 @@ from cellplan.model.units import DEG, MM
 from cellplan.pipeline.drawing import drawing, footprint, swept_area
 from cellplan.pipeline.layout.finish import Certified, certified_cell
 from cellplan.pipeline.layout.limits import Standing, effects, standing_of
-from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.prepared import Prepared, prepared, values_of
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, choice_text, origin_text
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.trial import EFFORT, change_of
@@ -151,7 +151,7 @@ def _candidate(ready: Prepared, trial: Mapping[str, Any], certified: Certified |
                 "clearance_mm": certified.clearance,
                 "change": change_of(ready, x),
             }
-    settings = plain_values({**(trial["values"].get("choice") or {}), **ready.values(x, start)})
+    settings = plain_values({**(trial["values"].get("choice") or {}), **values_of(ready, x, start)})
     rounded = {key: None if value is None else number(round(value, FINE)) for key, value in shown.items()}
     return {
         "trial": trial["trial"],
