@@ -1,7 +1,7 @@
 """``cellplan fastest``: the shortest cycle of a cell, its production curve, and the calmest program for a demand."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -76,7 +76,13 @@ def fastest(  # noqa: PLR0913, PLR0917 - the options of the command
     if free is not None:
         words = read_words(free, {"--demand": demand, "--task": task})
         chosen = [f"{key}={value}" for key, value in (("motion.mode", mode), ("solver.method", method)) if value]
-        options = {"timing": timing, "clearance": clearance, "margin": margin, "seed": seed, "free": words}
+        options: dict[str, Any] = {
+            "timing": timing,
+            "clearance": clearance,
+            "margin": margin,
+            "seed": seed,
+            "free": words,
+        }
         options |= {"settings": (*(settings or ()), *chosen), "allow_dirs": tuple(allow_dir or ())}
         search_free(cell, output, options, (budget, trials, workers, resume), as_json=as_json, quiet=quiet)
     with json_failure(SCHEMA, desired=as_json):
