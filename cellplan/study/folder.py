@@ -120,7 +120,7 @@ def _listed(folder: Path) -> Mapping[str, str]:
 
 
 def _is_listed(entry: Path, folder: Path, listed: Mapping[str, str]) -> bool:
-    """Whether a file, or every file of a folder, is a result that nobody has changed since."""
+    """Whether a file, or every file of a folder, is a result that no one has changed since."""
     if entry.is_symlink():
         return False
     if entry.is_dir():
