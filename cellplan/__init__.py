@@ -4,13 +4,14 @@ The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
 - compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``base_map``, ``search_layout``,
-  ``rehearse``
+  ``repair``, ``rehearse``
 - verify: ``verify``, ``open_gate``
-- write: ``write_run``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``, ``export_program``
+- write: ``write_run``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``, ``write_repair``,
+  ``export_program``
 - inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``BaseGrid``,
   ``CompareJob``, ``LayoutRequest``, ``Stop``
 - results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``,
-  ``LayoutResult``
+  ``LayoutResult``, ``Repair``
 - errors: ``CellplanError``
 
 Names are imported at first use, so that ``import cellplan`` and the help of the command line are fast.
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
     from cellplan.pipeline.layout.search import LayoutResult, search_layout
     from cellplan.pipeline.rehearsal.rehearse import rehearse
     from cellplan.pipeline.rehearsal.write import write_rehearsal
+    from cellplan.pipeline.repair.repair import Repair, repair
+    from cellplan.pipeline.repair.write import write_repair
     from cellplan.pipeline.screen import screen
     from cellplan.pipeline.solution import Solution
     from cellplan.pipeline.solve import solve
@@ -68,6 +71,7 @@ _HOME: Final = {
     "Motion": "model.motion",
     "Part": "model.cell",
     "Program": "model.motion",
+    "Repair": "pipeline.repair.repair",
     "Report": "model.report",
     "Robot": "model.cell",
     "Screening": "planning.layout_screening",
@@ -85,6 +89,7 @@ _HOME: Final = {
     "load_errors": "io.cell_errors",
     "open_gate": "pipeline.gate.open_gate",
     "rehearse": "pipeline.rehearsal.rehearse",
+    "repair": "pipeline.repair.repair",
     "screen": "pipeline.screen",
     "search_layout": "pipeline.layout.search",
     "solve": "pipeline.solve",
@@ -92,6 +97,7 @@ _HOME: Final = {
     "verify": "pipeline.verify",
     "write_base_map": "pipeline.base_map.judged",
     "write_fastest": "pipeline.fastest.write",
+    "write_repair": "pipeline.repair.write",
     "write_rehearsal": "pipeline.rehearsal.write",
     "write_run": "pipeline.write_run",
 }
@@ -109,6 +115,7 @@ __all__ = [
     "Motion",
     "Part",
     "Program",
+    "Repair",
     "Report",
     "Robot",
     "Screening",
@@ -127,6 +134,7 @@ __all__ = [
     "load_errors",
     "open_gate",
     "rehearse",
+    "repair",
     "screen",
     "search_layout",
     "solve",
@@ -135,6 +143,7 @@ __all__ = [
     "write_base_map",
     "write_fastest",
     "write_rehearsal",
+    "write_repair",
     "write_run",
 ]
 

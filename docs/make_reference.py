@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from cellplan.io.schema import errors_schema, json_schema, robot_table_schema
-from cellplan.report.record.schema import report_schema
+from cellplan.report.record.schema import advice_schema, layout_schema, report_schema
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 PAGE, ERRORS_PAGE, REPORT_PAGE = FOLDER / "cell-file.md", FOLDER / "errors-file.md", FOLDER / "report-json.md"
+LAYOUT_PAGE = FOLDER / "layout-json.md"
 INTRODUCTION = """\
 # The cell file
 
@@ -87,6 +88,29 @@ bytes.
 - **`iterations`, `slack` and `resolution`** of the solver are known to the planner alone, as the joint tables hold
   samples: `cellplan verify` derives everything else from the tables again and leaves these as they are.
 """
+LAYOUT_INTRODUCTION = """\
+# study.json and advice.json of a layout search
+
+This page is made from the types of the record by `docs/make_reference.py`; do not edit it by hand. `cellplan schema
+--layout` prints the same as a JSON Schema (draft 2020-12).
+
+`cellplan layout CELL -o DIR` writes `study.json` for scripts; `study.html` shows the same as a page, and `best.yaml`
+is the best layout as a cell file. The guide is [Find a layout](../guides/find-a-layout.md), the method
+[How a layout is searched](../concepts/layout-search.md).
+
+- **The promise of `cellplan.layout/1`** is that of [report.json](report-json.md): keys are only added, and none changes
+  its meaning or its unit. Equal cell, options, seed and number of trials give equal bytes.
+- **Units are in the keys**; effects of a variable are stated for a `step` of it, in its own `unit`.
+- **`null`** stands for a value that does not exist: the best layout where none is certified, a margin without limits.
+- **Only `certified` is verified**: figures of other candidates are those of the search, at its nodes and keys.
+- Addresses in `settings` and `variables` are those of [the cell file](cell-file.md).
+
+`study.jsonl` beside it is the journal: a header, then one line for each finished trial in order, each written to disk
+before the next. It is what `--resume` reads, and no interface: its keys may change with any version.
+
+`cellplan layout CELL --repair` writes `advice.json` (`cellplan.advice/1`) with the record [Advice](#advice); the guide
+is [Repair a cell](../guides/repair-a-cell.md).
+"""
 SERIES = """
 In the mode `pairwise` every task has a folder with a report of its own. The `report.json` above them is the
 [summary](#summary): the worst values of all of them; its `solver` holds no effort of steps.
@@ -146,6 +170,7 @@ def main() -> None:
     PAGE.write_text(reference(), encoding="utf-8")
     ERRORS_PAGE.write_text(errors_reference(), encoding="utf-8")
     REPORT_PAGE.write_text(report_reference(), encoding="utf-8")
+    LAYOUT_PAGE.write_text(layout_reference(), encoding="utf-8")
 
 
 def errors_reference() -> str:
@@ -164,6 +189,12 @@ def report_reference() -> str:
     return "".join(
         [REPORT_INTRODUCTION, *parts, record_section("SummaryRecord", {**summary, "properties": own}), SERIES]
     )
+
+
+def layout_reference() -> str:
+    """Text of the page about ``study.json`` of a layout search."""
+    definitions = layout_schema()["$defs"] | advice_schema()["$defs"]
+    return "".join([LAYOUT_INTRODUCTION, *(record_section(name, form) for name, form in definitions.items())])
 
 
 def record_section(name: str, record: dict[str, Any]) -> str:
@@ -185,6 +216,8 @@ def record_value(field: dict[str, Any]) -> str:
     if "$ref" in field:
         title = record_title(field["$ref"].rpartition("/")[2])
         return f"[{title.lower()}](#{title.lower().replace(' ', '-')})"
+    if not field.keys() - {"description"}:
+        return "any value"
     if "anyOf" in field:
         return " or ".join(record_value(arm) for arm in field["anyOf"])
     if field["type"] == "array":

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from cellplan.cli.fastest_free import read_words, search_free
+from cellplan.cli.layout import Budget, Distance, HowTimed, Margin, Resume, Seed, Trials
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Method, Mode, Quiet, Settings
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
@@ -20,6 +22,16 @@ TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Wo
 Demand = Annotated[
     str | None,
     typer.Option("--demand", metavar="N/h", help="Parts per hour (or N/min): choose the calmest program for them."),
+]
+Free = Annotated[
+    str | None,
+    typer.Option(
+        "--free",
+        metavar="WORDS",
+        help="Search the shortest cycle over some of start,weights,path,spin, bases and tools as they are: the start "
+        "posture of the positioner, weights of joints, the positioner's joint path, turns of tools about their axes. "
+        "The options below --free belong to it.",
+    ),
 ]
 Points = Annotated[
     int, typer.Option("--points", metavar="N", min=0, max=50, help="Calmer cycles of each law on the production curve.")
@@ -42,6 +54,14 @@ def fastest(  # noqa: PLR0913, PLR0917 - the options of the command
     settings: Settings = None,
     task: TaskName = None,
     workers: Workers = None,
+    free: Free = None,
+    timing: HowTimed = "laws",
+    clearance: Distance = None,
+    margin: Margin = None,
+    budget: Budget = None,
+    trials: Trials = None,
+    seed: Seed = 0,
+    resume: Resume = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
@@ -50,8 +70,15 @@ def fastest(  # noqa: PLR0913, PLR0917 - the options of the command
 
     First with the time laws of the cell, all faster by one factor; then along the same path with the best speed that
     all robots share; then with no tool faster than 250 mm/s. Exit status: 0 every program passed every check, 1 a
-    check failed, 2 bad input, 3 no solution or a demand that cannot be met, 4 internal error.
+    check failed, 2 bad input, 3 no solution or a demand that cannot be met, 4 internal error. With --free the study
+    folder of cellplan layout is written, with the fastest cell as best.yaml.
     """
+    if free is not None:
+        words = read_words(free, {"--demand": demand, "--task": task})
+        chosen = [f"{key}={value}" for key, value in (("motion.mode", mode), ("solver.method", method)) if value]
+        options = {"timing": timing, "clearance": clearance, "margin": margin, "seed": seed, "free": words}
+        options |= {"settings": (*(settings or ()), *chosen), "allow_dirs": tuple(allow_dir or ())}
+        search_free(cell, output, options, (budget, trials, workers, resume), as_json=as_json, quiet=quiet)
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.guard import processors
         from cellplan.io.cell.load import load_cell

@@ -5,11 +5,8 @@ from typing import Annotated
 
 import typer
 
-from cellplan.cli.errors import InterruptedWorkError
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
-from cellplan.cli.progress import progress_listener
-from cellplan.errors import ExitStatus
+from cellplan.cli.output import json_failure, say
 
 SCHEMA = "cellplan.layout/1"
 
@@ -29,7 +26,9 @@ Goal = Annotated[
 HowTimed = Annotated[
     str,
     typer.Option(
-        "--timing", metavar="NAME", help="laws: by the time laws of the cell; retimed: the best common speed."
+        "--timing",
+        metavar="NAME",
+        help="laws: by the time laws of the cell; retimed: as fast as the limits allow everywhere.",
     ),
 ]
 Duration = Annotated[
@@ -41,6 +40,15 @@ Distance = Annotated[
 Margin = Annotated[
     str | None,
     typer.Option("--margin", metavar="ANGLE", help="Demanded margin of all turning joints, such as 15deg."),
+]
+Displaced = Annotated[
+    str | None,
+    typer.Option(
+        "--misplacement",
+        metavar="LENGTH,ANGLE",
+        help="The layout must pass, in one cycle and with its motion planned anew, with every base off by so much "
+        "along each axis and about the vertical, such as 10mm,1deg.",
+    ),
 ]
 Vary = Annotated[
     list[str] | None,
@@ -75,6 +83,18 @@ WorkerCount = Annotated[
     int | None,
     typer.Option("--workers", metavar="N", min=1, help="Processes that search (default: one for each processor)."),
 ]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers search, such as tcp://10.0.0.5:8786 (extra: cellplan[cluster]). They read "
+        "the cell file under the same path.",
+    ),
+]
+Repair = Annotated[
+    bool, typer.Option("--repair", help="Find the smallest change with which the cell passes, and other remedies.")
+]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue the search in the folder.")]
 Status = Annotated[bool, typer.Option("--status", help="Say how far the search in the folder is, and do nothing.")]
 
@@ -87,6 +107,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     duration: Duration = None,
     clearance: Distance = None,
     margin: Margin = None,
+    misplacement: Displaced = None,
     vary: Vary = None,
     fix: Fix = None,
     settings: Settings = None,
@@ -95,6 +116,8 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     trials: Trials = None,
     seed: Seed = 0,
     workers: WorkerCount = None,
+    scheduler: Scheduler = None,
+    repair: Repair = False,
     resume: Resume = False,
     status: Status = False,
     as_json: AsJson = False,
@@ -108,18 +131,26 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     passed, 2 bad input, 3 no start at all, 130 interrupted (--resume goes on).
     """
     with json_failure(SCHEMA, desired=as_json):
-        from cellplan.cli.layout_options import read_request, read_stop, run_search, status_lines
+        from cellplan.cli.layout_options import (
+            Work,
+            read_request,
+            read_stop,
+            read_workers,
+            search_and_say,
+            status_lines,
+        )
 
         if status:
             say("\n".join(status_lines(cell, output)))
             return
         request = read_request(
             cell,
-            objective=objective,
+            objective="change" if repair else objective,
             timing=timing,
             duration=duration,
             clearance=clearance,
             margin=margin,
+            misplacement=misplacement,
             vary=tuple(vary or ()),
             fixed=tuple(fix or ()),
             settings=tuple(settings or ()),
@@ -127,21 +158,10 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
             seed=seed,
             allow_dirs=tuple(allow_dir or ()),
         )
-        stop = read_stop(budget, trials)
-        with progress_listener(quiet=quiet) as progress:
-            try:
-                record, folder = run_search(
-                    request, output, stop=stop, workers=workers, resume=resume, progress=progress
-                )
-            except KeyboardInterrupt as error:
-                raise InterruptedWorkError(str(error) or "interrupted") from None
-    statuses = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}
-    outcome = statuses.get(record["status"], ExitStatus.CHECK_FAILED)
-    if as_json:
-        place = {"folder": str(folder), "report_path": str(folder / "study.html")}
-        say_json({"schema": SCHEMA, "exit": int(outcome), **place, "study": record})
-    else:
-        from cellplan.report.text.layout import layout_lines
+        if repair:
+            from cellplan.cli.layout_repair import run_repair
 
-        say("\n".join(layout_lines(record, folder)))
-    raise typer.Exit(outcome)
+            run_repair(request, output, workers=workers, as_json=as_json, quiet=quiet)
+        stop = read_stop(budget, trials)
+        work = Work(stop, read_workers(workers, scheduler), resume)
+        search_and_say(request, output, work, as_json=as_json, quiet=quiet)

@@ -1,27 +1,56 @@
 """Options of ``cellplan layout`` as the search takes them."""
 
+from concurrent.futures import Executor
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
-from cellplan.errors import InputError
+import typer
+
+from cellplan.cli.errors import InterruptedWorkError
+from cellplan.cli.output import say, say_json
+from cellplan.cli.progress import progress_listener
+from cellplan.errors import ExitStatus, InputError
 from cellplan.guard import processors
 from cellplan.io.cell.load import load_cell
 from cellplan.io.input.findings import did_you_mean, listed, shown
-from cellplan.model.progress import Progress
-from cellplan.pipeline.layout.quantities import read_angle, read_length, read_time
+from cellplan.pipeline.layout.quantities import read_angle, read_length, read_misplacement, read_time
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.search import search_layout
 from cellplan.report.record.common import Record
+from cellplan.report.text.layout import layout_lines
 from cellplan.search.programs.objective import Objective, Timing
+from cellplan.study.cluster import Cluster
 from cellplan.study.status import read_status
 from cellplan.study.study import Stop
 
 Choice = TypeVar("Choice", bound=StrEnum)
 
 
+class Work(NamedTuple):
+    """How much is searched, by how many.
+
+    Attributes:
+        stop: Where the search ends; None for what is usual.
+        workers: Number of processes, or the address of a scheduler.
+        resume: Whether an earlier search in the folder goes on.
+    """
+
+    stop: Stop | None
+    workers: int | str
+    resume: bool
+
+
 def read_request(
-    cell: Path, *, objective: str, timing: str, clearance: str | None, margin: str | None, **others: Any
+    cell: Path,
+    *,
+    objective: str,
+    timing: str,
+    clearance: str | None,
+    margin: str | None,
+    misplacement: str | None = None,
+    **others: Any,
 ) -> LayoutRequest:
     """The request of the options.
 
@@ -34,6 +63,7 @@ def read_request(
         timing=_word("--timing", timing, Timing),
         clearance=None if clearance is None else read_length("--clearance", clearance),
         margin=None if margin is None else read_angle("--margin", margin),
+        misplacement=None if misplacement is None else read_misplacement("--misplacement", misplacement),
         **others,
     )
 
@@ -49,25 +79,53 @@ def read_stop(budget: str | None, trials: int | None) -> Stop | None:
     return Stop(trials=trials, seconds=None if budget is None else read_time("--budget", budget))
 
 
-def run_search(
+def read_workers(workers: int | None, scheduler: str | None) -> int | str:
+    """Who searches: a number of processes, or the address of a scheduler.
+
+    Raises:
+        InputError: Both are given.
+    """
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers: unexpected beside --scheduler, whose workers search; leave one of them out")
+    return scheduler or workers or processors()
+
+
+def search_and_say(
     request: LayoutRequest,
     output: Path | None,
+    work: Work,
     *,
-    stop: Stop | None,
-    workers: int | None,
-    resume: bool,
-    progress: Progress,
-) -> tuple[Record, Path]:
-    """The record of the search and its folder; arguments as the options give them."""
-    folder = output or default_folder(request.cell, request.allow_dirs)
-    count = workers or processors()
-    found = search_layout(request, folder, stop=stop, workers=count, resume=resume, progress=progress)
-    return found.record, folder
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Search, write the folder, say what came of it, and leave with the exit status; arguments as the options say.
+
+    Raises:
+        InputError: The cell cannot be searched.
+        InterruptedWorkError: The search was interrupted.
+        Exit: Always, at the end.
+    """
+    folder = output or default_folder(request.cell, request.allow_dirs, is_free=bool(request.free))
+    with progress_listener(quiet=quiet) as progress, ExitStack() as opened:
+        try:
+            by = work.workers
+            pool: int | Executor = opened.enter_context(Cluster(by)) if isinstance(by, str) else by
+            record = search_layout(
+                request,
+                folder,
+                stop=work.stop,
+                workers=pool,
+                resume=work.resume,
+                progress=progress,
+            ).record
+        except KeyboardInterrupt as error:
+            raise InterruptedWorkError(str(error) or "interrupted") from None
+    raise typer.Exit(say_result(record, folder, as_json=as_json))
 
 
-def default_folder(cell: Path, allow_dirs: tuple[Path, ...] = ()) -> Path:
+def default_folder(cell: Path, allow_dirs: tuple[Path, ...] = (), *, is_free: bool = False) -> Path:
     """Where the study of a cell is written unless the user says otherwise."""
-    return Path("outputs") / f"{load_cell(cell, allow_dirs=allow_dirs).name}-layout"
+    return Path("outputs") / f"{load_cell(cell, allow_dirs=allow_dirs).name}-{'fastest' if is_free else 'layout'}"
 
 
 def status_lines(cell: Path, output: Path | None) -> list[str]:
@@ -82,3 +140,15 @@ def _word(option: str, text: str, kind: type[Choice]) -> Choice:
     if text not in known:
         raise InputError(f"{option}: expected one of {listed(known)}, got {shown(text)}{did_you_mean(text, known)}")
     return kind(text)
+
+
+def say_result(record: Record, folder: Path, *, as_json: bool) -> ExitStatus:
+    """Print what the search came to; the exit status that says the same."""
+    statuses = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}
+    outcome = statuses.get(record["status"], ExitStatus.CHECK_FAILED)
+    if as_json:
+        place = {"folder": str(folder), "report_path": str(folder / "study.html")}
+        say_json({"schema": record["schema"], "exit": int(outcome), **place, "study": record})
+    else:
+        say("\n".join(layout_lines(record, folder)))
+    return outcome

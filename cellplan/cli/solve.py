@@ -1,7 +1,7 @@
 """``cellplan solve``: plan a cell, check the result and write joint tables, report and plots."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +20,9 @@ from cellplan.cli.options import (
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
+
+if TYPE_CHECKING:
+    pass
 
 SCHEMA = "cellplan.solve/1"
 
@@ -58,6 +61,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.background_plots import BackgroundPlots
 
         plots = BackgroundPlots(background)  # the child imports matplotlib while this process imports the rest
+        from cellplan.cli.repair_line import repair_lines
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
@@ -86,7 +90,8 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         place = {"folder": str(folder), "report_path": str(folder / "report.html")}
         say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "report": record})
     else:
-        say("\n".join(summary_lines(record, folder)))
+        further = [] if solution.passed or task is not None else repair_lines(cell, changed, allow_dir or ())
+        say("\n".join([*summary_lines(record, folder), *further]))
         if solution.remark:
             say(solution.remark)
     raise typer.Exit(status)

@@ -1,8 +1,8 @@
 """What a layout search may change of a cell, in SI units."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Container, Mapping
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from cellplan.geometry.shapes import Box, Cylinder
@@ -111,6 +111,19 @@ class KeepOut:
     X_WS: Array
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Misplacement:
+    """By how much every base may be off its place, all of them at once.
+
+    Attributes:
+        position: In [m], along each axis of the world.
+        orientation: In [rad], about the vertical through the origin of the base.
+    """
+
+    position: float
+    orientation: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LayoutSettings:
     """What a layout search may change, and within which bounds.
@@ -126,6 +139,7 @@ class LayoutSettings:
         margin: Distance from its limits in [rad] that every turning joint is to keep.
         margin_sliding: Distance from its limits in [m] that every sliding joint is to keep.
         cost: Cost of a change by 0.1 m, by 10 deg or by a factor of 10, by the address of the range; 1 when absent.
+        misplacement: By how much every base may be off while all demands are kept; None where it need not be asked.
         is_default: Whether the file says nothing of what may change.
     """
 
@@ -139,7 +153,16 @@ class LayoutSettings:
     margin: float = 0.0
     margin_sliding: float = 0.0
     cost: Mapping[str, float] = field(default_factory=dict)
+    misplacement: Misplacement | None = None
     is_default: bool = True
+
+    def without(self, addresses: Container[str]) -> "LayoutSettings":
+        """The same without some numbers, which stay as they are, and what has one value with them."""
+        return replace(
+            self,
+            ranges=tuple(each for each in self.ranges if each.address not in addresses),
+            equal=tuple(each for each in self.equal if not any(address in addresses for address in each)),
+        )
 
 
 def mirror_image(pair: Mirrored, index: int) -> tuple[float, float]:

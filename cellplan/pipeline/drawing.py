@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.geometry.shapes import support_point
+from cellplan.geometry.shapes import Box, Cylinder, support_point
 from cellplan.model.motion import Schedule
 from cellplan.model.task import Frame
 from cellplan.model.units import MM
@@ -58,6 +58,19 @@ def drawing(scene: Scene, start: Array, schedule: Schedule) -> dict[str, Any]:
     return {"robots": robots, "outlines": outlines, "paths": paths}
 
 
+def footprint(shape: Box | Cylinder, X_WS: Array) -> list[list[float]]:
+    """Outline in [mm] from above of an upright box or cylinder.
+
+    Args:
+        shape: The solid.
+        X_WS: Its pose in the world, shape (4, 4).
+    """
+    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    points = 0.5 * corners * np.array(shape.size[:2]) if isinstance(shape, Box) else shape.radius * AROUND[:, :2]
+    found: list[list[float]] = _rounded(points @ X_WS[:2, :2].T + X_WS[:2, 3])
+    return found
+
+
 def swept_area(scene: Scene, q: Array) -> dict[str, Any]:
     """What the links and tools of each robot cover from above, as rows of squares.
 
@@ -79,8 +92,7 @@ def swept_area(scene: Scene, q: Array) -> dict[str, Any]:
                 points = np.array([support_point(hull, n) for n in ALL_ROUND])
                 placed = (points @ np.swapaxes(poses.R[index], -1, -2) + poses.p[index][:, None])[..., :2]
                 extreme = (placed @ AROUND[:, :2].T).argmax(axis=1)  # of each configuration and direction
-                for corners in np.take_along_axis(placed, extreme[..., None], axis=1):
-                    covered |= _squares(corners)
+                covered |= _squares(np.take_along_axis(placed, extreme[..., None], axis=1))
         found[robot.name] = [[y * SQUARE, first * SQUARE, last * SQUARE] for y, first, last in _stretches(covered)]
     return {"square_mm": SQUARE, "robots": found}
 
@@ -91,16 +103,26 @@ def _solids(scene: Scene) -> list[int]:
     return [index for index, body in enumerate(scene.bodies) if index < len(names) and body.name == names[index]]
 
 
-def _squares(outline: Array) -> set[tuple[int, int]]:
-    """Squares whose middles lie in a convex outline in [m], by their row and column."""
-    corners = MM / SQUARE * outline
-    low, high = np.ceil(corners.min(axis=0)).astype(int), np.floor(corners.max(axis=0)).astype(int)
-    xs, ys = np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1)
-    middles = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
-    sides = np.roll(corners, -1, axis=0) - corners
-    apart = middles[:, None] - corners
-    inside = (sides[:, 0] * apart[..., 1] - sides[:, 1] * apart[..., 0] >= -NEAR).all(axis=1)
-    return {(int(y), int(x)) for x, y in middles[inside]}
+def _squares(outlines: Array) -> set[tuple[int, int]]:
+    """Squares whose middles lie in any of some convex outlines in [m], shape (K, C, 2), by their row and column."""
+    first = MM / SQUARE * outlines
+    second = np.roll(first, -1, axis=1)
+    low, high = np.ceil(first[..., 1].min()), np.floor(first[..., 1].max())
+    rows = np.arange(low, high + 1)[:, None, None]
+    rise = second[..., 1] - first[..., 1]
+    with np.errstate(divide="ignore", invalid="ignore"):  # sides along a row have no one place there
+        share = np.clip((rows - first[..., 1]) / rise, 0.0, 1.0)
+    at = first[..., 0] + np.where(rise == 0.0, 0.0, share) * (second[..., 0] - first[..., 0])
+    is_met = (np.minimum(first[..., 1], second[..., 1]) <= rows) & (rows <= np.maximum(first[..., 1], second[..., 1]))
+    begins = np.ceil(np.where(is_met, at, np.inf).min(axis=-1) - NEAR)
+    ends = np.floor(np.where(is_met, at, -np.inf).max(axis=-1) + NEAR)
+    flat = is_met & (rise == 0.0)
+    ends = np.maximum(ends, np.floor(np.where(flat, second[..., 0], -np.inf).max(axis=-1) + NEAR))
+    found = set[tuple[int, int]]()
+    for row, spans in zip(rows.ravel().astype(int).tolist(), np.stack([begins, ends], axis=-1), strict=True):
+        for begin, end in np.unique(spans[spans[:, 0] <= spans[:, 1]], axis=0).astype(int).tolist():
+            found.update((row, column) for column in range(begin, end + 1))
+    return found
 
 
 def _stretches(covered: set[tuple[int, int]]) -> Iterator[tuple[int, int, int]]:

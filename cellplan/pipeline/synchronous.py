@@ -1,15 +1,18 @@
 """Jobs that a search can judge: one synchronous motion by the weighted pseudo-inverse."""
 
+from collections.abc import Collection
+
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell, Mode, Timing
 
 
-def refuse_other_jobs(cell: Cell, what: str) -> None:
+def refuse_other_jobs(cell: Cell, what: str, *, paths: Collection[str] = ()) -> None:
     """Refuse jobs whose motion is not one synchronous pseudo-inverse motion on the clock of the cell.
 
     Args:
         cell: The cell.
         what: What the job is needed for, as messages name it.
+        paths: Robots that may have a given joint path.
 
     Raises:
         InputError: The job is another one.
@@ -30,10 +33,19 @@ def refuse_other_jobs(cell: Cell, what: str) -> None:
     if motion.cyclic:
         raise InputError(f"{at('motion.cyclic')}: expected false for {what}, got true")
     for robot in cell.robots:
-        if robot.path is not None:
+        if robot.path is not None and robot.name not in paths:
             raise InputError(f"{at(f'robots.{robot.name}.path')}: expected no given joint path for {what}: remove it")
     for key in solver.against_accurate:
         raise InputError(
             f"{at(f'solver.{key}')}: expected the weighted pseudo-inverse without goals, with constant weights, for "
             f"{what}"
         )
+
+
+def is_searchable(cell: Cell) -> bool:
+    """Whether the job is one that a search can judge; see ``refuse_other_jobs``."""
+    try:
+        refuse_other_jobs(cell, "a search")
+    except InputError:
+        return False
+    return True

@@ -2,6 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
 
 from cellplan.collision.bodies import CollisionBody, prepare
 from cellplan.collision.engine import Engine
@@ -81,7 +84,6 @@ class _ContactZones:
         self.cut_from: list[int] = []
         self._cell, self._bodies, self._first_index = cell, bodies, first_index
         self._at_work = {task.robot for task in cell.tasks if task.relative_to is Frame.PART}
-        self._known: dict[tuple[Solid, bytes], tuple[CollisionBody | None, bool]] = {}
 
     def watched(self, pair: ScenePair) -> ScenePair:
         """The pair with the rule of its zone, if it has one."""
@@ -119,13 +121,15 @@ class _ContactZones:
             return None, False
         robot = self._cell.robot(str(body.robot))
         tip = (inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT)[:3, 3]
-        key = (body.shape, tip.tobytes())
-        if key not in self._known:
-            surface, is_in_zone = outside_zone(body.shape, tip, self._cell.checks.contact_zone)
-            cut = prepare(body.name, surface) if is_in_zone and surface is not None else None
-            self._known[key] = cut, is_in_zone
-        outside, is_in_zone = self._known[key]
+        outside, is_in_zone = _cut_at_tip(body.shape, tuple(tip.tolist()), self._cell.checks.contact_zone)
         return (None if outside is None else replace(outside, name=body.name)), is_in_zone
+
+
+@lru_cache(maxsize=64)
+def _cut_at_tip(shape: Solid, tip: tuple[float, ...], zone: float) -> tuple[CollisionBody | None, bool]:
+    """The surface of a solid outside a zone about a tip in [m], and whether any lies inside."""
+    surface, is_in_zone = outside_zone(shape, np.array(tip), zone)
+    return (prepare("tool", surface) if is_in_zone and surface is not None else None), is_in_zone
 
 
 def _mounted(

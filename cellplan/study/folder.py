@@ -1,5 +1,6 @@
 """Folder of a study: the journal, the result once all trials are there, and the runs of variants that are kept."""
 
+import json
 import os
 import re
 import shutil
@@ -8,11 +9,13 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.errors import InputError
+from cellplan.io.input.files import digest
 from cellplan.io.run.content import LEFT_ALONE, foreign_within, is_run_folder
 from cellplan.study.running import STATE, require_idle
 
 SCHEMA: Final = "cellplan.study/1"
 JOURNAL: Final = "study.jsonl"
+RESULT: Final = "study.json"
 AHEAD: Final = "study-ahead.jsonl"  # trials that wait for one before them
 RUNS: Final = "runs"
 OWN: Final = re.compile(r"\.?study(-[a-z]+)?\.(jsonl|json|csv|html|svg|png)(\.draft)?")
@@ -62,6 +65,7 @@ def write_results(folder: Path, files: Mapping[str, bytes]) -> None:
     """
     for name, content in files.items():
         try:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_whole(folder / name, content)
         except OSError as error:
             raise _cannot_write(folder / name, error) from error
@@ -90,8 +94,13 @@ def _foreign(folder: Path) -> str | None:
     entries = sorted(folder.iterdir())
     if not _has_journal(folder):
         return next((entry.name for entry in entries if entry.name not in BEFORE_JOURNAL), None)
+    listed = _listed(folder)
     for entry in entries:
-        if entry.name == LEFT_ALONE or (OWN.fullmatch(entry.name) and entry.is_file() and not entry.is_symlink()):
+        if (
+            entry.name == LEFT_ALONE
+            or _is_listed(entry, folder, listed)
+            or (OWN.fullmatch(entry.name) and entry.is_file() and not entry.is_symlink())
+        ):
             continue
         if entry.name != RUNS or not entry.is_dir() or entry.is_symlink():
             return entry.name
@@ -99,6 +108,25 @@ def _foreign(folder: Path) -> str | None:
         if foreign:
             return f"{RUNS}/{foreign}"
     return None
+
+
+def _listed(folder: Path) -> Mapping[str, str]:
+    """Digests of further results by name, as ``study.json`` lists them; none where it lists none."""
+    try:
+        record = json.loads((folder / RESULT).read_bytes())
+        return {each["name"]: each["sha256"] for each in record["files"]}
+    except (OSError, ValueError, TypeError, KeyError):
+        return {}
+
+
+def _is_listed(entry: Path, folder: Path, listed: Mapping[str, str]) -> bool:
+    """Whether a file, or every file of a folder, is a result that nobody has changed since."""
+    if entry.is_symlink():
+        return False
+    if entry.is_dir():
+        within = sorted(entry.iterdir())
+        return bool(within) and all(_is_listed(each, folder, listed) for each in within)
+    return listed.get(entry.relative_to(folder).as_posix()) == digest(entry.read_bytes())
 
 
 def _foreign_run(entry: Path) -> str | None:

@@ -54,17 +54,27 @@ class Workers(ThreadPoolExecutor):
     the middle of a trial if it is left by an exception, and with this process, however that ends.
     """
 
-    def __init__(self, count: int, modules: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        count: int,
+        modules: Sequence[str] = (),
+        *,
+        first: Callable[[], object] | None = None,
+        at_once: int | None = None,
+    ) -> None:
         """Start the processes.
 
         Args:
             count: Number of processes.
             modules: Names of modules that trials need.
+            first: What each process works out before its first trial, to keep it: a function of a module, bound to
+                plain data. What it raises is ignored: trials meet it again.
+            at_once: Number of processes that start now; the others with their first trials. None for all.
         """
         self.count, self._children = count, ChildStock()
         super().__init__(count, thread_name_prefix="cellplan-worker", initializer=_use, initargs=(self._children,))
-        for _ in range(count):
-            self.submit(_warm, tuple(modules))
+        for _ in range(count if at_once is None else min(count, at_once)):
+            self.submit(_warm, tuple(modules), None if first is None else pickle.dumps(first))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -172,12 +182,15 @@ def _text(outcome: Outcome) -> str:
         return _text(crashed("expected finite numbers and other plain data as its figures, got something else"))
 
 
-def _warm(modules: tuple[str, ...]) -> None:
-    """Import modules in a child process; what goes wrong does so again in the first trial, which says it."""
+def _warm(modules: tuple[str, ...], first: bytes | None) -> None:
+    """Get a child process ready; what goes wrong does so again in the first trial, which says it."""
     with suppress(CellplanError):
-        _children().call(_imported, modules, guard=START)
+        _children().call(_made_ready, modules, first, guard=START)
 
 
-def _imported(modules: tuple[str, ...]) -> None:
+def _made_ready(modules: tuple[str, ...], first: bytes | None) -> None:
     for name in modules:
         import_module(name)
+    if first is not None:
+        with suppress(Exception):
+            pickle.loads(first)()  # noqa: S301 - packed by the process that asks

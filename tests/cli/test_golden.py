@@ -94,6 +94,11 @@ def test_the_help_of_every_command(place: Path, cells: Path, capsys: pytest.Capt
         ("export", ["export", "run", "--format", "csv", "--cell", "cell/small.yaml"]),
         ("export_no_choice", ["export", "run", "--format", "csv"]),
         ("export_unknown_format", ["export", "run", "--format", "krl", "--without-cell"]),
+        ("repair_passes", ["layout", "cell/small.yaml", "--repair", "-o", "repair"]),
+        (
+            "repair_refused",
+            ["layout", "cell/small.yaml", "--repair", "--set", "motion.mode=pairwise", "-o", "repair"],
+        ),
         ("robots", ["robots"]),
         ("unknown_command", ["slove"]),
     ],

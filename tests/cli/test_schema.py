@@ -14,3 +14,11 @@ def test_the_schema_is_one_json_object_with_the_keys_of_a_cell(capsys: pytest.Ca
     assert status == 0
     assert schema["$schema"].startswith("https://json-schema.org/")
     assert {"cellplan", "name", "robots", "part", "tasks", "environment", "motion"} <= set(schema["properties"])
+
+
+def test_one_schema_is_printed_at_a_time(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["schema", "--layout"]) == 0
+    assert json.loads(capsys.readouterr().out)["title"] == "cellplan.layout/1"
+
+    assert run(["schema", "--layout", "--report"]) == 2
+    assert "expected one of --report and --layout, got both" in capsys.readouterr().err

@@ -19,7 +19,7 @@ from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.units import in_si
 from cellplan.io.shapes import pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.layout import Choice, KeepOut, LayoutSettings, PathRange, VariableKind, VaryRange
+from cellplan.model.layout import Choice, KeepOut, LayoutSettings, Misplacement, PathRange, VariableKind, VaryRange
 from cellplan.model.robot import RobotModel
 from cellplan.model.units import MM
 
@@ -65,6 +65,7 @@ def read_layout(
         margin=entry.margin_deg.si,
         margin_sliding=entry.margin_mm.si,
         cost=ties.cost(),
+        misplacement=_misplacement(entry),
         is_default=entry.vary is None,
     )
     return settings, found.findings
@@ -116,11 +117,11 @@ def _usual(context: Context) -> dict[str, Any]:
             ranges["z_mm"] = (min(0.0, z), max(HIGHEST_MM, z))
         yaw = entry.base.rpy_deg[2]
         ranges["yaw_deg"] = (yaw - 180.0, yaw + 180.0)
-        usual[f"{name}.base"] = ranges
+        usual[f"robots.{name}.base"] = ranges
     for name in holders[:1]:
         if name in context.models:
             turns = all(joint.is_revolute for joint in context.models[name].joints)
-            usual[f"{name}.{'start_deg' if turns else 'start'}"] = True
+            usual[f"robots.{name}.{'start_deg' if turns else 'start'}"] = True
     return usual
 
 
@@ -139,6 +140,13 @@ def _keep_on_floor(entry: LayoutEntry, found: _Found, document: YamlDocument) ->
                 f"got {MM * lower:g} to {MM * upper:g}"
             )
             found.findings.append(document.finding(("layout", "floor", f"{SIDES[each.index]}_mm"), text))
+
+
+def _misplacement(entry: LayoutEntry) -> Misplacement | None:
+    """By how much every base may be off."""
+    if entry.misplacement is None:
+        return None
+    return Misplacement(position=entry.misplacement.position_mm.si, orientation=entry.misplacement.orientation_deg.si)
 
 
 def _floor(entry: LayoutEntry) -> Array | None:

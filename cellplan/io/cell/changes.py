@@ -26,6 +26,7 @@ COMPONENTS: Final[Mapping[str, tuple[str, str]]] = {
     "yaw_deg": ("rpy_deg", "2"),
 }  # of a pose, as a layout names them
 INDEX: Final = re.compile(r"\[([0-9]+)\]")
+NOTHING: Final = "null"  # as the value of an option: the key is left out
 SHOWN_LENGTH: Final = 60  # characters of a value that are repeated in a message
 LEFT_OUT: Final = object()  # in place of a value: the key is removed
 AN_ADDRESS: Final = "expected an address such as motion.duration_s"
@@ -35,16 +36,20 @@ class _AddressError(Exception):
     """An address leads nowhere; the argument says why."""
 
 
-def read_setting(text: str) -> tuple[str, object]:
-    """Address and value of ``KEY=VALUE``; the value is read as strictly as one in a cell file.
+def read_setting(text: str, *, option: str = "--set") -> tuple[str, object]:
+    """Address and value of ``KEY=VALUE``; the value is read as strictly as one in a cell file, ``null`` leaves it out.
+
+    Args:
+        text: The text.
+        option: The option that it belongs to, as messages name it.
 
     Raises:
         InputError: The text is not of this form, or the value cannot be read.
     """
     address, sign, value = (part.strip() for part in text.partition("="))
     if not sign or not address:
-        raise InputError(f"--set: expected KEY=VALUE, such as motion.duration_s=2.5, got {shown(text)}")
-    return address, _as_read(f"value: {value}", f"--set {address}")
+        raise InputError(f"{option}: expected KEY=VALUE, such as motion.duration_s=2.5, got {shown(text)}")
+    return address, None if value == NOTHING else _as_read(f"value: {value}", f"{option} {address}")
 
 
 def changed(document: YamlDocument, values: Mapping[str, object]) -> YamlDocument:

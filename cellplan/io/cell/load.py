@@ -130,9 +130,13 @@ def _read(source: CellFile) -> Cell:
     sources = Sources(document, AllowedFolders(folder=source.folder, allowed=allowed))
     sources.inputs[source.name] = document.digest
     valid, models = apply_srdfs(valid, _models(valid, document, sources), sources, document)
+    sound = dict(models)
     for name, model in models.items():
-        findings += robot_findings(name, valid.robots[name], model, document)
-        findings += mounting_findings(name, model, valid, document)
+        wrong = [*robot_findings(name, valid.robots[name], model, document)]
+        wrong += mounting_findings(name, model, valid, document)
+        findings += wrong
+        if wrong:
+            del sound[name]
     findings += posture_findings(valid, models, document)
     findings += path_findings(valid, models, document)
     findings += grip_findings(valid, models, document)
@@ -142,7 +146,7 @@ def _read(source: CellFile) -> Cell:
     findings += solver_findings(valid, models, document)
     findings += _part_extent(valid, document)
     _read_meshes(valid, sources)
-    layout, wrong = read_layout(valid, models, document)
+    layout, wrong = read_layout(valid, sound, document)
     findings += wrong
     targets = _targets(valid, sources)
     findings += target_findings(valid, targets, document)

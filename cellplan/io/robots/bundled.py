@@ -1,5 +1,6 @@
 """Robots that come with the program, as joint-axis tables."""
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -26,8 +27,9 @@ def load_bundled(name: str) -> RobotModel:
     return load_bundled_table(name).model
 
 
+@lru_cache(maxsize=16)
 def load_bundled_table(name: str) -> RobotTable:
-    """A bundled robot with the digest of its table.
+    """A bundled robot with the digest of its table; read once in each process.
 
     Raises:
         InputError: There is none of that name.

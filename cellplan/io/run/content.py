@@ -10,7 +10,7 @@ from typing import Any, Final
 MARK: Final = '"schema": "cellplan.'  # stands in the first lines of every report.json and rehearsal.json
 MARK_WITHIN: Final = 200  # [bytes]
 LIST_LIMIT: Final = 5_000_000  # [bytes] of a file that lists others
-REPORTS: Final = ("report.json", "rehearsal.json", "export.json", "fastest.json", "map.json")
+REPORTS: Final = ("report.json", "rehearsal.json", "export.json", "fastest.json", "map.json", "advice.json")
 REHEARSAL: Final = "rehearsal"  # folder of a rehearsal, inside the run folder of its cell
 PROGRAMS: Final = "programs"  # folder of exported programs, inside the run folder that they were made from
 EXPORT: Final = "export.json"  # what was exported, in the folder that holds it
@@ -18,7 +18,7 @@ MANIFEST: Final = "manifest.json"
 LEFT_ALONE: Final = ".DS_Store"  # put into every folder by the file manager of one system
 OWN_FOLDERS: Final = frozenset({PROGRAMS, "plots", "tables", "rejected"})  # their content is compared file by file
 USUAL: Final = re.compile(  # what a run, a rehearsal or a draft of them may hold that lists no files
-    r"cell\.yaml|(manifest|series)\.json|view\.html|(report|rehearsal|export|fastest)\.(json|html)|map\.(json|html|svg|png)|curve\.csv|demand\.yaml"
+    r"cell\.yaml|(manifest|series)\.json|view\.html|(report|rehearsal|export|fastest|advice)\.(json|html)|map\.(json|html|svg|png)|curve\.csv|(demand|best)\.yaml"
     r"|plots/[^/]+\.(svg|png)|(tables|rejected)/([^/]+/)?[^/]+\.csv"
 )
 

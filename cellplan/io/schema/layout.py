@@ -66,8 +66,10 @@ class MirroredEntry(Entry):
 class KeepOutBoxEntry(Entry):
     """A box seen from above."""
 
-    size_mm: tuple[Size, Size] | tuple[Size, Size, Size] = Field(
-        description="Edge lengths along x and y; one along z may follow, and does not count."
+    size_mm: tuple[Size, ...] = Field(
+        min_length=2,
+        max_length=3,
+        description="Edge lengths along x and y; one along z may follow, and does not count.",
     )
 
 
@@ -112,6 +114,15 @@ class FloorEntry(Entry):
         return self
 
 
+class MisplacementEntry(Entry):
+    """By how much every base may be off its place."""
+
+    position_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] = Field(description="Along each axis of the world.")
+    orientation_deg: Annotated[Deg, Within(gt=0.0, le=45.0)] = Field(
+        description="About the vertical through the origin of the base."
+    )
+
+
 class LayoutEntry(Entry):
     """What a layout search may change; addresses are those of the file, `robots.` may be left out."""
 
@@ -144,6 +155,11 @@ class LayoutEntry(Entry):
     )
     margin_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = Field(
         default=Mm(0.0), description="Distance from its limits that every sliding joint is to keep."
+    )
+    misplacement: MisplacementEntry | None = Field(
+        default=None,
+        description="All demands are to be kept, and the cycle to be reached, with every base off by so much and the "
+        "motion planned anew.",
     )
     cost: dict[str, Annotated[float, Field(ge=0.0, le=1e6)]] = Field(
         default={},

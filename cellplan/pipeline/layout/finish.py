@@ -35,6 +35,7 @@ SLOWED: Final = {
 }  # checks that pass when the motion is slow enough: how the time that they ask for grows with their value
 MORE_ANGLE: Final = np.radians(0.05)  # [rad] asked for beyond what was missed
 MORE_LENGTH: Final = 0.0005  # [m] likewise
+MORE_OWN: Final = 0.00002  # [m] and of a robot's own bodies
 MORE_TIME: Final = 0.002  # [-] likewise
 ROUNDING: Final = 1e-9  # [deg] by which a margin may be missed: of printed numbers
 
@@ -69,17 +70,17 @@ class Certified:
     @property
     def margin(self) -> float | None:
         """Smallest verified distance of a turning joint from its limits in [deg]; None without one."""
-        return None if self.program is None else _margin(self.program)
+        return None if self.program is None else margin_of(self.program)
 
     @property
     def clearance(self) -> float | None:
         """Smallest certified distance in [mm]; None without pairs."""
-        return None if self.program is None else _clearance(self.program, is_apart=False)
+        return None if self.program is None else clearance_of(self.program)
 
     @property
     def apart(self) -> float | None:
         """The same of bodies that do not belong to one robot."""
-        return None if self.program is None else _clearance(self.program, is_apart=True)
+        return None if self.program is None else clearance_of(self.program, is_own=False)
 
 
 @dataclass(slots=True)
@@ -88,6 +89,7 @@ class _Room:
 
     angle: float = Room().margin
     length: float = Room().distance
+    own: float = Room().own
     time: float = Room().time
     nodes: int = NODES
     keys: int = KEYS
@@ -95,7 +97,7 @@ class _Room:
     @property
     def effort(self) -> Effort:
         """As the local optimisation is asked."""
-        room = Room(margin=self.angle, distance=self.length, time=self.time)
+        room = Room(margin=self.angle, distance=self.length, own=self.own, time=self.time)
         return Effort(iterations=ITERATIONS, keys=self.keys, room=room, trust=0.2)
 
 
@@ -112,7 +114,7 @@ class Finish:
     ready: Prepared
     progress: Progress
     solves: int = 0
-    _problems: dict[int, Any] = field(default_factory=dict)
+    _problems: dict[tuple[Prepared, int], Any] = field(default_factory=dict)
 
     def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:
         """A layout of the search, certified or with the reason why not.
@@ -160,15 +162,16 @@ class Finish:
 
     def _problem(self, nodes: int) -> Any:
         """The layout problem at about so many nodes."""
-        if nodes not in self._problems:
-            self._problems[nodes] = self.ready.problem(nodes)
-        return self._problems[nodes]
+        key = (self.ready, nodes)
+        if key not in self._problems:
+            self._problems[key] = self.ready.problem(nodes)
+        return self._problems[key]
 
     def _solved(self, x: Array, start: Array, standing: Standing) -> tuple[TimedProgram | None, str]:
         """The program of a layout, solved and verified in full, and why it is rejected."""
         self.solves += 1
         try:
-            cell = self.ready.variables.cell(x, start)
+            cell = self.ready.variables.given_cell.with_values(self.ready.values(x, start))
             program = self._timed(cell, standing.measures.cycle).certified(self.progress)
         except (InputError, NoSolutionError) as error:
             return None, str(error).splitlines()[0]
@@ -176,15 +179,17 @@ class Finish:
 
     def _timed(self, cell: Cell, cycle: float) -> TimedProgram:
         """The program at the shortest cycle, or at the duration of the cell."""
-        if self.ready.request.objective is not Objective.CYCLE:
-            return TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=self.progress)
+        is_cycle = self.ready.request.objective is Objective.CYCLE
         if self.ready.request.timing is Timing.RETIMED:
-            values: dict[str, object] = {"motion.timing": "fastest"}
-            return TimedProgram.solved(cell, Law.COMMON_SPEED, values, task=None, progress=self.progress)
+            timing: object = "fastest" if is_cycle else {"cycle_s": self.ready.duration}
+            law = Law.COMMON_SPEED if is_cycle else Law.REDUCED_SPEED
+            return TimedProgram.solved(cell, law, {"motion.timing": timing}, task=None, progress=self.progress)
+        if not is_cycle:
+            return TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=self.progress)
         factor = whole_steps(cell, cycle / self.ready.duration)
         for _ in range(DURATIONS):
             program = self._at(cell, factor)
-            load = _load(program)
+            load = load_of(program)
             if 1.0 - MORE_TIME < load <= 1.0:
                 break
             following = whole_steps(cell, factor * load, longer_than=factor if load > 1.0 else 0.0)
@@ -192,7 +197,7 @@ class Finish:
                 break
             factor = following
         for _ in range(DURATIONS):
-            asked = max(_load(program), _time_asked(program))
+            asked = max(load_of(program), time_asked(program))
             if asked <= 1.0:
                 break
             factor = whole_steps(cell, factor * asked, longer_than=factor)
@@ -208,19 +213,19 @@ class Finish:
         failed = [check.message for run in program.solution.runs for check in run.report.checks if not check.passed]
         if failed:
             return failed[0]
-        demanded, margin = DEG * float(self.ready.variables.margin.max(initial=0.0)), _margin(program)
+        demanded, margin = DEG * float(self.ready.variables.margin.max(initial=0.0)), margin_of(program)
         if margin is not None and margin < demanded - ROUNDING:
             return f"smallest margin {margin:.4g} deg, {demanded:.4g} deg demanded"
         return ""
 
 
-def _load(program: TimedProgram) -> float:
+def load_of(program: TimedProgram) -> float:
     """Share of its time in which the limits of speed and acceleration of the joints would allow the same motion."""
     figures = program.figures
     return max(figures["max_velocity_ratio"] or 0.0, (figures["max_acceleration_ratio"] or 0.0) ** 0.5)
 
 
-def _time_asked(program: TimedProgram) -> float:
+def time_asked(program: TimedProgram) -> float:
     """How many times as long the motion must last for what is no limit of a joint but gets less when it is slower."""
     checks = [check for run in program.solution.runs for check in run.report.checks if not check.passed]
     asked = [(check.value / check.limit) ** SLOWED[check.name] for check in checks if check.name in SLOWED]
@@ -241,35 +246,39 @@ def certified_cell(found: Certified) -> Cell:
 def _enlarged(room: _Room, program: TimedProgram, demands: Demands) -> bool:
     """Ask for what the verified motion missed; False where it missed nothing that can be asked for."""
     is_asked = False
-    margin, demanded = _margin(program), DEG * float(demands.margin.max(initial=0.0))
+    margin, demanded = margin_of(program), DEG * float(demands.margin.max(initial=0.0))
     if margin is not None and margin < demanded:
         room.angle += np.radians(demanded - margin) + MORE_ANGLE
         is_asked = True
-    clearance = _clearance(program, is_apart=False)
     required = MM * program.solution.cell.checks.clearance
-    if clearance is not None and clearance < required:
-        room.length += (required - clearance) / MM + MORE_LENGTH
+    found = (clearance_of(program, is_own=each) for each in (False, True))
+    others, own = (required if each is None else each for each in found)
+    if others < required:
+        room.length += (required - others) / MM + MORE_LENGTH
+    if own < required:
+        room.own += (required - own) / MM + MORE_OWN
+    if min(others, own) < required:
         room.keys = 2 * room.keys - 1
         is_asked = True
-    if _load(program) > 1.0:
-        room.time += _load(program) - 1.0 + MORE_TIME
+    if load_of(program) > 1.0:
+        room.time += load_of(program) - 1.0 + MORE_TIME
         is_asked = True
     room.nodes = 2 * room.nodes - 1 if is_asked else room.nodes
     return is_asked
 
 
-def _margin(program: TimedProgram) -> float | None:
+def margin_of(program: TimedProgram) -> float | None:
     """Smallest distance of a turning joint from its limits in [deg]; None without one."""
     found = [use.margin for run in program.solution.runs for use in run.report.joints if use.is_revolute]
     return DEG * min(found) if found else None
 
 
-def _clearance(program: TimedProgram, *, is_apart: bool) -> float | None:
-    """Smallest certified distance in [mm]; None without pairs."""
+def clearance_of(program: TimedProgram, *, is_own: bool | None = None) -> float | None:
+    """Smallest certified distance in [mm], of a robot's own bodies or of others only if asked; None without pairs."""
     found = [
         minimum.minimum
         for run in program.solution.runs
         for kind, minimum in run.report.clearance.minima.items()
-        if minimum.minimum is not None and not (is_apart and kind is ClearanceClass.SELF)
+        if minimum.minimum is not None and is_own in {None, kind is ClearanceClass.SELF}
     ]
     return MM * min(found) if found else None

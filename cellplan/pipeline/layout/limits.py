@@ -1,7 +1,7 @@
 """What holds a layout back or what it breaks, and what each variable does about it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -11,8 +11,9 @@ from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import number
 from cellplan.report.record.layout import LimitRecord
 from cellplan.search.kernel.figures import Crests
+from cellplan.search.programs.explain import explain
 from cellplan.search.programs.measures import Measures
-from cellplan.search.programs.objective import Demands
+from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point, PointDerivatives, Problem
 
 BINDS: Final = 0.99  # [-] share of the largest load on the clock from which a joint counts as one that decides it
@@ -170,8 +171,13 @@ def effects(standing: Standing, steps: Array) -> dict[str, list[float | None]]:
 
 
 def _of_factor(standing: Standing, by: PointDerivatives) -> Array:
-    """Derivatives of the load of the joint that decides the clock."""
+    """Derivatives of the load of the joint that decides the clock; of all that decide it where it is retimed."""
     problem, measures = standing.problem, standing.measures
+    if measures.pace is not None:
+        asked = replace(standing.demands, objective=Objective.CYCLE, duration=None)
+        optimum = explain(problem, measures.point, asked, Effort())
+        span = float(problem.times[-1] - problem.times[0])
+        return np.full(by.q.shape[-1], np.nan) if optimum is None else optimum.by_variable / span
     rates = np.sqrt(measures.accelerations.value)
     if by.qdd is not None and rates.max() > measures.speeds.value.max():
         found = _highest(measures.accelerations, by.qdd, problem.acceleration, measures.accelerations.value)

@@ -1,20 +1,25 @@
 """A cell made ready for a layout search: its variables, its bodies, and its job at as many nodes as are asked for."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, Final
 
 import numpy as np
 
+from cellplan.errors import NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
+from cellplan.model.layout import VariableKind
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.layout.joint_path import PathSearch, resolving, without_path
 from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
 from cellplan.pipeline.plan.start import chosen_start
+from cellplan.pipeline.synchronous import refuse_other_jobs
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.verdicts import acceleration_limits
@@ -22,11 +27,14 @@ from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Job
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Objective
+from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.starts.generator import StartGenerator
 from cellplan.search.starts.problem import StartProblem
+from cellplan.search.variables.choices import Choices
 from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
+MORE_NODES: Final = 64  # [-] of a motion along a spline: some at each knot
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,6 +49,9 @@ class Prepared:
         bodies: Their distances, wherever the layout puts them.
         schedule: The tasks on the common clock.
         moving: Names of the robots that move.
+        unled: The same search without the joint path that varies: motions by the pseudo-inverse, which paths begin
+            with; None where no path varies.
+        found_start: The start posture of the given layout where it was found before all else, shape (nq,).
     """
 
     request: LayoutRequest
@@ -50,6 +61,8 @@ class Prepared:
     bodies: CellDistances
     schedule: Schedule
     moving: tuple[str, ...]
+    unled: "Prepared | None" = None
+    found_start: Array | None = None
 
     @classmethod
     def of(cls, request: LayoutRequest, cell: Cell) -> "Prepared":
@@ -62,11 +75,12 @@ class Prepared:
         Raises:
             InputError: The paths, bodies or variables of the cell are not usable.
         """
-        variables = Variables.of(cell)
+        unled = without_path(cell)
+        variables = Variables.of(cell, without=() if unled is None else resolving(cell))
         scene = Scene.from_cell(variables.base)
         paths = clock_paths(variables.base, [build_toolpath(task, cell.part) for task in cell.tasks])
         phase = plan_phases(variables.base).program[0]
-        return cls(
+        found = cls(
             request=request,
             cell=cell,
             variables=variables,
@@ -74,28 +88,76 @@ class Prepared:
             bodies=CellDistances.of(scene, variables),
             schedule=schedule_paths(variables.base, [paths[name] for name in phase.tasks]),
             moving=tuple(phase.moving),
+            unled=None if unled is None else cls.of(request, unled),
         )
+        is_found = any(each.kind is VariableKind.START and each.given is None for each in variables.tied.ranges)
+        return found._with_found_start() if is_found else found
 
-    def problem(self, nodes: int = NODES) -> LayoutProblem:
-        """The layout problem at about so many nodes."""
-        job = Job.of(self.variables.base, self.schedule, moving=self.moving, nodes=nodes)
-        return LayoutProblem(
-            job=job, variables=self.variables, bodies=self.bodies, acceleration=acceleration_limits(self.scene)
-        )
+    def _with_found_start(self) -> "Prepared":
+        """The same with the start posture that a solve finds as what is given; unchanged where it finds none."""
+        try:
+            start = self.given_start
+        except NoSolutionError:
+            return self
+        base, variables = self.variables.base, self.variables
+        robots = [replace(each, start=start[base.columns(each.name)]) for each in base.robots]
+        given = variables.read_from(replace(base, robots=tuple(robots)))
+        return replace(self, variables=replace(variables, given=given), found_start=start)
+
+    def problem(self, nodes: int = NODES) -> LayoutProblem | PathProblem:
+        """The problem at about so many nodes: of the layout, or of the joint path and whatever else varies."""
+        variables, acceleration = self.variables, acceleration_limits(self.scene)
+        if self.unled is None:
+            job = Job.of(variables.base, self.schedule, moving=self.moving, nodes=nodes)
+            return LayoutProblem(job=job, variables=variables, bodies=self.bodies, acceleration=acceleration)
+        return self.path_search.problem(nodes + MORE_NODES, bodies=self.bodies, acceleration=acceleration)
 
     @cached_property
-    def coarse(self) -> LayoutProblem:
-        """The layout problem of the trials."""
+    def coarse(self) -> LayoutProblem | PathProblem:
+        """The problem of the trials."""
         return self.problem()
 
+    def values(self, x: Array, start: Array) -> dict[str, object]:
+        """What to write into the given cell file: values by address, rounded."""
+        problem = self.coarse
+        return (problem if isinstance(problem, PathProblem) else self.variables).values(x, start)
+
     @cached_property
+    def path_search(self) -> PathSearch:
+        """Joint paths of this search.
+
+        Raises:
+            ValueError: No joint path may change.
+        """
+        if self.unled is None:
+            raise ValueError("expected a cell whose joint path may change")
+        try:
+            start = self.given_start
+        except NoSolutionError:
+            start = np.concatenate([0.5 * np.add(*finite_limits(robot.model)) for robot in self.variables.base.robots])
+        return PathSearch(own=self.variables, unled=self.unled.variables, schedule=self.schedule, start=start)
+
+    @property
     def given_start(self) -> Array:
         """The start posture of the given layout in [rad] or [m], shape (nq,); found where the cell gives none.
 
         Raises:
             NoSolutionError: There is none.
         """
-        return self.start_of(self.variables.base)
+        found = self._given_start
+        if isinstance(found, NoSolutionError):
+            raise found
+        return found
+
+    @cached_property
+    def _given_start(self) -> Array | NoSolutionError:
+        """See ``given_start``; or why there is none."""
+        if self.found_start is not None:
+            return self.found_start
+        try:
+            return self.start_of(self.variables.base)
+        except NoSolutionError as error:
+            return error
 
     def start_of(self, cell: Cell, progress: Progress = silent) -> Array:
         """The start posture of a cell with this job; see ``given_start``."""
@@ -111,6 +173,20 @@ class Prepared:
         problem = StartProblem.of(self.variables.base, self.variables, margin=self.variables.margin)
         return StartGenerator(problem, seed=self.request.seed)
 
+    def branches(self) -> list[dict[str, list[float]]]:
+        """Other start postures of the given layout from which all tools follow their paths, with their variables.
+
+        Those of the robots whose branch may change; none where the given layout has no start.
+        """
+        robots = frozenset(Choices.of(self.variables.base).branches)
+        if not robots:
+            return []
+        try:
+            x, start = self.starts.branches(robots, self.given_start)
+        except NoSolutionError:
+            return []
+        return [{"x": each.tolist(), "start": own.tolist()} for each, own in zip(x, start, strict=True)]
+
     @property
     def duration(self) -> float:
         """Duration of the job in [s], as the cell has it."""
@@ -119,7 +195,7 @@ class Prepared:
     @property
     def has_accelerations(self) -> bool:
         """Whether any joint is judged by its acceleration."""
-        return self.coarse.is_accelerating
+        return bool(np.isfinite(acceleration_limits(self.scene)).any())
 
     def demands(self, **changes: Any) -> Demands:
         """What is demanded of a layout."""
@@ -143,8 +219,11 @@ def prepared(request: LayoutRequest, choice: Mapping[str, object] | None = None)
     return _prepared(request, tuple(sorted((choice or {}).items())))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def _prepared(request: LayoutRequest, choice: tuple[tuple[str, object], ...]) -> Prepared:
     """See ``prepared``."""
     cell = searched_cell(request)
-    return Prepared.of(request, cell.with_values(dict(choice)) if choice else cell)
+    if choice:
+        cell = cell.with_values(dict(choice))
+        refuse_other_jobs(cell, "a layout search")
+    return Prepared.of(request, cell)

@@ -1,8 +1,8 @@
 """Where trials of a layout search begin: the given layout, those of the user, samples, and the best found so far."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import product
+from dataclasses import dataclass
 from typing import Any, Final
 
 from cellplan.pipeline.layout.request import LayoutRequest
@@ -11,7 +11,10 @@ from cellplan.study.status import Best
 from cellplan.study.trial import Trial
 
 SIZE: Final = 4  # [-] trials of a round
-SPREADS: Final = (0.6, 1.2, 0.3, 2.0)  # [-] usual steps of a perturbation, in turn
+WIDE: Final = (1.0, 1.0, 1.5)  # [-] usual steps of perturbations of the given layout, in turn
+NARROW: Final = (0.7, 1.0, 0.4)  # [-] and of the best ones
+SLIGHT: Final = 0.2  # [-] and of the given one where the first layout that conforms ends the search
+GIVEN_UP: Final = 1.25  # [-] cycle as a multiple of the best one above which a trial is given up on its way
 ADDED: Final = (0.010, 0.025, 0.005, 0.050)  # [m] clearance beyond the demand of trials for the front, in turn
 SAME: Final = 5e-3  # [-] share by which the objectives of two layouts differ that are not one
 BESTS: Final[Mapping[Objective, Best]] = {
@@ -28,12 +31,14 @@ class Proposals:
 
     Attributes:
         request: What is searched for.
-        choices: Discrete choices, each by address with its options; every combination is tried in turn.
+        choices: Combinations of discrete choices, values by address, the present one first; tried in turn.
+        branches: Other start postures of the given layout, each with its variables: the keys ``x`` and ``start``.
         rejected: Trials that are no candidates any more.
     """
 
     request: LayoutRequest
-    choices: Mapping[str, Sequence[object]] = field(default_factory=dict)
+    choices: Sequence[Mapping[str, object]] = ({},)
+    branches: Sequence[Mapping[str, Any]] = ()
     rejected: frozenset[int] = frozenset()
 
     def __call__(self, finished: Sequence[Trial]) -> list[dict[str, Any]]:
@@ -42,31 +47,39 @@ class Proposals:
         if first:
             return first
         number, following = len(finished) // SIZE, [*self._leading(finished)]
-        spreads = [SPREADS[(2 * number + k) % len(SPREADS)] for k in range(2)]
         known = [trial for trial in finished if "x" in trial.outcome.figures]
         nearest = min(known, key=lambda trial: trial.outcome.figures["violation"], default=None)  # type: ignore[arg-type,return-value]
         best = following[0] if following else nearest
         second = following[number % min(3, len(following))] if following else best
-        return [
-            self._perturbed(best, spreads[0], number),
-            self._sampled(number, number),
-            self._perturbed(second, spreads[1], number),
-            self._fourth(best, number),
+        size, wide = NARROW[number % len(NARROW)], WIDE[number % len(WIDE)]
+        proposed = [
+            self._perturbed(best, size, number),
+            self._perturbed(None, wide, number),
+            self._perturbed(second, NARROW[(number + 1) % len(NARROW)], number),
+            self._fourth(best, number, is_conforming=bool(following)),
         ]
-
-    @property
-    def combinations(self) -> list[dict[str, object]]:
-        """All combinations of the discrete choices; one without any."""
-        return [dict(zip(self.choices, each, strict=True)) for each in product(*self.choices.values())]
+        lost = [trial.variant.values.get("choice", {}) for trial in finished if _leads_nowhere(trial)]
+        for place, each in enumerate(proposed):
+            is_anew = each["kind"] == "sampled" or (each["kind"] == "perturbed" and each["of"] is None)
+            if is_anew and each["choice"] in lost:
+                proposed[place] = {**self._sampled(len(finished) + place, 0), "choice": each["choice"]}
+        if not following or self.request.objective is not Objective.CYCLE:
+            return proposed
+        limit = GIVEN_UP * (BESTS[Objective.CYCLE].value(following[0]) or math.inf)
+        return [each if "clearance_m" in each else each | {"give_up_above_s": limit} for each in proposed]
 
     def _first(self) -> list[dict[str, Any]]:
-        """The given layout and those of the user, then perturbations of the given one and samples."""
+        """The given layout and those of the user with all choices, then perturbations of the given one and samples."""
         listed: list[dict[str, Any]] = [
             {"kind": "given"},
             *({"kind": "attempt", "index": k} for k in range(len(self.request.attempts))),
         ]
-        options: list[dict[str, Any]] = [{**each, "choice": choice} for choice in self.combinations for each in listed]
-        rest = [self._perturbed(None, SPREADS[0], 0), self._sampled(0, 0), self._perturbed(None, SPREADS[1], 1)]
+        if self.request.seed and self.request.objective is Objective.CONFORMING:
+            listed[0] = {"kind": "perturbed", "of": None, "spread": SLIGHT}  # another seed, another layout
+        options: list[dict[str, Any]] = [{**each, "choice": choice} for choice in self.choices for each in listed]
+        options += [{"kind": "branch", **each, "choice": self.choices[0]} for each in self.branches]
+        options += [self._sampled(0, number) for number in range(1, len(self.choices))]
+        rest = [self._perturbed(None, WIDE[0], 0), self._perturbed(None, WIDE[1], 1), self._sampled(0, 0)]
         return [*options, *rest[: -len(options) % SIZE]]
 
     def _leading(self, finished: Sequence[Trial]) -> Iterator[Trial]:
@@ -87,7 +100,7 @@ class Proposals:
     def _perturbed(self, trial: Trial | None, spread: float, number: int) -> dict[str, Any]:
         """A trial near the end of another one; None for the given layout."""
         if trial is None:
-            choices = self.combinations
+            choices = self.choices
             return {"kind": "perturbed", "of": None, "spread": spread, "choice": choices[number % len(choices)]}
         figures, values = trial.outcome.figures, trial.variant.values
         return {
@@ -97,19 +110,30 @@ class Proposals:
             "x": figures["x"],
             "start": figures["start"],
             "choice": values.get("choice", {}),
+            **({"unled": figures["unled"]} if "unled" in figures else {}),
         }
 
     def _sampled(self, index: int, number: int) -> dict[str, Any]:
         """A trial anywhere within the bounds."""
-        choices = self.combinations
-        return {"kind": "sampled", "index": index, "choice": choices[number % len(choices)]}
+        return {"kind": "sampled", "index": index, "choice": self.choices[number % len(self.choices)]}
 
-    def _fourth(self, best: Trial | None, number: int) -> dict[str, Any]:
-        """In turn the given layout perturbed, and the best one asked for more clearance than is demanded."""
-        if number % 2 or best is None or self.request.objective is not Objective.CYCLE:
-            return self._perturbed(None, SPREADS[number % len(SPREADS)], number)
+    def _fourth(self, best: Trial | None, number: int, *, is_conforming: bool) -> dict[str, Any]:
+        """In turn a sample, the given layout perturbed, and the best one asked for more clearance than is demanded.
+
+        While nothing conforms, a sample in every round.
+        """
+        turn = number % 4
+        if turn == 0 or not is_conforming:
+            return self._sampled(number, number)
+        if turn != 2 or best is None or self.request.objective is not Objective.CYCLE:
+            return self._perturbed(None, WIDE[(number + 1) % len(WIDE)], number)
         more = self._perturbed(best, 0.0, number) | {"kind": "improved"}
-        return more | {"clearance_m": ADDED[number // 2 % len(ADDED)]}
+        return more | {"clearance_m": ADDED[number // 4 % len(ADDED)]}
+
+
+def _leads_nowhere(trial: Trial) -> bool:
+    """Whether a trial is the given layout and no motion begins there."""
+    return trial.variant.values["kind"] == "given" and "x" not in trial.outcome.figures
 
 
 def origin_text(values: Mapping[str, Any]) -> str:
@@ -119,6 +143,8 @@ def origin_text(values: Mapping[str, Any]) -> str:
             text = "the given layout"
         case "attempt":
             text = f"layout {values['index'] + 1} of --try"
+        case "branch":
+            text = "the given layout, another branch"
         case "sampled":
             text = f"sample {values['index']}"
         case "improved":
@@ -126,5 +152,10 @@ def origin_text(values: Mapping[str, Any]) -> str:
         case _:
             of = "the given layout" if values["of"] is None else f"trial {values['of']}"
             text = f"{of}, perturbed"
-    chosen = ", ".join(f"{address} = {value}" for address, value in (values.get("choice") or {}).items())
+    chosen = choice_text(values.get("choice") or {})
     return f"{text} ({chosen})" if chosen else text
+
+
+def choice_text(choice: Mapping[str, object]) -> str:
+    """A combination of discrete choices in words; starts that are to be found anew go without saying."""
+    return ", ".join(f"{address} = {value}" for address, value in choice.items() if value != "auto")

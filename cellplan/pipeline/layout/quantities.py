@@ -32,6 +32,21 @@ def read_angle(option: str, text: str) -> float:
     return _read(option, text, ANGLES, "an angle such as 15deg")
 
 
+def read_misplacement(option: str, text: str) -> tuple[float, float]:
+    """A length in [mm] and an angle in [deg] of a text such as ``10mm,1deg``.
+
+    Raises:
+        InputError: The text is not that, or one of them is 0.
+    """
+    length, comma, angle = text.partition(",")
+    if not comma:
+        raise InputError(f"{option}: expected a length and an angle such as 10mm,1deg, got {shown(text)}")
+    found = read_length(option, length), read_angle(option, angle)
+    if not min(found) > 0.0:
+        raise InputError(f"{option}: expected a length and an angle above 0 such as 10mm,1deg, got {shown(text)}")
+    return found
+
+
 def read_time(option: str, text: str) -> float:
     """A time in [s] of a text such as ``60s`` or ``10min``; a plain number is in seconds.
 

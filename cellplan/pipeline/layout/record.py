@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -11,18 +12,19 @@ from cellplan.geometry.arrays import Array
 from cellplan.io.cell.changes import plain_values
 from cellplan.kinematics.reach import arm_reach
 from cellplan.model.units import DEG, MM
-from cellplan.pipeline.drawing import drawing, swept_area
+from cellplan.pipeline.drawing import drawing, footprint, swept_area
 from cellplan.pipeline.layout.finish import Certified, certified_cell
 from cellplan.pipeline.layout.limits import Standing, effects, standing_of
-from cellplan.pipeline.layout.prepared import Prepared
-from cellplan.pipeline.layout.proposals import BESTS, SIZE, origin_text
+from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.proposals import BESTS, SIZE, choice_text, origin_text
 from cellplan.pipeline.layout.request import LayoutRequest
-from cellplan.pipeline.layout.trial import EFFORT
+from cellplan.pipeline.layout.trial import EFFORT, change_of
 from cellplan.pipeline.write_run import versions
 from cellplan.report.record.common import number
 from cellplan.report.record.layout import (
     SCHEMA,
     CandidateRecord,
+    ChoiceRecord,
     DroppedRecord,
     GivenRecord,
     LayoutRecord,
@@ -30,6 +32,7 @@ from cellplan.report.record.layout import (
     VariableRecord,
 )
 from cellplan.report.text.layout import verdict_line
+from cellplan.search.variables.choices import Choices
 from cellplan.study.study import Finished
 from cellplan.study.trial import TrialStatus
 
@@ -57,7 +60,8 @@ def layout_record(
     request, cell = ready.request, ready.cell
     listed = list(_candidates(ready, finished, tried))
     given = _given_standing(ready)
-    standing = given if best is None else best.standing
+    standing = best.standing if best else None if ready.unled else given
+    of_best = ready if best is None else _prepared_of(ready, next(_of_number(finished, best.trial)))
     is_free = request.objective == "cycle"
     return {
         "schema": SCHEMA,
@@ -81,9 +85,11 @@ def layout_record(
         "top": listed[:TOP],
         "front": _front(listed),
         "binding": best.standing.binding() if best else [],
-        "variables": _variables(ready, standing, best),
+        "variables": _variables(of_best, standing, best),
         "convergence": _convergence(finished),
+        "choices": _choices(ready, finished, tried),
         "dropped": _dropped(finished),
+        "misplacement": None,
         "remarks": list(ready.variables.remarks),
         "drawing": _drawing(ready, best) if best else {},
         "files": [],
@@ -131,7 +137,7 @@ def _is_same(one: CandidateRecord, other: CandidateRecord) -> bool:
 
 def _candidate(ready: Prepared, trial: Mapping[str, Any], certified: Certified | None) -> CandidateRecord:
     """One layout."""
-    figures = trial["figures"]
+    figures, ready = trial["figures"], _prepared_of(ready, trial)
     x, start = np.array(figures["x"]), np.array(figures["start"])
     status, reason = "conforming" if trial["status"] == TrialStatus.PASSED else "violating", ""
     shown = {key: figures[key] for key in ("cycle_s", "margin_deg", "clearance_mm", "change")}
@@ -143,9 +149,9 @@ def _candidate(ready: Prepared, trial: Mapping[str, Any], certified: Certified |
                 "cycle_s": certified.program.cycle,
                 "margin_deg": certified.margin,
                 "clearance_mm": certified.clearance,
-                "change": float((np.abs(x - ready.variables.given) * ready.variables.cost).sum()),
+                "change": change_of(ready, x),
             }
-    settings = plain_values({**(trial["values"].get("choice") or {}), **ready.variables.values(x, start)})
+    settings = plain_values({**(trial["values"].get("choice") or {}), **ready.values(x, start)})
     rounded = {key: None if value is None else number(round(value, FINE)) for key, value in shown.items()}
     return {
         "trial": trial["trial"],
@@ -174,8 +180,10 @@ def _front(listed: list[CandidateRecord]) -> list[CandidateRecord]:
 
 def _given_standing(ready: Prepared) -> Standing | None:
     """How the given layout stands; None where a tool cannot follow."""
+    if ready.unled is not None and not ready.path_search.is_given:
+        return _given_standing(ready.unled)
     try:
-        point = ready.coarse.evaluate(ready.variables.given, ready.given_start)
+        point = ready.coarse.evaluate(ready.coarse.given, ready.given_start)
     except NoSolutionError:
         return None
     return None if point is None else standing_of(ready.coarse, point, ready.demands(), EFFORT)
@@ -186,7 +194,10 @@ def _given(standing: Standing | None, ready: Prepared) -> GivenRecord:
     if standing is None:
         return {"status": "violating", "cycle_s": None, "margin_deg": None, "clearance_mm": None, "violations": []}
     at_duration = standing_of(
-        ready.coarse, standing.measures.point, ready.demands(objective="conforming", duration=ready.duration), EFFORT
+        standing.problem,
+        standing.measures.point,
+        ready.demands(objective="conforming", duration=ready.duration),
+        EFFORT,
     )
     violations = at_duration.violations()
     return {
@@ -201,9 +212,10 @@ def _given(standing: Standing | None, ready: Prepared) -> GivenRecord:
 def _variables(ready: Prepared, standing: Standing | None, best: Certified | None) -> list[VariableRecord]:
     """The variables in the units of the file, with their effects."""
     variables, names = ready.variables, ready.variables.names
+    before = len(ready.coarse.names) - len(names)  # coefficients of a joint path have no rows
     units = [_unit(name) for name in names]
     steps = np.array([{"mm": LENGTH_STEP, "deg": ANGLE_STEP, "": float(np.log(2.0))}[unit] for unit in units])
-    of = effects(standing, steps) if standing is not None else {}
+    of = effects(standing, np.append(np.zeros(before), steps)) if standing is not None else {}
     shown: list[VariableRecord] = []
     for place, (name, unit) in enumerate(zip(names, units, strict=True)):
         values = (variables.lower, variables.upper, variables.given)
@@ -215,11 +227,11 @@ def _variables(ready: Prepared, standing: Standing | None, best: Certified | Non
                 "lower": lower,
                 "upper": upper,
                 "given": given,
-                "best": None if best is None else _in_file_units(float(best.x[place]), unit),
+                "best": None if best is None else _in_file_units(float(best.x[before + place]), unit),
                 "step": {"mm": MM * LENGTH_STEP, "deg": DEG * ANGLE_STEP, "": 2.0}[unit],
-                "cycle_s": of["cycle_s"][place] if of else None,
-                "margin_deg": of["margin_deg"][place] if of else None,
-                "clearance_mm": of["clearance_mm"][place] if of else None,
+                "cycle_s": of["cycle_s"][before + place] if of else None,
+                "margin_deg": of["margin_deg"][before + place] if of else None,
+                "clearance_mm": of["clearance_mm"][before + place] if of else None,
             }
         )
     return shown
@@ -262,6 +274,45 @@ def _dropped(finished: Finished) -> list[DroppedRecord]:
     return [{"reason": reason, "count": count, "trial": first[reason]} for reason, count in ordered]
 
 
+def _choices(ready: Prepared, finished: Finished, tried: Mapping[int, Certified]) -> list[ChoiceRecord]:
+    """What came of every combination of discrete choices, in the order in which they were tried; none without any."""
+    combinations = list(Choices.of(ready.cell).values())
+    if len(combinations) == 1:
+        return []
+    found: list[ChoiceRecord] = []
+    for choice in combinations:
+        own = [trial for trial in finished.trials if (trial["values"].get("choice") or {}) == choice]
+        solved = [tried[trial["trial"]] for trial in own if trial["trial"] in tried]
+        passed = [trial["figures"]["cycle_s"] for trial in own if trial["status"] == TrialStatus.PASSED]
+        reasons = [each.reason for each in solved if each.reason] or [
+            each["reason"] for each in _dropped(replace(finished, trials=own))
+        ]
+        is_certified = any(each.passed for each in solved)
+        status = "certified" if is_certified else "conforming" if passed else "dropped" if own else "not_tried"
+        found.append(
+            {
+                "choice": choice_text(choice) or "as given",
+                "status": status,
+                "trials": len(own),
+                "conforming": len(passed),
+                "cycle_s": number(round(min(passed), FINE)) if passed else None,
+                "reason": reasons[0] if reasons and not is_certified else "",
+            }
+        )
+    return found
+
+
+def _prepared_of(ready: Prepared, trial: Mapping[str, Any]) -> Prepared:
+    """The cell with the discrete choices of a trial."""
+    choice = trial["values"].get("choice")
+    return prepared(ready.request, choice) if choice else ready
+
+
+def _of_number(finished: Finished, number: int) -> Iterator[Mapping[str, Any]]:
+    """The trial with a number."""
+    return (trial for trial in finished.trials if trial["trial"] == number)
+
+
 def _no_result(finished: Finished) -> str:
     """Why there is no best layout."""
     is_started = any(trial["figures"] for trial in finished.trials)
@@ -292,7 +343,7 @@ def _drawing(ready: Prepared, best: Certified) -> dict[str, Any]:
             )
             for robot in cell.robots
         },
-        "keep_out": {},
+        "keep_out": {area.name: footprint(area.shape, area.X_WS) for area in ready.variables.settings.keep_out},
     }
 
 

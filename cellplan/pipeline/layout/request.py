@@ -1,7 +1,7 @@
 """Request: what a layout search is asked for, as plain data, and the cell that it searches."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,6 +10,8 @@ from cellplan.io.cell.changes import read_setting
 from cellplan.io.cell.load import load_cell
 from cellplan.io.input.findings import did_you_mean, listed, shown
 from cellplan.model.cell import Cell
+from cellplan.model.units import DEG, MM
+from cellplan.pipeline.layout.free_motion import freed
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.synchronous import refuse_other_jobs
 from cellplan.search.programs.objective import Objective, Timing
@@ -31,10 +33,12 @@ class LayoutRequest:
             the cycle itself.
         clearance: Demanded distance in [mm]; None for that of the cell.
         margin: Demanded distance of turning joints from their limits in [deg]; None for that of the cell.
+        misplacement: By how much every base may be off in [mm] and [deg]; None for what the cell says.
         settings: Values set in the cell, each as ``KEY=VALUE``.
         vary: Keys that may change beside those of the cell, each as ``KEY`` or ``KEY=RANGES``.
         fixed: Keys that may not change.
         attempts: Cell files whose layouts are tried first.
+        free: Words for what alone may change, whatever the cell says, while bases and tools stay; see ``freed``.
         seed: Seed of starts and perturbations.
     """
 
@@ -45,11 +49,19 @@ class LayoutRequest:
     duration: float | None = None
     clearance: float | None = None
     margin: float | None = None
+    misplacement: tuple[float, float] | None = None
     settings: tuple[str, ...] = ()
     vary: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
     attempts: tuple[Path, ...] = ()
+    free: tuple[str, ...] = ()
     seed: int = 0
+
+    @property
+    def anywhere(self) -> "LayoutRequest":
+        """The same request for processes that run in other folders."""
+        attempts, folders = (tuple(path.absolute() for path in each) for each in (self.attempts, self.allow_dirs))
+        return replace(self, cell=self.cell.absolute(), attempts=attempts, allow_dirs=folders)
 
     @property
     def record(self) -> dict[str, Any]:
@@ -60,9 +72,11 @@ class LayoutRequest:
             "duration_s": self.duration,
             "clearance_mm": self.clearance,
             "margin_deg": self.margin,
+            "misplacement": None if self.misplacement is None else list(self.misplacement),
             "settings": list(self.settings),
             "vary": list(self.vary),
             "fix": list(self.fixed),
+            "free": list(self.free),
             "try": [path.name for path in self.attempts],
             "seed": self.seed,
         }
@@ -84,20 +98,84 @@ def searched_cell(request: LayoutRequest) -> Cell:
     values: dict[str, object] = {}
     if request.margin is not None:
         values["layout.margin_deg"] = request.margin
-    if request.vary or request.fixed:
+    if request.misplacement is not None:
+        position, orientation = request.misplacement
+        values["layout.misplacement"] = {"position_mm": position, "orientation_deg": orientation}
+    if request.free:
+        margins = {key: value for key, value in _written_layout(cell).items() if key.startswith("margin_")}
+        values = {"layout": {**margins, "vary": freed(cell, request.free)}, **values}
+    elif request.vary or request.fixed:
         values["layout.vary"] = _varied(cell, request)
     changed = cell.with_values(values) if values else cell
-    refuse_other_jobs(changed, "a layout search")
+    paths = () if changed.layout is None else [each.robot for each in changed.layout.paths]
+    refuse_other_jobs(changed, "a layout search", paths=paths)
+    _refuse_margins(changed)
+    _refuse_misplacement(request, changed)
     return changed
+
+
+def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:
+    """Refuse misplaced bases where the motions of all corners are not those of one time law.
+
+    Raises:
+        InputError: The motion is retimed, or the positioner's joint path is given.
+    """
+    if cell.layout is None or cell.layout.misplacement is None:
+        return
+    key = "--misplacement" if request.misplacement is not None else cell.origin.at("layout.misplacement")
+    if request.timing is Timing.RETIMED:
+        raise InputError(f"{key}: expected a motion by the time laws, got --timing retimed: leave one of them out")
+    if cell.layout.paths or any(robot.path is not None for robot in cell.robots):
+        raise InputError(f"{key}: expected no joint path of a positioner (robots.ROBOT.path): leave one of them out")
+
+
+def _refuse_margins(cell: Cell) -> None:
+    """Refuse demanded margins that leave a joint no room.
+
+    Raises:
+        InputError: A joint cannot keep so far from both of its limits.
+    """
+    if cell.layout is None:
+        return
+    for robot in cell.robots:
+        for joint in robot.model.joints:
+            margin = cell.layout.margin if joint.is_revolute else cell.layout.margin_sliding
+            room = 0.5 * (joint.upper - joint.lower)
+            if margin >= room > 0.0:
+                key, scale = ("margin_deg", DEG) if joint.is_revolute else ("margin_mm", MM)
+                raise InputError(
+                    f"{cell.origin.at(f'layout.{key}')}: expected less than {scale * room:.6g}, half of the range of "
+                    f"{joint.name} of '{robot.name}', got {scale * margin:.6g}"
+                )
+
+
+def read_attempts(request: LayoutRequest, cell: Cell) -> list[Cell]:
+    """The cells whose layouts are tried too.
+
+    Args:
+        request: What is searched for.
+        cell: The cell that is searched.
+
+    Raises:
+        InputError: One cannot be read or has other robots.
+    """
+    names = [robot.name for robot in cell.robots]
+    found = [load_cell(path, allow_dirs=request.allow_dirs) for path in request.attempts]
+    for path, other in zip(request.attempts, found, strict=True):
+        own = [robot.name for robot in other.robots]
+        if own != names or other.joint_count != cell.joint_count:
+            raise InputError(f"--try {path}: expected the robots of the cell ({listed(names)}), got {listed(own)}")
+    return found
 
 
 def _varied(cell: Cell, request: LayoutRequest) -> dict[str, Any]:
     """What may change: as the cell says, or as it is by default, with the options of the request."""
-    vary = {_short(key): _plain(value) for key, value in written_vary(cell).items()}
+    written = written_vary(cell) or (_by_default(cell) if request.fixed and not request.vary else {})
+    vary = {short_key(key): _plain(value) for key, value in written.items()}
     for text in request.vary:
         key, sign, ranges = text.partition("=")
-        vary[_short(key.strip())] = read_setting(f"{key.strip()}={ranges}")[1] if sign else True
-    for key in map(_short, request.fixed):
+        vary[short_key(key.strip())] = read_setting(f"{key.strip()}={ranges}", option="--vary")[1] if sign else True
+    for key in map(short_key, request.fixed):
         entry, _, component = key.rpartition(".")
         if key in vary:
             del vary[key]
@@ -117,8 +195,26 @@ def _varied(cell: Cell, request: LayoutRequest) -> dict[str, Any]:
 
 def written_vary(cell: Cell) -> Mapping[str, Any]:
     """What the cell file says may change; empty where it says nothing."""
+    return dict(_written_layout(cell).get("vary") or {})
+
+
+def _written_layout(cell: Cell) -> Mapping[str, Any]:
+    """The section ``layout`` of the cell file; empty where there is none."""
     written = cell.origin.source.written if cell.origin.source is not None else {}
-    return dict((written.get("layout") or {}).get("vary") or {})
+    return written.get("layout") or {}
+
+
+def _by_default(cell: Cell) -> Mapping[str, Any]:
+    """What may change of a cell that says nothing of it, as the file would say it."""
+    vary: dict[str, Any] = {}
+    for each in () if cell.layout is None else cell.layout.ranges:
+        entry, _, component = each.address.rpartition(".")
+        if component in COMPONENTS:
+            scale = DEG if each.is_angle else MM
+            vary.setdefault(entry, {})[component] = [round(scale * each.lower, 9), round(scale * each.upper, 9)]
+        else:
+            vary[each.address.partition("[")[0]] = True
+    return vary
 
 
 def _keys(vary: Mapping[str, Any]) -> Iterable[str]:
@@ -129,7 +225,7 @@ def _keys(vary: Mapping[str, Any]) -> Iterable[str]:
             yield from (f"{key}.{component}" for component in value)
 
 
-def _short(key: str) -> str:
+def short_key(key: str) -> str:
     """A key without ``robots.``, which may be left out."""
     return key.removeprefix(PREFIX)
 

@@ -41,8 +41,8 @@ def result_files(cell: Cell, given: Path, folder: Path, *, head: str) -> dict[st
 
 
 def file_records(files: Mapping[str, bytes]) -> list[dict[str, str]]:
-    """Names and digests of the files beside ``best.yaml``."""
-    return [{"name": name, "sha256": digest(content)} for name, content in files.items() if name != BEST]
+    """Names and digests of ``best.yaml`` and the files beside it."""
+    return [{"name": name, "sha256": digest(content)} for name, content in files.items()]
 
 
 def reads_back(folder: Path, cell: Cell, allow_dirs: tuple[Path, ...]) -> bool:

@@ -1,6 +1,6 @@
 """Layout search: trials in rounds, the best of them finished and certified, and all of it in one folder."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -8,19 +8,20 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from cellplan.io.cell.load import load_cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.misplacement import MisplacedFinish
+from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals
 from cellplan.pipeline.layout.record import head_of, layout_record
-from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
+from cellplan.pipeline.layout.request import LayoutRequest, read_attempts
 from cellplan.pipeline.layout.result_file import file_records, result_files
 from cellplan.pipeline.layout.trial import evaluate
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.layout import layout_files
 from cellplan.report.record.layout import LayoutRecord
 from cellplan.search.programs.objective import Objective
+from cellplan.search.variables.choices import Choices
 from cellplan.study.folder import write_results
 from cellplan.study.study import Finished, Stop, Study
 from cellplan.study.trial import Trial, TrialStatus
@@ -56,13 +57,15 @@ class _Search:
     stop: Stop
     progress: Progress
     finish: Finish
+    choices: Sequence[Mapping[str, object]]
+    branches: Sequence[Mapping[str, Any]]
     tried: dict[int, Certified] = field(default_factory=dict)
 
     def run(self, *, resume: bool) -> tuple[Finished, Certified | None]:
         """Rounds and finish; a search for any conforming layout goes on where the first one is rejected."""
         while True:
             finished = self._study().run(
-                partial(evaluate, self.request),
+                partial(evaluate, self.request.anywhere),
                 workers=self.workers,
                 stop=self.stop,
                 limits=Limits(seconds=TRIAL_LIMIT),
@@ -76,7 +79,7 @@ class _Search:
     def _study(self) -> Study:
         """The study, without the candidates that were rejected."""
         rejected = frozenset(self.tried)
-        proposals = Proposals(request=self.request, choices=choices_of(self.ready))
+        proposals = Proposals(request=self.request, choices=self.choices, branches=self.branches)
         is_enough = partial(_is_enough, rejected) if self.request.objective is Objective.CONFORMING else None
         cell = self.ready.cell
         header = {
@@ -95,10 +98,7 @@ class _Search:
             number = trial["trial"]
             if number not in self.tried:
                 self.progress(f"certifying trial {number}", 1.0)
-                choice = trial["values"].get("choice") or {}
-                self.finish.ready = (
-                    Prepared.of(self.request, self.ready.cell.with_values(choice)) if choice else self.ready
-                )
+                self.finish.ready = prepared(self.request, trial["values"].get("choice"))
                 self.tried[number] = self.finish.certified(number, trial["figures"])
             if self.tried[number].passed:
                 return self.tried[number]
@@ -151,10 +151,11 @@ def search_layout(
     with ExitStack() as opened:
         pool = workers
         if isinstance(workers, int):
-            pool = opened.enter_context(Workers(workers, modules=MODULES))
-        ready = Prepared.of(request, searched_cell(request))
-        for path in request.attempts:
-            load_cell(path, allow_dirs=request.allow_dirs)  # what is wrong with it is said before anything is tried
+            first = partial(prepared, request.anywhere)
+            at_once = 1 if request.objective is Objective.CONFORMING else None  # mostly its first trial is the last
+            pool = opened.enter_context(Workers(workers, modules=MODULES, first=first, at_once=at_once))
+        ready = prepared(request)
+        read_attempts(request, ready.cell)  # what is wrong with one is said before anything is tried
         search = _Search(
             request=request,
             folder=folder,
@@ -162,22 +163,28 @@ def search_layout(
             workers=pool,
             stop=stop or Stop(seconds=BUDGET),
             progress=progress,
-            finish=Finish(ready=ready, progress=progress),
+            finish=finish_of(ready, progress),
+            choices=tuple(Choices.of(ready.cell).values()),
+            branches=(ready.unled or ready).branches(),
         )
         finished, best = search.run(resume=resume)
         progress("writing the result", 1.0)
         return _written(search, finished, best)
 
 
-def choices_of(ready: Prepared) -> dict[str, Sequence[object]]:
-    """Discrete choices of a cell that are values of its file, by address."""
-    settings = ready.variables.settings
-    return {choice.address: choice.options for choice in settings.choices if choice.options}
+def finish_of(ready: Prepared, progress: Progress) -> Finish:
+    """The finish of the layouts of a cell, with displaced bases where they are asked for."""
+    misplacement = ready.variables.settings.misplacement
+    if misplacement is None:
+        return Finish(ready=ready, progress=progress)
+    return MisplacedFinish(ready=ready, progress=progress, misplacement=misplacement)
 
 
 def _written(search: _Search, finished: Finished, best: Certified | None) -> LayoutResult:
     """The record and all files."""
     record = layout_record(search.ready, finished, tried=search.tried, best=best, solves=search.finish.solves)
+    if isinstance(search.finish, MisplacedFinish) and best is not None:
+        record["misplacement"] = search.finish.records[best.trial]
     beside: dict[str, bytes] = {}
     if best is not None:
         head = head_of(record, search.request)

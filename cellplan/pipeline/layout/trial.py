@@ -1,6 +1,7 @@
 """One trial of a layout search: from a start to a local optimum and its figures."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.io.cell.load import load_cell
+from cellplan.model.cell import Cell
 from cellplan.model.seeds import generator
 from cellplan.pipeline.layout.limits import reason, standing_of
 from cellplan.pipeline.layout.prepared import Prepared, prepared
@@ -15,13 +17,34 @@ from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Effort
 from cellplan.search.programs.perturb import perturbed
+from cellplan.search.spline_path.perturb import perturbed_path
+from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.starts.generator import Starts
 from cellplan.study.trial import Outcome, TrialStatus, Variant
 
-EFFORT: Final = Effort()
+EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to
+STAGE: Final = Effort(iterations=6)  # of motions that joint paths begin with
+STAGES: Final = 4
+STILL: Final = Effort(iterations=0)
+PATH: Final = Effort(least_gain=1e-3)  # many coefficients gain little each, but for long
 NOT_FOLLOWED: Final = "a tool cannot follow its path"
 
 Begin = tuple[Array, Array]  # variables, shape (n,), and start posture, shape (nq,)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Begin:
+    """Where a trial begins.
+
+    Attributes:
+        x: Variables, shape (n,).
+        start: Start posture in [rad] or [m], shape (nq,).
+        unled: The same of the motion by the pseudo-inverse that a joint path comes from; None for all others.
+    """
+
+    x: Array
+    start: Array
+    unled: Begin | None = None
 
 
 def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
@@ -32,24 +55,81 @@ def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
         variant: Number of the trial, and where it begins; see ``proposed``.
     """
     values = variant.values
-    ready = prepared(request, _mapping(values.get("choice")))
     try:
-        begin = _begin(ready, variant)
+        ready = prepared(request, _mapping(values.get("choice")))
+        begin = _begin(ready, values, variant.number)
     except (InputError, NoSolutionError) as error:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
-    if begin is None:
-        return Outcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
     added = float(str(values.get("clearance_m", 0.0)))
     demands = ready.demands(clearance=added)
-    found = improve(ready.coarse, *begin, demands, EFFORT)
-    if found is None:
+    limit = values.get("give_up_above_s")
+    effort = EFFORT if ready.unled is None else PATH
+    effort = effort if limit is None else replace(effort, give_up_above=float(str(limit)))
+    found = None if begin is None else improve(ready.coarse, begin.x, begin.start, demands, effort)
+    if begin is None or found is None:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
-    return _outcome(ready, found)
+    return _outcome(ready, found, begin.unled)
 
 
-def _begin(ready: Prepared, variant: Variant) -> Begin | None:
+def _begin(ready: Prepared, values: Mapping[str, object], number: int) -> _Begin | None:
     """Where a trial begins; None where the tools cannot follow their paths."""
-    values = variant.values
+    if ready.unled is not None:
+        return _path(ready, ready.unled, values, number)
+    found = _layout(ready, values, number)
+    return None if found is None else _Begin(*found)
+
+
+def _path(ready: Prepared, unled: Prepared, values: Mapping[str, Any], number: int) -> _Begin | None:
+    """Where a trial of a joint path begins: near a path that is known, or at that of a motion by the pseudo-inverse.
+
+    Such a motion, from wherever the trial begins, is brought to its own shortest cycle first. Trials of odd numbers
+    that perturb another one begin near its path, those of even numbers near the motion that led to it.
+    """
+    search, known = ready.path_search, values.get("unled")
+    if values["kind"] == "given" and search.is_given:
+        return _Begin(ready.coarse.given, ready.given_start)
+    if values["kind"] == "attempt":
+        cell = _attempted(ready, int(values["index"]))
+        path = cell.robot(search.asked.robot).path
+        if path is not None:
+            others = search.own.read_from(cell)
+            return _Begin(search.variables(search.like_asked(path), others), ready.start_of(cell))
+    if values.get("of") is not None and (values["kind"] == "improved" or number % 2 or known is None):
+        x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
+        if values["kind"] == "improved" or not isinstance(ready.coarse, PathProblem):
+            return _Begin(x, start)
+        rng = generator(f"layout/{number}", ready.request.seed)
+        point = perturbed_path(ready.coarse, x, start, rng, size=float(values["spread"]))
+        return None if point is None else _Begin(point.x, point.start)
+    begin = _layout(unled, {**values, **(known or {})}, number)
+    return None if begin is None else _led(ready, unled, begin, 1 if values["kind"] == "given" else STAGES)
+
+
+def _led(ready: Prepared, unled: Prepared, begin: Begin, stages: int) -> _Begin | None:
+    """The path nearest to a motion by the pseudo-inverse, improved in stages: the stage whose path is the fastest.
+
+    A motion may be at its best where an operator just passes a singularity, which a path beside it does not survive.
+    """
+    search, best, least = ready.path_search, None, np.inf
+    for stage in range(stages):
+        if stage:
+            better = improve(unled.coarse, *begin, unled.demands(), STAGE)
+            if better is None:
+                break
+            begin = better.x, better.start
+        found = search.fitted(*begin)
+        if found is None:
+            break
+        x = search.variables(found[0], search.beside(begin[0]))
+        stands = improve(ready.coarse, x, found[1], ready.demands(), STILL)
+        if stands is not None and stands.cycle * (1.0 + stands.violation) < least:
+            least = stands.cycle * (1.0 + stands.violation)
+            best = _Begin(x, found[1], unled=begin)
+    return best
+
+
+def _layout(ready: Prepared, values: Mapping[str, object], number: int) -> Begin | None:
+    """Where a trial of a layout begins; None where the tools cannot follow their paths."""
     kind = values["kind"]
     if kind == "given":
         return _given(ready)
@@ -57,22 +137,26 @@ def _begin(ready: Prepared, variant: Variant) -> Begin | None:
         return _attempt(ready, int(str(values["index"])))
     if kind == "sampled":
         return _sampled(ready, int(str(values["index"])))
-    if values.get("of") is None:
+    if kind == "perturbed" and values["of"] is None:
         x, start = _given(ready)
     else:
         x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
-    if kind == "improved":
+    if kind in {"improved", "branch"}:
         return x, start
-    rng = generator(f"layout/{variant.number}", ready.request.seed)
+    rng = generator(f"layout/{number}", ready.request.seed)
     point = perturbed(ready.coarse, x, start, rng, size=float(str(values["spread"])))
     return None if point is None else (point.x, point.start)
 
 
 def _attempt(ready: Prepared, index: int) -> Begin:
     """The layout of a cell file of the user's."""
-    path = ready.request.attempts[index]
-    cell = load_cell(path, allow_dirs=ready.request.allow_dirs)
+    cell = _attempted(ready, index)
     return ready.variables.read_from(cell), ready.start_of(cell)
+
+
+def _attempted(ready: Prepared, index: int) -> Cell:
+    """A cell file of the user's."""
+    return load_cell(ready.request.attempts[index], allow_dirs=ready.request.allow_dirs)
 
 
 def _sampled(ready: Prepared, index: int) -> Begin:
@@ -110,10 +194,14 @@ def _first_of(starts: Starts) -> Begin:
     raise NoSolutionError(starts.reason)
 
 
-def _outcome(ready: Prepared, found: Improved) -> Outcome:
+def change_of(ready: Prepared, x: Array) -> float:
+    """Cost of the change from the given layout to variables of shape (n,)."""
+    return float((np.abs(x - ready.coarse.given) * ready.coarse.cost).sum())
+
+
+def _outcome(ready: Prepared, found: Improved, unled: Begin | None) -> Outcome:
     """Figures of a local optimum."""
     standing = standing_of(ready.coarse, found.point, ready.demands(), EFFORT)
-    cost = ready.variables.cost
     figures: dict[str, Any] = {
         "x": found.x.tolist(),
         "start": found.start.tolist(),
@@ -122,9 +210,11 @@ def _outcome(ready: Prepared, found: Improved) -> Outcome:
         "margin_deg": standing.margin,
         "clearance_mm": standing.clearance,
         "apart_mm": standing.apart,
-        "change": float((np.abs(found.x - ready.variables.given) * cost).sum()),
+        "change": change_of(ready, found.x),
         "programs": len(found.history),
     }
+    if unled is not None:
+        figures["unled"] = {"x": unled[0].tolist(), "start": unled[1].tolist()}
     if found.is_conforming:
         return Outcome(status=TrialStatus.PASSED, figures=figures)
     violations = standing.violations()

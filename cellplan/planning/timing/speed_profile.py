@@ -102,14 +102,26 @@ def fastest_profile(
     step = np.diff(lengths)
     if limited.any():
         along = directions[:, limited] / acceleration[limited]
-        lines = _lines(along, np.gradient(along, lengths, axis=0), step)
-        squared = _forward(lines, step, _backward(lines, step, allowed))
+        squared = largest_squares(step, along, np.gradient(along, lengths, axis=0), allowed)
     else:
         squared = allowed.copy()
         squared[[0, -1]] = 0.0
     speeds = np.sqrt(squared)
     times = np.append(0.0, np.cumsum(2.0 * step / (speeds[:-1] + speeds[1:])))
     return SpeedProfile(lengths=lengths, speeds=speeds, times=times)
+
+
+def largest_squares(step: Array, along: Array, bent: Array, allowed: Array) -> Array:
+    """Largest squared speeds along a path from rest to rest, shape (N,).
+
+    Args:
+        step: Lengths between neighbouring points of the path, positive, shape (N - 1,).
+        along: Derivatives of the joints by the length, in shares of their acceleration limits, shape (N, m).
+        bent: Their derivatives by the length, shape (N, m).
+        allowed: Largest squared speeds for other reasons, shape (N,).
+    """
+    lines = _lines(along, bent, step)
+    return _forward(lines, step, _backward(lines, step, allowed))
 
 
 def _lines(along: Array, bent: Array, step: Array) -> _Lines:

@@ -3,6 +3,7 @@
 from typing import Annotated, Any, Final, TypedDict
 
 from cellplan.report.record.common import Number
+from cellplan.report.record.misplacement import MisplacementRecord
 
 SCHEMA: Final = "cellplan.layout/1"
 
@@ -42,6 +43,17 @@ class VariableRecord(TypedDict):
     cycle_s: Annotated[Number, "effect of a step on the cycle, by the joint that decides it"]
     margin_deg: Annotated[Number, "effect on the smallest margin of a turning joint"]
     clearance_mm: Annotated[Number, "effect on the smallest distance of bodies"]
+
+
+class ChoiceRecord(TypedDict):
+    """A combination of discrete choices, and what came of it."""
+
+    choice: Annotated[str, "what differs from the given cell"]
+    status: Annotated[str, "`certified`, `conforming` by the search, `dropped`, or `not_tried`"]
+    trials: Annotated[int, "number of its trials"]
+    conforming: Annotated[int, "number of these that ended at a conforming layout"]
+    cycle_s: Annotated[Number, "shortest cycle of these, by the search; null without one"]
+    reason: Annotated[str, "why there is none, or why solve rejected it: the most frequent reason; else empty"]
 
 
 class DroppedRecord(TypedDict):
@@ -103,9 +115,13 @@ class LayoutRecord(TypedDict):
     binding: Annotated[list[LimitRecord], "what holds the best layout back"]
     variables: Annotated[list[VariableRecord], "the variables with what they do at the best layout"]
     convergence: Annotated[list[ProgressRecord], "the search, trial after trial"]
+    choices: Annotated[list[ChoiceRecord], "every combination of discrete choices; empty without any"]
     dropped: Annotated[list[DroppedRecord], "trials without a conforming layout, by reason"]
+    misplacement: Annotated[
+        MisplacementRecord | None, "the layout with every base off its place; null where it was not asked for"
+    ]
     remarks: Annotated[list[str], "what else the user should know, as pedestals that move with their robots"]
     drawing: Annotated[dict[str, Any], "floor plan in mm: the given and the best layout from above"]
-    files: Annotated[list[FileRecord], "files beside `best.yaml` that it names"]
+    files: Annotated[list[FileRecord], "`best.yaml` and the files that it names"]
     inputs: Annotated[dict[str, str], "SHA-256 of every input file, by name"]
     versions: Annotated[dict[str, str], "versions of cellplan and of the packages that the numbers depend on"]

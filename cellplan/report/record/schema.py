@@ -4,6 +4,8 @@ import types
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints, is_typeddict
 
+from cellplan.report.record.advice import AdviceRecord
+from cellplan.report.record.layout import LayoutRecord
 from cellplan.report.record.run import RunRecord
 from cellplan.report.record.summary import SummaryRecord
 
@@ -34,6 +36,23 @@ def report_schema(*, closed: bool = False) -> dict[str, Any]:
     }
 
 
+def layout_schema() -> dict[str, Any]:
+    """The JSON Schema of ``study.json`` of a layout search."""
+    return _whole(LayoutRecord, "cellplan.layout/1", "study.json of a layout search")
+
+
+def advice_schema() -> dict[str, Any]:
+    """The JSON Schema of ``advice.json``."""
+    return _whole(AdviceRecord, "cellplan.advice/1", "advice.json of a repair")
+
+
+def _whole(form: Any, title: str, description: str) -> dict[str, Any]:
+    """The schema of a file with one record."""
+    definitions: dict[str, dict[str, Any]] = {}
+    top = _schema(form, definitions, closed=False)
+    return {"$schema": DIALECT, "title": title, "description": description, **top, "$defs": definitions}
+
+
 def _schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) -> dict[str, Any]:
     """The schema of one type; records are added to the definitions."""
     if is_typeddict(form):
@@ -51,7 +70,7 @@ def _schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) 
         return {"type": "array", "items": _schema(arguments[0], definitions, closed=closed)}
     if origin is dict:
         return {"type": "object", "additionalProperties": _schema(arguments[1], definitions, closed=closed)}
-    return {"type": TYPES[form]}
+    return {} if form is Any else {"type": TYPES[form]}
 
 
 def _record_schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) -> dict[str, Any]:

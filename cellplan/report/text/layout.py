@@ -30,6 +30,8 @@ def layout_lines(record: Record, folder: Path) -> list[str]:
         rejected = [each for each in record["top"] if each["status"] == "rejected"]
         lines += [f"  rejected by solve: {each['reason']}" for each in rejected[:MOST]]
         lines += [f"  {each['reason']} ({_trials(each['count'])})" for each in record["dropped"][:MOST]]
+    lines += [f"  {line}" for line in map(_choice, record["choices"])]
+    lines += [f"  {line}" for line in _misplaced(record)]
     lines += [f"  {remark}" for remark in record["remarks"]]
     lines.append(f"  {_trials(record['trials'])} in {record['rounds']} rounds, {record['solves']} solved in full")
     if record["best"] is not None:
@@ -61,6 +63,20 @@ def changed_variables(record: Record) -> Entries:
     ]
 
 
+def _misplaced(record: Record) -> Iterator[str]:
+    """What was sampled with displaced bases."""
+    found = record["misplacement"]
+    if found is None:
+        return
+    by = f"{found['position_mm']:g} mm and {found['orientation_deg']:g} deg"
+    yield f"with every base off by {by}, sampled, motion planned anew, in this one cycle:"
+    yield (
+        f"  {found['seeded_kept']} of {found['seeded']} seeded corners, {found['by_derivatives_kept']} of "
+        f"{found['by_derivatives']} worst corners by derivatives, {found['ends_kept']} of {found['ends']} single "
+        f"displacements keep all demands; {len(found['solved'])} of them solved in full"
+    )
+
+
 def _given(record: Record) -> str:
     """The given layout in one line."""
     given = record["given"]
@@ -80,6 +96,13 @@ def _changes(record: Record) -> Iterator[str]:
             f"{name.removesuffix('_mm').removesuffix('_deg')} {each['given']:.5g} -> {each['best']:.5g}{unit}"
         )
     yield from (f"{entry}: {', '.join(texts)}" for entry, texts in groups.items())
+
+
+def _choice(each: Record) -> str:
+    """A combination of discrete choices in one line."""
+    cycle = "" if each["cycle_s"] is None else f", cycle {each['cycle_s']:.4g} s"
+    reason = f": {each['reason']}" if each["reason"] else ""
+    return f"{each['choice']}: {each['status'].replace('_', ' ')} ({_trials(each['trials'])}{cycle}){reason}"
 
 
 def _trials(count: int) -> str:

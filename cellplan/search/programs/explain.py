@@ -10,7 +10,7 @@ from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, Kind, Measur
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point, Problem
 from cellplan.search.programs.program import Program
-from cellplan.search.programs.rows import Linear, Rows
+from cellplan.search.programs.rows import Linear, PacedRows, Rows
 
 NEAR: Final = 0.02  # [-] usual steps of the region in which the multipliers hold
 COUNTS: Final = 1e-6  # [-] multiplier from which on a row binds
@@ -64,7 +64,8 @@ def explain(problem: Problem, point: Point, demands: Demands, effort: Effort) ->
     for rows in program.rows:
         multipliers = solved.multipliers[at : at + len(rows.lacks)]
         at += len(rows.lacks)
-        gradient += rows.aim * (multipliers @ rows.gradients)
+        if rows.aim or isinstance(rows, PacedRows):
+            gradient += (multipliers @ rows.gradients)[: len(gradient)]
         binding += _bound(problem, rows, multipliers, unit)
     if demands.objective is Objective.CHANGE:
         gradient = np.sign(point.x - problem.given) * problem.cost * problem.scale
@@ -90,6 +91,8 @@ def _bound(problem: Problem, rows: Rows, multipliers: Array, unit: float) -> lis
     """The rows of one kind that bind."""
     units = {Kind.DISTANCE: LENGTH, Kind.LOWER_LIMIT: ANGLE, Kind.UPPER_LIMIT: ANGLE}
     found = []
+    if rows.kind is Kind.DURATION:
+        return []
     for row in np.flatnonzero(multipliers > COUNTS).tolist():
         subject, size = int(rows.subjects[row]), units.get(rows.kind, SHARE)
         if size == ANGLE and not problem.limits.is_revolute[subject]:
@@ -101,7 +104,7 @@ def _bound(problem: Problem, rows: Rows, multipliers: Array, unit: float) -> lis
                 names=problem.pair_names(subject) if is_pair else problem.joint_names(subject),
                 time=float(problem.times[rows.nodes[row]]),
                 share=float(multipliers[row]),
-                gain=None if rows.aim else float(multipliers[row]) * unit / size,
+                gain=None if rows.aim or isinstance(rows, PacedRows) else float(multipliers[row]) * unit / size,
             )
         )
     return found

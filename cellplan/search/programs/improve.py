@@ -174,14 +174,15 @@ class _Climb:
                     self._trust = min(WIDEST, GROWS * self._trust)
                 return there
             bends = np.concatenate([each.bends(here.measures, there.measures, found.z) for each in program.rows])
-        reach = self._trust if found is None else float(np.abs(found.z).max(initial=0.0))
+        count = len(here.measures.point.x)
+        reach = self._trust if found is None else float(np.abs(found.z[:count]).max(initial=0.0))
         self._trust = SHRINKS * min(self._trust, reach)
         return None
 
     def _at(self, here: _State, linear: Linear, z: Array) -> _State | None:
         """The state after a step, in usual steps; None where a tool cannot follow."""
         problem, point = self._problem, here.measures.point
-        dx = np.clip(point.x + z * problem.scale, problem.lower, problem.upper) - point.x
+        dx = np.clip(point.x + z[: len(point.x)] * problem.scale, problem.lower, problem.upper) - point.x
         near = replace(point, q=point.q + linear.derivatives.q @ dx, rates=linear.derivatives.rates)
         motion = problem.evaluate(point.x + dx, point.start, near)
         return None if motion is None else self._state(motion)

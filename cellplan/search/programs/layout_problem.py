@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -12,10 +12,20 @@ from cellplan.model.joint_limits import JointLimits
 from cellplan.model.motion import Schedule
 from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
 from cellplan.search.kernel.derivatives import differentiate
-from cellplan.search.kernel.job import Job
+from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.run import run, run_near
+from cellplan.search.kernel.screws import Directions
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
-from cellplan.search.variables.variables import Variables
+
+
+class KernelVariables(Protocol):
+    """Variables, n of them, as the kernel needs them; the rest is as in ``Problem``."""
+
+    def layouts(self, x: Array, start: Array) -> Layouts:
+        """Candidates at values of shape (K, n), with start postures of shape (K, nq)."""
+
+    def directions(self, x: Array) -> Directions:
+        """What each variable does to a candidate, at values of shape (n,)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,7 +48,7 @@ class LayoutProblem:
     """
 
     job: Job
-    variables: Variables
+    variables: KernelVariables
     bodies: CellDistances
     acceleration: Array
     names: tuple[str, ...] = field(init=False)

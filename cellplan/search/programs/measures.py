@@ -1,6 +1,6 @@
 """Measures: how a point stands to all demands, without any derivative."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
@@ -8,7 +8,8 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.search.kernel.figures import Crests
-from cellplan.search.programs.objective import Demands, Effort, Objective, Room
+from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
+from cellplan.search.programs.pace import Pace
 from cellplan.search.programs.problem import Distances, Point, Problem
 
 ANGLE: Final = 0.01  # [rad] of a lack that weighs as much as
@@ -16,7 +17,6 @@ LENGTH: Final = 0.003  # [m] and as
 SHARE: Final = 0.01  # [-] of the duration
 IN_ROOM: Final = 0.02  # [-] of the price of a lack where only the room is missed that counts as kept
 ROUNDING: Final = 1e-6  # [-] usual units: 3 nm
-OWN_ROOM: Final = 0.1  # [-] share of the room that is asked of a robot's own bodies
 
 
 class Kind(StrEnum):
@@ -27,6 +27,7 @@ class Kind(StrEnum):
     SPEED = "speed"
     ACCELERATION = "acceleration"
     DISTANCE = "distance"
+    DURATION = "duration"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,14 +38,16 @@ class Measures:
         point: The point.
         lower: Distances of the joints from their lower limits, the demanded margin off, negative, shape (N, nq).
         upper: Likewise from their upper limits.
-        speeds: Speeds as shares of their limits, shape (N, nq).
-        accelerations: Roots of the accelerations as shares of their limits, shape (N, nq): the motion must last so many
-            times as long as the nodes do.
+        speeds: Speeds as shares of their limits, shape (N, nq); of a retimed motion those of its shortest cycle, as if
+            it lasted as long as the nodes do.
+        accelerations: Accelerations likewise, shape (N, nq): the motion must last as many times as long as the nodes do
+            as the root of them says.
         distances: Near pairs at the keys.
         lacks: By how much pairs miss what is demanded of them, in [m], negative where they keep it, shape (M,).
         within: Distance in [m] beyond what is demanded, from which on pairs are not near.
         factor: How many times as long as the nodes the motion must last for all speeds and accelerations.
         cycle: Shortest cycle in [s].
+        pace: The motion as fast as the limits allow everywhere; None where it is timed by the laws of the cell.
     """
 
     point: Point
@@ -57,20 +60,27 @@ class Measures:
     within: float
     factor: float
     cycle: float
+    pace: Pace | None = None
 
     @classmethod
     def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":
         """Measure a point."""
-        times, limits = problem.times, problem.limits
-        speeds = Crests.of(times, point.qd / limits.velocity, in_magnitude=True)
-        accelerations = Crests.of(times, point.qdd / problem.acceleration, in_magnitude=True)
-        factor = max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
-        distances = problem.distances(point, key_nodes(problem, effort), effort.within + demands.clearance)
+        times, limits, allowance = problem.times, problem.limits, demands.allowance
+        pace = Pace.of(problem, point) if demands.timing is Timing.RETIMED else None
+        speeds, accelerations, factor = (
+            _loads(problem, point, demands) if pace is None else _paced(problem, point, pace)
+        )
+        margin, most = demands.margin, demands.clearance
+        if allowance is not None:
+            margin, most = margin + allowance.margin, most + float(allowance.distance.max(initial=0.0))
+        distances = problem.distances(point, key_nodes(problem, effort), effort.within + most)
         added = np.where(distances.is_own, 0.0, demands.clearance)
+        if allowance is not None:
+            added = added + allowance.distance[distances.pairs]
         return cls(
             point=point,
-            lower=Crests.of(times, limits.lower + demands.margin - point.q),
-            upper=Crests.of(times, point.q - limits.upper + demands.margin),
+            lower=Crests.of(times, limits.lower + margin - point.q),
+            upper=Crests.of(times, point.q - limits.upper + margin),
             speeds=speeds,
             accelerations=accelerations,
             distances=distances,
@@ -78,6 +88,7 @@ class Measures:
             within=effort.within,
             factor=factor,
             cycle=factor * float(times[-1] - times[0]),
+            pace=pace,
         )
 
     def missed(self, problem: Problem, demands: Demands, room: Room) -> "Missed":
@@ -94,7 +105,9 @@ class Measures:
         allowed.append(most)
         if demands.duration is not None and demands.objective is not Objective.CYCLE:
             whole = demands.duration / self.span / (1.0 + room.time)
-            loads = np.concatenate([self.speeds.value.max(axis=0), np.sqrt(self.accelerations.value.max(axis=0))])
+            loads = np.array([self.factor])
+            if self.pace is None:
+                loads = np.concatenate([self.speeds.value.max(axis=0), np.sqrt(self.accelerations.value.max(axis=0))])
             lacks.append((loads / whole - 1.0) / SHARE)
             allowed.append(np.full(len(loads), 0.5 * room.time / SHARE))
         return Missed(lacks=np.concatenate(lacks), allowed=np.concatenate(allowed))
@@ -110,6 +123,8 @@ class Measures:
                 return self.speeds.value[nodes, subjects]
             case Kind.ACCELERATION:
                 return np.sqrt(self.accelerations.value[nodes, subjects])
+            case Kind.DURATION:
+                return np.full(len(nodes), self.factor)
             case Kind.DISTANCE:
                 found = self.distances
                 places = zip(found.pairs.tolist(), found.nodes.tolist(), strict=True)
@@ -163,9 +178,33 @@ class Missed:
         return price * (self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum()))
 
 
+def _loads(problem: Problem, point: Point, demands: Demands) -> tuple[Crests, Crests, float]:
+    """Speeds and accelerations under the laws, and how many times as long as the nodes they must last."""
+    speeds = Crests.of(problem.times, point.qd / problem.limits.velocity, in_magnitude=True)
+    accelerations = Crests.of(problem.times, point.qdd / problem.acceleration, in_magnitude=True)
+    if (allowance := demands.allowance) is not None:
+        speeds, accelerations = _raised(speeds, allowance.speed), _raised(accelerations, allowance.acceleration)
+    return speeds, accelerations, max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
+
+
+def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[Crests, Crests, float]:
+    """The same of a retimed motion: at its nodes, as nothing is an extreme between them."""
+    factor = pace.seconds / float(problem.times[-1] - problem.times[0])
+    speeds, accelerations = (
+        Crests(value=share * factor**order, shares=np.tile([0.0, 1.0, 0.0], (*share.shape, 1)))
+        for order, share in enumerate(pace.reached(point.qd, point.qdd), start=1)
+    )
+    return speeds, accelerations, factor
+
+
+def _raised(crests: Crests, by: Array) -> Crests:
+    """Values of functions that may be larger by so much, shape (N, n)."""
+    return replace(crests, value=crests.value + by)
+
+
 def rooms(distances: Distances, room: Room) -> Array:
     """What is asked of near pairs beyond their demands in [m], shape (M,)."""
-    return np.where(distances.is_own, OWN_ROOM, 1.0) * room.distance
+    return np.where(distances.is_own, room.own, room.distance)
 
 
 def key_nodes(problem: Problem, effort: Effort) -> Indices:

@@ -25,6 +25,23 @@ class Timing(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Allowance:
+    """What a point must keep beyond its demands, because something that is not known may take as much away.
+
+    Attributes:
+        margin: Of the joint positions at the nodes in [rad] or [m], shape (N, nq).
+        speed: Of the speeds, as shares of their limits, shape (N, nq).
+        acceleration: Of the accelerations, as shares of their limits, shape (N, nq).
+        distance: Of each pair of bodies in [m], shape (pairs,).
+    """
+
+    margin: Array
+    speed: Array
+    acceleration: Array
+    distance: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Demands:
     """What is demanded of a point.
 
@@ -35,6 +52,7 @@ class Demands:
             objectives clearance and change need one.
         timing: How the motion is timed.
         clearance: Added to what the cell demands of every pair but those of one robot's own bodies, in [m].
+        allowance: What is demanded beyond all that at each node and of each pair; None for nothing.
     """
 
     objective: Objective
@@ -42,11 +60,10 @@ class Demands:
     duration: float | None = None
     timing: Timing = Timing.LAWS
     clearance: float = 0.0
+    allowance: Allowance | None = None
 
     def __post_init__(self) -> None:
-        """Check at the door what the objective needs, and what the programs know."""
-        if self.timing is Timing.RETIMED:
-            raise ValueError("demands: programs know the time laws of the cell only, not a retimed motion")
+        """Check at the door what the objective needs."""
         if self.objective in (Objective.CLEARANCE, Objective.CHANGE) and self.duration is None:
             raise ValueError(f"demands: the objective '{self.objective}' needs a duration")
         if not np.all(self.margin >= 0.0):
@@ -61,12 +78,14 @@ class Room:
 
     Attributes:
         margin: In [rad] or [m].
-        distance: In [m]; of a robot's own bodies a tenth, as their distances are often its design.
+        distance: In [m].
+        own: Likewise of a robot's own bodies: little, as their distances are often its design.
         time: Share of the duration.
     """
 
     margin: float = float(np.radians(0.15))
     distance: float = 0.0025
+    own: float = 0.0001
     time: float = 0.002
 
 

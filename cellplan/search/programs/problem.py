@@ -66,8 +66,8 @@ class Distances:
     found: object
 
 
-class Problem(Protocol):
-    """What sequential programs improve.
+class Varied(Protocol):
+    """The variables of a problem, n of them.
 
     Attributes:
         names: Names of the variables.
@@ -76,9 +76,6 @@ class Problem(Protocol):
         scale: A usual step of each, shape (n,).
         cost: Cost of a change by one unit of each, shape (n,).
         given: Values from which a change is counted, shape (n,).
-        times: Times of the nodes in [s], from 0 to the end, shape (N,); two nodes may share one where speeds jump.
-        limits: Limits of the joints.
-        acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,).
     """
 
     @property
@@ -104,6 +101,16 @@ class Problem(Protocol):
     @property
     def given(self) -> Array:
         """See the class."""
+
+
+class Problem(Varied, Protocol):
+    """What sequential programs improve.
+
+    Attributes:
+        times: Times of the nodes in [s], from 0 to the end, shape (N,); two nodes may share one where speeds jump.
+        limits: Limits of the joints.
+        acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,).
+    """
 
     @property
     def times(self) -> Array:

@@ -17,6 +17,9 @@ HIGHER: Final = 10.0  # [-] factor of the price
 SPARED: Final = 0.1  # [-] share of what could be mended that a price may leave
 MISSED: Final = 1e-9  # [-] usual units: nothing
 PROXIMAL: Final = 1e-3  # [-] weight of a step: of equal ones the shortest
+CURVATURE: Final = 0.75  # [-] of the time: second derivative of c^(-1/2) by a relative change of c
+SLOWER: Final = -0.4  # [-] least relative change of a square in one step
+FASTER: Final = 0.6  # [-] largest one
 FARTHEST: Final = 1e6  # [-] by which the objective of one step may change
 
 
@@ -25,7 +28,7 @@ class Step:
     """The solution of a program.
 
     Attributes:
-        z: The step in usual steps of the variables, shape (n,).
+        z: The step in usual steps of the variables, then relative changes of the squares of a retimed motion, (n + m,).
         expected: What it is expected to gain.
         left: What is still missed after it, by the rows, in usual units.
         before: What is missed before it.
@@ -43,11 +46,15 @@ class Step:
 class Program:
     """One linear program in the step z, the objective t, the slacks of violated demands and costs of changes.
 
+    The time of a retimed motion is convex in the squares of its speed, which are part of the step: it is quadratic in
+    them, so that they do not change from one bound to the other.
+
     Attributes:
         rows: The rows, stacked.
-        box: Lower and upper ends of the step in usual steps, shape (n,) each.
+        box: Lower and upper ends of the step in usual steps, shape (n + m,) each.
         demands: What is demanded.
         changed: Cost of the present change and of one usual step of each variable, shape (n,) each.
+        curved: Second derivatives of the objective by the step, shape (n + m,).
         price: What a slack of one unit costs.
     """
 
@@ -55,6 +62,7 @@ class Program:
     box: tuple[Array, Array]
     demands: Demands
     changed: tuple[Array, Array]
+    curved: Array
     price: float = 1.0
 
     @classmethod
@@ -63,11 +71,19 @@ class Program:
         problem, x = linear.problem, linear.measures.point.x
         lower = np.minimum(np.maximum((problem.lower - x) / problem.scale, -trust), 0.0)
         upper = np.maximum(np.minimum((problem.upper - x) / problem.scale, trust), 0.0)
+        curved, pace = np.zeros(len(x)), linear.measures.pace
+        if pace is not None:
+            inner = pace.inner
+            lower = np.append(lower, np.full(len(inner), SLOWER))
+            upper = np.append(upper, np.full(len(inner), FASTER))
+            is_aim = demands.objective is Objective.CYCLE
+            curved = np.append(curved, is_aim * CURVATURE * pace.shares[inner])
         return cls(
             rows=linear.rows(demands, room, np.maximum(-lower, upper)),
             box=(lower, upper),
             demands=demands,
             changed=((x - problem.given) * problem.cost, problem.cost * problem.scale),
+            curved=curved,
         )
 
     def priced(self, price: float) -> "Program":
@@ -105,14 +121,16 @@ class Program:
         cost = np.concatenate([np.zeros(count), [self._weight], prices])
         lower = np.concatenate([self.box[0], [-FARTHEST], np.zeros(2 * slacks + costs)])
         upper = np.concatenate([self.box[1], [FARTHEST], free, most - free, np.full(costs, FARTHEST)])
-        solved = least(cost, np.full(len(cost), PROXIMAL), A, top, (lower, upper))
+        weights = np.full(len(cost), PROXIMAL)
+        weights[:count] += self.curved
+        solved = least(cost, weights, A, top, (lower, upper))
         if solved is None:
             return None
         now = np.concatenate([np.zeros(count), [0.0], free, most - free, np.abs(self.changed[0])[:costs]])
         out = slice(count + 1 + slacks, count + 1 + 2 * slacks)
         return Step(
             z=solved.at[:count],
-            expected=float(cost @ (now - solved.at)),
+            expected=float(cost @ (now - solved.at) - 0.5 * self.curved @ solved.at[:count] ** 2),
             left=float(solved.at[out].sum()),
             before=float(now[out].sum()),
             solved=solved,
@@ -130,7 +148,7 @@ class Program:
     @property
     def _costs(self) -> int:
         """Number of variables that stand for the costs of changes."""
-        return len(self.box[0]) if self.demands.objective is Objective.CHANGE else 0
+        return len(self.changed[0]) if self.demands.objective is Objective.CHANGE else 0
 
     def _families(self, is_loose: Flags, lacks: Array) -> tuple[Indices, Array, Array]:
         """Which slack each row has, -1 for none; what is missed now of each, and how much of it counts as kept.

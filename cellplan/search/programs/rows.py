@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Final, Self
 
 import numpy as np
 
@@ -9,7 +10,10 @@ from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.search.kernel.figures import Crests
 from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, Kind, Measures, rooms
 from cellplan.search.programs.objective import Demands, Objective, Room
+from cellplan.search.programs.pace import Pace
 from cellplan.search.programs.problem import PointDerivatives, Problem
+
+LEAST_LOAD: Final = 0.5  # [-] shares of limits of a retimed motion from which on they become rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,7 +40,7 @@ class Rows:
     units: Array
     aim: float = 0.0
 
-    def that_can_bind(self, box: Array) -> "Rows":
+    def that_can_bind(self, box: Array) -> Self:
         """Those that a step within ``+-box`` can bring to their bounds."""
         reach = np.abs(self.gradients) @ box
         highest = self.lacks + reach
@@ -47,18 +51,48 @@ class Rows:
         before, after = (each.values(self.kind, self.subjects, self.nodes) for each in (here, there))
         return np.nan_to_num((after - before) / self.units - self.gradients @ z)
 
-    def of(self, kept: Flags) -> "Rows":
+    def of(self, kept: Flags) -> Self:
         """Some of them."""
-        return Rows(
-            kind=self.kind,
+        return replace(
+            self,
             subjects=self.subjects[kept],
             nodes=self.nodes[kept],
             lacks=self.lacks[kept],
             gradients=self.gradients[kept],
             allowed=self.allowed[kept],
             units=self.units[kept],
-            aim=self.aim,
         )
+
+    def widened(self, count: int) -> Self:
+        """The same for steps that have more unknowns, which they do not depend on."""
+        return replace(self, gradients=np.pad(self.gradients, ((0, 0), (0, count))))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PacedRows(Rows):
+    """Rows about speeds or accelerations of a retimed motion; the squares of the path's speed are unknowns as well.
+
+    Attributes:
+        pace: The motion.
+        places: Numbers of the loads, see ``Pace.loads``, shape (M,).
+        signs: Signs of the loads, shape (M,).
+    """
+
+    pace: Pace
+    places: Indices
+    signs: Array
+
+    def bends(self, here: Measures, there: Measures, z: Array) -> Array:
+        """See ``Rows``: with the squares that the step was to have."""
+        pace, inner, count = self.pace, self.pace.inner, len(here.point.x)
+        squares = pace.squares.copy()
+        squares[inner] *= 1.0 + z[count:]
+        loads = pace.loads(there.point.qd, there.point.qdd, squares)[self.places, self.subjects]
+        return (self.signs * loads - 1.0) / self.units - (self.lacks + self.gradients @ z)
+
+    def of(self, kept: Flags) -> Self:
+        """See ``Rows``."""
+        return replace(Rows.of(self, kept), places=self.places[kept], signs=self.signs[kept])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -83,20 +117,78 @@ class Linear:
         )
 
     def rows(self, demands: Demands, room: Room, box: Array) -> list[Rows]:
-        """All rows that a step within a box can bind; the ones that bound the objective first."""
-        parts = [*self._timing(demands, room), *self._margins(room, box), self._apart(room)]
+        """All rows that a step within a box can bind; the ones that bound the objective first.
+
+        Args:
+            demands: What is demanded.
+            room: What is asked for beyond it.
+            box: Largest steps of the variables, then of the squares of a retimed motion, relative, (n + m,).
+        """
+        count = len(self.problem.scale)
+        parts = [*self._margins(room, box[:count]), self._apart(room)]
         if demands.objective is Objective.CLEARANCE:
             parts.append(self._aimed_apart())
-        return [rows.that_can_bind(box) for rows in parts if len(rows.lacks)]
+        pace, duration = self.measures.pace, self._duration(demands, room)
+        if pace is None:
+            first = [] if duration is None else [*self._timing(duration, demands, room)]
+        else:
+            parts = [rows.widened(len(box) - count) for rows in parts]
+            first = [] if duration is None else [self._lasting(pace, duration, demands, room), *self._paced(pace)]
+        return [rows.that_can_bind(box) for rows in (*first, *parts) if len(rows.lacks)]
 
-    def _timing(self, demands: Demands, room: Room) -> Iterator[Rows]:
-        """Speeds and accelerations: the objective itself, or bounds at a given duration."""
+    def _duration(self, demands: Demands, room: Room) -> float | None:
+        """How many times as long as the nodes the motion may last; None where it may last as long as it takes."""
+        if demands.objective is Objective.CYCLE:
+            return self.measures.factor
+        span = float(self.problem.times[-1] - self.problem.times[0])
+        return None if demands.duration is None else demands.duration / span / (1.0 + room.time)
+
+    def _lasting(self, pace: Pace, whole: float, demands: Demands, room: Room) -> Rows:
+        """The duration of a retimed motion: the objective itself, or bounded by a given one."""
+        is_aim = demands.objective is Objective.CYCLE
+        share, unit, count = self.measures.factor / whole, 1.0 if is_aim else SHARE, len(self.problem.scale)
+        saved = 0.5 * share * pace.shares[pace.inner] / unit
+        return Rows(
+            kind=Kind.DURATION,
+            subjects=np.zeros(1, dtype=np.intp),
+            nodes=np.zeros(1, dtype=np.intp),
+            lacks=np.array([(share - 1.0) / unit]),
+            gradients=np.concatenate([np.zeros(count), -saved])[None],
+            allowed=np.full(1, 0.0 if is_aim else 0.5 * room.time / unit),
+            units=np.full(1, whole * unit),
+            aim=1.0 if is_aim else 0.0,
+        )
+
+    def _paced(self, pace: Pace) -> Iterator[Rows]:
+        """Speeds and accelerations of a retimed motion."""
+        by, point, problem = self.derivatives, self.measures.point, self.problem
+        shapes, changes = pace.shapes(point.qd, point.qdd), pace.shapes(by.qd, by.qdd)
+        places, loads = pace.places(pace.squares), pace.loads(point.qd, point.qdd, pace.squares)
+        for kind, unit in ((Kind.SPEED, 1.0), (Kind.ACCELERATION, 2.0)):
+            is_kind = places.is_speed == (kind is Kind.SPEED)
+            rows, joints = (
+                part.astype(np.intp) for part in np.nonzero(is_kind[:, None] & (np.abs(loads) > LEAST_LOAD))
+            )
+            signs = np.sign(loads[rows, joints])
+            gradients = pace.derivatives(shapes, changes, rows, joints)
+            gradients[:, : len(problem.scale)] *= problem.scale
+            yield PacedRows(
+                kind=kind,
+                subjects=joints,
+                nodes=pace.nodes[places.at[rows]],
+                lacks=np.minimum(np.abs(loads[rows, joints]) - 1.0, 0.0) / unit,
+                gradients=gradients * signs[:, None] / unit,
+                allowed=np.zeros(len(rows)),
+                units=np.full(len(rows), unit),
+                pace=pace,
+                places=rows,
+                signs=signs,
+            )
+
+    def _timing(self, whole: float, demands: Demands, room: Room) -> Iterator[Rows]:
+        """Speeds and accelerations under the laws: the objective itself, or bounds at a given duration."""
         measures, problem = self.measures, self.problem
         is_aim = demands.objective is Objective.CYCLE
-        if not is_aim and demands.duration is None:
-            return
-        span = float(problem.times[-1] - problem.times[0])
-        whole = measures.factor if is_aim or demands.duration is None else demands.duration / span / (1.0 + room.time)
         unit = 1.0 if is_aim else SHARE
         found = [(Kind.SPEED, measures.speeds, self.derivatives.qd, problem.limits.velocity)]
         if self.derivatives.qdd is not None:

@@ -34,7 +34,7 @@ def first_path(
     carrier = next(robot for robot in cell.robots if robot.name == cell.positioners[0])
     start = layout.start[0]
     if carrier.path is not None:
-        return _with_count(carrier.path, count, degree), start
+        return with_count(carrier.path, count, degree), start
     free = replace(cell, robots=tuple(replace(robot, path=None) for robot in cell.robots))
     job = Job.of(free, schedule, moving=[robot.name for robot in cell.robots], nodes=NODES)
     motion = run(job, layout)
@@ -45,7 +45,7 @@ def first_path(
     return JointSpline.fitted(times / times[-1], q, count=count, degree=degree), motion.q[0, 0]
 
 
-def _with_count(path: JointSpline, count: int, degree: int) -> JointSpline:
+def with_count(path: JointSpline, count: int, degree: int) -> JointSpline:
     """A path with so many coefficients; the very path where it has them already."""
     if (len(path.coefficients), path.degree) == (count, degree):
         return path

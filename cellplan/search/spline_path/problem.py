@@ -21,12 +21,29 @@ from cellplan.search.spline_path.variables import PathVariables
 class LayoutVariables(Protocol):
     """What a path problem needs of the variables of the layout, of which there may be none; see ``Problem``."""
 
-    names: tuple[str, ...]
-    lower: Array
-    upper: Array
-    scale: Array
-    cost: Array
-    given: Array
+    @property
+    def names(self) -> tuple[str, ...]:
+        """See ``Problem``."""
+
+    @property
+    def lower(self) -> Array:
+        """See ``Problem``."""
+
+    @property
+    def upper(self) -> Array:
+        """See ``Problem``."""
+
+    @property
+    def scale(self) -> Array:
+        """See ``Problem``."""
+
+    @property
+    def cost(self) -> Array:
+        """See ``Problem``."""
+
+    @property
+    def given(self) -> Array:
+        """See ``Problem``."""
 
     def layouts(self, x: Array, start: Array) -> Layouts:
         """The layouts at some values, shape (K, n), with start postures near the right ones, shape (K, nq)."""
@@ -117,7 +134,8 @@ class PathProblem:
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
         """See ``Problem``."""
         _, others = self._split(point.x)
-        near = self.bodies.near(others, self._layout_at(point), point.q[nodes], within)
+        most = max((pair.demand for pair in self.bodies.pairs), default=0.0)
+        near = self.bodies.near(others, self._layout_at(point), point.q[nodes], within + most)
         return Distances(
             pairs=near.pairs,
             nodes=nodes[near.keys],

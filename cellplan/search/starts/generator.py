@@ -4,8 +4,8 @@ Start number ``index`` depends on the cell, the seed and this number only, so an
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
@@ -13,6 +13,8 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.seeds import generator
+from cellplan.planning.start.inverse_kinematics import SAME_POSTURE
+from cellplan.search.kernel.run import run
 from cellplan.search.starts.at_rest import Pool, Setting, pool, settings
 from cellplan.search.starts.combined import Judged, combined, judged
 from cellplan.search.starts.freedom import drawn_within
@@ -101,6 +103,26 @@ class StartGenerator:
             return self._random(rng, number)
         return self._sampled(rng, number)
 
+    def branches(self, robots: Collection[str], start: Array) -> tuple[Array, Array]:
+        """Other branches of inverse kinematics of the given layout from which all tools follow their paths.
+
+        Args:
+            robots: Names of the operators whose branch may change.
+            start: The start posture of the given layout, which is left out, shape (nq,).
+
+        Returns:
+            Variables, shape (C, n), and start postures, shape (C, nq), the best first.
+        """
+        problem = self._problem
+        x = problem.with_starts(problem.variables.given[None], start[None])[0]
+        many, starts, _ = branch_starts(problem, x, start, generator("branches", self._seed), robots)
+        if not len(many):
+            return many, starts
+        followed = run(problem.job, problem.variables.layouts(many, starts))
+        is_other = np.abs(followed.q[:, 0] - start).max(axis=1) > SAME_POSTURE
+        kept = followed.is_followed & is_other
+        return many[kept], followed.q[kept, 0]
+
     def _of_layout(self, origin: Origin, text: str, x: Array, start: Array) -> Starts:
         """One layout as it is, else with other branches of inverse kinematics of the operators."""
         problem = self._problem
@@ -134,6 +156,9 @@ class StartGenerator:
         pools = dict[int, Pool]()
         for robot in self._problem.operators:
             pools[robot] = pool(self._problem, robot, setting, rng)
+            if not len(pools[robot].q):
+                fine = replace(self._problem, at_rest=self._problem.at_rest_fine)
+                pools[robot] = pool(fine, robot, setting, rng)
             if not len(pools[robot].q):
                 name, drops = self._problem.cell.robots[robot].name, pools[robot].drops
                 reasons.append(f"'{name}' follows its path from none of {drops.total()} bases: {_words(drops)}")

@@ -1,5 +1,6 @@
 """Start postures of one layout: all branches of inverse kinematics of its operators."""
 
+from collections.abc import Collection
 from itertools import product
 from typing import Final
 
@@ -46,8 +47,17 @@ def branches(problem: StartProblem, robot: int, x: Array, start: Array, rng: np.
     return q[has_followed][order[room[order] >= 0.0]][:BRANCHES]
 
 
-def branch_starts(problem: StartProblem, x: Array, start: Array, rng: np.random.Generator) -> tuple[Array, Array, str]:
-    """Combinations of branches of all operators of one layout.
+def branch_starts(
+    problem: StartProblem, x: Array, start: Array, rng: np.random.Generator, robots: Collection[str] | None = None
+) -> tuple[Array, Array, str]:
+    """Combinations of branches of the operators of one layout.
+
+    Args:
+        problem: The cell.
+        x: Values of the variables, shape (n,).
+        start: Start posture, shape (nq,).
+        rng: Random numbers.
+        robots: Names of the operators whose branch may change; None for all.
 
     Returns:
         Variables, shape (C, n), start postures, shape (C, nq), and the robot that follows its path from no branch, in
@@ -56,7 +66,8 @@ def branch_starts(problem: StartProblem, x: Array, start: Array, rng: np.random.
     nothing = np.zeros((0, len(x))), np.zeros((0, len(start)))
     start = problem.variables.layouts(x[None], start[None]).start[0]
     choices = []
-    for robot in problem.operators:
+    operators = [each for each in problem.operators if robots is None or problem.cell.robots[each].name in robots]
+    for robot in operators:
         found = branches(problem, robot, x, start, rng)
         if not len(found):
             name = problem.cell.robots[robot].name
@@ -68,7 +79,7 @@ def branch_starts(problem: StartProblem, x: Array, start: Array, rng: np.random.
     rows = []
     for picks in product(*choices):
         row = start.copy()
-        for robot, q in zip(problem.operators, picks, strict=True):
+        for robot, q in zip(operators, picks, strict=True):
             row[problem.cell.columns(problem.cell.robots[robot].name)] = q
         rows.append(row)
     starts = np.array(rows)

@@ -1,6 +1,6 @@
 """Variables of a layout search: numbers of a cell file that may change, for the kernel and for the file."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,13 +59,17 @@ class Variables:
     conversion: Mapping[str, object]
 
     @classmethod
-    def of(cls, cell: Cell) -> "Variables":
+    def of(cls, cell: Cell, *, without: Container[str] = ()) -> "Variables":
         """The variables that a cell file gives.
+
+        Args:
+            cell: The cell.
+            without: Addresses of numbers that stay as they are, whatever the file says.
 
         Raises:
             InputError: The cell was not read from a file, or was changed in Python since.
         """
-        settings = cell.layout
+        settings = None if cell.layout is None else cell.layout.without(without)
         if settings is None:
             raise InputError(f"cell '{cell.name}': expected a cell that was read from a file, got one built in Python")
         conversion, remarks = with_pedestals(cell, settings)

@@ -36,11 +36,11 @@ def written_starts(cell: Cell, settings: LayoutSettings, start: Array) -> dict[s
     values = dict[str, Any]()
     for robot in cell.robots:
         if robot.name in working and robot.name not in kept:
-            values |= _written_start(cell, robot, start[cell.columns(robot.name)])
+            values |= written_start(cell, robot, start[cell.columns(robot.name)])
     return values
 
 
-def _written_start(cell: Cell, robot: Robot, start: Array) -> dict[str, Any]:
+def written_start(cell: Cell, robot: Robot, start: Array) -> dict[str, Any]:
     """The start posture of a robot under the key that its file uses, or that suits its joints."""
     joints = robot.model.joints
     numbers = [_within_limits(value, joint) for value, joint in zip(start.tolist(), joints, strict=True)]

@@ -1,6 +1,7 @@
 """The section ``layout`` of a cell file: what it becomes, and every finding about it, word for word."""
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -54,6 +55,18 @@ def test_without_ranges_the_operators_and_the_first_start_vary(load: Load) -> No
     raised = load(("xyz_mm: [2000, 0, 0]", "xyz_mm: [2000, 0, 700]")).layout
     assert raised is not None
     assert {it.address: (it.lower, it.upper) for it in raised.ranges}["robots.worker.base.z_mm"] == (0.0, 0.7)
+
+
+@pytest.mark.parametrize("size", ["[800, 400]", "[800, 400, 10]"])
+def test_the_height_of_an_area_kept_out_of_is_read_and_counts_for_nothing(size: str, load: Load) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cell = load(with_layout("{keep_out: {aisle: {box: {size_mm: " + size + "}}}}"))
+
+    assert cell.layout is not None
+    (aisle,) = cell.layout.keep_out
+    assert isinstance(aisle.shape, Box)
+    assert aisle.shape.size[:2] == (0.8, 0.4)
 
 
 def test_what_stands_beside_the_ranges(load: Load) -> None:

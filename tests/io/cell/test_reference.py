@@ -16,3 +16,5 @@ def test_the_reference_page_is_up_to_date(repository: Path) -> None:
     assert page == script.reference(), "run: python docs/make_reference.py"
     errors_page = (repository / "docs" / "reference" / "errors-file.md").read_text(encoding="utf-8")
     assert errors_page == script.errors_reference(), "run: python docs/make_reference.py"
+    layout_page = (repository / "docs" / "reference" / "layout-json.md").read_text(encoding="utf-8")
+    assert layout_page == script.layout_reference(), "run: python docs/make_reference.py"

@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from cellplan import LayoutRequest
-from cellplan.pipeline.layout.proposals import SIZE, Proposals, origin_text
+from cellplan.pipeline.layout.proposals import SIZE, Proposals, choice_text, origin_text
+from cellplan.search.programs.objective import Objective
 from cellplan.study.trial import Outcome, Trial, TrialStatus, Variant
 
 REQUEST = LayoutRequest(cell=Path("cell.yaml"))
@@ -25,18 +26,26 @@ def test_the_first_round_begins_with_the_given_layout_and_those_of_the_user() ->
 
 
 def test_every_combination_of_choices_is_tried_from_the_given_layout() -> None:
-    choices = {"motion.mode": ["simultaneous", "part_at_rest"], "tasks.a.robot": ["one", "two", "three"]}
+    choices = [{}, {"tasks.a.robot": "two", "robots.two.start_deg": "auto"}, {"tasks.a.robot": "three"}]
     proposals = Proposals(request=REQUEST, choices=choices)
 
     tried: list[dict[str, Any]] = []
     for _ in range(2):
         tried += proposals([ended(number, 1.0) for number in range(len(tried))])
 
-    given = [tuple(each["choice"].values()) for each in tried if each["kind"] == "given"]
-    assert sorted(given) == sorted(
-        (mode, robot) for mode in choices["motion.mode"] for robot in choices["tasks.a.robot"]
-    )
+    assert [each["choice"] for each in tried if each["kind"] == "given"] == choices
+    assert [each["choice"] for each in tried if each["kind"] == "sampled"][:2] == choices[1:]
     assert len(tried) == 2 * SIZE
+    assert [choice_text(choice) for choice in choices] == ["", "tasks.a.robot = two", "tasks.a.robot = three"]
+
+
+def test_other_branches_are_tried_as_they_are() -> None:
+    branches = [{"x": [0.5], "start": [1.0]}, {"x": [0.5], "start": [2.0]}]
+
+    first = Proposals(request=REQUEST, branches=branches)([])
+
+    assert [each["start"] for each in first if each["kind"] == "branch"] == [[1.0], [2.0]]
+    assert origin_text(first[1]) == "the given layout, another branch"
 
 
 def test_later_rounds_go_on_from_the_best_trial_of_finished_rounds() -> None:
@@ -45,8 +54,37 @@ def test_later_rounds_go_on_from_the_best_trial_of_finished_rounds() -> None:
     following = Proposals(request=REQUEST)(finished)
 
     assert (following[0]["kind"], following[0]["of"], following[0]["x"]) == ("perturbed", 1, [1.0])
-    assert following[1]["kind"] == "sampled"
+    assert (following[1]["kind"], following[1]["of"]) == ("perturbed", None)
+    assert {each.get("give_up_above_s") for each in following} == {1.25}
     assert Proposals(request=REQUEST)(finished) == following
+
+
+def test_while_nothing_conforms_every_round_has_a_sample() -> None:
+    failed = [ended(number, 2.0, TrialStatus.FAILED) for number in range(3 * SIZE)]
+
+    rounds = [Proposals(request=REQUEST)(failed[: SIZE * count]) for count in (1, 2, 3)]
+
+    assert ["sampled" in {each["kind"] for each in tried} for tried in rounds] == [True, True, True]
+    assert not any("give_up_above_s" in each for tried in rounds for each in tried)
+
+
+def test_another_seed_begins_a_search_for_any_conforming_layout_elsewhere() -> None:
+    begins = [
+        Proposals(request=LayoutRequest(cell=Path("cell.yaml"), objective=Objective.CONFORMING, seed=seed))([])[0]
+        for seed in (0, 1)
+    ]
+
+    assert [each["kind"] for each in begins] == ["given", "perturbed"]
+
+
+def test_where_the_given_layout_leads_nowhere_samples_take_its_place() -> None:
+    lost = Outcome(status=TrialStatus.NO_SOLUTION, reason="a tool cannot follow its path", figures={})
+    finished = [Trial(variant=Variant(number, {"kind": "given"}), outcome=lost) for number in range(SIZE)]
+
+    following = Proposals(request=REQUEST)(finished)
+
+    assert [each["kind"] for each in following] == ["sampled"] * SIZE
+    assert len({each["index"] for each in following}) == SIZE
 
 
 def test_a_rejected_trial_is_not_built_on() -> None:

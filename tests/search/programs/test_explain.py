@@ -11,7 +11,7 @@ from cellplan.search.programs.improve import improve
 from cellplan.search.programs.measures import Kind
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room
 
-EXACT = Effort(within=20.0, room=Room(margin=0.0, distance=0.0, time=0.0))
+EXACT = Effort(within=20.0, room=Room(margin=0.0, distance=0.0, own=0.0, time=0.0))
 
 
 def explained(toy: Toy, demands: Demands) -> Explanation:

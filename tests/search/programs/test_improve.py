@@ -9,7 +9,7 @@ from builders.toy_problem import DEMAND, Toy
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room
 
-EXACT = Effort(iterations=40, within=20.0, least_gain=1e-7, room=Room(margin=0.0, distance=0.0, time=0.0))
+EXACT = Effort(iterations=40, within=20.0, least_gain=1e-7, room=Room(margin=0.0, distance=0.0, own=0.0, time=0.0))
 NONE = np.zeros(2)
 TOY = Toy()
 
@@ -76,7 +76,7 @@ def test_widest_clearance_at_a_duration() -> None:
 
 def test_rows_ask_for_room() -> None:
     near = replace(TOY, upper_limit=3.5)
-    effort = replace(EXACT, room=Room(margin=0.02, distance=0.0, time=0.0))
+    effort = replace(EXACT, room=Room(margin=0.02, distance=0.0, own=0.0, time=0.0))
     found = improved(near, Demands(objective=Objective.CYCLE, margin=NONE), effort)
     assert found.x[0] == pytest.approx(1.74, abs=1e-3)
 

@@ -1,0 +1,138 @@
+"""A failing cell made ready for its repair: what one attempt may change, and where the search for it begins."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.errors import NoSolutionError
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell import Cell
+from cellplan.model.layout import LayoutSettings
+from cellplan.model.units import DEG, MM
+from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
+from cellplan.pipeline.repair.attempts import Attempt
+from cellplan.planning.start.inverse_kinematics import finite_limits
+from cellplan.search.distances.cell_distances import CellDistances
+from cellplan.search.kernel.run import run
+from cellplan.search.spline_path.problem import PathProblem
+from cellplan.search.variables.pedestals import with_pedestals
+from cellplan.search.variables.ties import Tied
+
+DRAWS: Final = 48  # [-] layouts nearby that are tried side by side where there is no motion
+SPREADS: Final = (0.5, 1.0, 2.0, 4.0)  # [-] usual steps by which they differ, more and more
+
+Begin = tuple[Array, Array]  # variables, shape (n,), and start posture, shape (nq,)
+
+
+@lru_cache(maxsize=1)
+def ready_cell(request: LayoutRequest) -> Prepared:
+    """The cell of a request with all that it lets a layout search change; made once in each process."""
+    return Prepared.of(request, searched_cell(request))
+
+
+def start_posture(ready: Prepared) -> tuple[Array, str]:
+    """The start posture of the given layout, shape (nq,), and why there is none; then one in mid-range."""
+    try:
+        return ready.given_start, ""
+    except NoSolutionError as error:
+        starts = []
+        for robot in ready.variables.base.robots:
+            lower, upper = finite_limits(robot.model)
+            starts.append(0.5 * (lower + upper) if robot.start is None else robot.start)
+        return np.concatenate(starts), str(error).splitlines()[0]
+
+
+def with_attempt(ready: Prepared, attempt: Attempt) -> Prepared:
+    """The cell ready for a search of what one attempt may change.
+
+    Raises:
+        InputError: The cell does not take it.
+    """
+    if attempt.addresses:
+        return _among(ready, frozenset(attempt.addresses))
+    return Prepared.of(ready.request, _varied(ready.cell, attempt.vary))
+
+
+def begins(ready: Prepared, start: Array, *, seed: int, count: int) -> Iterator[Begin]:
+    """Where searches begin: the given layout, and small perturbations of it; of those with a motion only.
+
+    Args:
+        ready: What may change.
+        start: The start posture of the given layout, shape (nq,).
+        seed: Seed of the perturbations.
+        count: Number of beginnings.
+    """
+    variables = ready.variables
+    for number in range(count):
+        rng = np.random.default_rng([seed, number])
+        x = variables.given
+        if number:
+            step = variables.scale * rng.standard_normal(len(variables.names))
+            x = np.clip(x + step, variables.lower, variables.upper)
+        if ready.coarse.evaluate(x, start) is not None:
+            yield x, start
+            continue
+        near = _near(ready, start, rng)
+        if near is not None:
+            yield near
+
+
+def _near(ready: Prepared, start: Array, rng: np.random.Generator) -> Begin | None:
+    """The layout of least change among draws in which all tools follow their paths; None without one."""
+    variables, problem = ready.variables, ready.coarse
+    if isinstance(problem, PathProblem):
+        return None
+    for spread in SPREADS:
+        steps = spread * variables.scale * rng.standard_normal((DRAWS, len(variables.names)))
+        x = np.clip(variables.given + steps, variables.lower, variables.upper)
+        starts = np.tile(start, (DRAWS, 1))
+        followed = np.flatnonzero(run(problem.job, variables.layouts(x, starts)).is_followed)
+        if len(followed):
+            cost = np.abs(x[followed] - variables.given) @ variables.cost
+            return x[followed[int(cost.argmin())]], start
+    return None
+
+
+def _among(ready: Prepared, addresses: frozenset[str]) -> Prepared:
+    """The same cell with some of its variables only."""
+    given = ready.variables
+    settings = _restricted(given.settings, addresses)
+    tied = Tied.of(settings)
+    variables = replace(
+        given,
+        names=tied.names,
+        lower=tied.lower,
+        upper=tied.upper,
+        given=tied.given,
+        scale=tied.scale,
+        cost=tied.cost,
+        settings=settings,
+        tied=tied,
+        conversion=with_pedestals(ready.cell, settings)[0],
+    )
+    return replace(ready, variables=variables, bodies=CellDistances.of(ready.scene, variables))
+
+
+def _restricted(settings: LayoutSettings, addresses: frozenset[str]) -> LayoutSettings:
+    """Settings with some of the ranges only, and what ties these."""
+    ranges = tuple(each for each in settings.ranges if each.address in addresses)
+    names = {each.name for each in ranges}
+    return replace(
+        settings,
+        ranges=ranges,
+        equal=tuple(group for group in settings.equal if addresses.issuperset(group)),
+        mirrored=tuple(pair for pair in settings.mirrored if names.issuperset(pair.robots)),
+    )
+
+
+def _varied(cell: Cell, vary: Any) -> Cell:
+    """The cell with other variables in place of its own, and the margins that it demands."""
+    settings = cell.layout
+    margins = {}
+    if settings is not None:
+        margins = {"margin_deg": DEG * settings.margin, "margin_mm": MM * settings.margin_sliding}
+    return cell.with_values({"layout": {"vary": dict(vary), **margins}})

@@ -1,0 +1,188 @@
+"""Repair: the smallest change with which a failing cell passes, and other remedies that were solved and verified."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Final
+
+from cellplan.model.cell import Cell
+from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.layout.limits import standing_of
+from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.repair.at_start import StartFault, start_faults
+from cellplan.pipeline.repair.attempts import (
+    Attempt,
+    RemedyKind,
+    of_branches,
+    of_layout,
+    of_tools,
+    of_weights,
+    owners,
+)
+from cellplan.pipeline.repair.prepare import ready_cell, start_posture
+from cellplan.pipeline.repair.record import Case, Tried, advice_record, remedy_values
+from cellplan.pipeline.repair.solved import BETWEEN, DISTANCES, LIMITS, TIMED, step_asked, time_asked
+from cellplan.pipeline.repair.trial import EFFORT, FACTOR, GIVEN, evaluate
+from cellplan.report.record.advice import AdviceRecord
+from cellplan.report.record.layout import LimitRecord
+from cellplan.search.programs.objective import Objective
+from cellplan.search.programs.problem import Point
+from cellplan.study.run import outcomes
+from cellplan.study.trial import Outcome, TrialStatus, Variant
+
+FEW: Final = 6  # [-] attempts that take less time than further processes to start
+KINDS: Final = list(RemedyKind)
+WITH_LIMITS: Final = "quadratic_program"  # the method that keeps joints within their limits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Repair:
+    """What makes a failing cell pass.
+
+    Attributes:
+        record: The record of ``advice.json``.
+        given: The cell as it is given, with what the request sets in it.
+        best: The cell with the first remedy; None where there is none.
+    """
+
+    record: AdviceRecord
+    given: Cell
+    best: Cell | None
+
+
+def repair(request: LayoutRequest, *, workers: int = 1, progress: Progress = silent) -> Repair:
+    """Find the smallest change with which a failing cell passes every check, and other remedies.
+
+    First all that the cell lets a layout search change of one robot alone, then of two, and so on until a change
+    passes; beside it other branches, spins, rods, weights, methods and a longer cycle. Every remedy is solved and
+    verified.
+
+    Args:
+        request: What is repaired; its objective counts for nothing.
+        workers: Number of processes.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The cell cannot be read, or its job is not one that can be searched.
+    """
+    sought = replace(request, objective=Objective.CHANGE)
+    ready = ready_cell(sought)
+    start, reason = start_posture(ready)
+    point = None if reason else ready.coarse.evaluate(ready.variables.given, start)
+    faults = () if point is None else start_faults(ready, point)
+    work = _Work(request=sought, workers=workers, progress=progress, faults=faults)
+    work.try_all(ready, point is not None and not _violations(ready, point))
+    case = Case(ready=ready, given=work.given, remedies=work.remedies, failures=work.failures)
+    best = ready.cell.with_values(remedy_values(case.remedies[0][1])) if case.remedies else None
+    return Repair(record=advice_record(case), given=ready.cell, best=best)
+
+
+def _violations(ready: Prepared, point: Point) -> list[LimitRecord]:
+    """What a motion breaks at the nodes of a search."""
+    return standing_of(ready.coarse, point, ready.demands(), EFFORT).violations()
+
+
+@dataclass(slots=True, kw_only=True)
+class _Work:
+    """The attempts of a repair.
+
+    Attributes:
+        request: What is repaired.
+        workers: Number of processes.
+        progress: Called with the stage and the fraction done.
+        faults: What the given start posture misses already.
+        given: What came of the cell as it is given.
+        tried: What came of the attempts.
+    """
+
+    request: LayoutRequest
+    workers: int
+    progress: Progress
+    faults: Sequence[StartFault] = ()
+    given: Outcome = field(default_factory=lambda: Outcome(status=TrialStatus.FAILED, figures={}))
+    tried: list[Tried] = field(default_factory=list)
+
+    def try_all(self, ready: Prepared, seems_sound: bool) -> None:
+        """Make attempts until changes of the layout of some number of robots pass, and all others."""
+        if seems_sound:
+            self._run([None])
+            if self.given.status is TrialStatus.PASSED:
+                return
+        names = {check["name"] for check in _failed(self.given)}
+        can_help = not seems_sound or bool(names & {*LIMITS, *DISTANCES})  # a search knows of nothing else
+        self._run([*([] if seems_sound else [None]), *(_first(ready) if can_help else [])])
+        sizes = range(2, len(owners(ready.cell, ready.variables.settings)) + 1) if can_help else ()
+        for size in sizes:
+            if any(attempt.kind is RemedyKind.LAYOUT for attempt, _ in self.remedies):
+                break
+            self._run(list(of_layout(ready.cell, ready.variables.settings, size)))
+        self._run(_about_limits(ready, self.given))
+
+    def _run(self, attempts: Sequence[Attempt | None]) -> None:
+        """Make some attempts; None stands for the cell as it is given."""
+        jobs: list[Attempt | None] = []
+        for each in attempts:
+            fault = None if each is None else next((it for it in self.faults if it.excludes(each)), None)
+            if each is None or fault is None:
+                jobs.append(each)
+            else:
+                self.tried.append((each, Outcome(status=TrialStatus.FAILED, reason=fault.text, figures={})))
+        variants = [Variant(place, {"kind": GIVEN} if each is None else each.record) for place, each in enumerate(jobs)]
+        workers = self.workers if len(jobs) > FEW else 1
+        with outcomes(variants, partial(evaluate, self.request), workers) as every:
+            for place, (attempt, outcome) in enumerate(zip(jobs, every, strict=True)):
+                if attempt is None:
+                    self.given = outcome
+                else:
+                    self.tried.append((attempt, outcome))
+                words = "cell as given" if attempt is None else attempt.text
+                self.progress(f"{words}, {place + 1} of {len(jobs)}", (place + 1) / len(jobs))
+
+    @property
+    def remedies(self) -> list[Tried]:
+        """Attempts that pass: changes of the layout by their number of robots and cost, then others by their cost."""
+        return sorted((each for each in self.tried if each[1].status is TrialStatus.PASSED), key=_size)
+
+    @property
+    def failures(self) -> list[Tried]:
+        """Attempts that do not pass."""
+        return [each for each in self.tried if each[1].status is not TrialStatus.PASSED]
+
+
+def _first(ready: Prepared) -> list[Attempt]:
+    """Attempts that do not depend on what comes of others."""
+    cell, settings = ready.cell, ready.variables.settings
+    found = [*of_layout(cell, settings, 1), *of_tools(cell, settings), *of_branches(cell)]
+    return sorted(found, key=lambda each: KINDS.index(each.kind))
+
+
+def _about_limits(ready: Prepared, given: Outcome) -> list[Attempt]:
+    """Attempts where the verdict is about limits of joints, or what a slower motion keeps, alone."""
+    checks, step = _failed(given), ready.cell.motion.step
+    failed = {check["name"] for check in checks}
+    found: list[Attempt] = []
+    if failed and failed <= LIMITS:
+        found += of_weights(ready.cell, ready.variables.settings)
+        if ready.cell.solver.method != WITH_LIMITS:
+            found.append(Attempt(kind=RemedyKind.METHOD, robots=(), values={"solver.method": WITH_LIMITS}))
+    if failed and failed <= BETWEEN and ready.cell.motion.grid is None:
+        values = {"motion.step_s": step_asked(checks, step)}
+        found.append(Attempt(kind=RemedyKind.STEP, robots=(), values=values))
+    if failed and failed <= TIMED.keys():
+        found.append(Attempt(kind=RemedyKind.DURATION, robots=(), values={FACTOR: time_asked(checks)}))
+    return found
+
+
+def _failed(given: Outcome) -> list[dict[str, Any]]:
+    """Failed checks of the cell as it is given."""
+    found: Any = given.figures.get("failed", ())
+    return list(found)
+
+
+def _size(each: Tried) -> tuple[bool, int, float, int]:
+    """The size of a remedy: changes of the layout first, then the number of robots, the cost and the kind."""
+    attempt, outcome = each
+    is_other = attempt.kind is not RemedyKind.LAYOUT
+    robots = 0 if is_other else len(attempt.robots)
+    return is_other, robots, float(str(outcome.figures["cost"])), KINDS.index(attempt.kind)

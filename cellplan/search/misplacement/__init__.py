@@ -1,0 +1,1 @@
+"""Misplacement: layouts that keep their demands when every base stands a little beside its place."""

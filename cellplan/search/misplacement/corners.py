@@ -1,0 +1,99 @@
+"""Corners: layouts whose bases are all off their places, planned anew and measured against the demands."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.search.kernel.run import run
+from cellplan.search.misplacement.guarded import GuardedProblem
+from cellplan.search.programs.measures import Measures
+from cellplan.search.programs.objective import Demands, Effort
+from cellplan.search.programs.problem import Point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Corner:
+    """A layout with displaced bases.
+
+    Attributes:
+        d: The displacements, shape (m,).
+        start: Its start posture in [rad] or [m], shape (nq,); not valid where it is not followed.
+        cycle: Its shortest cycle in [s]; inf where a tool cannot follow its path.
+        margins: By how much each joint keeps more than the margin that is demanded, in [rad] or [m], shape (nq,).
+        rooms: By how much each pair of bodies that is near keeps more than its distance, in [m]; inf for others.
+        first: The limit that is the next to be missed, or that is missed most: one line of text.
+    """
+
+    d: Array
+    start: Array
+    cycle: float
+    margins: Array
+    rooms: Array
+    first: str
+
+    @property
+    def room(self) -> float:
+        """The least of ``rooms``."""
+        return float(self.rooms.min(initial=np.inf))
+
+    def keeps(self, cycle: float) -> bool:
+        """Whether all demands are kept in a cycle of so many seconds."""
+        return self.cycle <= cycle and bool(np.all(self.margins >= 0.0)) and self.room >= 0.0
+
+
+def judged(problem: GuardedProblem, d: Array, start: Array, demands: Demands, effort: Effort) -> list[Corner]:
+    """Motions of a layout with displaced bases, planned anew, all together.
+
+    Args:
+        problem: The job, with displacements as its variables.
+        d: The displacements, shape (K, m).
+        start: Start posture of the layout, near theirs, shape (nq,).
+        demands: What is demanded of each.
+        effort: Where distances are asked, and within which distance beyond the demand.
+    """
+    motions = run(problem.job, problem.variables.layouts(d, np.tile(start, (len(d), 1))))
+    found = []
+    for place, is_followed in enumerate(motions.is_followed.tolist()):
+        if not is_followed:
+            found.append(_lost(problem, d[place], start))
+            continue
+        q, qd = motions.q[place], motions.qd[place]
+        point = Point(x=d[place], start=q[0], q=q, qd=qd, qdd=problem.job.rates @ qd)
+        found.append(_measured(problem, Measures.of(problem, point, demands, effort)))
+    return found
+
+
+def _lost(problem: GuardedProblem, d: Array, start: Array) -> Corner:
+    """A layout in which a tool cannot follow."""
+    margins, rooms = np.full(len(start), -np.inf), np.full(problem.pair_count, -np.inf)
+    return Corner(d=d, start=start, cycle=np.inf, margins=margins, rooms=rooms, first="a tool cannot follow its path")
+
+
+def _measured(problem: GuardedProblem, measures: Measures) -> Corner:
+    """A layout whose motion is known."""
+    rooms = np.full(problem.pair_count, np.inf)
+    np.minimum.at(rooms, measures.distances.pairs, -measures.lacks)
+    beyond = np.maximum(measures.lower.value.max(axis=0), measures.upper.value.max(axis=0))
+    point = measures.point
+    return Corner(
+        d=point.x,
+        start=point.start,
+        cycle=measures.cycle,
+        margins=-beyond,
+        rooms=rooms,
+        first=_first(problem, measures, beyond, rooms),
+    )
+
+
+def _first(problem: GuardedProblem, measures: Measures, beyond: Array, rooms: Array) -> str:
+    """What is missed most, of margins and distances; else the joint that decides the cycle."""
+    scores: Sequence[float] = (float(beyond.max()) / np.radians(1.0), -float(rooms.min(initial=np.inf)) / 0.01)
+    if max(scores) <= 0.0:
+        speeds, rates = measures.speeds.value.max(axis=0), np.sqrt(measures.accelerations.value.max(axis=0))
+        loads, kind = (speeds, "velocity") if speeds.max() >= rates.max() else (rates, "acceleration")
+        return f"{kind} of {' '.join(problem.joint_names(int(loads.argmax())))}"
+    if scores[0] >= scores[1]:
+        return f"margin of {' '.join(problem.joint_names(int(beyond.argmax())))}"
+    return f"distance of {' and '.join(problem.pair_names(int(rooms.argmin())))}"

@@ -1,0 +1,71 @@
+"""Tolerances: how far each base may be off, in one direction at a time, before a demand is missed."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.search.misplacement.corners import judged
+from cellplan.search.misplacement.guarded import GuardedProblem
+from cellplan.search.programs.objective import Demands, Effort
+
+FARTHEST: Final = 16.0  # [-] times the amount that is asked for
+HALVINGS: Final = 9  # [-] of the range: to 3 % of that amount
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tolerance:
+    """How far one base may be off in one direction, all else in place.
+
+    Attributes:
+        name: Address of what is displaced.
+        sign: Direction, -1 or 1.
+        kept: Largest displacement found in [m] or [rad] at which all demands are kept, not negative.
+        missed: Smallest one found at which a demand is missed; inf where none was missed as far as was asked.
+        first: The demand that is missed there; empty without one.
+    """
+
+    name: str
+    sign: float
+    kept: float
+    missed: float
+    first: str
+
+
+def tolerances(
+    problem: GuardedProblem, start: Array, demands: Demands, effort: Effort, cycle: float
+) -> tuple[Tolerance, ...]:
+    """How far each base may be off in every direction, by bisection of all of them together.
+
+    Args:
+        problem: The job, with the displacements as its variables.
+        start: Start posture of the layout in [rad] or [m], shape (nq,).
+        demands: What is demanded.
+        effort: Where distances are asked.
+        cycle: Cycle in [s] in which limits of speed and acceleration must be kept.
+    """
+    amounts, count = problem.upper, len(problem.upper)
+    directions = np.concatenate([np.diag(amounts), -np.diag(amounts)])
+    kept, missed, first = np.zeros(2 * count), np.full(2 * count, np.inf), [""] * (2 * count)
+    at = np.full(2 * count, FARTHEST)
+    for _ in range(1 + HALVINGS):
+        asked = np.flatnonzero(~(kept == FARTHEST))
+        corners = judged(problem, at[asked, None] * directions[asked], start, demands, effort)
+        for row, corner in zip(asked.tolist(), corners, strict=True):
+            if corner.keeps(cycle):
+                kept[row] = at[row]
+            else:
+                missed[row], first[row] = at[row], corner.first
+        at = 0.5 * (kept + np.minimum(missed, FARTHEST))
+    size = np.tile(amounts, 2)
+    return tuple(
+        Tolerance(
+            name=problem.names[row % count],
+            sign=1.0 if row < count else -1.0,
+            kept=float(kept[row] * size[row]),
+            missed=float(missed[row] * size[row]),
+            first=first[row],
+        )
+        for row in range(2 * count)
+    )

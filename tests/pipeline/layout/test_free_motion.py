@@ -1,0 +1,113 @@
+"""Searches with bases and tools as they are: what is free, and a joint path from the search to the written cell."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cellplan import LayoutRequest, LayoutResult, Stop, load_cell, search_layout, solve
+from cellplan.errors import InputError
+from cellplan.model.seeds import generator
+from cellplan.pipeline.layout.free_motion import freed
+from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.request import searched_cell
+from cellplan.search.spline_path.perturb import perturbed_path
+from cellplan.search.spline_path.problem import PathProblem
+
+CELLS = Path(__file__).resolve().parents[3] / "cells"
+FOUR = CELLS / "four_robots.yaml"
+BRIEF = ("motion.step_s=0.004", "solver.gain_per_s=200", "checks.clearance_mm=10")
+
+
+@pytest.fixture(scope="module")
+def request_of_path() -> LayoutRequest:
+    return LayoutRequest(cell=FOUR, settings=BRIEF, free=("path",), margin=15.0)
+
+
+@pytest.fixture(scope="module")
+def ready(request_of_path: LayoutRequest) -> Prepared:
+    return prepared(request_of_path)
+
+
+def test_words_are_keys_of_what_may_change() -> None:
+    cell = load_cell(FOUR)
+
+    assert freed(cell, ["start", "path"]) == {"reis.start_deg": True, "reis.path": True}
+    assert set(freed(cell, ["weights"])) == {f"{robot.name}.weights" for robot in cell.robots}
+    assert set(freed(cell, ["spin"])) == {f"tasks.{task.name}.spin_deg" for task in cell.tasks}
+
+
+def test_another_word_is_one_line() -> None:
+    with pytest.raises(InputError, match=r"^--free: expected some of .*path.*, got 'paht', did you mean 'path'"):
+        freed(load_cell(FOUR), ["paht"])
+
+
+def test_bases_and_tools_stay_whatever_the_cell_says() -> None:
+    request = LayoutRequest(cell=CELLS / "find_a_layout.yaml", free=("start", "weights"))
+
+    settings = searched_cell(request).layout
+
+    assert settings is not None
+    assert settings.margin > 0.0
+    assert {str(each.kind) for each in settings.ranges} == {"start", "weight"}
+
+
+def test_beside_a_path_start_and_weights_mean_nothing() -> None:
+    both = prepared(LayoutRequest(cell=FOUR, settings=BRIEF, free=("start", "weights", "path", "spin"), margin=15.0))
+
+    assert both.unled is not None
+    assert {name.split(".")[2].partition("_")[0] for name in both.coarse.names} == {"path", "spin"}
+    assert {name.split(".")[-1].partition("[")[0] for name in both.unled.coarse.names} == {
+        "start_deg",
+        "weights",
+        "spin_deg",
+    }
+
+
+def test_the_first_path_is_near_the_motion_of_the_cell(ready: Prepared) -> None:
+    assert ready.unled is not None
+    along = ready.coarse.evaluate(ready.coarse.given, ready.given_start)
+    resolved = ready.unled.coarse.evaluate(ready.unled.coarse.given, ready.given_start)
+
+    assert along is not None
+    assert resolved is not None
+    np.testing.assert_allclose(along.q[[0, -1]], resolved.q[[0, -1]], atol=2e-3)
+    at = [np.abs(ready.coarse.times - time).argmin() for time in ready.unled.coarse.times]
+    assert np.degrees(np.abs(along.q[at] - resolved.q)[:, :6]).max() < 2.0
+
+
+def test_perturbations_of_a_path_are_smooth_and_every_tool_follows(ready: Prepared) -> None:
+    problem = ready.coarse
+    assert isinstance(problem, PathProblem)
+    point = perturbed_path(problem, problem.given, ready.given_start, generator("test", 0), size=0.6)
+
+    assert point is not None
+    change = (point.x - problem.given).reshape(problem.path.given.coefficients.shape)
+    assert np.degrees(np.abs(change)).max() > 0.5
+    assert np.abs(np.diff(change, 3, axis=0)).max() < 0.2 * np.abs(change).max()
+
+
+@pytest.fixture(scope="module")
+def found(request_of_path: LayoutRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[LayoutResult, Path]:
+    folder = tmp_path_factory.mktemp("path") / "study"
+    return search_layout(request_of_path, folder, stop=Stop(trials=1)), folder
+
+
+@pytest.mark.slow
+def test_the_written_path_passes_solve_and_is_searched_further(found: tuple[LayoutResult, Path]) -> None:
+    result, folder = found
+    best = result.record["best"]
+    assert best is not None
+    given = result.record["given"]["cycle_s"]
+    cell = load_cell(folder / "best.yaml")
+
+    solution = solve(cell)
+    again = prepared(LayoutRequest(cell=folder / "best.yaml", free=("path",), margin=15.0))
+    point = again.coarse.evaluate(again.coarse.given, again.given_start)
+
+    assert solution.passed
+    assert given is not None
+    assert cell.robot("reis").path is not None
+    assert best["cycle_s"] < 0.8 * given
+    assert point is not None
+    np.testing.assert_allclose(point.q[-1], solution.motion.q[-1], atol=1e-4)

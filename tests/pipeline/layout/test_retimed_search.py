@@ -1,0 +1,61 @@
+"""A search for the shortest retimed cycle from end to end."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from cellplan import LayoutRequest, LayoutResult, Stop, load_cell, search_layout, solve
+from cellplan.search.programs.objective import Timing
+
+CELL = Path(__file__).resolve().parents[3] / "cells" / "planar_pair.yaml"
+SETTINGS = (
+    "motion.duration_s=2",
+    "tasks.circle.tolerance={position_mm: 0.1, orientation_deg: 0.05, between_rows_mm: 20, between_rows_deg: 20}",
+    "motion.step_s=0.02",
+    "checks.clearance_mm=10",
+    "acceleration={full_speed_in_s: 0.25}",
+    "motion.jerk_build_up_s=unlimited",
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("retimed")
+
+
+@pytest.fixture(scope="module")
+def found(folder: Path) -> LayoutResult:
+    shutil.copy(CELL, folder / "given.yaml")
+    request = LayoutRequest(
+        cell=folder / "given.yaml",
+        settings=SETTINGS,
+        vary=("right.base={x_mm: [1500, 2300], y_mm: [0, 600]}",),
+        margin=10.0,
+        timing=Timing.RETIMED,
+    )
+    return search_layout(request, folder / "study", stop=Stop(trials=1))
+
+
+def test_the_result_is_retimed_and_passes_solve(found: LayoutResult, folder: Path) -> None:
+    cell = load_cell(folder / "study" / "best.yaml")
+    solution = solve(cell)
+
+    best = found.record["best"]
+    assert best is not None
+    assert "timing: fastest" in (folder / "study" / "best.yaml").read_text()
+    assert solution.passed
+    assert solution.motion.times[-1] == best["cycle_s"]
+
+
+def test_the_search_and_the_program_agree_about_the_cycle(found: LayoutResult) -> None:
+    best = found.best
+    assert best is not None
+    assert best.program is not None
+    step = best.program.solution.cell.motion.step
+    assert best.program.cycle == pytest.approx(best.standing.measures.cycle, rel=0.02, abs=1.5 * step)
+
+
+def test_effects_of_the_variables_are_derivatives_of_the_retimed_cycle(found: LayoutResult) -> None:
+    effects = [variable["cycle_s"] for variable in found.record["variables"]]
+    assert all(effect is not None for effect in effects)

@@ -1,0 +1,132 @@
+"""Displaced bases of two planar arms: derivatives by differences, and corners as the product solves them."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cellplan import load_cell, solve
+from cellplan.model.layout import Misplacement
+from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
+from cellplan.search.distances.cell_distances import CellDistances
+from cellplan.search.misplacement.corners import judged
+from cellplan.search.misplacement.displacements import BaseDisplacements
+from cellplan.search.misplacement.guarded import GuardedProblem
+from cellplan.search.misplacement.tolerance import tolerances
+from cellplan.search.misplacement.worst import worst
+from cellplan.search.programs.measures import Measures
+from cellplan.search.programs.objective import Demands, Effort, Objective
+
+CELLS = Path(__file__).resolve().parents[3] / "cells"
+SETTINGS = ("motion.duration_s=2", "motion.step_s=0.02", "checks.clearance_mm=10")
+AMOUNTS = Misplacement(position=0.002, orientation=np.radians(0.2))
+
+
+def displaced_cell(cell: Path, settings: tuple[str, ...] = ()) -> SimpleNamespace:
+    request = LayoutRequest(cell=cell, settings=settings)
+    ready = Prepared.of(request, searched_cell(request))
+    of = BaseDisplacements.of(ready.variables, ready.variables.given, AMOUNTS)
+    problem = GuardedProblem.like(ready.problem(33), variables=of, bodies=CellDistances.of(ready.scene, of))
+    point = problem.evaluate(of.given, ready.given_start)
+    assert point is not None
+    demands = Demands(objective=Objective.CYCLE, margin=np.zeros(len(point.start)))
+    return SimpleNamespace(of=of, problem=problem, point=point, demands=demands, ready=ready)
+
+
+@pytest.fixture(scope="module")
+def pair() -> SimpleNamespace:
+    return displaced_cell(CELLS / "planar_pair.yaml", SETTINGS)
+
+
+def test_all_bases_are_displaced_along_the_axes_of_the_world(pair: SimpleNamespace) -> None:
+    given, d = pair.ready.variables.base, np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0, -1.0]) * pair.of.amounts
+
+    cell = pair.of.cell(d, pair.point.start)
+    placed = pair.of.placed(d)
+
+    for robot, sign in zip(given.robots, (1.0, -1.0), strict=True):
+        name = robot.name
+        by = cell.robot(name).X_WB[:3, 3] - robot.X_WB[:3, 3]
+        np.testing.assert_allclose(by, sign * np.array([0.002, -0.002, 0.002]), atol=1e-9)
+        turn = np.radians(0.2) * sign
+        Z = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+        np.testing.assert_allclose(cell.robot(name).X_WB[:3, :3], Z @ robot.X_WB[:3, :3], atol=1e-8)
+        np.testing.assert_allclose(placed.robot(name).X_WB, cell.robot(name).X_WB, atol=1e-8)
+
+
+def test_a_base_on_the_floor_is_not_lowered() -> None:
+    cell = load_cell(CELLS / "planar_pair.yaml").with_values({"environment.floor": {"plane": {"z_mm": 500}}})
+    variables = SimpleNamespace(base=cell, placed=lambda _: cell)
+
+    found = BaseDisplacements.of(variables, np.zeros(0), AMOUNTS)  # type: ignore[arg-type] # all that it asks for
+
+    assert [name for name in found.names if name.endswith("z_mm")] == []
+    assert len(found.names) == 6
+
+
+def test_allowances_are_sums_of_absolute_differences(pair: SimpleNamespace) -> None:
+    problem, point, step = pair.problem, pair.point, 1e-3
+    found = worst(problem, point, pair.demands, Effort(keys=5)).allowance
+
+    q, qd = np.zeros_like(point.q), np.zeros_like(point.q)
+    for unit in np.diag(problem.upper):
+        forward, back = (problem.evaluate(side * step * unit, point.start) for side in (1.0, -1.0))
+        q += np.abs(forward.q - back.q) / (2.0 * step)
+        qd += np.abs(forward.qd - back.qd) / (2.0 * step)
+    np.testing.assert_allclose(found.margin, q, atol=2e-3 * q.max())
+    np.testing.assert_allclose(found.speed, qd / problem.limits.velocity, atol=5e-3 * found.speed.max())
+
+
+def test_a_corner_moves_as_the_product_solves_it(pair: SimpleNamespace) -> None:
+    d = np.where(np.arange(8) % 3 == 0, -1.0, 1.0) * pair.of.amounts
+    corner = judged(pair.problem, d[None], pair.point.start, pair.demands, Effort(keys=9))[0]
+
+    solution = solve(pair.of.cell(d, corner.start))
+
+    limits = pair.problem.limits
+    q = solution.motion.q
+    margins = np.minimum(q - limits.lower, limits.upper - q).min(axis=0)
+    np.testing.assert_allclose(corner.margins, margins, atol=2e-3)
+    ratio = max(use.peak_velocity / use.velocity_limit for run in solution.runs for use in run.report.joints)
+    assert corner.cycle == pytest.approx(2.0 * ratio, rel=0.01)
+
+
+def test_tolerances_are_where_a_demand_is_missed(pair: SimpleNamespace) -> None:
+    effort = Effort(keys=5, within=0.003)
+    nominal = Measures.of(pair.problem, pair.point, pair.demands, effort)
+    cycle = 1.002 * nominal.cycle
+
+    found = tolerances(pair.problem, pair.point.start, pair.demands, effort, cycle)
+
+    limited = [each for each in found if each.first]
+    assert limited
+    for each in limited[:3]:
+        unit = np.array([each.sign if name == each.name else 0.0 for name in pair.problem.names])
+        inside, outside = judged(
+            pair.problem,
+            np.array([each.kept * unit, each.missed * unit]),
+            pair.point.start,
+            pair.demands,
+            effort,
+        )
+        assert inside.keeps(cycle)
+        assert not outside.keeps(cycle)
+
+
+def test_singular_values_of_arms_and_their_derivatives() -> None:
+    six = displaced_cell(CELLS / "find_a_layout.yaml", ("robots.abb.base.x_mm=2400",))
+    problem, point = six.problem, six.point
+    nodes = np.array([0, 11], dtype=np.intp)
+    found = problem.distances(point, nodes, 0.01)
+    is_arm = found.pairs >= len(problem.bodies.pairs)
+    by = problem.distance_derivatives(point, found, problem.derivatives(point))[is_arm]
+
+    assert [problem.pair_names(int(pair))[0] for pair in found.pairs[is_arm][:3]] == ["kuka", "abb", "staubli"]
+    model = six.ready.variables.base.robot("kuka").model
+    assert len(model.joints) == 6
+    unit = problem.upper * np.where(np.arange(len(problem.upper)) % 2, 1.0, -1.0)
+    sides = [problem.distances(problem.evaluate(s * unit, point.start, point), nodes, 0.01) for s in (1e-3, -1e-3)]
+    values = [side.values[side.pairs >= len(problem.bodies.pairs)] for side in sides]
+    np.testing.assert_allclose(by @ unit, (values[0] - values[1]) / 2e-3, atol=1e-5)
