@@ -1,7 +1,7 @@
 """``cellplan layout``: search the placement of all robots, and all else that may change, for the whole job at once."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -154,6 +154,11 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
                 )
             except KeyboardInterrupt as error:
                 raise InterruptedWorkError(str(error) or "interrupted") from None
+    _ended(record, folder, as_json=as_json)
+
+
+def _ended(record: dict[str, Any], folder: Path, *, as_json: bool) -> None:
+    """Print what a search has come to and exit."""
     statuses = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}
     outcome = statuses.get(record["status"], ExitStatus.CHECK_FAILED)
     if as_json:
