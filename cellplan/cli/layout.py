@@ -1,5 +1,6 @@
 """``cellplan layout``: search the placement of all robots, and all else that may change, for the whole job at once."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -157,7 +158,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
     _ended(record, folder, as_json=as_json)
 
 
-def _ended(record: dict[str, Any], folder: Path, *, as_json: bool) -> None:
+def _ended(record: Mapping[str, Any], folder: Path, *, as_json: bool) -> None:
     """Print what a search has come to and exit."""
     statuses = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}
     outcome = statuses.get(record["status"], ExitStatus.CHECK_FAILED)
