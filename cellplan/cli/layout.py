@@ -26,7 +26,9 @@ Goal = Annotated[
 HowTimed = Annotated[
     str,
     typer.Option(
-        "--timing", metavar="NAME", help="laws: by the time laws of the cell; retimed: the best common speed."
+        "--timing",
+        metavar="NAME",
+        help="laws: by the time laws of the cell; retimed: as fast as the limits allow everywhere.",
     ),
 ]
 Duration = Annotated[

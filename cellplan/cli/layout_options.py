@@ -15,7 +15,7 @@ from cellplan.errors import ExitStatus, InputError
 from cellplan.guard import processors
 from cellplan.io.cell.load import load_cell
 from cellplan.io.input.findings import did_you_mean, listed, shown
-from cellplan.pipeline.layout.quantities import read_angle, read_length, read_time
+from cellplan.pipeline.layout.quantities import read_angle, read_length, read_misplacement, read_time
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.search import search_layout
 from cellplan.report.text.layout import layout_lines
@@ -42,7 +42,14 @@ class Work(NamedTuple):
 
 
 def read_request(
-    cell: Path, *, objective: str, timing: str, clearance: str | None, margin: str | None, **others: Any
+    cell: Path,
+    *,
+    objective: str,
+    timing: str,
+    clearance: str | None,
+    margin: str | None,
+    misplacement: str | None = None,
+    **others: Any,
 ) -> LayoutRequest:
     """The request of the options.
 
@@ -55,6 +62,7 @@ def read_request(
         timing=_word("--timing", timing, Timing),
         clearance=None if clearance is None else read_length("--clearance", clearance),
         margin=None if margin is None else read_angle("--margin", margin),
+        misplacement=None if misplacement is None else read_misplacement("--misplacement", misplacement),
         **others,
     )
 

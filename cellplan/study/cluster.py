@@ -136,7 +136,7 @@ class Cluster(Executor):
     def _workers(self) -> int:
         """Number of workers that the client knows of."""
         info = getattr(self._client, "_scheduler_identity", None) or {}
-        return len(info.get("workers", {}))
+        return int(info.get("n_workers", len(info.get("workers", {}))))  # newer versions list no workers unasked
 
     def _give_up(self, reason: str) -> None:
         """Stop the study."""

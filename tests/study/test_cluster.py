@@ -95,6 +95,12 @@ def test_a_cluster_gives_the_same_study_although_a_worker_is_killed(cluster: Loc
 
 
 @pytest.mark.slow
+def test_a_cluster_that_has_workers_is_never_given_up_for_having_none(cluster: LocalCluster) -> None:
+    with Cluster(cluster.address) as executor:
+        assert executor._workers() == 2
+
+
+@pytest.mark.slow
 def test_results_that_count_are_worked_out_again_here(cluster: LocalCluster, tmp_path: Path) -> None:
     found = on_cluster(cluster, tmp_path / "cluster", Wrong(os.getpid()))
     assert found == here(tmp_path / "here", Wrong(os.getpid()))  # every wrong one would have been the best

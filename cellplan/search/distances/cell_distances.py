@@ -241,9 +241,7 @@ class CellDistances:
                 forward, back = (self._column(name, _displaced(X_WB, component, step)) for step in (STEP, -STEP))
                 yield index, by[component], forward, back
         for each in self._variables.beside(x, STEP):
-            moved = (self._moving.of_part(cell) for cell in each.sides)
-            if (robot := each.robot) is not None:
-                moved = (self._moving.of_tool(cell, robot) for cell in each.sides)
+            moved = (self._moving.that_differ(cell, each.robot) for cell in each.sides)
             for (index, forward), (_, back) in zip(*moved, strict=True):
                 if forward.shape != back.shape or not np.array_equal(forward.X_LS, back.X_LS):
                     yield index, each.by, forward, back

@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.shapes import Box, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import rotation_about
 from cellplan.model.cell import Cell
@@ -27,6 +28,18 @@ def keep_out_bodies(cell: Cell) -> tuple[list[SceneBody], list[SceneBody]]:
     return [_column(area) for area in areas], [
         replace(origin, name=f"{robot.name}/base", robot=robot.name) for robot in cell.robots
     ]
+
+
+def in_areas(cell: Cell, p: Array) -> Flags:
+    """Which places, shape (B, 3) in [m], lie in an area of a cell from above, shape (B,)."""
+    found = np.zeros(len(p), dtype=bool)
+    for area in () if cell.layout is None else cell.layout.keep_out:
+        away = (p[:, :2] - area.X_WS[:2, 3]) @ area.X_WS[:2, :2]
+        if isinstance(area.shape, Cylinder):
+            found |= np.linalg.norm(away, axis=1) < area.shape.radius
+        else:
+            found |= np.all(np.abs(away) < 0.5 * np.array(area.shape.size[:2]), axis=1)
+    return found
 
 
 def _column(area: KeepOut) -> SceneBody:

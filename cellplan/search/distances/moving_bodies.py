@@ -106,6 +106,10 @@ class MovingBodies:
                 tip = (inverse(body.X_BS) @ robot.tool.X_FT)[:3, 3]
                 yield self._cuts[index], _before(placed, tip, cell.checks.contact_zone, self._cuts[index])
 
+    def that_differ(self, cell: Cell, robot: str | None) -> Iterator[tuple[int, Placed]]:
+        """Those of the tool of a robot, or the part where there is none; see ``Beside``."""
+        return self.of_part(cell) if robot is None else self.of_tool(cell, robot)
+
     def of_part(self, cell: Cell) -> Iterator[tuple[int, Placed]]:
         """The part."""
         yield self._part, Placed(cell.part.shape, part_body(cell, cell.part, *cell.part.held_by[:1]).X_BS)

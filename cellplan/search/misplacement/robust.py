@@ -23,6 +23,7 @@ ROUNDS: Final = 6  # [-] in which what was missed is asked for
 WITHIN: Final = 0.003  # [m] beyond the demand: of pairs that are this near in a corner the room is known
 MORE_ANGLE: Final = float(np.radians(0.05))  # [rad] asked for beyond what a corner missed
 MORE_LENGTH: Final = 0.0003  # [m] likewise
+MORE_REACH: Final = 0.003  # [m] likewise of the singular values of arms: 0.01
 MORE_TIME: Final = 0.002  # [-] likewise
 GAIN: Final = 0.002  # [-] share of the cycle that another round must gain
 START_OVER: Final = 0.1  # [-] usual steps: first region of each round
@@ -77,11 +78,15 @@ class _Bent:
         )
 
     def add(self, robust: Robust, demands: Demands, effort: Effort) -> None:
-        """Ask for what corners missed, with half of the room that programs leave."""
-        missed = -np.min([corner.margins for corner in robust.corners], axis=0)
-        self.margin += np.where(missed > 0.0, np.minimum(missed, 10.0 * MORE_ANGLE) + MORE_ANGLE, 0.0)
-        lacks = -np.min([corner.rooms for corner in robust.corners], axis=0)
-        self.distance += np.where(lacks > 0.0, np.minimum(lacks, 20.0 * MORE_LENGTH) + MORE_LENGTH, 0.0)
+        """Ask for what corners missed, and a little more."""
+        followed = [corner for corner in robust.corners if np.isfinite(corner.cycle)]
+        if len(followed) < len(robust.corners):  # out of reach: only further from singular configurations helps
+            self.distance[len(robust.problem.bodies.pairs) :] += MORE_REACH
+        if followed:
+            missed = -np.min([corner.margins for corner in followed], axis=0)
+            self.margin += np.where(missed > 0.0, np.minimum(missed, 10.0 * MORE_ANGLE) + MORE_ANGLE, 0.0)
+            lacks = -np.min([corner.rooms for corner in followed], axis=0)
+            self.distance += np.where(lacks > 0.0, np.minimum(lacks, 20.0 * MORE_LENGTH) + MORE_LENGTH, 0.0)
         if demands.duration is not None and robust.cycle > demands.duration:
             self.time += min(robust.cycle / demands.duration - 1.0, 0.05) + effort.room.time
 

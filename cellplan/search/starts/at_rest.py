@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.search.distances.keep_out import in_areas
 from cellplan.search.starts.freedom import FIXED, drawn_within
 from cellplan.search.starts.problem import StartProblem
 from cellplan.search.starts.reaching import Placed, followed, matched, reached
@@ -107,15 +108,15 @@ def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tup
 
 
 def _drawn_settings(problem: StartProblem, rng: np.random.Generator) -> Array:
-    """Variables with those of the holder drawn, the given ones first, shape (SETTINGS, n)."""
+    """Variables with those of the holder, and those that place several robots, drawn, the given ones first."""
     cell, variables = problem.cell, problem.variables
     holder = 0 if cell.carrier is None else cell.carrier
-    x = drawn_within(variables, problem.freedom.own[holder], SETTINGS, rng)
+    x = drawn_within(variables, np.append(problem.freedom.own[holder], problem.freedom.shared), SETTINGS, rng)
     places = problem.freedom.columns[cell.columns(cell.robots[holder].name)]
     joints = places[places != FIXED]
     middle = 0.5 * (np.maximum(variables.lower, -np.pi) + np.minimum(variables.upper, np.pi))[joints]
     x[:, joints] = middle + HOLDER_RANGE * (x[:, joints] - middle)
-    base = problem.drawn_columns(holder)
+    base = np.append(problem.drawn_columns(holder), problem.freedom.shared)
     stays = rng.uniform(size=SETTINGS) < GIVEN_BASE
     x[np.ix_(stays, base)] = variables.given[base]
     x[0] = variables.given
@@ -177,6 +178,9 @@ def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Gen
     inside = _within(problem, robot, x)
     drops["base out of bounds"] = int(np.sum(~inside))
     x, at = x[inside], at.of_places(inside)
+    outside = ~in_areas(problem.cell, at.X_WB[:, :3, 3])
+    drops["base in an area that is kept free"] = int(np.sum(~outside))
+    x, at = x[outside], at.of_places(outside)
     q, has_followed = followed(arm, goal, at)
     drops["loses its path"] = int(np.sum(~has_followed))
     x, at, q = x[has_followed], at.of_places(has_followed), q[has_followed]

@@ -53,7 +53,8 @@ class Freedom:
         base: Columns of x, y, z and yaw of each robot's base among its own; ``FIXED`` where there is none,
             shape (robots, 4).
         columns: Column of the start position of each joint; ``FIXED`` where there is none, shape (nq,).
-        shared: Columns of all other variables.
+        shared: Columns of the variables that place several robots: equal or mirrored ones; those of weights and of
+            the part at rest are in none of these.
     """
 
     own: tuple[Indices, ...]
@@ -83,6 +84,7 @@ class Freedom:
             by_pose = [np.any(part[1:] != part[0], axis=(1, 2)) for part in placed]
             moved[:, index] = np.any([*by_pose, np.any(starts[:, cell.columns(robot.name)], axis=1)], axis=0)
         is_own = moved.sum(axis=1) == 1
+        is_shared = (moved.sum(axis=1) > 1) & [not name.startswith("part.at") for name in variables.names]
         own = tuple(np.flatnonzero(is_own & moved[:, index]) for index in range(len(cell.robots)))
         columns = np.full(cell.joint_count, FIXED)
         for column in np.flatnonzero(is_own).tolist():
@@ -90,7 +92,7 @@ class Freedom:
             if len(changed) == 1:
                 columns[changed[0]] = column
         base = [_base_columns(robot.name, variables.names, own[i]) for i, robot in enumerate(cell.robots)]
-        return cls(own=own, base=np.array(base, dtype=np.intp), columns=columns, shared=np.flatnonzero(~is_own))
+        return cls(own=own, base=np.array(base, dtype=np.intp), columns=columns, shared=np.flatnonzero(is_shared))
 
 
 def _base_columns(robot: str, names: Sequence[str], own: Indices) -> list[int]:

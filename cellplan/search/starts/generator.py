@@ -5,7 +5,7 @@ Start number ``index`` depends on the cell, the seed and this number only, so an
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
@@ -156,6 +156,9 @@ class StartGenerator:
         pools = dict[int, Pool]()
         for robot in self._problem.operators:
             pools[robot] = pool(self._problem, robot, setting, rng)
+            if not len(pools[robot].q):
+                fine = replace(self._problem, at_rest=self._problem.at_rest_fine)
+                pools[robot] = pool(fine, robot, setting, rng)
             if not len(pools[robot].q):
                 name, drops = self._problem.cell.robots[robot].name, pools[robot].drops
                 reasons.append(f"'{name}' follows its path from none of {drops.total()} bases: {_words(drops)}")

@@ -26,6 +26,7 @@ from cellplan.search.starts.reaching import BaseBounds, FreeArm, Goal
 
 NODES: Final = 65  # [-] of a motion: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
 NODES_AT_REST: Final = 24  # [-] of a path with the part at rest
+NODES_AT_REST_FINE: Final = 60  # [-] where no base follows at these: wrists turn far between them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,6 +43,7 @@ class StartProblem:
         acceleration: Largest acceleration of each joint in [rad/s^2] or [m/s^2] as the checks judge it, shape (nq,).
         job: The tasks at the nodes of a motion.
         at_rest: The tasks at fewer nodes, for paths with the part at rest.
+        at_rest_fine: The same at more of them.
         scene: The bodies.
         arms: Kinematics of each robot, base and tool left open.
         distances: What each layout is judged by in the end.
@@ -58,6 +60,7 @@ class StartProblem:
     acceleration: Array
     job: Job
     at_rest: Job
+    at_rest_fine: Job
     scene: Scene
     arms: tuple[FreeArm, ...]
     distances: CellDistances
@@ -98,6 +101,7 @@ class StartProblem:
             acceleration=acceleration_limits(scene),
             job=Job.of(cell, schedule, moving=moving, nodes=NODES),
             at_rest=Job.of(cell, schedule, moving=moving, nodes=NODES_AT_REST),
+            at_rest_fine=Job.of(cell, schedule, moving=moving, nodes=NODES_AT_REST_FINE),
             scene=scene,
             arms=tuple(FreeArm(robot) for robot in cell.robots),
             distances=CellDistances.of(scene, variables),

@@ -98,6 +98,7 @@ def test_the_written_path_passes_solve_and_is_searched_further(found: tuple[Layo
     result, folder = found
     best = result.record["best"]
     assert best is not None
+    assert best["cycle_s"] is not None
     given = result.record["given"]["cycle_s"]
     cell = load_cell(folder / "best.yaml")
 

@@ -36,6 +36,10 @@ def test_a_quantity_is_read_with_its_unit(read, text, value):  # type: ignore[no
             ["--budget", "soon"],
             "error: --budget: expected a time such as 60s or 10min (s, min, h), got 'soon'",
         ),
+        (
+            ["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"],
+            "error: --workers: unexpected beside --scheduler, whose workers search; leave one of them out",
+        ),
         (["--budget", "0"], "error: --budget: expected a time above 0 such as 60s or 10min, got '0'"),
         (["--clearance", "-1mm"], "error: --clearance: expected a length such as 10mm (mm, cm, m), got '-1mm'"),
         (["--margin", "15mm"], "error: --margin: expected an angle such as 15deg (deg, rad), got '15mm'"),
@@ -48,6 +52,14 @@ def test_a_quantity_is_read_with_its_unit(read, text, value):  # type: ignore[no
             ["--duration", "4"],
             "error: --duration: expected no duration where the shortest cycle is sought; add --objective conforming, "
             "clearance or change",
+        ),
+        (
+            ["--try", str(PAIR)],
+            f"error: --try {PAIR}: expected the robots of the cell (reis, kuka, abb, staubli), got left, right",
+        ),
+        (
+            ["--vary", "kuka.base={x_mm: [5, "],
+            "--vary kuka.base:2: not valid YAML: did not find expected node content",
         ),
         (
             ["--fix", "kuka.basis"],
@@ -99,3 +111,10 @@ def test_keys_are_added_and_fixed() -> None:
     assert set(vary["staubli.base"]) == {"x_mm", "y_mm", "yaw_deg"}
     assert {"abb.base", "kuka.tool"}.isdisjoint(vary)
     assert cell.origin.changes["layout.margin_deg"] == 7.0
+
+
+def test_a_margin_that_leaves_no_room_is_refused() -> None:
+    with pytest.raises(
+        CellplanError, match=r"layout\.margin_deg: expected less than \S+, half of the range of \S+ of "
+    ):
+        searched_cell(LayoutRequest(cell=FOUR, margin=179.0))

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-from cellplan import LayoutRequest, LayoutResult, Stop, load_cell, search_layout, solve
+from cellplan import CellplanError, LayoutRequest, LayoutResult, Stop, load_cell, search_layout, solve
 from cellplan.report.record.schema import layout_schema
 from cellplan.report.text.layout import layout_lines
+from cellplan.study.folder import prepare_folder
 
 CELL = Path(__file__).resolve().parents[3] / "cells" / "planar_pair.yaml"
 SETTINGS = ("motion.duration_s=2", "motion.step_s=0.02", "checks.clearance_mm=10")
@@ -52,6 +53,32 @@ def test_the_result_keeps_the_words_of_the_given_file(found: LayoutResult, folde
     assert found.record["status"] == "certified"
     assert any("was xyz_mm: [1900, 300, 500]" in line for line in best)
     assert all(any(key in line for key in ("base:", "start_deg:", "motion:")) for line in left)
+
+
+def test_an_earlier_search_is_replaced_unless_its_result_was_changed(found: LayoutResult, folder: Path) -> None:
+    study = shutil.copytree(folder / "study", folder / "again")
+    prepare_folder(study, resume=False)
+    left = [entry.name for entry in study.iterdir() if not entry.name.startswith(".")]
+
+    changed = shutil.copytree(folder / "study", folder / "changed")
+    (changed / "best.yaml").write_text("mine")
+
+    assert not left
+    with pytest.raises(CellplanError, match=r"holds 'best\.yaml', which no study wrote"):
+        prepare_folder(changed, resume=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "limit"), [("turntable", 1.5), ("dual_arm", 1.2), ("load_sharing", 2.5)])
+def test_cells_of_other_kinds_are_improved(name: str, limit: float, tmp_path: Path) -> None:
+    request = LayoutRequest(cell=CELL.parent / "layout" / f"{name}.yaml")
+
+    found = search_layout(request, tmp_path / "study", stop=Stop(trials=4))
+
+    best = found.record["best"]
+    assert best is not None
+    assert best["cycle_s"] <= limit
+    assert solve(load_cell(tmp_path / "study" / "best.yaml")).passed
 
 
 def test_the_cycle_is_the_shortest_of_this_motion(found: LayoutResult, folder: Path) -> None:
