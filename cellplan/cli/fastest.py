@@ -76,14 +76,8 @@ def fastest(  # noqa: PLR0913, PLR0917 - the options of the command
     if free is not None:
         words = read_words(free, {"--demand": demand, "--task": task})
         chosen = [f"{key}={value}" for key, value in (("motion.mode", mode), ("solver.method", method)) if value]
-        options: dict[str, Any] = {
-            "timing": timing,
-            "clearance": clearance,
-            "margin": margin,
-            "seed": seed,
-            "free": words,
-        }
-        options |= {"settings": (*(settings or ()), *chosen), "allow_dirs": tuple(allow_dir or ())}
+        options: dict[str, Any] = {"timing": timing, "clearance": clearance, "margin": margin, "seed": seed}
+        options |= {"free": words, "settings": (*(settings or ()), *chosen), "allow_dirs": tuple(allow_dir or ())}
         search_free(cell, output, options, (budget, trials, workers, resume), as_json=as_json, quiet=quiet)
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.guard import processors

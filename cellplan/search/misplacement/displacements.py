@@ -36,6 +36,12 @@ class BaseDisplacements:
         robots: The robot of each displacement, m of them.
         components: Its place in ``COMPONENTS``, m of them.
         amounts: By how much each base may be off, shape (m,).
+        names: Address that each changes.
+        given: No displacement, shape (m,).
+        lower: Lowest values, shape (m,).
+        upper: Highest values, shape (m,).
+        scale: Usual steps, shape (m,).
+        cost: Costs of a change, shape (m,).
     """
 
     variables: Variables
@@ -44,12 +50,27 @@ class BaseDisplacements:
     components: tuple[int, ...]
     amounts: Array
     names: tuple[str, ...] = field(init=False)
+    given: Array = field(init=False)
+    lower: Array = field(init=False)
+    upper: Array = field(init=False)
+    scale: Array = field(init=False)
+    cost: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        """Name the displacements by the addresses that they change."""
+        """Name the displacements by the addresses that they change, and derive their bounds and steps."""
         robots = self.variables.base.robots
         places = zip(self.robots, self.components, strict=True)
-        object.__setattr__(self, "names", tuple(f"robots.{robots[r].name}.base.{COMPONENTS[c]}" for r, c in places))
+        amounts = self.amounts
+        derived: dict[str, object] = {
+            "names": tuple(f"robots.{robots[r].name}.base.{COMPONENTS[c]}" for r, c in places),
+            "given": np.zeros_like(amounts),
+            "lower": -amounts,
+            "upper": amounts,
+            "scale": amounts,
+            "cost": 1.0 / amounts,
+        }
+        for name, value in derived.items():
+            object.__setattr__(self, name, value)
 
     @classmethod
     def of(cls, variables: Variables, x: Array, misplacement: Misplacement) -> "BaseDisplacements":
@@ -69,31 +90,6 @@ class BaseDisplacements:
             components=tuple(component for _, component in places),
             amounts=lengths[[component for _, component in places]],
         )
-
-    @property
-    def given(self) -> Array:
-        """No displacement, shape (m,)."""
-        return np.zeros(len(self.names))
-
-    @property
-    def lower(self) -> Array:
-        """Lowest values, shape (m,)."""
-        return -self.amounts
-
-    @property
-    def upper(self) -> Array:
-        """Highest values, shape (m,)."""
-        return self.amounts
-
-    @property
-    def scale(self) -> Array:
-        """Usual steps, shape (m,)."""
-        return self.amounts
-
-    @property
-    def cost(self) -> Array:
-        """Costs of a change, shape (m,)."""
-        return 1.0 / self.amounts
 
     def layouts(self, d: Array, start: Array) -> Layouts:
         """Candidates for the kernel at displacements of shape (K, m), with start postures of shape (K, nq)."""
