@@ -13,6 +13,7 @@ from cellplan.io.cell.changes import plain_values
 from cellplan.kinematics.reach import arm_reach
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.drawing import drawing, footprint, swept_area
+from cellplan.pipeline.fastest.timed_program import Law
 from cellplan.pipeline.layout.finish import Certified, certified_cell
 from cellplan.pipeline.layout.limits import Standing, effects, standing_of
 from cellplan.pipeline.layout.prepared import Prepared, prepared, values_of
@@ -38,6 +39,7 @@ from cellplan.study.trial import TrialStatus
 
 TOP: Final = 10  # [-] layouts that are listed
 SAME: Final = 1e-4  # [-] share by which figures of two layouts differ that are not one
+SLOWED: Final = 1.02  # [-] times the cycle that the joints allow, from which on it is said what else counts
 REACH: Final = 5  # [-] rounds that the reach of an arm is sought in: to some millimetres
 SWEPT: Final = 33  # [-] configurations that the swept area is made of
 FINE: Final = 6  # decimals of figures of the search: far above rounding
@@ -90,12 +92,25 @@ def layout_record(
         "choices": _choices(ready, finished, tried),
         "dropped": _dropped(finished),
         "misplacement": None,
-        "remarks": list(ready.variables.remarks),
+        "remarks": [*ready.variables.remarks, *_slowed(best)],
         "drawing": _drawing(ready, best) if best else {},
         "files": [],
         "inputs": dict(cell.inputs),
         "versions": versions(),
     }
+
+
+def _slowed(best: Certified | None) -> Iterator[str]:
+    """What makes the certified cycle longer than the limits of the joints do."""
+    if best is None or best.program is None:
+        return
+    alone, cycle = best.standing.measures.cycle, best.program.cycle
+    if best.program.law is Law.TIME_LAWS and cycle > SLOWED * alone:
+        yield (
+            f"the limits of the joints alone would allow {alone:.4g} s; what the search does not know asks for "
+            f"{cycle:.4g} s: errors of the tools between rows (a shorter motion.step_s makes them less), demanded "
+            "feeds, jerk, or limits of tool speed and of the part's acceleration"
+        )
 
 
 def head_of(record: LayoutRecord, request: LayoutRequest) -> str:
