@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -154,6 +155,15 @@ def test_another_process_finds_the_same_bytes(rounded: tuple[Scene, PlannedTrans
     assert there.stdout.strip() == here
 
 
+@pytest.fixture
+def heeded_ctrl_c() -> Iterator[None]:
+    """Jobs in the background inherit it as ignored."""
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, usual)
+
+
+@pytest.mark.usefixtures("heeded_ctrl_c")
 def test_a_search_is_left_by_ctrl_c() -> None:
     scene = scene_of(gantry("a"), things=[wall("wall", (0.05, 4.0))], step=STEP)
     stages: list[float] = []
