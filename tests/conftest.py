@@ -51,7 +51,7 @@ def two_processors(one_processor: None) -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def trials_here() -> Iterator[None]:
     """Trials of studies run in this process: a child would import the package for each study."""
     from builders.study_trials import InThisProcess

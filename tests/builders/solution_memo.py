@@ -27,8 +27,9 @@ from cellplan.pipeline.solution import Solution
 
 Events = list[tuple[Any, ...]]  # what was said of the progress, call by call
 Names = dict[tuple[str, str], object]  # what each name of the package stands for
-HARMLESS = {  # names whose replacement changes no figure: where plots are drawn, and how often a line is printed
+HARMLESS = {  # names whose replacement changes no figure: where plots and trials run, how often a line is printed
     ("cellplan.guard.background", "processors"),
+    ("cellplan.study.session", "Workers"),
     ("cellplan.cli.progress", "LINE_EVERY_S"),
 }
 
