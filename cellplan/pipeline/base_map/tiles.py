@@ -105,5 +105,6 @@ def _plain(found: PlaceVerdict) -> dict[str, Any]:
 
 def _verdict(values: Mapping[str, Any]) -> PlaceVerdict:
     """The verdict of plain data."""
-    found = {name: tuple(value) if name in PAIRS else value for name, value in values.items()}
-    return PlaceVerdict(**{**found, "verdict": Verdict(values["verdict"]), "start": np.array(values["start"])})
+    found: dict[str, Any] = {name: tuple(value) if name in PAIRS else value for name, value in values.items()}
+    found |= {"verdict": Verdict(values["verdict"]), "start": np.array(values["start"])}
+    return PlaceVerdict(**found)
