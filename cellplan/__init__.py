@@ -3,13 +3,13 @@
 The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
-- compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``base_map``, ``search_layout``,
-  ``repair``, ``rehearse``
+- compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``base_map``, ``map_study``,
+  ``search_layout``, ``repair``, ``rehearse``
 - verify: ``verify``, ``open_gate``
 - write: ``write_run``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``, ``write_repair``,
   ``export_program``
 - inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``BaseGrid``,
-  ``CompareJob``, ``LayoutRequest``, ``Stop``
+  ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``
 - results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``,
   ``LayoutResult``, ``Repair``
 - errors: ``CellplanError``
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from cellplan.model.toolpath import Toolpath
     from cellplan.pipeline.base_map.grid import BaseGrid
     from cellplan.pipeline.base_map.judged import base_map, write_base_map
+    from cellplan.pipeline.base_map.prepared import MapRequest
+    from cellplan.pipeline.base_map.study import map_study
     from cellplan.pipeline.compare import CompareJob, compare
     from cellplan.pipeline.export import export_program
     from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
@@ -68,6 +70,7 @@ _HOME: Final = {
     "CompareJob": "pipeline.compare",
     "LayoutRequest": "pipeline.layout.request",
     "LayoutResult": "pipeline.layout.search",
+    "MapRequest": "pipeline.base_map.prepared",
     "Motion": "model.motion",
     "Part": "model.cell",
     "Program": "model.motion",
@@ -87,6 +90,7 @@ _HOME: Final = {
     "fastest": "pipeline.fastest.shortest",
     "load_cell": "io.cell.load",
     "load_errors": "io.cell_errors",
+    "map_study": "pipeline.base_map.study",
     "open_gate": "pipeline.gate.open_gate",
     "rehearse": "pipeline.rehearsal.rehearse",
     "repair": "pipeline.repair.repair",
@@ -112,6 +116,7 @@ __all__ = [
     "CompareJob",
     "LayoutRequest",
     "LayoutResult",
+    "MapRequest",
     "Motion",
     "Part",
     "Program",
@@ -132,6 +137,7 @@ __all__ = [
     "fastest",
     "load_cell",
     "load_errors",
+    "map_study",
     "open_gate",
     "rehearse",
     "repair",

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from cellplan.cli.errors import InterruptedWorkError
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
@@ -32,8 +33,14 @@ Certify = Annotated[
 ]
 Output = Annotated[
     Path | None,
-    typer.Option("-o", "--output", metavar="DIR", help="Folder of the map (default: outputs/<cell name>-map-<robot>)."),
+    typer.Option("-o", "--output", metavar="DIR", help="Study folder (default: outputs/<cell name>-map-<robot>)."),
 ]
+WorkerCount = Annotated[
+    int | None,
+    typer.Option("--workers", metavar="N", min=1, help="Processes that judge (default: one for each processor)."),
+]
+Resume = Annotated[bool, typer.Option("--resume", help="Continue the map in the folder.")]
+Status = Annotated[bool, typer.Option("--status", help="Say how far the map in the folder is, and do nothing.")]
 
 
 def base_map(  # noqa: PLR0913, PLR0917 - the options of the command
@@ -47,6 +54,9 @@ def base_map(  # noqa: PLR0913, PLR0917 - the options of the command
     output: Output = None,
     mode: Mode = None,
     settings: Settings = None,
+    workers: WorkerCount = None,
+    resume: Resume = False,
+    status: Status = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
@@ -54,16 +64,15 @@ def base_map(  # noqa: PLR0913, PLR0917 - the options of the command
     """Judge the whole job with the base of one robot at each place of a grid, and draw the plane from above.
 
     Exit status: 0 at least one place passes (with --certify: is verified), 1 none does, 2 bad input, 3 no start at the
-    present base.
+    present base, 130 interrupted (--resume goes on).
     """
     with json_failure(SCHEMA, desired=as_json):
-        from cellplan.io.cell.load import load_cell
-        from cellplan.io.run.folder import refuse_unless_replaceable
+        from cellplan.guard import processors
         from cellplan.pipeline.base_map.grid import BaseGrid, read_span, read_yaw
-        from cellplan.pipeline.base_map.judged import base_map as judged_map
-        from cellplan.pipeline.base_map.judged import write_base_map
-        from cellplan.pipeline.overrides import with_overrides
+        from cellplan.pipeline.base_map.prepared import MapRequest, requested_cell
+        from cellplan.pipeline.base_map.study import NOUN, map_study
         from cellplan.report.text.base_map import map_lines
+        from cellplan.study.status import read_status
 
         asked = BaseGrid(
             x=None if x is None else read_span("--x", x),
@@ -71,19 +80,36 @@ def base_map(  # noqa: PLR0913, PLR0917 - the options of the command
             step=grid,
             yaw=None if yaw is None else read_yaw(yaw),
         )
-        changed = with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), settings or (), mode=mode)
-        folder = output or Path("outputs") / f"{changed.name}-map-{robot}"
-        refuse_unless_replaceable(folder)
+        request = MapRequest(
+            cell=cell,
+            robot=robot,
+            grid=asked,
+            allow_dirs=tuple(allow_dir or ()),
+            settings=tuple(settings or ()),
+            mode=mode,
+        )
+        folder = output or Path("outputs") / f"{requested_cell(request).name}-map-{robot}"
+        if status:
+            say(f"{folder}: {read_status(folder).text(NOUN)}")
+            return
         with progress_listener(quiet=quiet) as progress:
-            record = judged_map(changed, robot, asked, certify=certify, progress=progress)
-        write_base_map(record, folder)
+            try:
+                record = map_study(
+                    request,
+                    folder,
+                    workers=workers or processors(),
+                    resume=resume,
+                    certify=certify,
+                    progress=progress,
+                )
+            except KeyboardInterrupt as error:
+                raise InterruptedWorkError(str(error) or "interrupted") from None
     outcomes = [each["certified"]["status"] == "passed" for each in record["best"] if each["certified"] is not None]
-    status = (
-        ExitStatus.PASSED if (any(outcomes) if certify else record["counts"]["passes"]) else ExitStatus.CHECK_FAILED
-    )
+    passes = any(outcomes) if certify else record["counts"]["passes"]
+    outcome = ExitStatus.PASSED if passes else ExitStatus.CHECK_FAILED
     if as_json:
         where = {"folder": str(folder), "report_path": str(folder / "map.html")}
-        say_json({"schema": SCHEMA, "exit": int(status), **where, "map": record})
+        say_json({"schema": SCHEMA, "exit": int(outcome), **where, "map": record})
     else:
         say("\n".join(map_lines(record, folder)))
-    raise typer.Exit(status)
+    raise typer.Exit(outcome)

@@ -21,7 +21,7 @@ MAX_CORNERS: Final = 2000  # the work of every distance grows with their number
 FEW_CORNER_COUNT: Final = 250  # coal keeps at most 255 neighbours of a corner: so few corners cannot have more
 MAX_GROWTH: Final = 1.1  # [-] by which a hull of some of the points may be blown up to hold the others
 PAIR_CHUNK: Final = 4_000_000  # [-] products of points and planes worked on at once: about 30 MB
-PROOF_CHUNK: Final = 200_000  # [-] likewise where only the largest counts: what a processor keeps at hand
+PROOF_CHUNK: Final = 64_000  # [-] likewise where only the largest counts: what a processor keeps at hand
 GOLDEN_ANGLE: Final = np.pi * (3.0 - np.sqrt(5.0))  # [rad]
 
 
@@ -120,8 +120,14 @@ def _blown_up(hull: Mesh, points: Array) -> Mesh | None:
 def _sticking_out(hull: Mesh, points: Array) -> float:
     """How far in [m] the farthest point lies outside of a face: the proof of the hull, however it was found."""
     normals, offsets = _planes(hull)
+    planes = np.vstack([normals.T, -offsets])
     step = max(1, PROOF_CHUNK // len(normals))
-    return max(float((points[k : k + step] @ normals.T - offsets).max()) for k in range(0, len(points), step))
+    heights, farthest = np.empty((min(step, len(points)), len(normals))), -np.inf
+    for first in range(0, len(points), step):
+        some = points[first : first + step]
+        above = np.matmul(np.column_stack([some, np.ones(len(some))]), planes, out=heights[: len(some)])
+        farthest = np.maximum(farthest, above.max())  # stays what is not a number
+    return float(farthest)
 
 
 def _planes(hull: Mesh) -> tuple[Array, Array]:

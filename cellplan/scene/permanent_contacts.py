@@ -1,6 +1,6 @@
 """Pairs that touch, or come near, in every configuration: a robot's own design, or a mistake in its mounting."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -152,15 +152,15 @@ class _Sampled:
         """Whether a link touches a thing in every configuration, apart from rounding."""
         poses, (first, second) = self.poses(None), (pair.first, pair.second)
         if not is_ground(self.bodies[second]):
-            return self.distances(pair, None)[1] <= CONTACT_TOL
+            return all(distance <= CONTACT_TOL for distance in self.distances(pair, None))
         height = heights(self.engine.bodies[first].hull, poses.R[first], poses.p[first], X_WS=self.bodies[second].X_BS)
         return bool(np.all(height <= CONTACT_TOL))
 
-    def distances(self, pair: ScenePair, holder: str | None) -> tuple[float, float]:
-        """Smallest and largest distance of two bodies in [m]."""
+    def distances(self, pair: ScenePair, holder: str | None) -> Iterator[float]:
+        """Distance of two bodies in [m] in one configuration after the other, measured when it is asked for."""
         poses, ends = self.poses(holder), (pair.first, pair.second)
-        found = [measure(self.engine, ends, poses, sample=k).bound for k in range(poses.p.shape[1])]
-        return min(found), max(found)
+        for k in range(poses.p.shape[1]):
+            yield measure(self.engine, ends, poses, sample=k).bound
 
 
 def _views(cell: Cell, bodies: Sequence[SceneBody]) -> dict[str | None, Sequence[SceneBody]]:
@@ -234,11 +234,13 @@ def _mount_behind(design: Design, sampled: _Sampled, pair: ScenePair, holder: st
 
 def _relaxed(pair: ScenePair, sampled: _Sampled, holder: str | None) -> ScenePair:
     """The pair, checked for contact only where the distance between the two is a matter of their mounting."""
-    nearest, farthest = sampled.distances(pair, holder)
+    nearest, farthest = np.inf, -np.inf
+    for distance in sampled.distances(pair, holder):
+        nearest, farthest = min(nearest, distance), max(farthest, distance)
+        if farthest >= pair.demand and farthest - nearest > CONSTANT_DISTANCE_TOL:
+            return pair  # whatever it is elsewhere
     if farthest < pair.demand:
         reason = "checked for contact only: closer than the required clearance in every configuration by the mounting"
         return replace(pair, rule=Rule.CONTACT, reason=reason)
-    if farthest - nearest <= CONSTANT_DISTANCE_TOL:
-        reason = "checked for contact only: their distance is fixed by the mounting"
-        return replace(pair, rule=Rule.CONTACT, reason=reason)
-    return pair
+    reason = "checked for contact only: their distance is fixed by the mounting"
+    return replace(pair, rule=Rule.CONTACT, reason=reason)

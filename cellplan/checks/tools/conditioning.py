@@ -13,6 +13,7 @@ from cellplan.model.report import Conditioning
 from cellplan.model.task import Frame
 
 MAX_SAMPLES: Final = 2000  # [-] worked on at once, however small the stack is
+WELL_CONDITIONED: Final = 1e-3  # [-] ratio of singular values down to which their squares give them to nine digits
 STACK_WORK: Final = 4_000_000  # [-] entries of the stacked matrices worked on at once: 32 MB
 
 
@@ -132,11 +133,18 @@ def _stacked(rows: Sequence[Mapping[str, Array]], robots: Sequence[str], moving:
 
 
 def _singular_values(J: Array) -> Array:
-    """Singular values of each matrix, largest first, shape (N, rows); zeros when there are fewer columns than rows."""
+    """Singular values of each matrix, largest first, shape (N, rows); zeros when there are fewer columns than rows.
+
+    They are the roots of the eigenvalues of ``J J^T``, which are found in half the time; near singularities, where that
+    loses digits, those of ``J`` itself.
+    """
     if J.shape[2] < J.shape[1]:
         return np.zeros(J.shape[:2])
-    values = np.linalg.svd(J, compute_uv=False)
-    return values.astype(np.float64, copy=False)
+    squares = np.linalg.eigvalsh(J @ np.swapaxes(J, 1, 2))[:, ::-1]
+    is_near = ~(squares[:, -1] > WELL_CONDITIONED**2 * squares[:, 0])
+    values = np.sqrt(np.maximum(squares, 0.0))
+    values[is_near] = np.linalg.svd(J[is_near], compute_uv=False)
+    return values
 
 
 def _smallest(J: Array) -> Array:

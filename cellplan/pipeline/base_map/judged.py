@@ -1,5 +1,6 @@
 """Map of a base: what becomes of the whole job of a cell when one of its robots stands elsewhere in the plane."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -7,37 +8,25 @@ from typing import Any, Final
 
 import numpy as np
 
-from cellplan.errors import InputError
 from cellplan.io.cell.write import written_document
 from cellplan.io.run.folder import RunFolder
 from cellplan.model.cell import Cell
-from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.task import Frame
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.base_map.grid import BaseGrid
+from cellplan.pipeline.base_map.prepared import PreparedMap, prepared
 from cellplan.pipeline.base_map.record import map_record
+from cellplan.pipeline.base_map.tiles import Tiles, judged
 from cellplan.pipeline.drawing import drawing
 from cellplan.pipeline.outcome import solved_outcome
 from cellplan.pipeline.plan.rounded import rounded
-from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.solution import Solution
-from cellplan.pipeline.synchronous import refuse_other_jobs
 from cellplan.pipeline.write_run import versions
-from cellplan.planning.modes import plan_phases
-from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.start.given import part_pose
-from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.report.page.base_map import map_files
 from cellplan.report.record.common import Record, number
 from cellplan.report.record.key_figures import KeyFigures, key_figures
-from cellplan.scene.mounting import Mount, MountedPair
-from cellplan.scene.scene import Scene
-from cellplan.search.base_map.starts import StartGoal, starts_at
-from cellplan.search.base_map.verdicts import MapJob, PlaceVerdict, best_first, judge
-from cellplan.search.kernel.job import Job
+from cellplan.search.base_map.verdicts import MapJob, PlaceVerdict, best_first
 
-NODES: Final = 65  # [-] of a motion: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
 BEST: Final = 10  # [-] places that are listed with their settings
 SAME_ANGLE: Final = 1e-9  # [deg]
 
@@ -60,18 +49,34 @@ def base_map(
         progress: Called with the stage and the fraction done.
 
     Returns:
-        The record of ``map.json``.
+        The record of ``map.json``; the same as that of ``map_study``.
 
     Raises:
         InputError: There is no such operator, the grid is not usable, or the cell is of a kind that is not mapped.
         StartNotFoundError: A start posture is to be found, and there is none at the present base.
     """
-    _refuse_other_jobs(cell, robot)
-    asked, schedule = _prepared(cell, robot, grid or BaseGrid(), progress)
+    ready = prepared(cell, robot, grid or BaseGrid(), progress)
     progress("finding starts", 0.0)
-    placed = asked.scene.cell.robot(robot)
-    q, at = starts_at(_goal(asked), asked.places, placed.model, placed.X_WB, seed=cell.solver.seed)
-    found = judge(asked, q, at, lambda share: progress("judging places", share))
+    tiles = Tiles.of(ready.asked, *ready.starts())
+    trials = []
+    for place, values in enumerate(tiles.values):
+        progress("judging places", place / len(tiles.values))
+        trials.append({"values": values, **judged(ready.asked, values).record})
+    return finished_record(ready, tiles.verdicts(trials), certify=certify, progress=progress)
+
+
+def finished_record(
+    ready: PreparedMap, found: Sequence[PlaceVerdict], *, certify: int = 0, progress: Progress = silent
+) -> Record:
+    """The record of a map whose places are judged, the best of them solved on request.
+
+    Args:
+        ready: What the map is made of.
+        found: The verdict of every place.
+        certify: How many of the best places are solved and verified.
+        progress: Called with the stage and the fraction done.
+    """
+    asked, cell = ready.asked, ready.cell
     best = best_first(found)[: max(BEST, certify)]
     settings = [place_settings(asked, found[place], place) for place in best]
     certified = []
@@ -84,7 +89,7 @@ def base_map(
         found,
         best=list(zip(best, settings, strict=True)),
         certified=certified,
-        drawn=drawing(asked.scene, asked.start, schedule),
+        drawn=drawing(asked.scene, asked.start, ready.schedule),
         versions=versions(),
     )
 
@@ -123,57 +128,3 @@ def place_settings(asked: MapJob, found: PlaceVerdict, place: int) -> dict[str, 
 def _figures(solution: Solution) -> KeyFigures:
     """Key figures of a certified place."""
     return key_figures([run.report for run in solution.runs])
-
-
-def _refuse_other_jobs(cell: Cell, name: str) -> None:
-    """Refuse robots that are no operators, and jobs whose motion is not one synchronous pseudo-inverse motion."""
-    operators = [task.robot for task in cell.tasks if task.robot not in cell.positioners]
-    if name not in operators:
-        raise InputError(
-            f"--robot: expected a robot with a task that does not hold the part "
-            f"({', '.join(dict.fromkeys(operators)) or 'there is none'}), got '{name}'"
-        )
-    refuse_other_jobs(cell, "a map of bases")
-
-
-def _prepared(cell: Cell, robot: str, grid: BaseGrid, progress: Progress) -> tuple[MapJob, Schedule]:
-    """The scene, the job at its nodes, the start at the present base, and the places."""
-    scene = Scene.from_cell(cell)
-    paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
-    start = chosen_start(scene, paths, progress=progress).start
-    cell = replace(cell, robots=tuple(replace(each, start=start[cell.columns(each.name)]) for each in cell.robots))
-    phase = plan_phases(cell).program[0]
-    schedule = schedule_paths(cell, [paths[name] for name in phase.tasks])
-    job = Job.of(cell, schedule, moving=phase.moving, nodes=NODES)
-    places = grid.places(cell.robot(robot), _part_at(cell)[:3, 3])
-    scene = replace(scene, cell=cell, mounted=_standing(scene, robot))
-    return MapJob(job=job, scene=scene, robot=robot, start=start, places=places), schedule
-
-
-def _standing(scene: Scene, robot: str) -> tuple[MountedPair, ...]:
-    """Pairs of what never moves that depend on where a robot stands; how deep they may be in each other is judged."""
-    return tuple(
-        pair
-        for pair in scene.mounted
-        if pair.mount is Mount.STANDING and robot in {scene.bodies[end].robot for end in (pair.first, pair.second)}
-    )
-
-
-def _goal(asked: MapJob) -> StartGoal:
-    """What the robot's tool is to reach at the start."""
-    cell, job = asked.scene.cell, asked.job
-    place = next(place for place, each in enumerate(job.relations) if each.robot == asked.robot)
-    relation = job.relations[place]
-    return StartGoal(
-        robot=cell.robot(asked.robot),
-        chain=asked.scene.chains[asked.robot],
-        relation=relation,
-        X_RT=job.X[:, :, place, 0],
-        X_WR=_part_at(cell) if relation.relative_to is Frame.PART else np.eye(4),
-        given=asked.start[cell.columns(asked.robot)],
-    )
-
-
-def _part_at(cell: Cell) -> Any:
-    """The part at the start, shape (4, 4)."""
-    return part_pose(cell, None if cell.carrier is None else cell.robots[cell.carrier].start)

@@ -130,4 +130,4 @@ def _reason(asked: MapJob, found: PlaceVerdict) -> str:
         distance = MM * (found.distance or 0.0)
         how = f"{distance:.3g} mm apart" if distance > 0.0 else f"{-distance:.3g} mm into each other"
         return f"{found.pair[0]} and {found.pair[1]} {how} at {found.at or 0.0:.3g} s"
-    return ""
+    return found.reason

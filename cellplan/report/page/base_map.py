@@ -4,7 +4,7 @@ from typing import Any
 
 from cellplan.model.report import CAUTION
 from cellplan.report.page.render import inline_svg, template
-from cellplan.report.plots.base_map import COLOURS, TITLES, cycle_classes, map_sheet
+from cellplan.report.plots.base_map import TITLES, colours_of, cycle_classes, map_sheet
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.record.common import Record, as_json
 
@@ -30,17 +30,18 @@ def map_page(record: Record, plot: bytes) -> str:
         record: As ``base_map`` returns it.
         plot: Its picture as SVG.
     """
+    colours = colours_of(record)
     best: list[dict[str, Any]] = [{**each, **record["places"][each["place"]]} for each in record["best"]]
     examples = {
         verdict: next((place["reason"] for place in record["places"] if place["verdict"] == verdict), "")
-        for verdict in COLOURS
+        for verdict in colours
     }
     return template("base_map.html").render(
         r=record,
         best=best,
         plot=inline_svg(plot.decode(), prefix="m-"),
         classes=cycle_classes(record),
-        colours=COLOURS,
+        colours=colours,
         titles=TITLES,
         examples=examples,
         caution=CAUTION,

@@ -15,6 +15,7 @@ COLOURS: Final = {
     "speed": "#eccb85",
     "limit": "#b9c0ca",
     "out_of_reach": "#f1f3f6",
+    "not_judged": "#8a6fb0",
 }
 SHADES: Final = ("#12492f", "#1e6b45", "#2f8d5d", "#55ad7c", "#86c9a1", "#b6e0c5")  # of places that pass, fastest first
 TITLES: Final = {
@@ -23,6 +24,7 @@ TITLES: Final = {
     "speed": "too fast",
     "limit": "beyond a joint limit",
     "out_of_reach": "out of reach",
+    "not_judged": "not judged",
 }
 LONGEST: Final = 6.6  # [inch] of the longer side of the plane
 LEFT, TOP, FOOT, LEGEND = 0.75, 0.5, 0.65, 2.2  # [inch]
@@ -67,6 +69,11 @@ def cycle_classes(record: Record) -> list[tuple[str, float, float]]:
     if edges[0] == edges[-1]:
         return [(SHADES[0], edges[0], edges[0])]
     return [(colour, edges[i], edges[i + 1]) for i, colour in enumerate(SHADES)]
+
+
+def colours_of(record: Record) -> dict[str, str]:
+    """Colours of the verdicts that a map has, but for places that pass."""
+    return {verdict: colour for verdict, colour in COLOURS.items() if verdict in record["counts"]}
 
 
 def _step(record: Record) -> float:
@@ -136,7 +143,9 @@ def _draw_legend(sheet: Sheet, panel: Panel, record: Record) -> None:
     classes = cycle_classes(record)
     entries = [(colour, f"cycle {first:.2f} to {last:.2f} s") for colour, first, last in classes]
     lines = [(None, f"passes: {record['counts']['passes']}"), *entries]
-    lines += [(colour, f"{TITLES[verdict]}: {record['counts'][verdict]}") for verdict, colour in COLOURS.items()]
+    lines += [
+        (colour, f"{TITLES[verdict]}: {record['counts'][verdict]}") for verdict, colour in colours_of(record).items()
+    ]
     for colour, text in lines:
         if colour is None:
             sheet.write(left, y, text, va="center", weight="bold")

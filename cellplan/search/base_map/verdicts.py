@@ -1,6 +1,7 @@
 """What becomes of the whole job at each place of one base: of the first start that passes, or the best one."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -8,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.checks.joints.acceleration_limits import acceleration_limit
-from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell import joint_at
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.contacts import contacts
@@ -21,8 +22,9 @@ AT_ONCE: Final = 256  # [-] motions worked out together
 
 
 class Verdict(StrEnum):
-    """What becomes of a place, the nearer to passing the later."""
+    """What becomes of a place, the nearer to passing the later; one that is not judged is not known."""
 
+    NOT_JUDGED = "not_judged"
     OUT_OF_REACH = "out_of_reach"
     LIMIT = "limit"
     SPEED = "speed"
@@ -50,6 +52,7 @@ class PlaceVerdict:
         pair: Bodies that are too near each other, and their distance in [m]; None where none are.
         distance: That distance.
         at: Time in [s] at which they are.
+        reason: Why it is not judged; empty where it is.
     """
 
     verdict: Verdict
@@ -64,6 +67,18 @@ class PlaceVerdict:
     pair: tuple[str, str] | None = None
     distance: float | None = None
     at: float | None = None
+    reason: str = ""
+
+    @property
+    def passes(self) -> bool:
+        """Whether the whole job can be done."""
+        return self.verdict is Verdict.PASSES
+
+    def or_better(self, other: "PlaceVerdict | None") -> "PlaceVerdict":
+        """This one where it is nearer to passing than an earlier one of the same place, else the earlier one."""
+        if other is None or other.start is None or RANK[self.verdict] > RANK[other.verdict]:
+            return self
+        return other
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,14 +100,16 @@ class MapJob:
     places: Places
 
 
-def judge(asked: MapJob, q: Array, at: Indices, tell: Callable[[float], None]) -> list[PlaceVerdict]:
-    """The verdict of every place.
+def verdicts_at_start(asked: MapJob, q: Array, at: Indices) -> tuple[list[PlaceVerdict], Indices]:
+    """What the starts alone say of every place, and which starts are within limits.
 
     Args:
         asked: The job and the places.
         q: Starts of the robot, shape (S, n), as ``starts_at`` returns them.
         at: Their places, shape (S,).
-        tell: Called with the fraction done.
+
+    Returns:
+        The verdict of every place, and the starts to be judged, ascending.
     """
     model = asked.scene.cell.robot(asked.robot).model
     room = np.minimum(q - model.lower, model.upper - q)
@@ -104,26 +121,27 @@ def judge(asked: MapJob, q: Array, at: Indices, tell: Callable[[float], None]) -
             joint = (asked.robot, model.joint_names[tight])
             margin = float(rooms[tight])
             found[place] = PlaceVerdict(verdict=Verdict.LIMIT, start=start, joint=joint, margin=margin, at=0.0)
-    inside = np.flatnonzero(room.min(axis=1) >= 0.0)
-    first = np.searchsorted(at[inside], at[inside], side="left")
-    turn = np.arange(len(inside)) - first  # 0 for the start of a place that is nearest to the present one
-    done = 0
+    return found, np.flatnonzero(room.min(axis=1) >= 0.0)
+
+
+def judge(asked: MapJob, q: Array, at: Indices) -> dict[int, PlaceVerdict]:
+    """The verdict of each place of some starts by its motions: of the first that passes, else of the best one.
+
+    Args:
+        asked: The job and the places.
+        q: Starts of the robot within its limits, shape (S, n).
+        at: Their places, ascending, shape (S,); at each place those that are tried first come first.
+    """
+    found = dict[int, PlaceVerdict]()
+    turn = np.arange(len(at)) - np.searchsorted(at, at, side="left")
     for number in range(int(turn.max(initial=-1)) + 1):
-        rows = inside[turn == number]
-        rows = rows[[found[place].verdict is not Verdict.PASSES for place in at[rows].tolist()]]
+        rows = np.flatnonzero(turn == number)
+        rows = rows[[place not in found or not found[place].passes for place in at[rows].tolist()]]
         for begin in range(0, len(rows), AT_ONCE):
             group = rows[begin : begin + AT_ONCE]
             for place, verdict in zip(at[group].tolist(), _judged(asked, q[group], at[group]), strict=True):
-                if _is_better(verdict, found[place]):
-                    found[place] = verdict
-            done += len(group)
-            tell(done / len(inside))
+                found[place] = verdict.or_better(found.get(place))
     return found
-
-
-def _is_better(one: PlaceVerdict, other: PlaceVerdict) -> bool:
-    """Whether one start of a place came nearer to passing than another."""
-    return RANK[one.verdict] > RANK[other.verdict] or other.start is None
 
 
 def _judged(asked: MapJob, q: Array, at: Indices) -> Iterator[PlaceVerdict]:
@@ -212,6 +230,6 @@ def best_first(found: Sequence[PlaceVerdict]) -> list[int]:
 
 
 def counts(found: Sequence[PlaceVerdict]) -> dict[Verdict, int]:
-    """How many places each verdict has, the best verdict first."""
-    flags: dict[Verdict, Flags] = {each: np.array([one.verdict is each for one in found]) for each in Verdict}
-    return {each: int(flags[each].sum()) for each in reversed(Verdict)}
+    """How many places each verdict has, the best verdict first; places that are not judged only where there are any."""
+    number = Counter(each.verdict for each in found)
+    return {each: number[each] for each in reversed(Verdict) if number[each] or each is not Verdict.NOT_JUDGED}
