@@ -57,21 +57,22 @@ class SignedDistances:
         spots, spot = np.unique(ends * count + samples[:, None], return_inverse=True)
         body, at = np.divmod(spots, count)
         placed = self._poses(poses.R[body, at], poses.p[body, at])
-        places, distances, points = list[int](), list[float](), list[Array]()
+        places, distances, points = list[int](), list[float](), np.empty((len(ends), 2, 3))
         asked = zip(kind.tolist(), spot.reshape(-1, 2).tolist(), strict=True)
         for place, (query, (a, b)) in enumerate(asked):
             result.clear()
             distance = queries[query](placed[a], placed[b], request, result)
             if distance < within:
-                first, second = result.getNearestPoint1(), result.getNearestPoint2()
-                if not distance > -FARTHEST:
+                pair = points[len(places)]
+                if distance > -FARTHEST:
+                    pair[0], pair[1] = result.getNearestPoint1(), result.getNearestPoint2()
+                else:
                     one, other = ends[place].tolist()
                     where = (one, other, int(samples[place]))
-                    distance, first, second = _along_centres(bodies[one], bodies[other], poses, where)
+                    distance, pair[0], pair[1] = _along_centres(bodies[one], bodies[other], poses, where)
                 places.append(place)
                 distances.append(distance)
-                points += [first, second]
-        return np.array(places, dtype=np.intp), np.array(distances), np.array(points).reshape(-1, 2, 3)
+        return np.array(places, dtype=np.intp), np.array(distances), points[: len(places)]
 
     def _poses(self, R: Array, p: Array) -> list[Any]:
         """Coal's poses, shape (N, 3, 3) and (N, 3); the objects are used again, as making them takes twice as long."""

@@ -23,10 +23,17 @@ def with_bases(cell: Cell, X_WB: Mapping[str, Array]) -> Cell:
     for name, X in X_WB.items():
         if name not in names:
             raise ValueError(f"moved: expected names of robots ({', '.join(names)}), got '{name}'")
-        if np.shape(X) != (4, 4) or not is_rigid(np.asarray(X, dtype=float)[None]):
-            raise ValueError(f"moved: expected a rigid displacement of shape (4, 4) as base of '{name}', got {X}")
+        if np.shape(X) != (4, 4):
+            raise _not_rigid(name, X)
+    if X_WB and not is_rigid(np.array(list(X_WB.values()), dtype=float)):
+        raise next(_not_rigid(name, X) for name, X in X_WB.items() if not is_rigid(np.array(X, dtype=float)[None]))
     robots = [replace(robot, X_WB=X_WB[robot.name]) if robot.name in X_WB else robot for robot in cell.robots]
     return replace(cell, robots=tuple(robots))
+
+
+def _not_rigid(name: str, X: Array) -> ValueError:
+    """The error of a base that is no displacement."""
+    return ValueError(f"moved: expected a rigid displacement of shape (4, 4) as base of '{name}', got {X}")
 
 
 def stands_by_link(cell: Cell, robot: str) -> bool:

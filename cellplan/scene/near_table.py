@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -90,7 +91,8 @@ class NearTable:
             within: The distance.
         """
         poses = self.bodies.poses(D)
-        parts = [self._solids(engine, poses, within), self._grounds(poses, within)]
+        centres, lines = self.bodies.bounds(poses)
+        parts = [self._solids(engine, poses, (centres, lines), within), self._grounds(poses, centres, within)]
         rows, samples, distances, normals, first, second, bodies = (
             np.concatenate(part) for part in zip(*parts, strict=True)
         )
@@ -119,19 +121,21 @@ class NearTable:
             found: The pairs.
             screws: Of all axes, shape (axes, K, 6).
         """
-        links = self.links_of(found)
+        links, forces, count = self.links_of(found), wrenches(found), screws.shape[1]
         moved = self.forest.carries[links[:, 1]] - self.forest.carries[links[:, 0]]
-        work = np.swapaxes(screws, 0, 1)[found.samples] @ wrenches(found)[:, :, None]
-        return work[..., 0] * moved
+        bounds = np.searchsorted(found.samples, np.arange(count + 1)).tolist()
+        for sample, (first, last) in enumerate(pairwise(bounds)):
+            moved[first:last] *= forces[first:last] @ screws[:, sample].T
+        return moved
 
     def links_of(self, found: Found) -> Indices:
         """Links that carry the bodies of pairs, shape (M, 2)."""
         return np.where(found.bodies < 0, WORLD, self.bodies.links[found.bodies])
 
-    def _solids(self, engine: Engine, poses: BodyPoses, within: float) -> "Parts":
+    def _solids(self, engine: Engine, poses: BodyPoses, bounds: tuple[Array, Array], within: float) -> "Parts":
         """Pairs of solids: bounding spheres, bounding lines, hulls, then surfaces where the hull is not what counts."""
         table, ends = self.bodies, self.pairs.solids
-        centres, lines = table.bounds(poses)
+        centres, lines = bounds
         places, samples = self._near_spheres(centres, within)
         a, b = ends[places].T
         gaps = line_gaps(lines[a, samples], lines[b, samples])
@@ -178,12 +182,11 @@ class NearTable:
         places, samples = np.nonzero(is_near)
         return places, samples
 
-    def _grounds(self, poses: BodyPoses, within: float) -> "Parts":
+    def _grounds(self, poses: BodyPoses, centres: Array, within: float) -> "Parts":
         """Pairs of a solid and a half-space."""
         table, above, planes = self.bodies, self.pairs.above, self.pairs.planes
         up, origin = planes[:, :3, 2], planes[:, :3, 3]
-        centres = (poses.R[above] @ table.centres[above, None, :, None])[..., 0] + poses.p[above]
-        lowest = np.einsum("gki,gi->gk", centres - origin[:, None], up) - table.radii[above, None]
+        lowest = ((centres[above] - origin[:, None]) @ up[:, :, None])[..., 0] - table.radii[above, None]
         is_near = lowest < within
         is_near[self.pairs.once[len(self.pairs.solids) :], 1:] = False
         places, samples = np.nonzero(is_near)
@@ -201,7 +204,8 @@ Parts = tuple[Indices, Indices, Array, Array, Array, Array, Indices]  # the attr
 
 def wrenches(found: Found) -> Array:
     """Unit forces along the normals with their moments about the world's origin, shape (M, 6)."""
-    return np.concatenate([found.normals, np.cross(found.second, found.normals)], axis=1)
+    (x, y, z), (a, b, c) = found.second.T, found.normals.T
+    return np.stack([a, b, c, y * c - z * b, z * a - x * c, x * b - y * a], axis=1)
 
 
 def counts_by_hull(body: CollisionBody, tip: Array | None) -> bool:

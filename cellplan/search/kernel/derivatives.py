@@ -21,6 +21,7 @@ from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.memory import keep_freed_memory
 from cellplan.search.kernel.screws import Directions, TaskScrews
 
+BACK: Final = 2  # [-] nodes before the present one whose speeds the multistep rule of ``run`` takes
 REGULAR: Final = 1e-12  # [-] of the largest entry that keeps a matrix invertible where its rank is lost
 
 
@@ -51,8 +52,10 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
     """
     keep_freed_memory()
     rates = _Rates(job, layout, q, qd, directions)
-    nq, steps, begins = q.shape[1], job.steps.tolist(), job.is_begin.tolist()
-    found, at = np.empty((len(q), 2 * nq, directions.count)), rates.start(directions.start)
+    nq, begins, last = q.shape[1], job.is_begin.tolist(), len(q) - 1
+    before = np.zeros((BACK + len(q), 2 * nq, directions.count))  # nodes that there are not, then all nodes
+    blocks, found, at = before.reshape(-1, nq * directions.count), before[BACK:], rates.start(directions.start)
+    shares = _shares(job)
     for node, (taking, adding) in enumerate(zip(rates.by_joints, rates.by_layout, strict=True)):
         np.matmul(taking, at, out=found[node])
         found[node] += adding
@@ -61,12 +64,17 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
                 node - 1 : node + 1, nq:
             ].sum(axis=0)
             found[node] = taking @ at + adding
-        if node + 1 < len(q):
-            at = found[node, :nq] + steps[node][0] * found[node, nq:]
-            for back, weight in enumerate(steps[node][1:], start=1):
-                if weight:
-                    at += weight * found[node - back, nq:]
+        if node < last:
+            at = (shares[node] @ blocks[2 * node : 2 * (node + BACK + 1)]).reshape(nq, -1)
     return MotionDerivatives(q=found[:, :nq], qd=found[:, nq:], rates=np.ascontiguousarray(rates.by_joints[:, nq:]))
+
+
+def _shares(job: Job) -> Array:
+    """Shares of the joints and speeds at each node and those before it in the joints predicted after it, (N - 1, 6)."""
+    weights = np.zeros((len(job.steps), BACK + 1, 2))
+    weights[:, BACK, 0] = 1.0
+    weights[:, :, 1] = job.steps[:, ::-1]
+    return weights.reshape(len(job.steps), -1)
 
 
 def equations(job: Job, layout: Layouts, q: Array, qd: Array, directions: Directions) -> tuple[Array, Array]:
