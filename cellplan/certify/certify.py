@@ -27,6 +27,7 @@ def certify(
     demand: float | None = None,
     *,
     with_minimum: bool = True,
+    with_curves: bool = True,
     progress: Callable[[float], object] | None = None,
 ) -> Bound:
     """Bound the distance of every pair of bodies from below, at the samples of a motion and between them.
@@ -40,6 +41,8 @@ def certify(
         demand: Distance in [m] that pairs with the rule ``clearance`` are to keep; that of the scene when None.
         with_minimum: Whether the smallest distances are searched for too. Otherwise the search ends with the first pair
             that does not keep its demand, and only ``Bound.is_kept`` of the result is valid.
+        with_curves: Whether the bounds of each class are then raised in every block, to be drawn; the verdict and the
+            smallest distances are known before.
         progress: Called with the fraction done.
     """
     if demand is not None:
@@ -51,7 +54,7 @@ def certify(
         stretch = StretchSearch(survey, motion, first, last)
         if with_minimum:
             stretch.search_all()
-            for kind in ClearanceClass:
+            for kind in ClearanceClass if with_curves else ():
                 stretch.raise_curve(kind)
             stretch.note_work()
         elif not stretch.prove_all():

@@ -31,8 +31,18 @@ from cellplan.model.cell import Cell
 from cellplan.model.idle import idle_robots
 from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report import Check, ClosureAccuracy, JointUse, Report, RobotSpeed, TaskAccuracy
+from cellplan.model.report import (
+    Check,
+    ClearanceReport,
+    ClosureAccuracy,
+    JointUse,
+    Report,
+    RobotSpeed,
+    TaskAccuracy,
+)
 from cellplan.scene.scene import Scene
+
+Clearance = tuple[ClearanceReport, tuple[Check, ...]]
 
 
 def verify(
@@ -127,10 +137,35 @@ def with_clearance(report: Report, scene: Scene, schedule: Schedule, *, progress
         schedule: Likewise.
         progress: Called with the stage and the fraction done.
     """
-    q = np.concatenate([report.q[robot.name] for robot in scene.cell.robots], axis=1)
-    clearance, checks = check_clearance(scene, schedule, q, progress=progress)
-    mounting = check_mounting(scene, q, schedule.times)
-    return replace(report, checks=(*report.checks, *mounting, *checks), clearance=clearance)
+    q = stacked(scene.cell, report.q)
+    return completed(report, run_clearance(scene, schedule, q, progress=progress))
+
+
+def run_clearance(
+    scene: Scene, schedule: Schedule, q: Array, *, with_curves: bool = True, progress: Progress = silent
+) -> Clearance:
+    """Clearance of all bodies of a run, with the checks of it and of the depth of mounted ones.
+
+    Args:
+        scene: The scene.
+        schedule: The tasks and the clock.
+        q: Stacked joint positions in [rad] or [m], shape (N, nq).
+        with_curves: Whether the distances over time are worked out sharply enough to be drawn.
+        progress: Called with the stage and the fraction done.
+    """
+    clearance, checks = check_clearance(scene, schedule, q, with_curves=with_curves, progress=progress)
+    return clearance, (*check_mounting(scene, q, schedule.times), *checks)
+
+
+def completed(report: Report, found: Clearance) -> Report:
+    """The report of ``verify_motion`` with the clearance of the same run."""
+    clearance, checks = found
+    return replace(report, checks=(*report.checks, *checks), clearance=clearance)
+
+
+def stacked(cell: Cell, q: Mapping[str, Array]) -> Array:
+    """Positions of all robots side by side, shape (N, nq)."""
+    return np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
 
 
 def _errors(

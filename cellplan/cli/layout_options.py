@@ -13,16 +13,13 @@ from cellplan.cli.output import say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
 from cellplan.guard import processors
-from cellplan.io.cell.load import load_cell
 from cellplan.io.input.findings import did_you_mean, listed, shown
 from cellplan.pipeline.layout.quantities import read_angle, read_length, read_misplacement, read_time
 from cellplan.pipeline.layout.request import LayoutRequest
-from cellplan.pipeline.layout.search import search_layout
-from cellplan.report.text.layout import layout_lines
+from cellplan.pipeline.layout.workers import layout_workers
 from cellplan.search.programs.objective import Objective, Timing
-from cellplan.study.cluster import Cluster
+from cellplan.study.session import Stop
 from cellplan.study.status import read_status
-from cellplan.study.study import Stop
 
 Choice = TypeVar("Choice", bound=StrEnum)
 
@@ -104,11 +101,14 @@ def search_and_say(
         InterruptedWorkError: The search was interrupted.
         Exit: Always, at the end.
     """
-    folder = output or default_folder(request.cell, request.allow_dirs, is_free=bool(request.free))
-    with progress_listener(quiet=quiet) as progress, ExitStack() as opened:
+    with ExitStack() as opened:
+        pool = opened.enter_context(_pool(work.workers, request))  # begins while this process imports what follows
+        from cellplan.pipeline.layout.search import search_layout
+        from cellplan.report.text.layout import layout_lines
+
+        folder = output or default_folder(request.cell, request.allow_dirs, is_free=bool(request.free))
+        progress = opened.enter_context(progress_listener(quiet=quiet))
         try:
-            by = work.workers
-            pool: int | Executor = opened.enter_context(Cluster(by)) if isinstance(by, str) else by
             record = search_layout(
                 request,
                 folder,
@@ -129,8 +129,19 @@ def search_and_say(
     raise typer.Exit(outcome)
 
 
+def _pool(by: int | str, request: LayoutRequest) -> Executor:
+    """The processes that search, here or of a cluster."""
+    if isinstance(by, int):
+        return layout_workers(by, request)
+    from cellplan.study.cluster import Cluster
+
+    return Cluster(by)
+
+
 def default_folder(cell: Path, allow_dirs: tuple[Path, ...] = (), *, is_free: bool = False) -> Path:
     """Where the study of a cell is written unless the user says otherwise."""
+    from cellplan.io.cell.load import load_cell
+
     return Path("outputs") / f"{load_cell(cell, allow_dirs=allow_dirs).name}-{'fastest' if is_free else 'layout'}"
 
 

@@ -59,6 +59,12 @@ class ChildStock:
                     self._prepared.pop(child, None)
         return value
 
+    def stop(self) -> None:
+        """End the processes that are in the middle of a job; what waits for its answer gets an error."""
+        with self._lock:
+            for child in self._busy:
+                child.kill()
+
     def end(self) -> None:
         """End all processes, in the middle of a job if need be; what waits for an answer gets an error."""
         with self._lock:

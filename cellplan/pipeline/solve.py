@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import PurePath
 
 from cellplan.checks.joints.joins import with_joins
-from cellplan.checks.verify import verify_motion, with_clearance
+from cellplan.checks.verify import completed, stacked, verify_motion, with_clearance
 from cellplan.geometry.transforms import Array
 from cellplan.io.run.clock_table import render_clock
 from cellplan.io.run.joint_tables import TableHeader, parse_table, program_digest, render_table, replace_header
@@ -24,6 +24,7 @@ from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.run import plan_run
 from cellplan.pipeline.plan.sequence import plan_program
 from cellplan.pipeline.plan.start import chosen_start
+from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
@@ -68,8 +69,17 @@ def solve_with_plots(
     return certified(solution, scene, progress=progress)
 
 
-def solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[Scene, Solution]:
-    """All phases, verified but for their clearance, and the scene of the solved cell; see ``solve``."""
+def solve_motion(
+    cell: Cell, *, task: str | None, progress: Progress, quick: QuickClearance | None = None
+) -> tuple[Scene, Solution]:
+    """All phases, verified but for their clearance, and the scene of the solved cell; see ``solve``.
+
+    Args:
+        cell: The cell.
+        task: Name of the only task to work on.
+        progress: Called with the stage and the fraction done.
+        quick: Begins with the clearance of each phase as soon as its rows are known.
+    """
     refuse_clock_name(cell)
     if cell.program is not None:
         return _solve_program(cell if task is None else with_only_task(cell, task), progress=progress)
@@ -87,7 +97,7 @@ def solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[S
     scene = replace(scene, cell=solved)
     nominal = [replace(run.motion, q=standing(solved, run.phase, run.motion.q)) for run in planned]
     clock = ProgramClock.of(solved, plan, [run.schedule for run in planned])
-    motion, runs = _runs(solved, clock, nominal, [scene] * len(planned), progress=progress)
+    motion, runs = _runs(solved, clock, nominal, [scene] * len(planned), quick=quick, progress=progress)
     return scene, Solution(cell=solved, motion=motion, runs=runs, remark=choice.warning)
 
 
@@ -98,7 +108,7 @@ def _solve_program(cell: Cell, *, progress: Progress) -> tuple[Scene, Solution]:
     plan = Plan(phases=tuple(each.stage.phase for each in stages) * cycles)
     clock = ProgramClock.of(planned.cell, plan, [each.schedule for each in stages] * cycles)
     motions, scenes = [each.motion for each in stages] * cycles, [each.scene for each in stages] * cycles
-    motion, runs = _runs(planned.cell, clock, motions, scenes, cycles=cycles, progress=progress)
+    motion, runs = _runs(planned.cell, clock, motions, scenes, progress=progress)
     runs = tuple(replace(run, rungs=each.rungs, scene=each.scene) for run, each in zip(runs, stages, strict=True))
     remark = "; ".join(planned.remarks) or None
     return replace(planned.scenes.held, cell=planned.cell), Solution(
@@ -106,13 +116,27 @@ def _solve_program(cell: Cell, *, progress: Progress) -> tuple[Scene, Solution]:
     )
 
 
-def certified(solution: Solution, scene: Scene, *, progress: Progress) -> Solution:
-    """The solution with the clearance of every phase checked and the verdict in the headers of its tables."""
-    reports = [with_clearance(run.report, run.scene or scene, run.schedule, progress=progress) for run in solution.runs]
+def certified(solution: Solution, scene: Scene, *, progress: Progress, quick: QuickClearance | None = None) -> Solution:
+    """The solution with the clearance of every phase checked and the verdict in the headers of its tables.
+
+    Args:
+        solution: The solution of ``solve_motion``.
+        scene: Its scene.
+        progress: Called with the stage and the fraction done.
+        quick: Has the clearance, without curves.
+    """
+    reports = [_with_clearance(run, run.scene or scene, quick, progress) for run in solution.runs]
     reports = with_joins(solution.cell, reports)
     program = with_verdict(solution.cell, solution.program, [run.phase for run in solution.runs], reports)
     runs = zip(solution.runs, reports, strict=True)
     return replace(solution, runs=tuple(replace(run, report=report, program=program) for run, report in runs))
+
+
+def _with_clearance(run: Run, scene: Scene, quick: QuickClearance | None, progress: Progress) -> Report:
+    """The report of a run, completed by its clearance."""
+    if quick is None:
+        return with_clearance(run.report, scene, run.schedule, progress=progress)
+    return completed(run.report, quick.of(scene, run.schedule, stacked(scene.cell, run.report.q), progress))
 
 
 def _runs(
@@ -121,7 +145,7 @@ def _runs(
     nominal: Sequence[Motion],
     scenes: Sequence[Scene],
     *,
-    cycles: int = 1,
+    quick: QuickClearance | None = None,
     progress: Progress,
 ) -> tuple[Motion, tuple[Run, ...]]:
     """The motion of the program, and its phases verified on the rows that would be written, but for their clearance.
@@ -136,9 +160,11 @@ def _runs(
     program = replace(program, clock=text)
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
     runs = []
-    for place in range(len(motions) // cycles):
+    for place in range(len(motions) // (1 if cell.program is None else cell.program.cycles)):
         schedule, own = clock.schedules[place], motions[place]
         phase, rows = clock.plan.program[place], clock.cut(tables, place)
+        if quick is not None:
+            quick.begin(scenes[place], schedule, stacked(cell, {table.robot: table.q for table in rows}))
         report = verify_motion(scenes[place], schedule, rows, moving=phase.moving, idle=phase.idle, progress=progress)
         report = replace(report, mode=str(cell.motion.mode), phases=clock.timed_phases, phase=phase.label)
         runs.append(Run(phase=phase, schedule=schedule, motion=own, program=program, report=report))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
 from types import TracebackType
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
 from cellplan.errors import CellplanError, OverrunError, StudyStoppedError, TimeLimitError
 from cellplan.guard import ChildStock, Guard
@@ -25,6 +25,7 @@ START: Final = Guard(
 )
 
 Evaluate = Callable[[Variant], Outcome]
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,6 +76,29 @@ class Workers(ThreadPoolExecutor):
         super().__init__(count, thread_name_prefix="cellplan-worker", initializer=_use, initargs=(self._children,))
         for _ in range(count if at_once is None else min(count, at_once)):
             self.submit(_warm, tuple(modules), None if first is None else pickle.dumps(first))
+
+    def begin(self, function: Callable[..., Value], *arguments: object) -> Callable[[], Value]:
+        """Begin ``function(*arguments)`` in one of the processes; the returned function waits for its value.
+
+        What goes wrong with the process or on the way is done in this one.
+
+        Args:
+            function: A function of a module.
+            *arguments: Plain data.
+        """
+        begun = self.submit(_called, function, arguments)
+
+        def value() -> Value:
+            with suppress(CellplanError, TypeError, AttributeError, pickle.PicklingError):
+                found: Value = begun.result()
+                return found
+            return function(*arguments)
+
+        return value
+
+    def stop(self) -> None:
+        """End the processes of trials under way: nothing is asked of these any more."""
+        self._children.stop()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -186,6 +210,11 @@ def _warm(modules: tuple[str, ...], first: bytes | None) -> None:
     """Get a child process ready; what goes wrong does so again in the first trial, which says it."""
     with suppress(CellplanError):
         _children().call(_made_ready, modules, first, guard=START)
+
+
+def _called(function: Callable[..., Any], arguments: tuple[object, ...]) -> Any:
+    """Value of a function in a child process."""
+    return _children().call(function, *arguments, guard=START)
 
 
 def _made_ready(modules: tuple[str, ...], first: bytes | None) -> None:

@@ -101,7 +101,9 @@ def _install() -> None:
 def _motion(real: Callable[..., Any]) -> Callable[..., Any]:
     """The first part of ``solve``; a known solution takes the place of the scene."""
 
-    def solve_motion(cell: Cell, *, task: str | None, progress: Progress) -> tuple[Any, Solution]:
+    def solve_motion(cell: Cell, *, task: str | None, progress: Progress, quick: Any = None) -> tuple[Any, Solution]:
+        if quick is not None:  # begins with what is asked for afterwards
+            return real(cell, task=task, progress=progress, quick=quick)
         _state.making = entry = None if _state.folder is None or _is_patched() else _entry(cell, task, _state.folder)
         if entry is None:
             return real(cell, task=task, progress=progress)
@@ -118,10 +120,12 @@ def _motion(real: Callable[..., Any]) -> Callable[..., Any]:
 def _clearance(real: Callable[..., Any]) -> Callable[..., Any]:
     """The second part of ``solve``."""
 
-    def with_clearance(solution: Solution, scene: Any, *, progress: Progress) -> Solution:
+    def with_clearance(solution: Solution, scene: Any, *, progress: Progress, quick: Any = None) -> Solution:
         if isinstance(scene, Solved):
             _say(scene.clearance_events, progress)
             return scene.whole
+        if quick is not None:  # without curves
+            return real(solution, scene, progress=progress, quick=quick)
         entry = _state.making
         if entry is None or entry.motion is not solution:
             return real(solution, scene, progress=progress)

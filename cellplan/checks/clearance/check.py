@@ -25,7 +25,7 @@ UNKNOWN: Final = ClearanceReport(
 
 
 def check_clearance(
-    scene: Scene, schedule: Schedule, q: Array, *, progress: Progress = silent
+    scene: Scene, schedule: Schedule, q: Array, *, with_curves: bool = True, progress: Progress = silent
 ) -> tuple[ClearanceReport, tuple[Check, ...]]:
     """Find every contact and the smallest distance of each class, at the samples of a motion and between them.
 
@@ -42,6 +42,7 @@ def check_clearance(
         scene: The cell made computable.
         schedule: The tasks and the clock.
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
+        with_curves: Whether the distances over time are worked out sharply enough to be drawn; see ``certify``.
         progress: Called with the stage and the fraction done.
 
     Returns:
@@ -50,7 +51,9 @@ def check_clearance(
     """
     scene = scene_of_run(scene, [scheduled.task.name for scheduled in schedule.tasks])
     queries = replace(scene.engine.queries)
-    bound = certify(scene, q, progress=lambda fraction: progress(STAGE, CERTIFY_FRACTION * fraction))
+    bound = certify(
+        scene, q, with_curves=with_curves, progress=lambda fraction: progress(STAGE, CERTIFY_FRACTION * fraction)
+    )
     times, contacts = schedule.times, find_contacts(bound, schedule.times)
     minima = {kind: _minimum(bound, times, kind) for kind in ClearanceClass}
     curve_times, curves = _curves(bound, times, minima)

@@ -12,6 +12,7 @@ from cellplan.model.cell import Cell, joint_at
 from cellplan.model.progress import Progress
 from cellplan.model.report import TaskAccuracy
 from cellplan.pipeline.plan.retiming import RowLimits, row_limits
+from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.pipeline.solve import certified, solve_motion
 from cellplan.report.record.load_figures import LoadFigures, load_figures
@@ -84,7 +85,14 @@ class TimedProgram:
 
     @classmethod
     def solved(
-        cls, cell: Cell, law: Law, values: Mapping[str, object], *, task: str | None, progress: Progress
+        cls,
+        cell: Cell,
+        law: Law,
+        values: Mapping[str, object],
+        *,
+        task: str | None,
+        progress: Progress,
+        quick: QuickClearance | None = None,
     ) -> Self:
         """The program of a cell with other values, verified but for its clearance.
 
@@ -94,8 +102,9 @@ class TimedProgram:
             values: Values by address.
             task: Name of the only task to work on.
             progress: Called with the stage and the fraction done.
+            quick: Begins with its clearance at once.
         """
-        scene, solution = solve_motion(cell.with_values(values), task=task, progress=progress)
+        scene, solution = solve_motion(cell.with_values(values), task=task, progress=progress, quick=quick)
         scaled = [run for run in solution.runs if _is_scaled(run, cell)]
         rows = [_rows(run.scene or scene, run) for run in scaled]
         return cls(
@@ -107,9 +116,9 @@ class TimedProgram:
             load=max(_slower(scene, limits, q) for limits, q in rows),
         )
 
-    def certified(self, progress: Progress) -> Self:
-        """The same program with the clearance of every phase checked."""
-        return replace(self, solution=certified(self.solution, self.scene, progress=progress))
+    def certified(self, progress: Progress, quick: QuickClearance | None = None) -> Self:
+        """The same program with the clearance of every phase checked; ``quick`` has it without curves."""
+        return replace(self, solution=certified(self.solution, self.scene, progress=progress, quick=quick))
 
     @property
     def figures(self) -> LoadFigures:

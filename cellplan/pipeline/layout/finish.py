@@ -16,6 +16,7 @@ from cellplan.pipeline.fastest.scaling import scaled_values, whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.limits import Standing, standing_of
 from cellplan.pipeline.layout.prepared import Prepared, values_of
+from cellplan.pipeline.quick_clearance import Begin, QuickClearance
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
 
@@ -108,11 +109,13 @@ class Finish:
     Attributes:
         ready: The cell.
         progress: Called with the stage and the fraction done.
+        begin: Begins a function in another process, see ``QuickClearance``; None where all is done here.
         solves: How often a layout was solved in full so far.
     """
 
     ready: Prepared
     progress: Progress
+    begin: Begin | None = None
     solves: int = 0
     _problems: dict[tuple[Prepared, int], Any] = field(default_factory=dict)
 
@@ -172,20 +175,23 @@ class Finish:
         self.solves += 1
         try:
             cell = self.ready.variables.given_cell.with_values(values_of(self.ready, x, start))
-            program = self._timed(cell, standing.measures.cycle).certified(self.progress)
+            is_once = self.ready.request.objective is not Objective.CYCLE  # else other durations are tried
+            quick = QuickClearance(self.begin if is_once else None)
+            program = self._timed(cell, standing.measures.cycle, quick).certified(self.progress, quick)
         except (InputError, NoSolutionError) as error:
             return None, str(error).splitlines()[0]
         return program, self._rejection(program)
 
-    def _timed(self, cell: Cell, cycle: float) -> TimedProgram:
+    def _timed(self, cell: Cell, cycle: float, quick: QuickClearance) -> TimedProgram:
         """The program at the shortest cycle, or at the duration of the cell."""
         is_cycle = self.ready.request.objective is Objective.CYCLE
         if self.ready.request.timing is Timing.RETIMED:
             timing: object = "fastest" if is_cycle else {"cycle_s": self.ready.duration}
             law = Law.COMMON_SPEED if is_cycle else Law.REDUCED_SPEED
-            return TimedProgram.solved(cell, law, {"motion.timing": timing}, task=None, progress=self.progress)
+            values = {"motion.timing": timing}
+            return TimedProgram.solved(cell, law, values, task=None, progress=self.progress, quick=quick)
         if not is_cycle:
-            return TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=self.progress)
+            return TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=self.progress, quick=quick)
         factor = whole_steps(cell, cycle / self.ready.duration)
         for _ in range(DURATIONS):
             program = self._at(cell, factor)

@@ -10,7 +10,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.joint_spline import JointSpline
 from cellplan.model.layout import PathRange, VariableKind
 from cellplan.model.motion import Schedule
-from cellplan.pipeline.layout.request import short_key, written_vary
+from cellplan.pipeline.layout.searched import short_key, written_vary
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.spline_path.first import first_path, with_count
 from cellplan.search.spline_path.nodes import PathNodes

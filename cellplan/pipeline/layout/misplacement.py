@@ -27,6 +27,7 @@ from cellplan.pipeline.layout.finish import (
     time_asked,
 )
 from cellplan.pipeline.layout.limits import standing_of
+from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.report.record.common import number
 from cellplan.report.record.misplacement import CornerRecord, MisplacementRecord, ToleranceRecord
 from cellplan.search.distances.cell_distances import CellDistances
@@ -132,7 +133,7 @@ class MisplacedFinish(Finish):
                     break
                 factor = whole_steps(cells[0], factor * asked, longer_than=factor)
         self.solves += len(cells)
-        return [program.certified(self.progress) for program in found]
+        return [program.certified(self.progress, QuickClearance()) for program in found]
 
     def _record(
         self,

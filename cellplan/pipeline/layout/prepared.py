@@ -14,7 +14,8 @@ from cellplan.model.layout import VariableKind
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.joint_path import PathSearch, resolving, without_path
-from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
+from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.synchronous import refuse_other_jobs
 from cellplan.planning.modes import plan_phases

@@ -5,8 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.objective import Objective
+from cellplan.search.variables.choices import Choices
 from cellplan.study.status import Best
 from cellplan.study.trial import Trial
 
@@ -129,6 +131,17 @@ class Proposals:
             return self._perturbed(None, WIDE[(number + 1) % len(WIDE)], number)
         more = self._perturbed(best, 0.0, number) | {"kind": "improved"}
         return more | {"clearance_m": ADDED[number // 4 % len(ADDED)]}
+
+
+def proposals_of(request: LayoutRequest, ready: Prepared) -> "Proposals":
+    """What the rounds of a search of a cell try.
+
+    Args:
+        request: What is searched for.
+        ready: The cell.
+    """
+    choices = tuple(Choices.of(ready.cell).values())
+    return Proposals(request=request, choices=choices, branches=(ready.unled or ready).branches())
 
 
 def _leads_nowhere(trial: Trial) -> bool:

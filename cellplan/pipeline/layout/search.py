@@ -1,6 +1,5 @@
 """Layout search: trials in rounds, the best of them finished and certified, and all of it in one folder."""
 
-from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -12,16 +11,18 @@ from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
 from cellplan.pipeline.layout.misplacement import MisplacedFinish
 from cellplan.pipeline.layout.prepared import Prepared, prepared
-from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals
+from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals, proposals_of
 from cellplan.pipeline.layout.record import head_of, layout_record
-from cellplan.pipeline.layout.request import LayoutRequest, read_attempts
+from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.result_file import file_records, result_files
+from cellplan.pipeline.layout.searched import read_attempts
 from cellplan.pipeline.layout.trial import evaluate
+from cellplan.pipeline.layout.workers import layout_workers
+from cellplan.pipeline.quick_clearance import Begin
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.layout import layout_files
 from cellplan.report.record.layout import LayoutRecord
 from cellplan.search.programs.objective import Objective
-from cellplan.search.variables.choices import Choices
 from cellplan.study.folder import write_results
 from cellplan.study.study import Finished, Stop, Study
 from cellplan.study.trial import Trial, TrialStatus
@@ -30,7 +31,6 @@ from cellplan.study.workers import Limits, Workers
 BUDGET: Final = 60.0  # [s] of a search that does not say where to end
 CANDIDATES: Final = 4  # [-] layouts that are finished until one passes
 TRIAL_LIMIT: Final = 900.0  # [s] of the processor for one trial
-MODULES: Final = ("cellplan.pipeline.layout.trial",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,8 +57,7 @@ class _Search:
     stop: Stop
     progress: Progress
     finish: Finish
-    choices: Sequence[Mapping[str, object]]
-    branches: Sequence[Mapping[str, Any]]
+    proposals: Proposals
     tried: dict[int, Certified] = field(default_factory=dict)
 
     def run(self, *, resume: bool) -> tuple[Finished, Certified | None]:
@@ -72,6 +71,8 @@ class _Search:
                 resume=resume or bool(self.tried),
                 progress=self.progress,
             )
+            if isinstance(self.workers, Workers) and self.request.objective is Objective.CONFORMING:
+                self.workers.stop()  # trials after the one that is enough do not count
             best = self._best(finished)
             if best is not None or self.request.objective is not Objective.CONFORMING or not self._goes_on(finished):
                 return finished, best
@@ -79,7 +80,6 @@ class _Search:
     def _study(self) -> Study:
         """The study, without the candidates that were rejected."""
         rejected = frozenset(self.tried)
-        proposals = Proposals(request=self.request, choices=self.choices, branches=self.branches)
         is_enough = partial(_is_enough, rejected) if self.request.objective is Objective.CONFORMING else None
         cell = self.ready.cell
         header = {
@@ -90,7 +90,7 @@ class _Search:
             "versions": versions(),
         }
         best = BESTS[self.request.objective]
-        return Study(folder=self.folder, header=header, size=SIZE, propose=proposals, best=best, enough=is_enough)
+        return Study(folder=self.folder, header=header, size=SIZE, propose=self.proposals, best=best, enough=is_enough)
 
     def _best(self, finished: Finished) -> Certified | None:
         """The first candidate that passes, best first."""
@@ -140,7 +140,7 @@ def search_layout(
         request: What is searched for.
         folder: Folder of the study; an earlier one is replaced, or continued with ``resume``.
         stop: Where it ends: a number of trials, or a budget of seconds; None for 60 s.
-        workers: Number of processes that search; or an executor, which stays open.
+        workers: Number of processes that search; or an executor, which stays open, such as ``layout_workers``.
         resume: Whether trials that the folder holds already are not repeated.
         progress: Called with the stage and the fraction done.
 
@@ -151,9 +151,7 @@ def search_layout(
     with ExitStack() as opened:
         pool = workers
         if isinstance(workers, int):
-            first = partial(prepared, request.anywhere)
-            at_once = 1 if request.objective is Objective.CONFORMING else None  # mostly its first trial is the last
-            pool = opened.enter_context(Workers(workers, modules=MODULES, first=first, at_once=at_once))
+            pool = opened.enter_context(layout_workers(workers, request))
         ready = prepared(request)
         read_attempts(request, ready.cell)  # what is wrong with one is said before anything is tried
         search = _Search(
@@ -163,20 +161,25 @@ def search_layout(
             workers=pool,
             stop=stop or Stop(seconds=BUDGET),
             progress=progress,
-            finish=finish_of(ready, progress),
-            choices=tuple(Choices.of(ready.cell).values()),
-            branches=(ready.unled or ready).branches(),
+            finish=finish_of(ready, progress, pool.begin if isinstance(pool, Workers) else None),
+            proposals=proposals_of(request, ready),
         )
         finished, best = search.run(resume=resume)
         progress("writing the result", 1.0)
         return _written(search, finished, best)
 
 
-def finish_of(ready: Prepared, progress: Progress) -> Finish:
-    """The finish of the layouts of a cell, with displaced bases where they are asked for."""
+def finish_of(ready: Prepared, progress: Progress, begin: Begin | None = None) -> Finish:
+    """The finish of the layouts of a cell, with displaced bases where they are asked for.
+
+    Args:
+        ready: The cell.
+        progress: Called with the stage and the fraction done.
+        begin: Begins a function in another process; see ``Finish``.
+    """
     misplacement = ready.variables.settings.misplacement
     if misplacement is None:
-        return Finish(ready=ready, progress=progress)
+        return Finish(ready=ready, progress=progress, begin=begin)
     return MisplacedFinish(ready=ready, progress=progress, misplacement=misplacement)
 
 

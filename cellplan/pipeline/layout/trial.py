@@ -1,7 +1,9 @@
 """One trial of a layout search: from a start to a local optimum and its figures."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +15,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.seeds import generator
 from cellplan.pipeline.layout.limits import reason, standing_of
 from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.proposals import proposals_of
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Effort
@@ -52,12 +55,24 @@ def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
 
     Args:
         request: What is searched for.
-        variant: Number of the trial, and where it begins; see ``proposed``.
+        variant: Number of the trial, and where it begins; see ``Proposals``.
     """
-    values = variant.values
+    return _evaluated(request, variant.number, json.dumps(variant.values))
+
+
+def evaluate_first(request: LayoutRequest) -> None:
+    """Make the cell ready and work out the first trial before it is asked for; ``evaluate`` then has it at once."""
+    proposed = proposals_of(request, prepared(request))([])
+    _evaluated(request, 0, json.dumps(proposed[0]))
+
+
+@lru_cache(maxsize=1)
+def _evaluated(request: LayoutRequest, number: int, text: str) -> Outcome:
+    """See ``evaluate``; the values of the trial as JSON."""
+    values = json.loads(text)
     try:
         ready = prepared(request, _mapping(values.get("choice")))
-        begin = _begin(ready, values, variant.number)
+        begin = _begin(ready, values, number)
     except (InputError, NoSolutionError) as error:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
     added = float(str(values.get("clearance_m", 0.0)))

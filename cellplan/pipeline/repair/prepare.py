@@ -12,7 +12,8 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.layout.prepared import Prepared
-from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
+from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.pipeline.repair.attempts import Attempt
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.search.distances.cell_distances import CellDistances

@@ -10,7 +10,7 @@ from cellplan.errors import InputError
 from cellplan.model.seeds import generator
 from cellplan.pipeline.layout.free_motion import freed
 from cellplan.pipeline.layout.prepared import Prepared, prepared
-from cellplan.pipeline.layout.request import searched_cell
+from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.search.spline_path.perturb import perturbed_path
 from cellplan.search.spline_path.problem import PathProblem
 

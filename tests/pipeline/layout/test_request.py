@@ -7,7 +7,7 @@ import pytest
 from cellplan import CellplanError, LayoutRequest
 from cellplan.cli.main import run
 from cellplan.pipeline.layout.quantities import read_angle, read_length, read_time
-from cellplan.pipeline.layout.request import searched_cell, written_vary
+from cellplan.pipeline.layout.searched import searched_cell, written_vary
 from cellplan.search.programs.objective import Objective
 
 CELLS = Path(__file__).resolve().parents[3] / "cells"

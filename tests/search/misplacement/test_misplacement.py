@@ -9,7 +9,8 @@ import pytest
 from cellplan import load_cell, solve
 from cellplan.model.layout import Misplacement
 from cellplan.pipeline.layout.prepared import Prepared
-from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
+from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.misplacement.corners import judged
 from cellplan.search.misplacement.displacements import BaseDisplacements
