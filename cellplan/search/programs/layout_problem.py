@@ -59,6 +59,7 @@ class LayoutProblem:
     given: Array = field(init=False)
     times: Array = field(init=False)
     limits: JointLimits = field(init=False)
+    is_dense: bool = field(init=False, default=False)
     is_accelerating: bool = field(init=False)
     most_demanded: float = field(init=False)
 
