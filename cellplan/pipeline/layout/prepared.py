@@ -27,7 +27,7 @@ from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Job
 from cellplan.search.programs.layout_problem import LayoutProblem
-from cellplan.search.programs.objective import Demands, Objective
+from cellplan.search.programs.objective import Demands, Objective, Timing
 from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.starts.generator import StartGenerator
 from cellplan.search.starts.problem import StartProblem
@@ -35,7 +35,7 @@ from cellplan.search.variables.choices import Choices
 from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
-MORE_NODES: Final = 64  # [-] of a motion along a spline: some at each knot
+ALONG_SPLINE: Final = {Timing.LAWS: 4, Timing.RETIMED: 2}  # [-] times as many of a motion along a spline, no parabolas
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,7 +100,8 @@ class Prepared:
         if self.unled is None:
             job = Job.of(variables.base, self.schedule, moving=self.moving, nodes=nodes)
             return LayoutProblem(job=job, variables=variables, bodies=self.bodies, acceleration=acceleration)
-        return self.path_search.problem(nodes + MORE_NODES, bodies=self.bodies, acceleration=acceleration)
+        nodes *= ALONG_SPLINE[self.request.timing]
+        return self.path_search.problem(nodes, bodies=self.bodies, acceleration=acceleration)
 
     @cached_property
     def coarse(self) -> LayoutProblem | PathProblem:

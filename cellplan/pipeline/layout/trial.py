@@ -27,8 +27,9 @@ from cellplan.study.trial import Outcome, TrialStatus, Variant
 
 EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to
 STAGE: Final = Effort(iterations=6)  # of motions that joint paths begin with
-STAGES: Final = 4
-STILL: Final = Effort(iterations=0)
+STAGES: Final = 5
+BOTH: Final = 2
+PROBE: Final = Effort(iterations=12)  # of the paths that a trial chooses from
 PATH: Final = Effort(least_gain=1e-3)  # many coefficients gain little each, but for long
 NOT_FOLLOWED: Final = "a tool cannot follow its path"
 
@@ -121,26 +122,34 @@ def _path(ready: Prepared, unled: Prepared, values: Mapping[str, Any], number: i
 
 
 def _led(ready: Prepared, unled: Prepared, begin: Begin, stages: int) -> _Begin | None:
-    """The path nearest to a motion by the pseudo-inverse, improved in stages: the stage whose path is the fastest.
+    """The path nearest to a motion by the pseudo-inverse, improved in stages, or to one of the stages on the way.
 
-    A motion may be at its best where an operator just passes a singularity, which a path beside it does not survive.
+    The last stage whose path the tools can follow, or the first one, whichever some programs make faster: a motion may
+    be at its best where an operator just passes a singularity, which a path beside it does not survive.
     """
-    search, best, least = ready.path_search, None, np.inf
-    for stage in range(stages):
-        if stage:
-            better = improve(unled.coarse, *begin, unled.demands(), STAGE)
-            if better is None:
-                break
-            begin = better.x, better.start
-        found = search.fitted(*begin)
-        if found is None:
+    begins = [begin]
+    for _ in range(stages - 1):
+        better = improve(unled.coarse, *begins[-1], unled.demands(), STAGE)
+        if better is None:
             break
-        x = search.variables(found[0], search.beside(begin[0]))
-        stands = improve(ready.coarse, x, found[1], ready.demands(), STILL)
-        if stands is not None and stands.cycle * (1.0 + stands.violation) < least:
-            least = stands.cycle * (1.0 + stands.violation)
-            best = _Begin(x, found[1], unled=begin)
-    return best
+        begins.append((better.x, better.start))
+    paths = (_path_of(ready, each) for each in reversed(begins[1:]))
+    found = [each for each in (next(filter(None, paths), None), _path_of(ready, begin)) if each is not None]
+    if len(found) < BOTH:
+        return next(iter(found), None)
+    probed = [improve(ready.coarse, each.x, each.start, ready.demands(), PROBE) for each in found]
+    ranks = [(np.inf, np.inf) if each is None else (each.violation, each.objective) for each in probed]
+    return found[ranks.index(min(ranks))]
+
+
+def _path_of(ready: Prepared, begin: Begin) -> _Begin | None:
+    """The path nearest to a motion by the pseudo-inverse; None where a tool cannot follow."""
+    search = ready.path_search
+    found = search.fitted(*begin)
+    if found is None:
+        return None
+    x = search.variables(found[0], search.beside(begin[0]))
+    return None if ready.coarse.evaluate(x, found[1]) is None else _Begin(x, found[1], unled=begin)
 
 
 def _layout(ready: Prepared, values: Mapping[str, object], number: int) -> Begin | None:

@@ -55,7 +55,7 @@ class Peaks:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Crests:
-    """Values of functions of time at their nodes; where one is highest among its neighbours, that of the parabola.
+    """Values of functions of time at their nodes, or where one is highest among its neighbours that of the parabola.
 
     Attributes:
         value: The values, shape (N, n).
@@ -86,6 +86,13 @@ class Crests:
             signs = np.sign(values)
             shares *= np.stack([np.roll(signs, 1, axis=0), signs, np.roll(signs, -1, axis=0)], axis=-1)
         return cls(value=value, shares=shares)
+
+    @classmethod
+    def at_nodes(cls, values: Array, *, in_magnitude: bool = False) -> "Crests":
+        """Those of the nodes alone, of values of shape (N, n)."""
+        shares = np.zeros((*values.shape, 3))
+        shares[..., 1] = np.sign(values) if in_magnitude else 1.0
+        return cls(value=np.abs(values) if in_magnitude else values, shares=shares)
 
     def derivatives(self, nodes: Indices, columns: Indices, of_values: Array) -> Array:
         """Derivatives of some of them from those of the values at the nodes, shape (N, n, p) to (M, p)."""

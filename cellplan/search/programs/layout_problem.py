@@ -42,6 +42,7 @@ class LayoutProblem:
     given: Array = field(init=False)
     times: Array = field(init=False)
     limits: JointLimits = field(init=False)
+    is_dense: bool = field(init=False, default=False)
     is_accelerating: bool = field(init=False)
 
     def __post_init__(self) -> None:

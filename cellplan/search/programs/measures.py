@@ -32,7 +32,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Measures:
-    """Figures of one point; each is that of the parabola where it is an extreme between nodes.
+    """Figures of one point; see ``Problem.is_dense`` for extremes between nodes.
 
     Attributes:
         point: The point.
@@ -79,8 +79,8 @@ class Measures:
             added = added + allowance.distance[distances.pairs]
         return cls(
             point=point,
-            lower=Crests.of(times, limits.lower + margin - point.q),
-            upper=Crests.of(times, point.q - limits.upper + margin),
+            lower=_crests(problem, limits.lower + margin - point.q),
+            upper=_crests(problem, point.q - limits.upper + margin),
             speeds=speeds,
             accelerations=accelerations,
             distances=distances,
@@ -178,10 +178,17 @@ class Missed:
         return price * (self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum()))
 
 
+def _crests(problem: Problem, values: Array, *, in_magnitude: bool = False) -> Crests:
+    """Functions of time with values at the nodes of shape (N, n), and their extremes between them where these count."""
+    if problem.is_dense:
+        return Crests.at_nodes(values, in_magnitude=in_magnitude)
+    return Crests.of(problem.times, values, in_magnitude=in_magnitude)
+
+
 def _loads(problem: Problem, point: Point, demands: Demands) -> tuple[Crests, Crests, float]:
     """Speeds and accelerations under the laws, and how many times as long as the nodes they must last."""
-    speeds = Crests.of(problem.times, point.qd / problem.limits.velocity, in_magnitude=True)
-    accelerations = Crests.of(problem.times, point.qdd / problem.acceleration, in_magnitude=True)
+    speeds = _crests(problem, point.qd / problem.limits.velocity, in_magnitude=True)
+    accelerations = _crests(problem, point.qdd / problem.acceleration, in_magnitude=True)
     if (allowance := demands.allowance) is not None:
         speeds, accelerations = _raised(speeds, allowance.speed), _raised(accelerations, allowance.acceleration)
     return speeds, accelerations, max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
@@ -191,8 +198,7 @@ def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[Crests, Crests, 
     """The same of a retimed motion: at its nodes, as nothing is an extreme between them."""
     factor = pace.seconds / float(problem.times[-1] - problem.times[0])
     speeds, accelerations = (
-        Crests(value=share * factor**order, shares=np.tile([0.0, 1.0, 0.0], (*share.shape, 1)))
-        for order, share in enumerate(pace.reached(point.qd, point.qdd), start=1)
+        Crests.at_nodes(share * factor**order) for order, share in enumerate(pace.reached(point.qd, point.qdd), start=1)
     )
     return speeds, accelerations, factor
 

@@ -74,6 +74,8 @@ class Problem(Varied, Protocol):
         times: Times of the nodes in [s], from 0 to the end, shape (N,); two nodes may share one where speeds jump.
         limits: Limits of the joints.
         acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,).
+        is_dense: Whether the nodes alone count. Elsewhere an extreme between two of them is that of the parabola
+            through three: good with few nodes, but it jumps where the highest of them becomes another one.
     """
 
     @property
@@ -86,6 +88,10 @@ class Problem(Varied, Protocol):
 
     @property
     def acceleration(self) -> Array:
+        """See the class."""
+
+    @property
+    def is_dense(self) -> bool:
         """See the class."""
 
     def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:

@@ -49,6 +49,7 @@ class PathProblem:
     scale: Array = field(init=False)
     cost: Array = field(init=False)
     given: Array = field(init=False)
+    is_dense: bool = field(init=False, default=True)  # its nodes are cheap; wrists near a singularity make peaks narrow
 
     def __post_init__(self) -> None:
         """Put the variables one after the other."""

@@ -7,7 +7,9 @@ import pytest
 from builders.toy_problem import DEMAND, Toy
 
 from cellplan.search.programs.improve import Improved, improve
+from cellplan.search.programs.measures import Measures
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room
+from cellplan.search.programs.problem import Point
 
 EXACT = Effort(iterations=40, within=20.0, least_gain=1e-7, room=Room(margin=0.0, distance=0.0, own=0.0, time=0.0))
 NONE = np.zeros(2)
@@ -108,3 +110,14 @@ def test_equal_input_gives_equal_bytes() -> None:
 def test_objectives_at_a_duration_need_one() -> None:
     with pytest.raises(ValueError, match="demands: the objective 'change' needs a duration"):
         Demands(objective=Objective.CHANGE, margin=NONE)
+
+
+def test_where_nodes_are_dense_nothing_between_them_counts() -> None:
+    speeds = np.array([[0.0, 0.0], [0.9, 0.7], [0.8, 0.7], [0.0, 0.0]])
+    point = Point(x=np.array([0.5, 4.5]), start=NONE, q=0.0 * speeds, qd=speeds, qdd=0.0 * speeds)
+    demands, sparse = Demands(objective=Objective.CYCLE, margin=NONE), Toy(times=np.array([0.0, 0.5, 1.0, 2.0]))
+
+    measured = [Measures.of(replace(sparse, is_dense=each), point, demands, EXACT) for each in (False, True)]
+
+    np.testing.assert_array_equal(measured[1].speeds.value, speeds / sparse.limits.velocity)
+    assert np.all(measured[0].speeds.value.max(axis=0) > measured[1].speeds.value.max(axis=0))
