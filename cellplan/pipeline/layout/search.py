@@ -9,7 +9,6 @@ from typing import Any, Final
 
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
-from cellplan.pipeline.layout.misplacement import MisplacedFinish
 from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals, proposals_of
 from cellplan.pipeline.layout.record import head_of, layout_record
@@ -180,14 +179,16 @@ def finish_of(ready: Prepared, progress: Progress, begin: Begin | None = None) -
     misplacement = ready.variables.settings.misplacement
     if misplacement is None:
         return Finish(ready=ready, progress=progress, begin=begin)
+    from cellplan.pipeline.layout.misplacement import MisplacedFinish
+
     return MisplacedFinish(ready=ready, progress=progress, misplacement=misplacement)
 
 
 def _written(search: _Search, finished: Finished, best: Certified | None) -> LayoutResult:
     """The record and all files."""
     record = layout_record(search.ready, finished, tried=search.tried, best=best, solves=search.finish.solves)
-    if isinstance(search.finish, MisplacedFinish) and best is not None:
-        record["misplacement"] = search.finish.records[best.trial]
+    if best is not None:
+        record["misplacement"] = search.finish.records.get(best.trial)
     beside: dict[str, bytes] = {}
     if best is not None:
         head = head_of(record, search.request)
