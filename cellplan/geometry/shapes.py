@@ -81,11 +81,12 @@ def support(shape: Solid, directions: Array) -> Array:
         case Box(size):
             reach = np.abs(n) @ (0.5 * np.asarray(size))
         case Cylinder(radius, length):
-            reach = radius * np.hypot(n[..., 0], n[..., 1]) + 0.5 * length * np.abs(n[..., 2])
+            across = np.sqrt(n[..., 0] * n[..., 0] + n[..., 1] * n[..., 1])  # unit directions: nothing overflows
+            reach = radius * across + 0.5 * length * np.abs(n[..., 2])
         case Capsule(radius, length):
-            reach = radius * np.linalg.norm(n, axis=-1) + 0.5 * length * np.abs(n[..., 2])
+            reach = radius * np.sqrt(np.einsum("...i,...i->...", n, n)) + 0.5 * length * np.abs(n[..., 2])
         case Sphere(radius):
-            reach = radius * np.linalg.norm(n, axis=-1)
+            reach = radius * np.sqrt(np.einsum("...i,...i->...", n, n))
         case Mesh():
             reach = np.max(n @ shape.vertices.T, axis=-1)
     return reach

@@ -140,7 +140,7 @@ def _depths(columns: Columns, shape: Solid, X_ST: Array) -> Array:
     poses, lines, count = len(X_ST), len(columns.points), len(columns.line)
     R, p = X_ST[:, :3, :3], X_ST[:, :3, 3]
     across = columns.points[columns.line]
-    points = p[:, None, :] + np.einsum("nij,cj->nci", R[:, :, :2], across)
+    points = p[:, None, :] + across @ np.swapaxes(R[:, :, :2], 1, 2)
     directions = np.broadcast_to(R[:, None, :, 2], points.shape)
     spans = line_spans(shape, points.reshape(-1, 3), directions.reshape(-1, 3))
     pose, column = np.divmod(spans.line, max(count, 1))

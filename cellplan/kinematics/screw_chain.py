@@ -4,15 +4,19 @@ The checks, the collision bodies and the reports use this file; the planner uses
 one of them shows as an error in the report ([Ribeiro2010]_ appendix B).
 """
 
+from typing import Any, Final
+
 import numpy as np
 
 from cellplan.geometry.transforms import Array, pose_from, rotation_about, skew
 from cellplan.model.cell import Robot
 from cellplan.model.robot import FollowerJoint, Joint
 
+KEPT_ROWS: Final = 16_384  # [-] configurations whose displacements are kept: 15 MB for six links
+
 
 class ScrewChain:
-    """The links of one placed robot."""
+    """The links of one placed robot; it keeps the displacements that it was asked for last."""
 
     def __init__(self, robot: Robot) -> None:
         """Take the joint axes at the reference configuration, followers after driven joints."""
@@ -24,6 +28,11 @@ class ScrewChain:
         self._X_BF = model.X_BF
         self._X_BT = model.X_BF @ robot.tool.X_FT
         self._n = len(model.joints)
+        self._last: tuple[Array, Array] | None = None  # positions and displacements, which nobody may write to
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the displacements behind; the other side works them out anew."""
+        return self.__dict__ | {"_last": None}
 
     def link_displacements(self, q: Array) -> Array:
         """Displacement of every link from its place in B at the reference configuration to its place in the world.
@@ -35,13 +44,19 @@ class ScrewChain:
             q: Positions of the driven joints in [rad] or [m], shape (N, n).
 
         Returns:
-            Displacements, shape (N, links + 1, 4, 4).
+            Displacements, shape (N, links + 1, 4, 4); they cannot be written to.
         """
+        if self._last is not None and np.array_equal(self._last[0], q):
+            return self._last[1]
         D = np.empty((len(self._axes) + 1, len(q), 4, 4))
         D[0] = self._X_WB
         for link, (axis, position) in enumerate(zip(self._axes, self._positions(q), strict=True)):
             D[link + 1] = _carried_on(axis, position, D[axis.parent + 1])[0]
-        return np.moveaxis(D, 0, 1)
+        D.setflags(write=False)
+        displacements = np.moveaxis(D, 0, 1)
+        if len(q) <= KEPT_ROWS:
+            self._last = q.copy(), displacements
+        return displacements
 
     def flange_poses(self, q: Array) -> Array:
         """Flange in the world, shape (N, 4, 4)."""

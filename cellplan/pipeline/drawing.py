@@ -1,11 +1,10 @@
 """A cell from above: outlines of robots, part and surroundings, the paths, and what the links sweep."""
 
-from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.shapes import Box, Cylinder, support_point
 from cellplan.model.motion import Schedule
 from cellplan.model.task import Frame
@@ -85,15 +84,15 @@ def swept_area(scene: Scene, q: Array) -> dict[str, Any]:
     poses = scene.body_poses(q)
     found: dict[str, Any] = {}
     for robot in scene.cell.robots:
-        covered = set[tuple[int, int]]()
+        covered = [np.empty((0, 3), dtype=np.intp)]
         for index in _solids(scene):
             if scene.bodies[index].robot == robot.name and not scene.bodies[index].is_at_rest:
                 hull = scene.engine.bodies[index].hull
                 points = np.array([support_point(hull, n) for n in ALL_ROUND])
                 placed = (points @ np.swapaxes(poses.R[index], -1, -2) + poses.p[index][:, None])[..., :2]
                 extreme = (placed @ AROUND[:, :2].T).argmax(axis=1)  # of each configuration and direction
-                covered |= _squares(np.take_along_axis(placed, extreme[..., None], axis=1))
-        found[robot.name] = [[y * SQUARE, first * SQUARE, last * SQUARE] for y, first, last in _stretches(covered)]
+                covered.append(_squares(np.take_along_axis(placed, extreme[..., None], axis=1)))
+        found[robot.name] = (SQUARE * _stretches(np.concatenate(covered))).tolist()
     return {"square_mm": SQUARE, "robots": found}
 
 
@@ -103,8 +102,12 @@ def _solids(scene: Scene) -> list[int]:
     return [index for index, body in enumerate(scene.bodies) if index < len(names) and body.name == names[index]]
 
 
-def _squares(outlines: Array) -> set[tuple[int, int]]:
-    """Squares whose middles lie in any of some convex outlines in [m], shape (K, C, 2), by their row and column."""
+def _squares(outlines: Array) -> Indices:
+    """Squares whose middles lie in any of some convex outlines in [m], shape (K, C, 2).
+
+    Returns:
+        Row, first and last column of what each outline covers of a row, shape (M, 3).
+    """
     first = MM / SQUARE * outlines
     second = np.roll(first, -1, axis=1)
     low, high = np.ceil(first[..., 1].min()), np.floor(first[..., 1].max())
@@ -118,22 +121,23 @@ def _squares(outlines: Array) -> set[tuple[int, int]]:
     ends = np.floor(np.where(is_met, at, -np.inf).max(axis=-1) + NEAR)
     flat = is_met & (rise == 0.0)
     ends = np.maximum(ends, np.floor(np.where(flat, second[..., 0], -np.inf).max(axis=-1) + NEAR))
-    found = set[tuple[int, int]]()
-    for row, spans in zip(rows.ravel().astype(int).tolist(), np.stack([begins, ends], axis=-1), strict=True):
-        for begin, end in np.unique(spans[spans[:, 0] <= spans[:, 1]], axis=0).astype(int).tolist():
-            found.update((row, column) for column in range(begin, end + 1))
-    return found
+    is_covered = begins <= ends
+    found = np.broadcast_to(rows[..., 0], begins.shape)[is_covered], begins[is_covered], ends[is_covered]
+    return np.stack(found, axis=-1).astype(np.intp)
 
 
-def _stretches(covered: set[tuple[int, int]]) -> Iterator[tuple[int, int, int]]:
-    """Row, first and last column of each stretch of covered squares."""
-    squares = sorted(covered)
-    first = 0
-    for place in range(1, len(squares) + 1):
-        row, column = squares[place - 1]
-        if place == len(squares) or squares[place] != (row, column + 1):
-            yield row, squares[first][1], column
-            first = place
+def _stretches(covered: Indices) -> Indices:
+    """Row, first and last column of each stretch of squares that any of some stretches covers, shape (M, 3)."""
+    if not len(covered):
+        return covered
+    corner = np.array([covered[:, 0].min(), covered[:, 1].min()])
+    row, first, last = covered.T - corner[[0, 1, 1]][:, None]
+    changes = np.zeros((row.max() + 1, last.max() + 3), dtype=np.intp)  # with a free column on either side
+    np.add.at(changes, (row, first + 1), 1)
+    np.add.at(changes, (row, last + 2), -1)
+    turns = np.diff((np.cumsum(changes, axis=1) > 0).astype(np.int8), axis=1)
+    begins, ends = np.argwhere(turns > 0), np.argwhere(turns < 0)
+    return np.column_stack([begins + corner, ends[:, 1] - 1 + corner[1]])
 
 
 def _outline(shape: Any, R: Array, p: Array) -> Array:

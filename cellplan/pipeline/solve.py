@@ -22,13 +22,11 @@ from cellplan.pipeline.plan.program import ProgramClock, refuse_clock_name
 from cellplan.pipeline.plan.retiming import retimed
 from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.run import plan_run
-from cellplan.pipeline.plan.sequence import plan_program
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.sequence.only_task import with_only_task
 from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.scene import Scene
@@ -82,7 +80,7 @@ def solve_motion(
     """
     refuse_clock_name(cell)
     if cell.program is not None:
-        return _solve_program(cell if task is None else with_only_task(cell, task), progress=progress)
+        return _solve_program(cell, task=task, progress=progress)
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     paths = clock_paths(cell, toolpaths.values())
@@ -101,9 +99,12 @@ def solve_motion(
     return scene, Solution(cell=solved, motion=motion, runs=runs, remark=choice.warning)
 
 
-def _solve_program(cell: Cell, *, progress: Progress) -> tuple[Scene, Solution]:
+def _solve_program(cell: Cell, *, task: str | None, progress: Progress) -> tuple[Scene, Solution]:
     """The stages of a program from home to home, verified but for their clearance, and the scene with the part held."""
-    planned = plan_program(cell, progress=progress)
+    from cellplan.pipeline.plan.sequence import plan_program  # with all transfer moves, which few cells have
+    from cellplan.planning.sequence.only_task import with_only_task
+
+    planned = plan_program(cell if task is None else with_only_task(cell, task), progress=progress)
     stages, cycles = planned.stages, planned.cycles
     plan = Plan(phases=tuple(each.stage.phase for each in stages) * cycles)
     clock = ProgramClock.of(planned.cell, plan, [each.schedule for each in stages] * cycles)

@@ -17,6 +17,7 @@ from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.limits import Standing, standing_of
 from cellplan.pipeline.layout.prepared import Prepared, values_of
 from cellplan.pipeline.quick_clearance import Begin, QuickClearance
+from cellplan.report.record.misplacement import MisplacementRecord
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
 
@@ -111,12 +112,14 @@ class Finish:
         progress: Called with the stage and the fraction done.
         begin: Begins a function in another process, see ``QuickClearance``; None where all is done here.
         solves: How often a layout was solved in full so far.
+        records: What was found of each layout with displaced bases, by its trial; empty where none are asked for.
     """
 
     ready: Prepared
     progress: Progress
     begin: Begin | None = None
     solves: int = 0
+    records: dict[int, MisplacementRecord] = field(default_factory=dict)
     _problems: dict[tuple[Prepared, int], Any] = field(default_factory=dict)
 
     def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:

@@ -1,7 +1,7 @@
 """Finish of a layout whose bases may all be off their places: one cycle for all corners, the worst of them solved."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -48,11 +48,9 @@ class MisplacedFinish(Finish):
 
     Attributes:
         misplacement: By how much.
-        records: What was found of each layout that was finished, by its trial.
     """
 
     misplacement: Misplacement
-    records: dict[int, MisplacementRecord] = field(default_factory=dict)
 
     def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:
         """A layout of the search with all its corners; see ``Finish``.

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -47,22 +47,52 @@ LENGTH_STEP: Final = 0.1  # [m] that effects are stated for
 ANGLE_STEP: Final = float(np.radians(10.0))  # [rad] likewise
 
 
+class Given(NamedTuple):
+    """What is shown of the given layout.
+
+    Attributes:
+        record: Its record.
+        drawing: Its floor plan.
+        reach: Reach of each arm, without its tool, in [m].
+    """
+
+    record: GivenRecord
+    drawing: dict[str, Any]
+    reach: dict[str, float]
+
+
+def given_layout(request: LayoutRequest) -> Given:
+    """What is shown of the given layout of a search, whatever comes of the search."""
+    ready = prepared(request)
+    return Given(
+        record=_given(_given_standing(ready), ready),
+        drawing=drawing(ready.scene, _shown_start(ready), ready.schedule),
+        reach={robot.name: float(arm_reach(robot.model, rounds=REACH)) for robot in ready.cell.robots},
+    )
+
+
 def layout_record(
-    ready: Prepared, finished: Finished, *, tried: Mapping[int, Certified], best: Certified | None, solves: int
+    ready: Prepared,
+    finished: Finished,
+    given: Given,
+    *,
+    tried: Mapping[int, Certified],
+    best: Certified | None,
+    solves: int,
 ) -> LayoutRecord:
     """The search in printed units.
 
     Args:
         ready: The cell.
         finished: Its trials.
+        given: The given layout.
         tried: What came of those that were solved in full, by number.
         best: The best certified layout.
         solves: How often a layout was solved in full.
     """
     request, cell = ready.request, ready.cell
     listed = list(_candidates(ready, finished, tried))
-    given = _given_standing(ready)
-    standing = best.standing if best else None if ready.unled else given
+    standing = best.standing if best else None if ready.unled else _given_standing(ready)
     of_best = ready if best is None else _prepared_of(ready, next(_of_number(finished, best.trial)))
     is_free = request.objective == "cycle"
     return {
@@ -81,7 +111,7 @@ def layout_record(
         "trials": len(finished.trials),
         "rounds": -(-len(finished.trials) // SIZE),
         "solves": solves,
-        "given": _given(given, ready),
+        "given": given.record,
         "best": next((each for each in listed if best and each["trial"] == best.trial), None),
         "velocity_only_s": _velocity_only(best) if best and ready.has_accelerations else None,
         "top": listed[:TOP],
@@ -93,7 +123,7 @@ def layout_record(
         "dropped": _dropped(finished),
         "misplacement": None,
         "remarks": [*ready.variables.remarks, *_slowed(best)],
-        "drawing": _drawing(ready, best) if best else {},
+        "drawing": _drawing(ready, given, best) if best else {},
         "files": [],
         "inputs": dict(cell.inputs),
         "versions": versions(),
@@ -340,7 +370,7 @@ def _velocity_only(best: Certified) -> float:
     return round(float(measures.speeds.value.max()) * float(times[-1] - times[0]), FINE)
 
 
-def _drawing(ready: Prepared, best: Certified) -> dict[str, Any]:
+def _drawing(ready: Prepared, given: Given, best: Certified) -> dict[str, Any]:
     """Floor plan of the given and the best layout."""
     cell = certified_cell(best)
     if best.program is None:
@@ -349,13 +379,11 @@ def _drawing(ready: Prepared, best: Certified) -> dict[str, Any]:
     rows = np.unique(np.linspace(0, len(solution.motion.q) - 1, SWEPT).round().astype(np.intp))
     q = solution.motion.q[rows]
     return {
-        "given": drawing(ready.scene, _shown_start(ready), ready.schedule),
+        "given": given.drawing,
         "best": drawing(scene, q[0], solution.runs[0].schedule),
         "swept": swept_area(scene, q),
         "reach_mm": {
-            robot.name: number(
-                round(MM * float(arm_reach(robot.model, rounds=REACH) + np.linalg.norm(robot.tool.X_FT[:3, 3])), 3)
-            )
+            robot.name: number(round(MM * (given.reach[robot.name] + float(np.linalg.norm(robot.tool.X_FT[:3, 3]))), 3))
             for robot in cell.robots
         },
         "keep_out": {area.name: footprint(area.shape, area.X_WS) for area in ready.variables.settings.keep_out},

@@ -1,5 +1,6 @@
 """Layout search: trials in rounds, the best of them finished and certified, and all of it in one folder."""
 
+from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -9,10 +10,9 @@ from typing import Any, Final
 
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
-from cellplan.pipeline.layout.misplacement import MisplacedFinish
 from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals, proposals_of
-from cellplan.pipeline.layout.record import head_of, layout_record
+from cellplan.pipeline.layout.record import Given, given_layout, head_of, layout_record
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.result_file import file_records, result_files
 from cellplan.pipeline.layout.searched import read_attempts
@@ -58,6 +58,7 @@ class _Search:
     progress: Progress
     finish: Finish
     proposals: Proposals
+    given: Callable[[], Given] | None = None
     tried: dict[int, Certified] = field(default_factory=dict)
 
     def run(self, *, resume: bool) -> tuple[Finished, Certified | None]:
@@ -73,6 +74,8 @@ class _Search:
             )
             if isinstance(self.workers, Workers) and self.request.objective is Objective.CONFORMING:
                 self.workers.stop()  # trials after the one that is enough do not count
+            if self.given is None and isinstance(self.workers, Workers):
+                self.given = self.workers.begin(given_layout, self.request.anywhere)
             best = self._best(finished)
             if best is not None or self.request.objective is not Objective.CONFORMING or not self._goes_on(finished):
                 return finished, best
@@ -180,14 +183,17 @@ def finish_of(ready: Prepared, progress: Progress, begin: Begin | None = None) -
     misplacement = ready.variables.settings.misplacement
     if misplacement is None:
         return Finish(ready=ready, progress=progress, begin=begin)
+    from cellplan.pipeline.layout.misplacement import MisplacedFinish
+
     return MisplacedFinish(ready=ready, progress=progress, misplacement=misplacement)
 
 
 def _written(search: _Search, finished: Finished, best: Certified | None) -> LayoutResult:
     """The record and all files."""
-    record = layout_record(search.ready, finished, tried=search.tried, best=best, solves=search.finish.solves)
-    if isinstance(search.finish, MisplacedFinish) and best is not None:
-        record["misplacement"] = search.finish.records[best.trial]
+    given = given_layout(search.request) if search.given is None else search.given()
+    record = layout_record(search.ready, finished, given, tried=search.tried, best=best, solves=search.finish.solves)
+    if best is not None:
+        record["misplacement"] = search.finish.records.get(best.trial)
     beside: dict[str, bytes] = {}
     if best is not None:
         head = head_of(record, search.request)

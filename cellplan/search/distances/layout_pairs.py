@@ -34,12 +34,22 @@ class LayoutPair:
 
 def layout_pairs(scene: Scene) -> tuple[tuple[LayoutPair, ...], WatchedPairs]:
     """All pairs of a scene, then those of which the depth is judged; and the same as arrays."""
-    bodies, known = scene.bodies, near_table(scene).pairs
-    found = [
-        _pair(scene, (each.first, each.second), each.demand if each.rule is Rule.CLEARANCE else 0.0)
-        for each in scene.pairs
-    ]
-    found += [_pair(scene, (each.first, each.second), -each.limit) for each in scene.mounted]
+    bodies, table = scene.bodies, near_table(scene)
+    known, forest = table.pairs, table.forest
+    carriers = [forest.carries[forest.place(body.robot, body.link)].tobytes() for body in bodies]  # what moves each
+
+    def pair(first: int, second: int, demand: float) -> LayoutPair:
+        a, b = bodies[first], bodies[second]
+        return LayoutPair(
+            names=(a.name, b.name),
+            ends=(first, second),
+            demand=demand,
+            is_own=a.robot is not None and a.robot == b.robot,
+            is_fixed=carriers[first] == carriers[second],
+        )
+
+    found = [pair(each.first, each.second, each.demand if each.rule is Rule.CLEARANCE else 0.0) for each in scene.pairs]
+    found += [pair(each.first, each.second, -each.limit) for each in scene.mounted]
     first = len(scene.pairs)
     solids = [(first + k, each) for k, each in enumerate(scene.mounted) if not is_ground(bodies[each.second])]
     grounds = [(first + k, each) for k, each in enumerate(scene.mounted) if is_ground(bodies[each.second])]
@@ -96,20 +106,6 @@ def among(pairs: WatchedPairs, kept: Flags) -> WatchedPairs:
         planes=pairs.planes[above],
         demands=pairs.demands[is_kept],
         once=pairs.once[is_kept],
-    )
-
-
-def _pair(scene: Scene, ends: tuple[int, int], demand: float) -> LayoutPair:
-    """A pair of two bodies of the scene."""
-    a, b = (scene.bodies[end] for end in ends)
-    forest = near_table(scene).forest
-    links = [forest.place(body.robot, body.link) for body in (a, b)]
-    return LayoutPair(
-        names=(a.name, b.name),
-        ends=ends,
-        demand=demand,
-        is_own=a.robot is not None and a.robot == b.robot,
-        is_fixed=bool(np.array_equal(*forest.carries[links])),
     )
 
 
