@@ -58,7 +58,7 @@ def is_hull(hull: Mesh, points: Array) -> bool:
     if not hull.is_closed or not count_edges(hull.faces).is_closed:
         return False
     with np.errstate(invalid="ignore", divide="ignore"):  # a triangle without area has no normal: nothing is held
-        return _holds(hull, hull.vertices) and _holds(hull, points)
+        return _holds(hull, np.unique(np.concatenate([hull.vertices, points]), axis=0))
 
 
 def _holds(hull: Mesh, points: Array) -> bool:
@@ -119,9 +119,14 @@ def _blown_up(hull: Mesh, points: Array) -> Mesh | None:
 
 def _sticking_out(hull: Mesh, points: Array) -> float:
     """How far in [m] the farthest point lies outside of a face: the proof of the hull, however it was found."""
-    normals, offsets = _planes(hull)
-    step = max(1, PROOF_CHUNK // len(normals))
-    return max(float((points[k : k + step] @ normals.T - offsets).max()) for k in range(0, len(points), step))
+    planes = np.column_stack(_planes(hull)).T * np.array([[1.0], [1.0], [1.0], [-1.0]])
+    step = max(1, PROOF_CHUNK // planes.shape[1])
+    raised, heights = (
+        np.column_stack([points, np.ones(len(points))]),
+        np.empty((min(step, len(points)), planes.shape[1])),
+    )
+    parts = (raised[k : k + step] for k in range(0, len(points), step))
+    return max(float(np.matmul(part, planes, out=heights[: len(part)]).max()) for part in parts)
 
 
 def _planes(hull: Mesh) -> tuple[Array, Array]:
