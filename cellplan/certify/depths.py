@@ -30,7 +30,7 @@ class FoundDepth:
     row: int
 
 
-def mounted_depths(scene: Scene, q: Array) -> tuple[FoundDepth, ...]:
+def mounted_depths(scene: Scene, q: Array, first: BodyPoses | None = None) -> tuple[FoundDepth, ...]:
     """Depths of all pairs that are judged by it.
 
     Pairs that do not move against each other are measured once. For a further holder that grips in all components this
@@ -40,8 +40,10 @@ def mounted_depths(scene: Scene, q: Array) -> tuple[FoundDepth, ...]:
     Args:
         scene: The scene.
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
+        first: Poses of the bodies of the engine at the first configuration, where they are known.
     """
-    first = scene.body_poses(q[:1])
+    if first is None:
+        first = scene.body_poses(q[:1])
     return tuple(_moving(scene, pair, q) if pair.moves else _at_rest(scene, pair, first) for pair in scene.mounted)
 
 

@@ -30,7 +30,7 @@ class Contact:
     node: int
 
 
-def contacts(scene: Scene, robot: str, X_WB: Array, q: Array) -> list[Contact | None]:
+def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool = True) -> list[Contact | None]:
     """The worst contact of each motion at the first nodes that show one; None for a motion without any.
 
     Args:
@@ -38,9 +38,11 @@ def contacts(scene: Scene, robot: str, X_WB: Array, q: Array) -> list[Contact | 
         robot: Name of the robot that stands elsewhere.
         X_WB: Its base for each motion, shape (K, 4, 4).
         q: The motions, shape (K, N, nq).
+        standing: Whether what stands there is judged too, by its depth.
     """
     if stands_by_link(scene.cell, robot) and len(q) > 1:  # its pairs depend on where it stands
-        return [contacts(scene, robot, X_WB[k : k + 1], q[k : k + 1])[0] for k in range(len(q))]
+        each = (slice(k, k + 1) for k in range(len(q)))
+        return [contacts(scene, robot, X_WB[k], q[k], standing=standing)[0] for k in each]
     found: list[Contact | None] = [None] * len(q)
     if not len(q):
         return found
@@ -57,7 +59,7 @@ def contacts(scene: Scene, robot: str, X_WB: Array, q: Array) -> list[Contact | 
                     pair=contact.pair, distance=contact.distance, node=int(nodes[contact.node])
                 )
         places = np.array([place for place in places.tolist() if found[place] is None], dtype=np.intp)
-    for place in places.tolist():
+    for place in places.tolist() if standing else ():
         found[place] = _standing(scene.moved({robot: X_WB[place]}), q[place, :1])
     return found
 
@@ -90,7 +92,9 @@ def _first_of_each(short: Array, motions: Indices) -> Indices:
 
 def _standing(scene: Scene, q: Array) -> Contact | None:
     """The first pair of which one stands too deep in the other, at a configuration of shape (1, nq)."""
-    for found in mounted_depths(scene, q):
+    table = near_table(scene)
+    D = table.forest.displacements(q, np.array([each.X_WB for each in scene.cell.robots]))
+    for found in mounted_depths(scene, q, table.bodies.poses(D)):
         if found.depth > found.pair.limit:
             names = (scene.bodies[found.pair.first].name, scene.bodies[found.pair.second].name)
             return Contact(pair=names, distance=-found.depth, node=0)

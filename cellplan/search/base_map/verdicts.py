@@ -1,7 +1,7 @@
 """What becomes of the whole job at each place of one base: of the first start that passes, or the best one."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.checks.joints.acceleration_limits import acceleration_limit
-from cellplan.geometry.arrays import Array, Indices
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.cell import joint_at
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.contacts import contacts
@@ -134,14 +134,27 @@ def judge(asked: MapJob, q: Array, at: Indices) -> dict[int, PlaceVerdict]:
     """
     found = dict[int, PlaceVerdict]()
     turn = np.arange(len(at)) - np.searchsorted(at, at, side="left")
-    for number in range(int(turn.max(initial=-1)) + 1):
-        rows = np.flatnonzero(turn == number)
-        rows = rows[[place not in found or not found[place].passes for place in at[rows].tolist()]]
-        for begin in range(0, len(rows), AT_ONCE):
-            group = rows[begin : begin + AT_ONCE]
+    for rows in (np.flatnonzero(turn == 0), np.flatnonzero(turn > 0)[np.argsort(turn[turn > 0], kind="stable")]):
+        left = rows[[place not in found or not found[place].passes for place in at[rows].tolist()]]
+        left = left[~_is_in_vain(asked, found, q[left], at[left])]
+        for begin in range(0, len(left), AT_ONCE):
+            group = left[begin : begin + AT_ONCE]
+            group = group[[place not in found or not found[place].passes for place in at[group].tolist()]]
             for place, verdict in zip(at[group].tolist(), _judged(asked, q[group], at[group]), strict=True):
                 found[place] = verdict.or_better(found.get(place))
     return found
+
+
+def _is_in_vain(asked: MapJob, found: Mapping[int, PlaceVerdict], q: Array, at: Indices) -> Flags:
+    """Starts that need no motion: two bodies are too near already there, and at their place nothing else is known."""
+    collides = [place in found and found[place].verdict is Verdict.COLLISION for place in at.tolist()]
+    asking = np.flatnonzero(np.array(collides, dtype=bool))
+    start = np.tile(asked.start, (len(asking), 1, 1))
+    start[:, 0, asked.scene.cell.columns(asked.robot)] = q[asking]
+    touching = contacts(asked.scene, asked.robot, asked.places.X_WB[at[asking]], start, standing=False)
+    is_vain = np.zeros(len(at), dtype=bool)
+    is_vain[asking] = [contact is not None for contact in touching]
+    return is_vain
 
 
 def _judged(asked: MapJob, q: Array, at: Indices) -> Iterator[PlaceVerdict]:
