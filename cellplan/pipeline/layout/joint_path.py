@@ -1,6 +1,6 @@
 """Joint paths of a positioner that may change: the same job without one, and what means nothing beside one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from cellplan.model.layout import PathRange, VariableKind
 from cellplan.model.motion import Schedule
 from cellplan.pipeline.layout.searched import short_key, written_vary
 from cellplan.search.distances.cell_distances import CellDistances
-from cellplan.search.spline_path.first import first_path, with_count
+from cellplan.search.spline_path.first import SAMPLES, first_path, with_count
 from cellplan.search.spline_path.nodes import PathNodes
 from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.spline_path.variables import PathVariables
@@ -80,6 +80,13 @@ class PathSearch:
         """What varies beside the path, as in a layout without one."""
         place = {name: column for column, name in enumerate(self.unled.names)}
         return np.array([x[place[name]] for name in self.own.names])
+
+    def departures(self, x: Array) -> Array:
+        """How far each joint leaves the given path at most in [rad] or [m], shape (n,), at variables of the problem."""
+        coefficients = x[: self.given.coefficients.size].reshape(self.given.coefficients.shape)
+        shares = np.linspace(0.0, 1.0, SAMPLES)
+        departure = replace(self.given, coefficients=coefficients).at(shares) - self.given.at(shares)
+        return np.asarray(np.abs(departure).max(axis=0))
 
     def problem(self, nodes: int, *, bodies: CellDistances, acceleration: Array) -> PathProblem:
         """The path problem at about so many nodes.

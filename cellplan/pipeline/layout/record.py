@@ -29,6 +29,7 @@ from cellplan.report.record.layout import (
     DroppedRecord,
     GivenRecord,
     LayoutRecord,
+    PathRecord,
     ProgressRecord,
     VariableRecord,
 )
@@ -118,6 +119,7 @@ def layout_record(
         "front": _front(listed),
         "binding": best.standing.binding() if best else [],
         "variables": _variables(of_best, standing, best),
+        "path": path_record(of_best, best.x) if best and ready.unled else None,
         "convergence": _convergence(finished),
         "choices": _choices(ready, finished, tried),
         "dropped": _dropped(finished),
@@ -280,6 +282,22 @@ def _variables(ready: Prepared, standing: Standing | None, best: Certified | Non
             }
         )
     return shown
+
+
+def path_record(ready: Prepared, x: Array) -> PathRecord:
+    """The joint path at variables of shape (n,), beside the given motion."""
+    search = ready.path_search
+    model, departures = ready.variables.base.robot(search.asked.robot).model, search.departures(x)
+    turning = np.array([joint.is_revolute for joint in model.joints])
+    in_deg, in_mm = (departures[kept].max(initial=-1.0) for kept in (turning, ~turning))
+    return {
+        "robot": search.asked.robot,
+        "coefficients": search.asked.coefficients,
+        "degree": search.asked.degree,
+        "is_given": search.is_given,
+        "departure_deg": number(round(DEG * in_deg, FINE)) if in_deg >= 0.0 else None,
+        "departure_mm": number(round(MM * in_mm, FINE)) if in_mm >= 0.0 else None,
+    }
 
 
 def _unit(name: str) -> str:

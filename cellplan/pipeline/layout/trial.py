@@ -27,7 +27,7 @@ from cellplan.study.trial import Outcome, TrialStatus, Variant
 
 EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to
 STAGE: Final = Effort(iterations=6)  # of motions that joint paths begin with
-STAGES: Final = 5
+STAGES: Final = 4
 BOTH: Final = 2
 PROBE: Final = Effort(iterations=12)  # of the paths that a trial chooses from
 PATH: Final = Effort(least_gain=1e-3)  # many coefficients gain little each, but for long
@@ -118,17 +118,17 @@ def _path(ready: Prepared, unled: Prepared, values: Mapping[str, Any], number: i
         point = perturbed_path(ready.coarse, x, start, rng, size=float(values["spread"]))
         return None if point is None else _Begin(point.x, point.start)
     begin = _layout(unled, {**values, **(known or {})}, number)
-    return None if begin is None else _led(ready, unled, begin, 1 if values["kind"] == "given" else STAGES)
+    return None if begin is None else _led(ready, unled, begin)
 
 
-def _led(ready: Prepared, unled: Prepared, begin: Begin, stages: int) -> _Begin | None:
+def _led(ready: Prepared, unled: Prepared, begin: Begin) -> _Begin | None:
     """The path nearest to a motion by the pseudo-inverse, improved in stages, or to one of the stages on the way.
 
     The last stage whose path the tools can follow, or the first one, whichever some programs make faster: a motion may
     be at its best where an operator just passes a singularity, which a path beside it does not survive.
     """
     begins = [begin]
-    for _ in range(stages - 1):
+    for _ in range(STAGES):
         better = improve(unled.coarse, *begins[-1], unled.demands(), STAGE)
         if better is None:
             break
@@ -137,9 +137,13 @@ def _led(ready: Prepared, unled: Prepared, begin: Begin, stages: int) -> _Begin 
     found = [each for each in (next(filter(None, paths), None), _path_of(ready, begin)) if each is not None]
     if len(found) < BOTH:
         return next(iter(found), None)
-    probed = [improve(ready.coarse, each.x, each.start, ready.demands(), PROBE) for each in found]
-    ranks = [(np.inf, np.inf) if each is None else (each.violation, each.objective) for each in probed]
-    return found[ranks.index(min(ranks))]
+    ranks = []
+    for place, each in enumerate(found):
+        probed = improve(ready.coarse, each.x, each.start, ready.demands(), PROBE)
+        if probed is not None:
+            ranks.append((probed.violation, probed.objective, place))
+            found[place] = replace(each, x=probed.x, start=probed.start)
+    return found[min(ranks, default=(0.0, 0.0, 0))[2]]
 
 
 def _path_of(ready: Prepared, begin: Begin) -> _Begin | None:

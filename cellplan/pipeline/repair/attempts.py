@@ -29,6 +29,7 @@ class RemedyKind(StrEnum):
     WEIGHTS = "weights"  # joint weights of one robot
     METHOD = "method"  # a method that knows the limits
     STEP = "step"  # rows in shorter steps
+    PATH = "path"  # the joint path of the positioner
     TOOL = "tool"  # length, tilt and roll of one rod
     DURATION = "duration"  # a longer cycle
 
@@ -39,9 +40,12 @@ WORDS: Final = {
     RemedyKind.FREE_SPIN: "free spin of the tool of",
     RemedyKind.WEIGHTS: "joint weights of",
     RemedyKind.BRANCH: "start branch of",
+    RemedyKind.PATH: "joint path of",
     RemedyKind.DURATION: "longer cycle",
 }
-CONTINUOUS: Final = frozenset({RemedyKind.LAYOUT, RemedyKind.SPIN, RemedyKind.WEIGHTS, RemedyKind.TOOL})
+CONTINUOUS: Final = frozenset(
+    {RemedyKind.LAYOUT, RemedyKind.SPIN, RemedyKind.WEIGHTS, RemedyKind.PATH, RemedyKind.TOOL}
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,6 +159,13 @@ def of_weights(cell: Cell, settings: LayoutSettings) -> Iterator[Attempt]:
     for robot in cell.robots:
         if robot.name in working - known:
             yield Attempt(kind=RemedyKind.WEIGHTS, robots=(robot.name,), vary={f"{robot.name}.weights": True})
+
+
+def of_paths(cell: Cell) -> Iterator[Attempt]:
+    """Attempts with the joint path of the positioner, where it may change."""
+    for each in () if cell.layout is None else cell.layout.paths:
+        vary = {f"{each.robot}.path": {"coefficients": each.coefficients, "degree": each.degree}}
+        yield Attempt(kind=RemedyKind.PATH, robots=(each.robot,), vary=vary)
 
 
 def tied(settings: LayoutSettings) -> list[tuple[str, ...]]:

@@ -58,7 +58,7 @@ def confirmed(ready: Prepared, x: Array, start: Array) -> Confirmed:
         x: Values of the variables, shape (n,).
         start: Start posture in [rad] or [m], shape (nq,).
     """
-    variables, problem, demands = ready.variables, ready.problem(NODES), ready.demands()
+    problem, demands = ready.problem(NODES), ready.demands()
     effort = Effort(iterations=ITERATIONS, keys=KEYS, trust=0.2)
     done = Confirmed(values={}, cost=0.0, solved=None, reason="a tool cannot follow its path", solves=0)
     for solves in range(1, SOLVES + 1):
@@ -66,7 +66,7 @@ def confirmed(ready: Prepared, x: Array, start: Array) -> Confirmed:
         if found is None or not (found.is_conforming or solves == 1):
             break
         x, start = neat(ready, found.x, found.start)
-        values, cost = changed_values(ready, x, start), float(np.abs(x - variables.given) @ variables.cost)
+        values, cost = changed_values(ready, x, start), float(np.abs(x - problem.given) @ problem.cost)
         solved, reason = solved_cell(ready.cell, values)
         done = Confirmed(values=values, cost=cost, solved=solved, reason=reason, solves=solves)
         tighter = _tightened(solved, demands, effort) if solved is not None and reason else None

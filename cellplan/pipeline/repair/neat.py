@@ -7,7 +7,8 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.model.layout import VariableKind
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import Prepared, values_of
+from cellplan.search.spline_path.problem import PathProblem
 
 LEAST: Final = 1e-3  # [-] cost of a change that is left out: 0.1 mm or 0.01 deg
 LENGTH: Final = 1e-4  # [m] to which lengths are rounded
@@ -24,6 +25,8 @@ def neat(ready: Prepared, x: Array, start: Array) -> tuple[Array, Array]:
         start: Start posture in [rad] or [m], shape (nq,).
     """
     variables = ready.variables
+    if isinstance(ready.coarse, PathProblem):  # every coefficient changes, none is one that anyone would type
+        return x, start
     kinds = {each.address: each for each in variables.settings.ranges}
     rounded = x.copy()
     for place, name in enumerate(variables.names):
@@ -40,7 +43,7 @@ def neat(ready: Prepared, x: Array, start: Array) -> tuple[Array, Array]:
 
 def changed_values(ready: Prepared, x: Array, start: Array) -> dict[str, object]:
     """What to write into the cell file, by address; nothing that stands in it already."""
-    written = ready.variables.values(x, start)
+    written = values_of(ready, x, start)
     document: Any = ready.cell.origin.document
     return {address: value for address, value in written.items() if not _is_same(written_at(document, address), value)}
 

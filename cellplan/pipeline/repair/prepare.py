@@ -7,10 +7,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from cellplan.errors import NoSolutionError
+from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.units import DEG, MM
+from cellplan.pipeline.layout.joint_path import without_path
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.searched import searched_cell
@@ -28,8 +29,22 @@ Begin = tuple[Array, Array]  # variables, shape (n,), and start posture, shape (
 
 @lru_cache(maxsize=1)
 def ready_cell(request: LayoutRequest) -> Prepared:
-    """The cell of a request with all that it lets a layout search change; made once in each process."""
-    return Prepared.of(request, searched_cell(request))
+    """The cell of a request with all that it lets a layout search change but joint paths; made once in each process.
+
+    Where a joint path may change, so may the start posture of its robot, which decides the motion without one.
+
+    Raises:
+        InputError: The cell gives a joint path.
+    """
+    cell = searched_cell(request)
+    for robot in cell.robots:
+        if robot.path is not None:
+            where = cell.origin.at(f"robots.{robot.name}.path")
+            raise InputError(
+                f"{where}: expected no joint path for --repair, which begins with the motion without one: leave it "
+                "out, or search on from it with cellplan layout"
+            )
+    return Prepared.of(request, without_path(cell) or cell)
 
 
 def start_posture(ready: Prepared) -> tuple[Array, str]:
@@ -65,14 +80,14 @@ def begins(ready: Prepared, start: Array, *, seed: int, count: int) -> Iterator[
         seed: Seed of the perturbations.
         count: Number of beginnings.
     """
-    variables = ready.variables
+    problem = ready.coarse
     for number in range(count):
         rng = np.random.default_rng([seed, number])
-        x = variables.given
+        x = problem.given
         if number:
-            step = variables.scale * rng.standard_normal(len(variables.names))
-            x = np.clip(x + step, variables.lower, variables.upper)
-        if ready.coarse.evaluate(x, start) is not None:
+            step = problem.scale * rng.standard_normal(len(problem.names))
+            x = np.clip(x + step, problem.lower, problem.upper)
+        if problem.evaluate(x, start) is not None:
             yield x, start
             continue
         near = _near(ready, start, rng)

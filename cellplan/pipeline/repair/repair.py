@@ -9,13 +9,14 @@ from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.limits import standing_of
 from cellplan.pipeline.layout.prepared import Prepared
-from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
 from cellplan.pipeline.repair.at_start import StartFault, start_faults
 from cellplan.pipeline.repair.attempts import (
     Attempt,
     RemedyKind,
     of_branches,
     of_layout,
+    of_paths,
     of_tools,
     of_weights,
     owners,
@@ -153,7 +154,8 @@ class _Work:
 def _first(ready: Prepared) -> list[Attempt]:
     """Attempts that do not depend on what comes of others."""
     cell, settings = ready.cell, ready.variables.settings
-    found = [*of_layout(cell, settings, 1), *of_tools(cell, settings), *of_branches(cell)]
+    paths = of_paths(searched_cell(ready.request))
+    found = [*of_layout(cell, settings, 1), *of_tools(cell, settings), *of_branches(cell), *paths]
     return sorted(found, key=lambda each: KINDS.index(each.kind))
 
 

@@ -78,7 +78,10 @@ def _of_robot(cell: Cell, name: str, attempt: Attempt, parts: Mapping[str, tuple
     """Start posture and weights of a robot; start postures that follow from other changes are not named."""
     varies_start = any("start" in each and each.startswith(f"robots.{name}.") for each in attempt.addresses)
     for component, (old, new) in parts.items():
-        if component == "weights":
+        if component == "path":
+            rows = new.get("coefficients_deg") or new["coefficients"]
+            yield f"joint path of {name}: {len(rows)} coefficients a joint"
+        elif component == "weights":
             yield f"joint weights of {name}: {_by_joint(cell, name, old, new, '')}"
         elif component in {"start_deg", "start"} and varies_start:
             yield f"start of {name}: {_by_joint(cell, name, old, new, ' deg')}"

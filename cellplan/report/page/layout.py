@@ -5,7 +5,7 @@ from cellplan.report.page.render import inline_svg, template
 from cellplan.report.plots.layout import convergence_sheet, floor_plan, front_sheet
 from cellplan.report.plots.svg import svg_text
 from cellplan.report.record.common import Record, as_json
-from cellplan.report.text.layout import changed_variables, verdict_line
+from cellplan.report.text.layout import changed_variables, path_text, verdict_line
 
 
 def layout_files(record: Record) -> dict[str, bytes]:
@@ -32,5 +32,6 @@ def layout_page(record: Record) -> str:
         plots=plots,
         verdict=verdict_line(record),
         changed=changed_variables(record),
+        path="" if record["path"] is None else path_text(record["path"]),
         caution=CAUTION,
     )

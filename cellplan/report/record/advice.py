@@ -22,7 +22,9 @@ class RemedyRecord(TypedDict):
     """A change with which every check passes, solved and verified."""
 
     kind: Annotated[
-        str, "`move`, `tool`, `start`, `branch`, `spin`, `free_spin`, `weights`, `method`, `duration` or `everything`"
+        str,
+        "`move`, `tool`, `start`, `branch`, `spin`, `free_spin`, `weights`, `path`, `method`, `duration` or "
+        "`everything`",
     ]
     text: Annotated[str, "the change as one line of text"]
     robots: Annotated[list[str], "what is changed: robots, or `part` for a part at rest"]

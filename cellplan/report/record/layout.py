@@ -45,6 +45,17 @@ class VariableRecord(TypedDict):
     clearance_mm: Annotated[Number, "effect on the smallest distance of bodies"]
 
 
+class PathRecord(TypedDict):
+    """The joint path of the best layout."""
+
+    robot: Annotated[str, "whose joints follow it"]
+    coefficients: Annotated[int, "number of coefficients of each joint"]
+    degree: Annotated[int, "degree of the spline"]
+    is_given: Annotated[bool, "whether the given cell has a path; else the given motion is that without one"]
+    departure_deg: Annotated[Number, "by how much a turning joint leaves the given motion at most; null without one"]
+    departure_mm: Annotated[Number, "by how much a sliding joint does; null without one"]
+
+
 class ChoiceRecord(TypedDict):
     """A combination of discrete choices, and what came of it."""
 
@@ -114,6 +125,7 @@ class LayoutRecord(TypedDict):
     front: Annotated[list[CandidateRecord], "those that no other one beats in both cycle and clearance"]
     binding: Annotated[list[LimitRecord], "what holds the best layout back"]
     variables: Annotated[list[VariableRecord], "the variables with what they do at the best layout"]
+    path: Annotated[PathRecord | None, "the joint path that was searched; null where none may change"]
     convergence: Annotated[list[ProgressRecord], "the search, trial after trial"]
     choices: Annotated[list[ChoiceRecord], "every combination of discrete choices; empty without any"]
     dropped: Annotated[list[DroppedRecord], "trials without a conforming layout, by reason"]

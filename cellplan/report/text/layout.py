@@ -96,6 +96,19 @@ def _changes(record: Record) -> Iterator[str]:
             f"{name.removesuffix('_mm').removesuffix('_deg')} {each['given']:.5g} -> {each['best']:.5g}{unit}"
         )
     yield from (f"{entry}: {', '.join(texts)}" for entry, texts in groups.items())
+    if record["path"] is not None:
+        yield path_text(record["path"])
+
+
+def path_text(path: Record) -> str:
+    """A joint path in one line, and how far it is from the given motion."""
+    parts = ((path["departure_deg"], "deg"), (path["departure_mm"], "mm"))
+    departures = " and ".join(f"{value:.3g} {unit}" for value, unit in parts if value is not None)
+    given = "path" if path["is_given"] else "motion"
+    return (
+        f"{path['robot']}.path: {path['coefficients']} coefficients a joint, largest departure {departures} from the "
+        f"given {given}"
+    )
 
 
 def _choice(each: Record) -> str:

@@ -1,16 +1,22 @@
 """Searches with bases and tools as they are: what is free, and a joint path from the search to the written cell."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cellplan import LayoutRequest, LayoutResult, Stop, load_cell, search_layout, solve
 from cellplan.errors import InputError
+from cellplan.geometry.arrays import Array
 from cellplan.model.seeds import generator
+from cellplan.pipeline.layout import trial
 from cellplan.pipeline.layout.free_motion import freed
 from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.record import path_record
 from cellplan.pipeline.layout.searched import searched_cell
+from cellplan.pipeline.layout.trial import Begin, _Begin
+from cellplan.report.text.layout import path_text
 from cellplan.search.spline_path.perturb import perturbed_path
 from cellplan.search.spline_path.problem import PathProblem
 
@@ -85,6 +91,45 @@ def test_perturbations_of_a_path_are_smooth_and_every_tool_follows(ready: Prepar
     change = (point.x - problem.given).reshape(problem.path.given.coefficients.shape)
     assert np.degrees(np.abs(change)).max() > 0.5
     assert np.abs(np.diff(change, 3, axis=0)).max() < 0.2 * np.abs(change).max()
+
+
+def test_the_record_says_how_far_the_path_is_from_the_given_motion(ready: Prepared) -> None:
+    x = ready.coarse.given.copy()
+    x[:84:6] += np.radians(20.0)  # the first joint, all along
+
+    record = path_record(ready, x)
+
+    assert record["departure_deg"] == pytest.approx(20.0)
+    assert record["departure_mm"] is None
+    assert path_text(dict(record)) == (
+        "reis.path: 14 coefficients a joint, largest departure 20 deg from the given motion"
+    )
+
+
+def test_paths_begin_at_the_last_motion_that_they_can_follow(ready: Prepared, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert ready.unled is not None
+    begins = [(ready.unled.coarse.given, ready.given_start + k) for k in range(4)]
+    stages = iter(begins[1:])
+    path = ready.coarse.given
+    followed = {1.0: 0.9, 0.0: 1.4}  # cycles by the place of the stage; nothing follows the later two
+
+    def path_of(_: Prepared, begin: Begin) -> _Begin | None:
+        place = float(begin[1][0] - ready.given_start[0])
+        return _Begin(path, begin[1], unled=begin) if round(place) in followed else None
+
+    def improved(problem: object, x: Array, start: Array, *_: object) -> SimpleNamespace | None:
+        if problem is ready.coarse:
+            cycle = followed[round(float(start[0] - ready.given_start[0]))]
+            return SimpleNamespace(violation=0.0, objective=cycle, x=x, start=start)
+        following = next(stages, None)
+        return following and SimpleNamespace(x=following[0], start=following[1])
+
+    monkeypatch.setattr(trial, "_path_of", path_of)
+    monkeypatch.setattr(trial, "improve", improved)
+    begin = trial._led(ready, ready.unled, begins[0])
+
+    assert begin is not None
+    assert begin.start is begins[1][1]
 
 
 @pytest.fixture(scope="module")

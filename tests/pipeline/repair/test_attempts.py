@@ -7,11 +7,21 @@ import numpy as np
 import pytest
 
 from cellplan import load_cell
+from cellplan.errors import InputError
 from cellplan.model.cell import Cell
 from cellplan.model.layout import Mirrored
-from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
 from cellplan.pipeline.repair.at_start import StartFault
-from cellplan.pipeline.repair.attempts import Attempt, RemedyKind, of_branches, of_layout, of_tools, of_weights, owners
+from cellplan.pipeline.repair.attempts import (
+    Attempt,
+    RemedyKind,
+    of_branches,
+    of_layout,
+    of_paths,
+    of_tools,
+    of_weights,
+    owners,
+)
 from cellplan.pipeline.repair.neat import changed_values, neat, written_at
 from cellplan.pipeline.repair.prepare import ready_cell, start_posture, with_attempt
 from cellplan.pipeline.repair.solved import step_asked, time_asked
@@ -139,3 +149,35 @@ def test_changes_are_round_and_only_what_differs_is_written(cells: Path) -> None
 )
 def test_what_the_file_has_at_an_address(cell: Cell, address: str, value: float | None) -> None:
     assert written_at(cell.origin.document, address) == value
+
+
+def test_a_joint_path_is_an_attempt_of_its_own() -> None:
+    cells = Path(__file__).resolve().parents[3] / "cells"
+    request = LayoutRequest(
+        cell=cells / "four_robots.yaml",
+        objective=Objective.CHANGE,
+        vary=("reis.path={coefficients: 10}",),
+        settings=("motion.step_s=0.004", "solver.gain_per_s=200"),
+    )
+    ready = ready_cell(request)
+    (attempt,) = of_paths(searched_cell(request))
+
+    opened = with_attempt(ready, attempt)
+    values = changed_values(opened, *neat(opened, opened.coarse.given, start_posture(ready)[0]))
+
+    assert ready.unled is None
+    assert not any("path" in name for name in ready.coarse.names)
+    assert attempt.text == "joint path of reis"
+    assert change_text(ready.cell, attempt, values) == "joint path of reis: 10 coefficients a joint"
+    assert ready.cell.with_values(values).robot("reis").path is not None
+
+
+def test_a_cell_with_a_joint_path_is_not_repaired() -> None:
+    cells = Path(__file__).resolve().parents[3] / "cells"
+    path = "robots.reis.path={degree: 3, coefficients_deg: [[0, -93, 108, 0, -15, 0], [0, -93, 108, 0, -15, 0]]}"
+    request = LayoutRequest(
+        cell=cells / "four_robots.yaml", objective=Objective.CHANGE, vary=("reis.path",), settings=(path,)
+    )
+
+    with pytest.raises(InputError, match=r"robots\.reis\.path: expected no joint path for --repair"):
+        ready_cell(request)
