@@ -6,7 +6,7 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install constraints test test-all lint format demo bench bench-methods reproduce clean FORCE
+.PHONY: help install constraints test test-all quick-tests lint style rules format demo bench bench-methods reproduce clean FORCE
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -63,13 +63,21 @@ constraints: $(STAMP)
 	@echo "# The versions that the project was last tested with; written by \`make constraints\`." >constraints.txt
 	$(BIN)/python -m pip freeze --exclude-editable >>constraints.txt
 
-lint: $(STAMP)
+lint: style rules
+
+style: $(STAMP)
 	$(BIN)/python -m ruff format --check .
 	$(BIN)/python -m ruff check .
+
+rules: $(STAMP)
 	$(BIN)/python -m mypy
 	$(BIN)/lint-imports
 
-test: lint
+# Types and import rules keep one core busy for a minute, which the tests can use the others of.
+test: style
+	@$(MAKE) --no-print-directory -j2 rules quick-tests
+
+quick-tests: $(STAMP)
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope -m "not slow"
 
 test-all: lint

@@ -56,7 +56,10 @@ def trials_here() -> Iterator[None]:
     """Trials of studies run in this process: a child would import the package for each study."""
     from builders.study_trials import InThisProcess
 
-    with mock.patch("cellplan.study.session.Workers", InThisProcess):
+    with (
+        mock.patch("cellplan.study.session.Workers", InThisProcess),
+        mock.patch("cellplan.pipeline.layout.search.Workers", InThisProcess),
+    ):
         yield
 
 
@@ -88,10 +91,10 @@ def kept_solutions() -> Iterator[None]:
         yield
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def sketched_pictures() -> Iterator[None]:
     """Pictures of runs are no more than the digest of what they would show; tests of plots paint them."""
-    with picture_memo.sketched():
+    with picture_memo.sketching(is_sketching=True):
         yield
 
 
@@ -112,6 +115,6 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from builders.stored_cells import solve_into, write_cell
 
     folder = tmp_path_factory.mktemp("sound")
-    with shared_solutions():
+    with shared_solutions(), picture_memo.sketching(is_sketching=False):
         solve_into(write_cell(folder / "cell"), folder / "run")
     return folder

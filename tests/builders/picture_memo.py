@@ -24,9 +24,12 @@ def install(folder: Path) -> None:
 
 
 @contextmanager
-def sketched() -> Iterator[None]:
-    """While the ``with`` statement lasts a picture holds no more than the digest of its sheet: other figures show."""
-    before, _sketching[0] = _sketching[0], True
+def sketching(*, is_sketching: bool) -> Iterator[None]:
+    """Sketch pictures, or paint them, while the ``with`` statement lasts.
+
+    A sketch holds no more than the digest of its sheet, so that other figures show in it.
+    """
+    before, _sketching[0] = _sketching[0], is_sketching
     try:
         yield
     finally:

@@ -29,7 +29,7 @@ WORDS = {
     "instants": r"instants",
     "who wants to know": r"who\s+wants\s+to\s+know",
 }
-NAMED = re.compile("|".join(rf"(?P<w{index}>\b(?:{words})\b)" for index, words in enumerate(WORDS.values())), re.I)
+NAMED = re.compile(rf"\b(?:{'|'.join(WORDS.values())})\b", re.I)
 SUFFIXES = {".py", ".md", ".txt", ".html", ".css", ".js", ".toml"}
 
 

@@ -11,7 +11,13 @@ import pytest
 from cellplan import export_program, open_gate
 
 ROOT = Path(__file__).resolve().parents[2]
-CSV = ("--format", "csv")
+SOLVE_AND_EXPORT = """
+import sys
+from cellplan.cli.main import run
+run_folder = sys.argv[1]
+status = run(["solve", "small.yaml", "-o", run_folder])
+sys.exit(status or run(["export", run_folder, "--cell", "small.yaml", "--format", "csv"]))
+"""
 
 
 def tree(run: Path) -> dict[str, bytes]:
@@ -28,11 +34,10 @@ def first(sound: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, by
 
 
 def differing(first: dict[str, bytes], sound: Path, run: Path, **environment: str) -> list[str]:
-    """Names of the files that the commands write otherwise, from another folder and in processes of their own."""
+    """Names of the files that the commands write otherwise, from another folder and in a process of their own."""
     env = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
-    for arguments in (["solve", "small.yaml", "-o", str(run)], ["export", str(run), "--cell", "small.yaml", *CSV]):
-        command = [sys.executable, "-m", "cellplan", *arguments]
-        subprocess.run(command, check=True, cwd=sound / "cell", env=env, capture_output=True)
+    command = [sys.executable, "-c", SOLVE_AND_EXPORT, str(run)]
+    subprocess.run(command, check=True, cwd=sound / "cell", env=env, capture_output=True)
     again = tree(run)
     return [name for name in sorted(first.keys() | again.keys()) if again.get(name) != first.get(name)]
 

@@ -1,19 +1,16 @@
 """A search for the shortest retimed cycle from end to end."""
 
-import shutil
 from pathlib import Path
 
 import pytest
+from builders.layout_search import searched_pair
 
-from cellplan import LayoutRequest, LayoutResult, Stop, load_cell, search_layout, solve
+from cellplan import LayoutResult, load_cell, solve
 from cellplan.search.programs.objective import Timing
 
-CELL = Path(__file__).resolve().parents[3] / "cells" / "planar_pair.yaml"
+pytestmark = pytest.mark.usefixtures("trials_here", "kept_solutions")
 SETTINGS = (
-    "motion.duration_s=2",
     "tasks.circle.tolerance={position_mm: 0.1, orientation_deg: 0.05, between_rows_mm: 20, between_rows_deg: 20}",
-    "motion.step_s=0.02",
-    "checks.clearance_mm=10",
     "acceleration={full_speed_in_s: 0.25}",
     "motion.jerk_build_up_s=unlimited",
 )
@@ -26,15 +23,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def found(folder: Path) -> LayoutResult:
-    shutil.copy(CELL, folder / "given.yaml")
-    request = LayoutRequest(
-        cell=folder / "given.yaml",
-        settings=SETTINGS,
-        vary=("right.base={x_mm: [1500, 2300], y_mm: [0, 600]}",),
-        margin=10.0,
-        timing=Timing.RETIMED,
-    )
-    return search_layout(request, folder / "study", stop=Stop(trials=1))
+    return searched_pair(folder, *SETTINGS, timing=Timing.RETIMED)
 
 
 def test_the_result_is_retimed_and_passes_solve(found: LayoutResult, folder: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.layout_search import CELL, SETTINGS, searched_pair
 from jsonschema import Draft202012Validator
 
 from cellplan import CellplanError, LayoutRequest, LayoutResult, Stop, load_cell, search_layout, solve
@@ -13,8 +14,7 @@ from cellplan.report.record.schema import layout_schema
 from cellplan.report.text.layout import layout_lines
 from cellplan.study.folder import prepare_folder
 
-CELL = Path(__file__).resolve().parents[3] / "cells" / "planar_pair.yaml"
-SETTINGS = ("motion.duration_s=2", "motion.step_s=0.02", "checks.clearance_mm=10")
+pytestmark = pytest.mark.usefixtures("trials_here", "kept_solutions")
 
 
 @pytest.fixture(scope="module")
@@ -24,14 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def found(folder: Path) -> LayoutResult:
-    shutil.copy(CELL, folder / "given.yaml")
-    request = LayoutRequest(
-        cell=folder / "given.yaml",
-        settings=SETTINGS,
-        vary=("right.base={x_mm: [1500, 2300], y_mm: [0, 600]}",),
-        margin=10.0,
-    )
-    return search_layout(request, folder / "study", stop=Stop(trials=1))
+    return searched_pair(folder)
 
 
 def test_the_result_is_a_cell_file_that_passes_solve(found: LayoutResult, folder: Path) -> None:

@@ -1,0 +1,29 @@
+"""A quick layout search: the base of the right arm of the planar pair, one trial."""
+
+import shutil
+from pathlib import Path
+
+from cellplan import LayoutRequest, LayoutResult, Stop, search_layout
+from cellplan.search.programs.objective import Timing
+
+CELL = Path(__file__).resolve().parents[2] / "cells" / "planar_pair.yaml"
+SETTINGS = ("motion.duration_s=2", "motion.step_s=0.02", "checks.clearance_mm=10")
+
+
+def searched_pair(folder: Path, *settings: str, timing: Timing = Timing.LAWS) -> LayoutResult:
+    """Search a layout of ``given.yaml`` into ``study``, both in a folder.
+
+    Args:
+        folder: The folder.
+        settings: Further settings of the cell.
+        timing: How the program is timed.
+    """
+    shutil.copy(CELL, folder / "given.yaml")
+    request = LayoutRequest(
+        cell=folder / "given.yaml",
+        settings=(*SETTINGS, *settings),
+        vary=("right.base={x_mm: [1500, 2300], y_mm: [0, 600]}",),
+        margin=10.0,
+        timing=timing,
+    )
+    return search_layout(request, folder / "study", stop=Stop(trials=1))
