@@ -40,7 +40,7 @@ MIRRORED = {
 }
 AT_REST = {
     "part.held_by": [],
-    "part.at": {"xyz_mm": [9000, 0, 455], "rpy_deg": [0, 0, 0]},
+    "part.at": {"xyz_mm": [9000, 0, 435], "rpy_deg": [0, 0, 0]},
     "layout": {"vary": {"part.at": {"x_mm": [0, 9000], "y_mm": [-500, 1000], "yaw_deg": [-180, 180]}}},
 }
 
