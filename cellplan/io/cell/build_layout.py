@@ -1,7 +1,7 @@
 """The layout of a cell file: what a search may change, as data or as findings."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -24,6 +24,8 @@ from cellplan.model.robot import RobotModel
 from cellplan.model.units import MM
 
 NEAR_MM: Final = 1000.0  # x and y of a base may change by so much where no range is given
+FAR_MM: Final = 2500.0  # a base that stands farther than this from the first holder or the part may come nearer to it
+CLOSE_MM: Final = 500.0  # how near
 HIGHEST_MM: Final = 600.0  # z of a base where no range is given
 CHOICES: Final = ("robot", "mode", "branch")
 SIDES: Final = ("x", "y")
@@ -107,12 +109,13 @@ def _usual(context: Context) -> dict[str, Any]:
     holders = [grasp.robot for grasp in valid.part.held_by] if valid.part is not None else []
     operators = {task.robot for task in valid.tasks.values()} - set(holders)
     planes = [it.plane.z_mm for it in valid.environment.values() if it.plane is not None]
+    middle = _middle(valid, holders)
     for name, entry in valid.robots.items():
         mount = entry.mount
         if name not in operators or (mount is not None and mount.wall is not None):
             continue
-        x, y, z = entry.base.xyz_mm
-        ranges = {"x_mm": (x - NEAR_MM, x + NEAR_MM), "y_mm": (y - NEAR_MM, y + NEAR_MM)}
+        z = entry.base.xyz_mm[2]
+        ranges = {f"{side}_mm": _near(entry.base.xyz_mm[i], middle[i]) for i, side in enumerate(SIDES)}
         if mount is None and not any(abs(z - plane) <= 1e-3 for plane in planes):
             ranges["z_mm"] = (min(0.0, z), max(HIGHEST_MM, z))
         yaw = entry.base.rpy_deg[2]
@@ -123,6 +126,22 @@ def _usual(context: Context) -> dict[str, Any]:
             turns = all(joint.is_revolute for joint in context.models[name].joints)
             usual[f"robots.{name}.{'start_deg' if turns else 'start'}"] = True
     return usual
+
+
+def _middle(valid: ValidEntries, holders: Sequence[str]) -> tuple[float, ...]:
+    """Where the work is done in [mm]: the base of the first holder, else the part at rest."""
+    at = valid.part.at if valid.part is not None else None
+    if at is None and holders and holders[0] in valid.robots:
+        at = valid.robots[holders[0]].base
+    return (math.nan, math.nan, math.nan) if at is None else tuple(at.xyz_mm)
+
+
+def _near(value: float, middle: float) -> tuple[float, float]:
+    """Range of x or y of a base in [mm]: near its place, and from far away on to the work."""
+    lower, upper = value - NEAR_MM, value + NEAR_MM
+    if abs(value - middle) > FAR_MM:
+        lower, upper = min(lower, middle + CLOSE_MM), max(upper, middle - CLOSE_MM)
+    return lower, upper
 
 
 def _keep_on_floor(entry: LayoutEntry, found: _Found, document: YamlDocument) -> None:

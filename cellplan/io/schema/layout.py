@@ -134,8 +134,9 @@ class LayoutEntry(Entry):
         "tilt_deg, roll_deg} of a tool with rod; ROBOT.weights: true or [low, high]; ROBOT.path: true or "
         "{coefficients: 14, degree: 5}; ROBOT.branch: true; tasks.TASK.spin_deg: true or [low, high]; "
         "tasks.TASK.robot: [ROBOT, …]; part.held_by[0].at, part.at: ranges as of a base; motion.mode: [MODE, …]. When "
-        "absent: the bases of all operators (x and y within 1 m, z between 0 and 600 mm unless they stand on a floor, "
-        "any yaw) and the start posture of the first holder.",
+        "absent: the bases of all operators (x and y within 1 m, and from beyond 2.5 m on to 0.5 m from the first "
+        "holder or the part at rest; z between 0 and 600 mm unless they stand on a floor; any yaw) and the start "
+        "posture of the first holder.",
     )
     fixed: tuple[Text, ...] = Field(
         default=(), max_length=ITEM_LIMIT, description="Addresses that stay as they are, whatever vary says."

@@ -146,12 +146,20 @@ def proposals_of(request: LayoutRequest, ready: Prepared) -> "Proposals":
 
 def _leads_nowhere(trial: Trial) -> bool:
     """Whether a trial is the given layout and no motion begins there."""
-    return trial.variant.values["kind"] == "given" and "x" not in trial.outcome.figures
+    figures = trial.outcome.figures
+    return trial.variant.values["kind"] == "given" and ("x" not in figures or "sampled" in figures)
 
 
-def origin_text(values: Mapping[str, Any]) -> str:
-    """Where a trial began, in words."""
+def origin_text(values: Mapping[str, Any], *, is_sampled: bool = False) -> str:
+    """Where a trial began, in words.
+
+    Args:
+        values: The values of the trial.
+        is_sampled: Whether no motion begins at the given layout and a sample took its place.
+    """
     match values["kind"]:
+        case _ if is_sampled:
+            text = "a sample in place of the given layout"
         case "given":
             text = "the given layout"
         case "attempt":

@@ -202,7 +202,7 @@ def _candidate(ready: Prepared, trial: Mapping[str, Any], certified: Certified |
     rounded = {key: None if value is None else number(round(value, FINE)) for key, value in shown.items()}
     return {
         "trial": trial["trial"],
-        "origin": origin_text(trial["values"]),
+        "origin": origin_text(trial["values"], is_sampled="sampled" in trial["figures"]),
         "status": status,
         "reason": reason,
         "cycle_s": rounded["cycle_s"],

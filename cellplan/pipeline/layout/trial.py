@@ -15,14 +15,13 @@ from cellplan.model.cell import Cell
 from cellplan.model.seeds import generator
 from cellplan.pipeline.layout.limits import reason, standing_of
 from cellplan.pipeline.layout.prepared import Prepared, prepared
-from cellplan.pipeline.layout.proposals import proposals_of
+from cellplan.pipeline.layout.proposals import SIZE, proposals_of
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Effort
 from cellplan.search.programs.perturb import perturbed
 from cellplan.search.spline_path.perturb import perturbed_path
 from cellplan.search.spline_path.problem import PathProblem
-from cellplan.search.starts.generator import Starts
 from cellplan.study.trial import Outcome, TrialStatus, Variant
 
 EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to
@@ -84,7 +83,8 @@ def _evaluated(request: LayoutRequest, number: int, text: str) -> Outcome:
     found = None if begin is None else improve(ready.coarse, begin.x, begin.start, demands, effort)
     if begin is None or found is None:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
-    return _outcome(ready, found, begin.unled)
+    outcome = _outcome(ready, found, begin.unled)
+    return replace(outcome, figures={**outcome.figures, "sampled": True}) if _is_far(ready, values) else outcome
 
 
 def _begin(ready: Prepared, values: Mapping[str, object], number: int) -> _Begin | None:
@@ -159,21 +159,47 @@ def _path_of(ready: Prepared, begin: Begin) -> _Begin | None:
 def _layout(ready: Prepared, values: Mapping[str, object], number: int) -> Begin | None:
     """Where a trial of a layout begins; None where the tools cannot follow their paths."""
     kind = values["kind"]
-    if kind == "given":
-        return _given(ready)
+    if kind == "given" or (kind == "perturbed" and values["of"] is None):
+        return _near_given(ready, values, number)
     if kind == "attempt":
         return _attempt(ready, int(str(values["index"])))
     if kind == "sampled":
         return _sampled(ready, int(str(values["index"])))
-    if kind == "perturbed" and values["of"] is None:
-        x, start = _given(ready)
-    else:
-        x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
+    x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
     if kind in {"improved", "branch"}:
         return x, start
+    return _perturbed(ready, (x, start), values, number)
+
+
+def _perturbed(ready: Prepared, begin: Begin, values: Mapping[str, object], number: int) -> Begin | None:
+    """A layout near another one."""
     rng = generator(f"layout/{number}", ready.request.seed)
-    point = perturbed(ready.coarse, x, start, rng, size=float(str(values["spread"])))
+    point = perturbed(ready.coarse, *begin, rng, size=float(str(values["spread"])))
     return None if point is None else (point.x, point.start)
+
+
+def _near_given(ready: Prepared, values: Mapping[str, object], number: int) -> Begin | None:
+    """The given layout or one near it; where no motion begins there, a sample that no other trial takes.
+
+    Raises:
+        NoSolutionError: There is none; says what is wrong with both.
+    """
+    try:
+        begin = ready.given
+    except NoSolutionError as error:
+        try:
+            return _sampled(ready, number or SIZE - 1)  # the last trial of the first round is sample 0
+        except NoSolutionError as other:
+            raise NoSolutionError(f"{error}; a sample: {other}") from other
+    return begin if values["kind"] == "given" else _perturbed(ready, begin, values, number)
+
+
+def _is_far(ready: Prepared, values: Mapping[str, object]) -> bool:
+    """Whether a trial of the given layout, or near it, began at a sample instead."""
+    is_near = values["kind"] == "given" or (values["kind"] == "perturbed" and values["of"] is None)
+    if not is_near or (ready.unled is not None and ready.path_search.is_given):
+        return False
+    return (ready.unled or ready).leads_nowhere
 
 
 def _attempt(ready: Prepared, index: int) -> Begin:
@@ -193,33 +219,7 @@ def _sampled(ready: Prepared, index: int) -> Begin:
     Raises:
         NoSolutionError: There is none.
     """
-    return _first_of(ready.starts.at(1 + index))
-
-
-def _given(ready: Prepared) -> Begin:
-    """The given layout, or with other branches of its inverse kinematics where its start leads nowhere.
-
-    Raises:
-        NoSolutionError: There is none.
-    """
-    try:
-        start = ready.given_start
-    except NoSolutionError:
-        return _first_of(ready.starts.at(0))
-    if ready.coarse.evaluate(ready.variables.given, start) is None:
-        return _first_of(ready.starts.at(0))
-    return ready.variables.given, start
-
-
-def _first_of(starts: Starts) -> Begin:
-    """The best of some starts.
-
-    Raises:
-        NoSolutionError: There is none.
-    """
-    for start in starts:
-        return start.x, start.start
-    raise NoSolutionError(starts.reason)
+    return ready.starts.at(1 + index).first
 
 
 def change_of(ready: Prepared, x: Array) -> float:

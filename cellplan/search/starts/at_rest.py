@@ -7,10 +7,11 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.model.units import MM
 from cellplan.search.distances.keep_out import in_areas
 from cellplan.search.starts.freedom import FIXED, drawn_within
 from cellplan.search.starts.problem import StartProblem
-from cellplan.search.starts.reaching import Placed, followed, matched, reached
+from cellplan.search.starts.reaching import FAR, FreeArm, Goal, Placed, followed, matched, reached
 
 SETTINGS: Final = 400  # [-] configurations of the holder that are drawn
 MATCHED: Final = 150  # [-] of these, free of contact, that are compared by what operators reach of them
@@ -46,17 +47,21 @@ class Setting:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pool:
-    """Bases of one operator that follow its path with the part at rest, the best first; M of them.
+    """Bases of an operator, or of several tied ones, that follow with the part at rest, the best first; M of them.
 
     Attributes:
-        x: The variables, of which its own columns count, shape (M, n).
-        q: Its start configurations in [rad] or [m], shape (M, n).
+        x: The variables, shape (M, n).
+        columns: Those that count.
+        q: Start configurations in [rad] or [m], shape (M, j).
+        joints: Columns of these joints among all, shape (j,).
         cost: What following costs in speed and margin, shape (M,).
         drops: How many draws failed by what.
     """
 
     x: Array
+    columns: Indices
     q: Array
+    joints: Indices
     cost: Array
     drops: Counter[str]
 
@@ -74,10 +79,7 @@ def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tup
     """
     cell, drops = problem.cell, Counter[str]()
     if cell.carrier is None:
-        layouts = problem.variables.layouts(problem.variables.given[None], problem.start[None])
-        return [
-            Setting(x=problem.variables.given, start=problem.start, X_WB=layouts.X_WB[0], X_WP=cell.part.X_CP)
-        ], drops
+        return _part_settings(problem, rng, count), drops
     x = _drawn_settings(problem, rng)
     layouts = problem.variables.layouts(x, np.tile(problem.start, (len(x), 1)))
     columns, arm = cell.columns(cell.robots[cell.carrier].name), problem.arms[cell.carrier]
@@ -107,6 +109,20 @@ def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tup
     return [found[i] for i in np.argsort(-ability, kind="stable")[:count].tolist()], drops
 
 
+def _part_settings(problem: StartProblem, rng: np.random.Generator, count: int) -> list[Setting]:
+    """Places for a part that no robot holds: the given one, where it may lie elsewhere drawn ones."""
+    variables, places = problem.variables, problem.freedom.part
+    layouts = variables.layouts(variables.given[None], problem.start[None])
+    x = drawn_within(variables, places, MATCHED if len(places) else 1, rng)
+    x[0] = variables.given
+    found = [
+        Setting(x=each, start=problem.start, X_WB=layouts.X_WB[0], X_WP=variables.placed(each).part.X_CP) for each in x
+    ]
+    if len(found) == 1:
+        return found
+    return [found[i] for i in np.argsort(-_abilities(problem, found, rng), kind="stable")[:count].tolist()]
+
+
 def _drawn_settings(problem: StartProblem, rng: np.random.Generator) -> Array:
     """Variables with those of the holder, and those that place several robots, drawn, the given ones first."""
     cell, variables = problem.cell, problem.variables
@@ -127,13 +143,16 @@ def _abilities(problem: StartProblem, found: list[Setting], rng: np.random.Gener
     """How much of what each operator can do suits the start of its path, for the worst operator, shape (S,)."""
     ability = np.full(len(found), np.inf)
     for robot in problem.operators:
+        if problem.freedom.leaders[robot] != robot:
+            continue  # where it may stand depends on the one that it follows
         arm, bounds = problem.arms[robot], problem.bounds(robot)
         draws = _draws(problem, robot, found[0], MATCHES, rng)[1]
-        X_BT = arm.flanges(draws.q) @ draws.X_FT
+        X_BT, is_tied = arm.flanges(draws.q) @ draws.X_FT, bool(len(problem.freedom.shared))
         for place, setting in enumerate(found):
             goal = problem.goal(robot, setting.X_WP)
             if goal is not None:
-                miss = matched(goal, bounds, X_BT, draws.X_WB)[1]
+                X_WB = np.broadcast_to(setting.X_WB[robot], draws.X_WB.shape) if is_tied else draws.X_WB
+                miss = matched(goal, bounds, X_BT, X_WB)[1]
                 ability[place] = min(ability[place], float(np.sum(np.exp(-((miss / NEAR) ** 2)))))
     return ability
 
@@ -146,7 +165,7 @@ def _draws(
     own = problem.drawn_columns(robot)
     x = np.tile(setting.x, (TEMPLATES, 1))
     x[:, own] = drawn_within(problem.variables, own, TEMPLATES, rng)[:, own]
-    layouts = problem.variables.layouts(x, np.tile(setting.start, (TEMPLATES, 1)))
+    layouts = problem.placed_layouts(x, np.tile(setting.start, (TEMPLATES, 1)))
     row = np.arange(count) % TEMPLATES
     margin = problem.margin[problem.cell.columns(model.name)]
     lower, upper = np.minimum(arm.lower + margin, arm.upper), np.maximum(arm.upper - margin, arm.lower)
@@ -172,7 +191,7 @@ def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Gen
     drops = Counter[str]()
     x, drawn = x[best], draws.X_WB[best]
     at, has_arrived = reached(arm, goal, bounds, replace(draws, X_WB=X_WB).of_places(best))
-    drops["does not reach the start of its path"] = int(np.sum(~has_arrived))
+    drops[_unreached(goal, arm, at)] = int(np.sum(~has_arrived))
     x, drawn, at = x[has_arrived], drawn[has_arrived], at.of_places(has_arrived)
     x = _with_bases(problem, robot, x, at.X_WB, drawn)
     inside = _within(problem, robot, x)
@@ -192,7 +211,21 @@ def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Gen
     ranked = np.argsort(cost, kind="stable")
     kept = _free(problem, robot, setting, at.X_WB[order][ranked], q[order][ranked], drops)
     rows = order[ranked[kept]]
-    return Pool(x=x[rows], q=q[rows, 0], cost=cost[ranked[kept]], drops=drops)
+    return Pool(
+        x=x[rows],
+        columns=problem.freedom.own[robot],
+        q=q[rows, 0],
+        joints=np.arange(problem.cell.joint_count)[problem.cell.columns(goal.relation.robot)],
+        cost=cost[ranked[kept]],
+        drops=drops,
+    )
+
+
+def _unreached(goal: Goal, arm: FreeArm, at: Placed) -> str:
+    """That tools do not reach the start of the path; where all stay far away, how far."""
+    tips = (at.X_WB @ arm.flanges(at.q) @ at.X_FT)[:, :3, 3]
+    nearest = float(np.linalg.norm(tips - (goal.X_WR @ goal.X_RT[0])[:3, 3], axis=1).min())
+    return "does not reach the start of its path" + (f", stays {MM * nearest:.0f} mm away" if nearest > FAR else "")
 
 
 def _costs(problem: StartProblem, robot: int, q: Array, room: Array) -> Array:

@@ -1,7 +1,7 @@
 """Operators put together: the coupled motion of many combinations, and what is left of them by limits and distances."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -34,7 +34,7 @@ class Judged:
         start: Start postures with the tools on their paths, shape (F, nq).
         violation: 0 for those that keep all limits and distances that were asked, shape (F,).
         cycle: Shortest time in [s] of the same motion that keeps speeds and accelerations, shape (F,).
-        picks: What was picked of each operator's pool, shape (F, operators).
+        picks: What was picked of each pool, shape (F, pools).
         drops: How many candidates failed by what.
     """
 
@@ -47,19 +47,18 @@ class Judged:
 
 
 def combined(
-    problem: StartProblem, setting: Setting, pools: Mapping[int, Pool], rng: np.random.Generator
+    problem: StartProblem, setting: Setting, pools: Sequence[Pool], rng: np.random.Generator
 ) -> tuple[Array, Array, Indices]:
-    """Variables, shape (C, n), and start postures, (C, nq), of combinations, and their picks, (C, operators)."""
-    sizes = [len(each.q) for each in pools.values()]
-    picks = np.stack([_picked(each.cost, rng) for each in pools.values()], axis=1)
+    """Variables, shape (C, n), and start postures, (C, nq), of combinations, and their picks, (C, pools)."""
+    sizes = [len(each.q) for each in pools]
+    picks = np.stack([_picked(each.cost, rng) for each in pools], axis=1)
     if np.prod(sizes) <= COMBINATIONS:
         picks = np.stack([part.ravel() for part in np.meshgrid(*(np.arange(size) for size in sizes))], axis=1)
     picks = np.unique(picks, axis=0)
     x, start = np.tile(setting.x, (len(picks), 1)), np.tile(setting.start, (len(picks), 1))
-    for column, (robot, each) in enumerate(pools.items()):
-        own = problem.freedom.own[robot]
-        x[:, own] = each.x[picks[:, column]][:, own]
-        start[:, problem.cell.columns(problem.cell.robots[robot].name)] = each.q[picks[:, column]]
+    for column, each in enumerate(pools):
+        x[:, each.columns] = each.x[picks[:, column]][:, each.columns]
+        start[:, each.joints] = each.q[picks[:, column]]
     return problem.with_starts(x, start), start, picks
 
 
@@ -78,7 +77,7 @@ def judged(problem: StartProblem, x: Array, start: Array, picks: Indices | None 
         problem: The cell.
         x: Variables, shape (C, n).
         start: Start postures, shape (C, nq).
-        picks: What was picked of each operator's pool, shape (C, operators).
+        picks: What was picked of each pool, shape (C, pools).
     """
     layouts = problem.variables.layouts(x, start)
     motions = run(problem.job, layouts)
@@ -88,7 +87,8 @@ def judged(problem: StartProblem, x: Array, start: Array, picks: Indices | None 
     order = alive[np.lexsort((alive, cycle[alive], violation[alive]))]
     violation = violation.copy()
     chosen = order[:JUDGED]
-    short = _shortfalls(problem, layouts.of_places(chosen), motions.q[chosen], drops)
+    placed = problem.placed_layouts(x, start) if problem.is_part_placed else layouts
+    short = _shortfalls(problem, placed.of_places(chosen), motions.q[chosen], drops)
     violation[chosen] += short / LENGTH
     violation[order[JUDGED:]] = np.inf
     chosen = chosen[np.lexsort((chosen, cycle[chosen], violation[chosen]))]

@@ -6,7 +6,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array, Indices
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.cell import Cell
 from cellplan.search.distances.moving_bodies import LayoutVariables
 from cellplan.search.kernel.varied import KernelVariables
@@ -25,18 +25,23 @@ class Freedom:
     """The variables of a search, sorted by the robot that they place.
 
     Attributes:
-        own: Columns of the variables that move only this robot's base, tool or start posture, by robot.
+        own: Columns of the variables that move only this robot's base, tool or start posture, by robot; and those that
+            move other operators after it as well.
         base: Columns of x, y, z and yaw of each robot's base among its own; ``FIXED`` where there is none,
             shape (robots, 4).
         columns: Column of the start position of each joint; ``FIXED`` where there is none, shape (nq,).
-        shared: Columns of the variables that place several robots: equal or mirrored ones; those of weights and of
-            the part at rest are in none of these.
+        shared: Columns of the variables that place the first holder and others: equal or mirrored ones; those of
+            weights are in none of these.
+        part: Columns of the variables that place a part at rest.
+        leaders: By robot, the one whose own variables move it too: equal or mirrored ones; itself without any.
     """
 
     own: tuple[Indices, ...]
     base: Indices
     columns: Indices
     shared: Indices
+    part: Indices
+    leaders: tuple[int, ...]
 
     @classmethod
     def of(cls, cell: Cell, variables: StartVariables, start: Array) -> "Freedom":
@@ -59,16 +64,47 @@ class Freedom:
             placed = (seen.X_WB[:, index], seen.X_FT[:, index])
             by_pose = [np.any(part[1:] != part[0], axis=(1, 2)) for part in placed]
             moved[:, index] = np.any([*by_pose, np.any(starts[:, cell.columns(robot.name)], axis=1)], axis=0)
-        is_own = moved.sum(axis=1) == 1
-        is_shared = (moved.sum(axis=1) > 1) & [not name.startswith("part.at") for name in variables.names]
-        own = tuple(np.flatnonzero(is_own & moved[:, index]) for index in range(len(cell.robots)))
+        is_part = np.array([name.startswith("part.at") for name in variables.names], dtype=bool)
+        leader = _leaders(cell, variables.names, np.where(is_part[:, None], False, moved))
+        own = tuple(np.flatnonzero(leader == index) for index in range(len(cell.robots)))
         columns = np.full(cell.joint_count, FIXED)
-        for column in np.flatnonzero(is_own).tolist():
+        for column in np.flatnonzero(leader != FIXED).tolist():
             changed = np.flatnonzero(starts[column])
             if len(changed) == 1:
                 columns[changed[0]] = column
         base = [_base_columns(robot.name, variables.names, own[i]) for i, robot in enumerate(cell.robots)]
-        return cls(own=own, base=np.array(base, dtype=np.intp), columns=columns, shared=np.flatnonzero(is_shared))
+        led = [set(leader[moved[:, index] & ~is_part]) - {FIXED, index} for index in range(len(cell.robots))]
+        return cls(
+            own=own,
+            base=np.array(base, dtype=np.intp),
+            columns=columns,
+            shared=np.flatnonzero((leader == FIXED) & ~is_part & (moved.sum(axis=1) > 1)),
+            part=np.flatnonzero(is_part),
+            leaders=tuple(int(min(each, default=index)) for index, each in enumerate(led)),
+        )
+
+    def groups(self, operators: Sequence[int]) -> list[tuple[int, ...]]:
+        """Operators by what ties them to each other, those that lead first."""
+        found = dict[int, list[int]]()
+        for robot in operators:
+            first = robot
+            for _ in self.leaders:
+                first = self.leaders[first]
+            found.setdefault(first, []).append(robot)
+        return [tuple(sorted(each, key=lambda robot: (self.leaders[robot] != robot, robot))) for each in found.values()]
+
+
+def _leaders(cell: Cell, names: Sequence[str], moved: Flags) -> Indices:
+    """The robot that each variable is drawn for, ``FIXED`` where it is none or the first holder is among several."""
+    leader = np.full(len(names), FIXED)
+    for column, name in enumerate(names):
+        robots = np.flatnonzero(moved[column])
+        if len(robots) == 1:
+            leader[column] = robots[0]
+        elif len(robots) > 1 and cell.carrier not in robots:
+            named = [index for index in robots.tolist() if name.startswith(f"robots.{cell.robots[index].name}.")]
+            leader[column] = named[0] if named else FIXED
+    return leader
 
 
 def _base_columns(robot: str, names: Sequence[str], own: Indices) -> list[int]:

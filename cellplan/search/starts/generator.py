@@ -4,27 +4,28 @@ Start number ``index`` depends on the cell, the seed and this number only, so an
 """
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
 import numpy as np
 
+from cellplan.errors import NoSolutionError
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.seeds import generator
 from cellplan.planning.start.inverse_kinematics import SAME_POSTURE
 from cellplan.search.kernel.run import run
-from cellplan.search.starts.at_rest import Pool, Setting, pool, settings
+from cellplan.search.starts.at_rest import settings
 from cellplan.search.starts.combined import Judged, combined, judged
 from cellplan.search.starts.freedom import drawn_within
+from cellplan.search.starts.pools import pools, words
 from cellplan.search.starts.postures import branch_starts
 from cellplan.search.starts.problem import StartProblem
 
 SETTINGS_TRIED: Final = 4  # [-] places of the part at rest, one after the other until a combination follows all paths
 RANDOM: Final = 16  # [-] random layouts that are drawn for one start
 EVERY_RANDOM: Final = 8  # of the sampled starts every so manieth is drawn at random
-SHOWN: Final = 3  # [-] reasons that are named for one robot
 
 
 class Origin(StrEnum):
@@ -73,6 +74,17 @@ class Starts:
     def __iter__(self) -> Iterator[Start]:
         """The starts, the best first."""
         return iter(self.found)
+
+    @property
+    def first(self) -> tuple[Array, Array]:
+        """Variables, shape (n,), and start posture, shape (nq,), of the best one.
+
+        Raises:
+            NoSolutionError: There is none.
+        """
+        if not self.found:
+            raise NoSolutionError(self.reason)
+        return self.found[0].x, self.found[0].start
 
 
 class StartGenerator:
@@ -131,39 +143,27 @@ class StartGenerator:
             return Starts(found=self._starts(origin, text, as_it_is), reason="")
         x, starts, reason = branch_starts(problem, x, start, generator(f"branches/{text}", self._seed))
         others = judged(problem, x, starts) if len(x) else as_it_is
-        words = f"{text}: {reason or _words(others.drops)}"
-        return Starts(found=self._starts(Origin.BRANCH, f"{text}, other branches", others), reason=words)
+        why = f"{text}: {reason or words(others.drops)}"
+        return Starts(found=self._starts(Origin.BRANCH, f"{text}, other branches", others), reason=why)
 
     def _sampled(self, rng: np.random.Generator, number: int) -> Starts:
         """Starts with the part at rest first, put together afterwards."""
         problem, reasons = self._problem, list[str]()
         places, drops = settings(problem, rng, SETTINGS_TRIED)
         if not places:
-            return Starts(found=(), reason=f"no configuration of the holder can be used: {_words(drops)}")
+            return Starts(found=(), reason=f"no configuration of the holder can be used: {words(drops)}")
         for setting in places:
-            pools = self._pools(setting, rng, reasons)
-            if pools is None:
+            here = problem.with_part(setting.x)
+            found_bases, reason = pools(here, setting, rng)
+            if reason:
+                reasons.append(reason)
                 continue
-            found = judged(problem, *combined(problem, setting, pools, rng))
+            found = judged(here, *combined(here, setting, found_bases, rng))
             if len(found.x):
                 text = f"sampled with the part at rest, draw {number}"
-                return Starts(found=self._starts(Origin.SAMPLED, text, found), reason="; ".join(reasons))
-            reasons.append(f"no combination follows all paths: {_words(found.drops)}")
-        return Starts(found=(), reason="; ".join(reasons))
-
-    def _pools(self, setting: Setting, rng: np.random.Generator, reasons: list[str]) -> Mapping[int, Pool] | None:
-        """Bases of all operators; None, and the reason, where one has none."""
-        pools = dict[int, Pool]()
-        for robot in self._problem.operators:
-            pools[robot] = pool(self._problem, robot, setting, rng)
-            if not len(pools[robot].q):
-                fine = replace(self._problem, at_rest=self._problem.at_rest_fine)
-                pools[robot] = pool(fine, robot, setting, rng)
-            if not len(pools[robot].q):
-                name, drops = self._problem.cell.robots[robot].name, pools[robot].drops
-                reasons.append(f"'{name}' follows its path from none of {drops.total()} bases: {_words(drops)}")
-                return None
-        return pools
+                return Starts(found=self._starts(Origin.SAMPLED, text, found), reason="".join(reasons[:1]))
+            reasons.append(f"no combination follows all paths: {words(found.drops)}")
+        return Starts(found=(), reason="".join(reasons[:1]))
 
     def _random(self, rng: np.random.Generator, number: int) -> Starts:
         """Layouts drawn within the bounds, with all branches of inverse kinematics."""
@@ -176,9 +176,7 @@ class StartGenerator:
             return Starts(found=(), reason=_most_frequent([part[2] for part in parts]))
         found = judged(problem, x, start)
         text = f"drawn within the bounds, draw {number}"
-        return Starts(
-            found=self._starts(Origin.RANDOM, text, found), reason="" if len(found.x) else _words(found.drops)
-        )
+        return Starts(found=self._starts(Origin.RANDOM, text, found), reason="" if len(found.x) else words(found.drops))
 
     def _starts(self, origin: Origin, text: str, found: Judged) -> tuple[Start, ...]:
         """Candidates as starts, spread."""
@@ -203,12 +201,6 @@ def _spread(violation: Array, picks: Indices) -> Indices:
         (others if shares else first).append(candidate)
     feasible = [i for i in first if violation[i] == 0.0]
     return np.array([*feasible, *sorted({*first, *others} - set(feasible))], dtype=np.intp)
-
-
-def _words(drops: Counter[str]) -> str:
-    """The most frequent reasons in words."""
-    shown = sorted(((count, reason) for reason, count in drops.items() if count), key=lambda each: (-each[0], each[1]))
-    return ", ".join(f"{reason} ({count})" for count, reason in shown[:SHOWN]) or "nothing was drawn"
 
 
 def _most_frequent(reasons: Sequence[str]) -> str:

@@ -1,8 +1,8 @@
 """What all starts of one cell share: its variables, its job at nodes, its bodies and the paths of its tools."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 
@@ -49,6 +49,7 @@ class StartProblem:
         distances: What each layout is judged by in the end.
         all_contacts: All pairs.
         contacts: Pairs of each robot with itself, the surroundings and the first holder with the part.
+        is_part_placed: Whether the part stands where a setting has it, not where the file has it.
     """
 
     cell: Cell
@@ -66,6 +67,7 @@ class StartProblem:
     distances: CellDistances
     all_contacts: Contacts
     contacts: tuple[Contacts, ...]
+    is_part_placed: bool = False
 
     @classmethod
     def of(cls, cell: Cell, variables: StartVariables, *, margin: Array | float = 0.0) -> "StartProblem":
@@ -90,7 +92,6 @@ class StartProblem:
             middle if each.start is None else each.start for each, middle in zip(cell.robots, middles, strict=True)
         ]
         start = np.concatenate(starts)
-        holder = cell.positioners[:1]
         return cls(
             cell=cell,
             variables=variables,
@@ -105,9 +106,25 @@ class StartProblem:
             scene=scene,
             arms=tuple(FreeArm(robot) for robot in cell.robots),
             distances=CellDistances.of(scene, variables),
-            all_contacts=Contacts(scene, [robot.name for robot in cell.robots]),
-            contacts=tuple(Contacts(scene, [robot.name], holder) for robot in cell.robots),
+            **_contacts(cell, scene),
         )
+
+    def with_part(self, x: Array) -> "StartProblem":
+        """The same with the part at rest where the variables have it, shape (n,); itself where that does not vary."""
+        if not len(self.freedom.part):
+            return self
+        cell = replace(self.cell, part=self.variables.placed(x).part)
+        return replace(self, cell=cell, is_part_placed=True, **_contacts(cell, Scene.from_cell(cell)))
+
+    def placed_layouts(self, x: Array, start: Array) -> Layouts:
+        """Bases and tools beside the part of the cell, x of shape (K, n) and start postures of shape (K, nq).
+
+        The kernel leaves a part at rest in its place, and moves all bases the other way.
+        """
+        if self.is_part_placed:
+            x = x.copy()
+            x[:, self.freedom.part] = self.variables.given[self.freedom.part]
+        return self.variables.layouts(x, start)
 
     def given_start(self) -> Array:
         """The start posture of the given layout, what is not given found as by a solve; else in mid-range, (nq,)."""
@@ -163,3 +180,12 @@ class StartProblem:
         found, columns = x.copy(), self.freedom.columns
         found[:, columns[columns != FIXED]] = start[:, columns != FIXED]
         return found
+
+
+def _contacts(cell: Cell, scene: Scene) -> dict[str, Any]:
+    """All pairs, and those of each robot."""
+    holder = cell.positioners[:1]
+    return {
+        "all_contacts": Contacts(scene, [robot.name for robot in cell.robots]),
+        "contacts": tuple(Contacts(scene, [robot.name], holder) for robot in cell.robots),
+    }

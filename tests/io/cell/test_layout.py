@@ -57,6 +57,14 @@ def test_without_ranges_the_operators_and_the_first_start_vary(load: Load) -> No
     assert {it.address: (it.lower, it.upper) for it in raised.ranges}["robots.worker.base.z_mm"] == (0.0, 0.7)
 
 
+def test_without_ranges_a_base_far_away_may_come_to_the_holder(load: Load) -> None:
+    layout = load(("xyz_mm: [2000, 0, 0]", "xyz_mm: [-4000, 2400, 0]")).layout
+    assert layout is not None
+    found = {each.address: (each.lower, each.upper) for each in layout.ranges}
+    assert found["robots.worker.base.x_mm"] == (-5.0, -0.5)
+    assert found["robots.worker.base.y_mm"] == (1.4, 3.4)
+
+
 @pytest.mark.parametrize("size", ["[800, 400]", "[800, 400, 10]"])
 def test_the_height_of_an_area_kept_out_of_is_read_and_counts_for_nothing(size: str, load: Load) -> None:
     with warnings.catch_warnings():

@@ -1,16 +1,48 @@
 """Starts of a search: repeatable, spread, judged as the cell is, and with a reason where there is none."""
 
+import re
+
 import numpy as np
 import pytest
 
 from cellplan import load_cell, solve
 from cellplan.model.seeds import generator
+from cellplan.search.starts import pools
 from cellplan.search.starts.combined import judged
 from cellplan.search.starts.contacts import Contacts
 from cellplan.search.starts.generator import Origin, StartGenerator
 from cellplan.search.starts.problem import StartProblem
 from cellplan.search.variables.variables import Variables
 from tests.search.starts.conftest import CELLS, DRAWS, prepared
+
+SHORT = {
+    "motion.duration_s": 2,
+    "motion.step_s": 0.02,
+    "tasks.circle.tolerance": {"position_mm": 0.5, "orientation_deg": 0.1},
+}
+ARM = {"model": "planar_3r", "start_deg": "auto", "tool": {"xyz_mm": [0, 0, 40]}}
+SMALL = {"robot": "right", "tool_x": "-x", "axes": ["x", "y", "rz"]}
+VARY = {"x_mm": [500, 2500], "yaw_deg": [-180, 180]}
+MIRRORED = {
+    "robots.right": {**ARM, "base": {"xyz_mm": [1900, 5000, 500]}},
+    "robots.other": {**ARM, "base": {"xyz_mm": [1900, -5000, 500]}},
+    "tasks.circle": SMALL
+    | {"path": {"circle": {"radius_mm": 30, "center_mm": [40, 100], "plane": "xy"}, "project": "+z"}},
+    "tasks.ring": SMALL
+    | {
+        "robot": "other",
+        "path": {"circle": {"radius_mm": 30, "center_mm": [40, -100], "plane": "xy"}, "project": "+z"},
+    },
+    "layout": {
+        "vary": {"right.base": VARY | {"y_mm": [200, 5000]}, "other.base": VARY | {"y_mm": [-5000, -200]}},
+        "mirrored": [{"bases": ["right.base", "other.base"], "plane": "xz"}],
+    },
+}
+AT_REST = {
+    "part.held_by": [],
+    "part.at": {"xyz_mm": [9000, 0, 435], "rpy_deg": [0, 0, 0]},
+    "layout": {"vary": {"part.at": {"x_mm": [0, 9000], "y_mm": [-500, 1000], "yaw_deg": [-180, 180]}}},
+}
 
 
 @pytest.fixture
@@ -62,10 +94,29 @@ def test_what_reaches_nothing_is_named_with_the_reason():
     found = StartGenerator(problem, seed=0).at(1)
 
     assert found.found == ()
-    assert (
-        f"'{operator}' follows its path from none of {DRAWS} bases: does not reach the start of its path ({DRAWS})"
-        in (found.reason)
-    )
+    reason, far = f"'{operator}' follows its path from none of {DRAWS} bases: ", "does not reach the start of its path"
+    assert re.fullmatch(re.escape(reason + far) + rf", stays [6-8]\d{{3}} mm away \({DRAWS}\)", found.reason)
+
+
+def test_mirrored_operators_are_sampled_together(monkeypatch):
+    monkeypatch.setattr(pools, "LEADING", 3)
+    cell = load_cell(CELLS / "planar_pair.yaml").with_values(SHORT | MIRRORED)
+    problem = prepared(cell)
+    assert problem.freedom.groups(problem.operators) == [(1, 2)]
+    found = StartGenerator(problem, seed=0).at(1).found[0]
+
+    assert found.violation == 0.0
+    first, second = (problem.variables.placed(found.x).robot(name).X_WB for name in ("right", "other"))
+    np.testing.assert_allclose(second[:3, 3] * [1.0, -1.0, 1.0], first[:3, 3], atol=1e-12)
+
+
+def test_a_part_at_rest_is_sampled_where_it_can_be_reached():
+    cell = load_cell(CELLS / "planar_pair.yaml").with_values(SHORT | AT_REST)
+    problem = prepared(cell)
+    found = StartGenerator(problem, seed=0).at(1).found[0]
+
+    assert found.violation == 0.0
+    assert solve(problem.variables.cell(found.x, found.start)).passed
 
 
 def test_first_distances_are_those_of_the_moved_scene(four_robots):
