@@ -9,7 +9,8 @@ from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.limits import standing_of
 from cellplan.pipeline.layout.prepared import Prepared
-from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
+from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.pipeline.repair.at_start import StartFault, start_faults
 from cellplan.pipeline.repair.attempts import (
     Attempt,
