@@ -10,7 +10,8 @@ from cellplan import load_cell
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell
 from cellplan.model.layout import Mirrored
-from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
+from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.pipeline.repair.at_start import StartFault
 from cellplan.pipeline.repair.attempts import (
     Attempt,
