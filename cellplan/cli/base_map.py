@@ -1,7 +1,7 @@
 """``cellplan map``: the base plane of one robot, coloured by what becomes of the whole job at each place."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
@@ -10,6 +10,9 @@ from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Setti
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
+
+if TYPE_CHECKING:
+    from cellplan.report.record.common import Record
 
 SCHEMA = "cellplan.map/1"
 
@@ -71,7 +74,6 @@ def base_map(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.base_map.grid import BaseGrid, read_span, read_yaw
         from cellplan.pipeline.base_map.prepared import MapRequest, requested_cell
         from cellplan.pipeline.base_map.study import NOUN, map_study
-        from cellplan.report.text.base_map import map_lines
         from cellplan.study.status import read_status
 
         asked = BaseGrid(
@@ -104,8 +106,15 @@ def base_map(  # noqa: PLR0913, PLR0917 - the options of the command
                 )
             except KeyboardInterrupt as error:
                 raise InterruptedWorkError(str(error) or "interrupted") from None
+        _say(record, folder, is_certified=bool(certify), as_json=as_json)
+
+
+def _say(record: "Record", folder: Path, *, is_certified: bool, as_json: bool) -> NoReturn:
+    """Say what came of a map, and leave with the exit status."""
+    from cellplan.report.text.base_map import map_lines
+
     outcomes = [each["certified"]["status"] == "passed" for each in record["best"] if each["certified"] is not None]
-    passes = any(outcomes) if certify else record["counts"]["passes"]
+    passes = any(outcomes) if is_certified else record["counts"]["passes"]
     outcome = ExitStatus.PASSED if passes else ExitStatus.CHECK_FAILED
     if as_json:
         where = {"folder": str(folder), "report_path": str(folder / "map.html")}

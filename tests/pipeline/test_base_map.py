@@ -11,6 +11,8 @@ from cellplan import BaseGrid, base_map, load_cell, solve, write_base_map
 from cellplan.cli.main import run
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.model.cell import Cell
+from cellplan.pipeline.base_map.prepared import prepared
+from cellplan.search.base_map.verdicts import PlaceVerdict, Verdict, judge, verdicts_at_start
 
 CELLS = Path(__file__).resolve().parents[2] / "cells"
 CELL = CELLS / "planar_pair.yaml"
@@ -129,3 +131,27 @@ def test_what_cannot_be_mapped_is_one_located_line(
     error = capsys.readouterr().err.strip()
     assert error.endswith(message)
     assert "\n" not in error
+
+
+@pytest.mark.parametrize(("clearance", "verdict"), [(20, Verdict.PASSES), (60, Verdict.COLLISION)])
+def test_starts_judged_together_are_judged_as_each_by_itself(clearance: float, verdict: Verdict) -> None:
+    near = load_cell(CELL).with_values({**STARTS, "checks.clearance_mm": clearance})  # the arms are 30 mm apart
+    ready = prepared(near, "right", BaseGrid(x=(1900, 2300), y=(100, 100), step=400))
+    q, at = ready.starts()
+    known, inside = verdicts_at_start(ready.asked, q, at)
+    q, at = q[inside], at[inside]
+
+    together = judge(ready.asked, q, at)
+
+    alone: dict[int, PlaceVerdict] = {}
+    for start, place in zip(q, at.tolist(), strict=True):
+        (found,) = judge(ready.asked, start[None], np.array([place])).values()
+        alone[place] = found.or_better(alone.get(place))
+    assert len(known) == 2
+    assert len(set(at.tolist())) < len(at)
+    assert verdict in {each.verdict for each in together.values()}
+    assert together.keys() == alone.keys()
+    for place, found in together.items():
+        assert found.verdict is alone[place].verdict
+        np.testing.assert_array_equal(found.start, alone[place].start)
+        assert found.cycle == pytest.approx(alone[place].cycle, rel=1e-9)
