@@ -56,10 +56,7 @@ def trials_here() -> Iterator[None]:
     """Trials of studies run in this process: a child would import the package for each study."""
     from builders.study_trials import InThisProcess
 
-    with (
-        mock.patch("cellplan.study.session.Workers", InThisProcess),
-        mock.patch("cellplan.pipeline.layout.search.Workers", InThisProcess),
-    ):
+    with mock.patch("cellplan.study.session.Workers", InThisProcess):
         yield
 
 

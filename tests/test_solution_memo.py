@@ -69,3 +69,12 @@ def test_a_package_in_which_a_name_is_replaced_solves_anew(
 
     solve(cell)
     assert list(memo.iterdir()) == [known]
+
+
+def test_a_name_that_stays_replaced_is_reported_where_solutions_are_to_be_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with kept(tmp_path / "memo"):
+        monkeypatch.setattr(modes, "standing", lambda *arguments: arguments[-1])
+    with pytest.raises(RuntimeError, match=r"replaced for longer than one test.*cellplan\.planning\.modes\.standing"):
+        kept(tmp_path / "memo").__enter__()

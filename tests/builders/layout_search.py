@@ -3,6 +3,7 @@
 import shutil
 from pathlib import Path
 
+from builders.study_trials import InThisProcess
 from cellplan import LayoutRequest, LayoutResult, Stop, search_layout
 from cellplan.search.programs.objective import Timing
 
@@ -11,7 +12,7 @@ SETTINGS = ("motion.duration_s=2", "motion.step_s=0.02", "checks.clearance_mm=10
 
 
 def searched_pair(folder: Path, *settings: str, timing: Timing = Timing.LAWS) -> LayoutResult:
-    """Search a layout of ``given.yaml`` into ``study``, both in a folder.
+    """Search a layout of ``given.yaml`` into ``study``, both in a folder, without a process of its own.
 
     Args:
         folder: The folder.
@@ -26,4 +27,4 @@ def searched_pair(folder: Path, *settings: str, timing: Timing = Timing.LAWS) ->
         margin=10.0,
         timing=timing,
     )
-    return search_layout(request, folder / "study", stop=Stop(trials=1))
+    return search_layout(request, folder / "study", stop=Stop(trials=1), workers=InThisProcess())

@@ -30,7 +30,6 @@ Names = dict[tuple[str, str], object]  # what each name of the package stands fo
 HARMLESS = {  # names whose replacement changes no figure: where plots and trials run, how often a line is printed
     ("cellplan.guard.background", "processors"),
     ("cellplan.study.session", "Workers"),
-    ("cellplan.pipeline.layout.search", "Workers"),
     ("cellplan.cli.progress", "LINE_EVERY_S"),
 }
 
@@ -72,6 +71,8 @@ def kept(folder: Path) -> Iterator[None]:
     folder.mkdir(parents=True, exist_ok=True)
     if not _state.names:
         _install()
+    if replaced := _replaced():
+        raise RuntimeError(f"names replaced for longer than one test, so that every cell is solved anew: {replaced}")
     before, _state.folder = _state.folder, folder
     try:
         yield
@@ -239,6 +240,12 @@ def _package_names() -> Names:
 
 def _is_patched() -> bool:
     """Whether any name of the package stands for something else than when the memo was installed."""
+    return bool(_replaced())
+
+
+def _replaced() -> list[str]:
+    """The names of the package that stand for something else."""
     now = _package_names()
     missing = object()
-    return any(now.get(key, missing) is not value for key, value in _state.names.items() if key not in HARMLESS)
+    changed = [key for key, value in _state.names.items() if now.get(key, missing) is not value]
+    return [".".join(key) for key in changed if key not in HARMLESS]

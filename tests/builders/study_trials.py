@@ -25,7 +25,7 @@ class InThisProcess(Executor):
 
     count = 1
 
-    def __init__(self, _count: int = 1, **_: object) -> None:
+    def __init__(self, _count: int = 1) -> None:
         self.numbers: list[int] = []
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:

@@ -14,7 +14,7 @@ from cellplan.report.record.schema import layout_schema
 from cellplan.report.text.layout import layout_lines
 from cellplan.study.folder import prepare_folder
 
-pytestmark = pytest.mark.usefixtures("trials_here", "kept_solutions")
+pytestmark = pytest.mark.usefixtures("kept_solutions")
 
 
 @pytest.fixture(scope="module")

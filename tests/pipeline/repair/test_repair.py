@@ -14,7 +14,7 @@ from cellplan.pipeline.repair.repair import Repair, repair
 from cellplan.pipeline.repair.write import write_repair
 from cellplan.search.programs.objective import Objective
 
-pytestmark = pytest.mark.usefixtures("trials_here", "kept_solutions")
+pytestmark = pytest.mark.usefixtures("kept_solutions")
 CLEARANCE = 200.0  # [mm] that the given cell misses by 59 mm
 
 
