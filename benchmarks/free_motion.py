@@ -1,15 +1,19 @@
 """Shortest cycles with bases and tools as they are: ``python benchmarks/free_motion.py CELL --trials 8``.
 
 For each set of what is free, with and without limits of acceleration: the certified cycle of the cell that the search
-writes (margins of 15 deg, 10 mm of clearance, every check of ``solve`` passed), trials and processor time.
+writes (margins of 15 deg, 10 mm of clearance, no limit of jerk, every check of ``solve`` passed), trials, and the
+processor time of the finish; trials run in a process of their own. ``--layout`` adds bases and tools.
 """
 
 import argparse
+import json
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
 from sections import Section, table
 
 from cellplan import LayoutRequest, Stop, load_cell, search_layout
@@ -23,19 +27,45 @@ RULES: Final = {
 }  # limits of acceleration: no limit, and full speed in 0.25 s (axes 1 to 3) and 0.15 s (axes 4 to 6)
 MARGIN: Final = 15.0  # [deg]
 CLEARANCE: Final = 10.0  # [mm]
+PLACE: Final = {"x_mm": [-1500, 4500], "y_mm": [-3000, 3500], "z_mm": [0, 600], "yaw_deg": [-180, 180]}
+TOOL: Final = {"length_mm": [100, 250], "tilt_deg": [0, 60], "roll_deg": [-180, 180]}
+THIN: Final = {"radius_mm": 1, "stick_out_mm": 90}  # of a rod in place of a tool without bodies
 
 
-def measured(cell: Path, free: tuple[str, ...], limits: str, timing: Timing, trials: int) -> list[str]:
-    """One line of the table."""
-    robots = [robot.name for robot in load_cell(cell).robots]
-    request = LayoutRequest(
+def asked(cell: Path, limits: str, timing: Timing, free: tuple[str, ...]) -> LayoutRequest:
+    """A search with bases and tools as they are."""
+    rules = [f"robots.{robot.name}.acceleration={RULES[limits]}" for robot in load_cell(cell).robots]
+    return LayoutRequest(
         cell=cell,
         free=free,
         timing=timing,
         margin=MARGIN,
         clearance=CLEARANCE,
-        settings=tuple(f"robots.{name}.acceleration={RULES[limits]}" for name in robots),
+        settings=(*rules, "motion.jerk_build_up_s=unlimited"),
     )
+
+
+def together(cell: Path) -> LayoutRequest:
+    """A search of bases, tools and the path of the positioner; tools without bodies become thin rods."""
+    given, request = load_cell(cell), asked(cell, "none", Timing.LAWS, ())
+    settings, vary = list(request.settings), [f"{given.positioners[0]}.path"]
+    for name in dict.fromkeys(task.robot for task in given.tasks):
+        tool, tip = given.robot(name).tool, given.robot(name).tool.X_FT
+        vary.append(f"{name}.base={json.dumps(PLACE)}")
+        if tool.rod is not None or not tool.bodies:
+            vary.append(f"{name}.tool={json.dumps(TOOL)}")
+        if tool.rod is None and not tool.bodies:
+            shape = {
+                "length_mm": round(1000.0 * float(np.linalg.norm(tip[:3, 3])), 6),
+                "tilt_deg": round(float(np.degrees(np.arccos(np.clip(tip[2, 2], -1.0, 1.0)))), 6),
+                "roll_deg": round(float(np.degrees(np.arctan2(-tip[0, 1], tip[1, 1]))), 6),
+            }
+            settings.append(f"robots.{name}.tool={json.dumps({'rod': {**shape, **THIN}})}")
+    return replace(request, vary=tuple(vary), settings=tuple(settings))
+
+
+def measured(request: LayoutRequest, words: str, limits: str, trials: int) -> list[str]:
+    """One line of the table."""
     begin = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
         record = search_layout(request, Path(folder) / "study", stop=Stop(trials=trials)).record
@@ -43,13 +73,20 @@ def measured(cell: Path, free: tuple[str, ...], limits: str, timing: Timing, tri
     best = record["best"]
     keys = ("cycle_s", "margin_deg", "clearance_mm")
     figures = ["none"] * 3 if best is None else [f"{best[key]:.4g}" for key in keys]  # type: ignore[literal-required]
-    return [", ".join(free), limits, str(timing), *figures, str(trials), f"{spent:.0f}"]
+    return [words, limits, str(request.timing), *figures, str(trials), f"{spent:.0f}"]
 
 
-def section(cell: Path, trials: int, timings: tuple[Timing, ...]) -> Section:
+def section(cell: Path, trials: int, timings: tuple[Timing, ...], *, with_layout: bool) -> Section:
     """The whole table."""
-    head = ("free", "accelerations", "timing", "certified, s", "margin, deg", "clearance, mm", "trials", "processor, s")
-    rows = [measured(cell, free, limits, timing, trials) for limits in RULES for timing in timings for free in FREE]
+    head = ("free", "accelerations", "timing", "certified, s", "margin, deg", "clearance, mm", "trials", "finish, s")
+    rows = [
+        measured(asked(cell, limits, timing, free), ", ".join(free), limits, trials)
+        for limits in RULES
+        for timing in timings
+        for free in FREE
+    ]
+    if with_layout:
+        rows.append(measured(together(cell), "bases, tools, path", "none", trials))
     text = f"The cell {cell.name}, bases and tools as they are; margins of {MARGIN:g} deg, {CLEARANCE:g} mm apart."
     return Section(title="Free motion", lines=[text, "", *table(head, rows)])
 
@@ -60,9 +97,10 @@ def main() -> None:
     parser.add_argument("cell", type=Path, nargs="?", default=CELL)
     parser.add_argument("--trials", type=int, default=4)
     parser.add_argument("--retimed", action="store_true", help="with the best common speed as well")
+    parser.add_argument("--layout", action="store_true", help="bases, tools and path together as well")
     chosen = parser.parse_args()
     timings = (Timing.LAWS, Timing.RETIMED) if chosen.retimed else (Timing.LAWS,)
-    print(section(chosen.cell, chosen.trials, timings).text())
+    print(section(chosen.cell, chosen.trials, timings, with_layout=chosen.layout).text())
 
 
 if __name__ == "__main__":
