@@ -122,7 +122,8 @@ class Standing:
             pair = int(found.pairs[row])
             if not lacks[row] > -room:
                 return
-            if pair in seen:
+            is_shallow = found.demands[row] < 0.0 and lacks[row] < 0.5 * found.demands[row]
+            if pair in seen or is_shallow:  # what may be in each other, as a grip, is not near its demand there
                 continue
             seen.add(pair)
             distance, demand = MM * float(found.values[row]), MM * float(found.demands[row])

@@ -182,15 +182,12 @@ def _near_given(ready: Prepared, values: Mapping[str, object], number: int) -> B
     """The given layout or one near it; where no motion begins there, a sample that no other trial takes.
 
     Raises:
-        NoSolutionError: There is none; says what is wrong with both.
+        NoSolutionError: There is none either.
     """
     try:
         begin = ready.given
-    except NoSolutionError as error:
-        try:
-            return _sampled(ready, number or SIZE - 1)  # the last trial of the first round is sample 0
-        except NoSolutionError as other:
-            raise NoSolutionError(f"{error}; a sample: {other}") from other
+    except NoSolutionError:
+        return _sampled(ready, number or SIZE - 1)  # the last trial of the first round is sample 0
     return begin if values["kind"] == "given" else _perturbed(ready, begin, values, number)
 
 

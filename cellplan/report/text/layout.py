@@ -21,8 +21,9 @@ def layout_lines(record: Record, folder: Path) -> list[str]:
     lines = [f"{record['cell']}: {verdict_line(record)}", f"  {_given(record)}"]
     lines += [f"    {each['text']}" for each in record["given"]["violations"][:MOST]]
     if record["best"] is not None:
-        lines.append("  what changed")
-        lines += [f"    {line}" for line in _changes(record)]
+        changes = list(_changes(record))
+        lines.append("  what changed" if changes else "  nothing changed")
+        lines += [f"    {line}" for line in changes]
         if record["binding"]:
             lines.append("  what holds it back")
             lines += [f"    {each['text']}" for each in record["binding"][:MOST]]
@@ -33,7 +34,8 @@ def layout_lines(record: Record, folder: Path) -> list[str]:
     lines += [f"  {line}" for line in map(_choice, record["choices"])]
     lines += [f"  {line}" for line in _misplaced(record)]
     lines += [f"  {remark}" for remark in record["remarks"]]
-    lines.append(f"  {_trials(record['trials'])} in {record['rounds']} rounds, {record['solves']} solved in full")
+    rounds = "1 round" if record["rounds"] == 1 else f"{record['rounds']} rounds"
+    lines.append(f"  {_trials(record['trials'])} in {rounds}, {record['solves']} solved in full")
     if record["best"] is not None:
         lines.append(f"next: cellplan solve {shlex.quote(str(folder / 'best.yaml'))}")
     return [*lines, f"report: {folder / 'study.html'}"]

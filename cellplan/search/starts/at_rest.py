@@ -11,7 +11,7 @@ from cellplan.model.units import MM
 from cellplan.search.distances.keep_out import in_areas
 from cellplan.search.starts.freedom import FIXED, drawn_within
 from cellplan.search.starts.problem import StartProblem
-from cellplan.search.starts.reaching import FAR, FreeArm, Goal, Placed, followed, matched, reached
+from cellplan.search.starts.reaching import FreeArm, Goal, Placed, followed, matched, reached
 
 SETTINGS: Final = 400  # [-] configurations of the holder that are drawn
 MATCHED: Final = 150  # [-] of these, free of contact, that are compared by what operators reach of them
@@ -25,6 +25,8 @@ TEMPLATES: Final = 100  # [-] of these with tools, tilts and heights of their ow
 KEPT: Final = 40  # [-] bases of an operator that are kept
 LOOKED_AT: Final = 0.0, 0.34, 0.67  # shares of a path at which contacts are asked
 CONTACTS_AT_ONCE: Final = 32
+FAR_AWAY: Final = 0.1  # [m] from the start of a path, where it is worth saying
+ROUND: Final = 100  # [mm] to which that is said
 ROOMY: Final = 0.7  # [rad, m] a margin above which more of it is worth no more
 
 
@@ -225,7 +227,8 @@ def _unreached(goal: Goal, arm: FreeArm, at: Placed) -> str:
     """That tools do not reach the start of the path; where all stay far away, how far."""
     tips = (at.X_WB @ arm.flanges(at.q) @ at.X_FT)[:, :3, 3]
     nearest = float(np.linalg.norm(tips - (goal.X_WR @ goal.X_RT[0])[:3, 3], axis=1).min())
-    return "does not reach the start of its path" + (f", stays {MM * nearest:.0f} mm away" if nearest > FAR else "")
+    far = f", stays more than {ROUND * int(MM * nearest / ROUND)} mm away" if nearest > FAR_AWAY else ""
+    return f"does not reach the start of its path{far}"
 
 
 def _costs(problem: StartProblem, robot: int, q: Array, room: Array) -> Array:

@@ -49,7 +49,8 @@ def written_start(cell: Cell, robot: Robot, start: Array) -> dict[str, Any]:
     if as_list:
         return {f"robots.{robot.name}.start_deg": numbers}
     keys = [f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in joints]
-    return {f"robots.{robot.name}.start": dict(zip(keys, numbers, strict=True))}
+    replaced = {f"robots.{robot.name}.start_deg": None} if "start_deg" in entry[robot.name] else {}
+    return {f"robots.{robot.name}.start": dict(zip(keys, numbers, strict=True)), **replaced}
 
 
 def _within_limits(value: float, joint: Joint) -> float:
