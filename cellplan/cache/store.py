@@ -180,11 +180,12 @@ def _write(path: Path, content: bytes) -> None:
 def _make_room(folder: Path) -> None:
     """Remove the entries that were not used for longest, until the others fit."""
     entries = []
-    for path in folder.iterdir():
-        if path.suffix in (SUFFIX, ".part"):
-            with suppress(OSError):
-                status = path.lstat()
-                entries.append((status.st_mtime, path.name, status.st_size))
+    with os.scandir(folder) as found:
+        for each in found:
+            if each.name.endswith((SUFFIX, ".part")):
+                with suppress(OSError):
+                    status = each.stat(follow_symlinks=False)
+                    entries.append((status.st_mtime, each.name, status.st_size))
     total = sum(size for _, _, size in entries)
     for _, name, size in sorted(entries):
         if total <= MAX_FOLDER:

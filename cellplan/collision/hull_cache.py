@@ -1,8 +1,10 @@
 """Hulls of meshes: found by a search in the child process, and kept from run to run."""
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 
-from cellplan.cache import key_of
+from cellplan.cache import Key, key_of
 from cellplan.collision.hulls import convex_hull, is_hull
 from cellplan.geometry.mesh.cache import keep_mesh, recall_mesh
 from cellplan.geometry.shapes import Mesh
@@ -18,11 +20,36 @@ def hull_of(mesh: Mesh) -> Mesh:
         InputError: The mesh is flat.
         OverrunError: The search crashed, or took too long or too much memory.
     """
-    key = key_of("hull", np.ascontiguousarray(mesh.vertices).tobytes())
-    kept = recall_mesh(key, source=mesh.source)
-    if kept is not None and is_hull(kept, mesh.vertices):
+    kept = _kept(mesh)
+    if kept is not None:
         return kept
     guard = Guard(file=mesh.source, worker="the search for the hull")
     found: Mesh = in_child(convex_hull, mesh, guard=guard)
-    keep_mesh(key, found)
+    keep_mesh(_key(mesh), found)
     return found
+
+
+def keep_hulls(meshes: Sequence[Mesh]) -> None:
+    """Find the hulls of some meshes and keep them for other processes; only in a process that the search may end.
+
+    Raises:
+        InputError: A mesh is flat.
+    """
+    for mesh in meshes:
+        keep_mesh(_key(mesh), convex_hull(mesh))
+
+
+def without_hull(meshes: Iterable[Mesh]) -> list[Mesh]:
+    """Those meshes of which no hull is kept."""
+    return [mesh for mesh in meshes if recall_mesh(_key(mesh), source=mesh.source) is None]
+
+
+def _kept(mesh: Mesh) -> Mesh | None:
+    """The hull that was kept of a mesh, proved anew; None where there is none."""
+    kept = recall_mesh(_key(mesh), source=mesh.source)
+    return kept if kept is not None and is_hull(kept, mesh.vertices) else None
+
+
+def _key(mesh: Mesh) -> Key | None:
+    """Key of the hull of a mesh."""
+    return key_of("hull", np.ascontiguousarray(mesh.vertices).tobytes())

@@ -109,8 +109,8 @@ def _blown_up(hull: Mesh, points: Array) -> Mesh | None:
     depth = offsets - normals @ middle
     if not np.all(depth > 0.0):
         return None
-    step = max(1, PAIR_CHUNK // len(normals))
-    share = max(float(((points[k : k + step] - middle) @ normals.T / depth).max()) for k in range(0, len(points), step))
+    step, shares = max(1, PROOF_CHUNK // len(normals)), (normals / depth[:, None]).T
+    share = max(float(((points[k : k + step] - middle) @ shares).max()) for k in range(0, len(points), step))
     if share > MAX_GROWTH:
         return None
     corners = middle + max(share, 1.0) * (hull.vertices - middle)

@@ -28,7 +28,7 @@ class ScrewChain:
         self._X_BF = model.X_BF
         self._X_BT = model.X_BF @ robot.tool.X_FT
         self._n = len(model.joints)
-        self._last: tuple[Array, Array] | None = None  # positions and displacements, which nobody may write to
+        self._last: tuple[Array, Array] | None = None  # positions and read-only displacements
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the displacements behind; the other side works them out anew."""

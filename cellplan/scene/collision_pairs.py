@@ -1,6 +1,6 @@
 """All pairs of bodies of a cell: which are watched and for what, which are left out, and how deep some may be."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -9,14 +9,14 @@ import numpy as np
 from cellplan.collision.bodies import CollisionBody, prepare
 from cellplan.collision.engine import Engine
 from cellplan.collision.overlap.contact_zone import outside_zone
-from cellplan.geometry.shapes import HalfSpace, Solid
+from cellplan.geometry.shapes import HalfSpace, Mesh, Solid
 from cellplan.geometry.transforms import inverse
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOutKind
 from cellplan.model.task import Frame
 from cellplan.model.units import MM
-from cellplan.scene.bodies import Kind, SceneBody
+from cellplan.scene.bodies import Kind, SceneBody, scene_bodies
 from cellplan.scene.grips import grip_watch
 from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair, works_like_a_tool
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
@@ -119,10 +119,25 @@ class _ContactZones:
         """The surface of a tool outside its contact zone, and whether any lies inside; equal tools are cut once."""
         if isinstance(body.shape, HalfSpace):
             return None, False
-        robot = self._cell.robot(str(body.robot))
-        tip = (inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT)[:3, 3]
-        outside, is_in_zone = _cut_at_tip(body.shape, tuple(tip.tolist()), self._cell.checks.contact_zone)
+        outside, is_in_zone = _cut_at_tip(body.shape, _tip(self._cell, body), self._cell.checks.contact_zone)
         return (None if outside is None else replace(outside, name=body.name)), is_in_zone
+
+
+def cut_tools(cell: Cell) -> Iterator[Mesh]:
+    """Surfaces of tools at work outside their contact zones, where a zone holds a part of the tool."""
+    at_work = {task.robot for task in cell.tasks if task.relative_to is Frame.PART}
+    for body in scene_bodies(cell):
+        if body.robot in at_work and works_like_a_tool(body, cell) and not isinstance(body.shape, HalfSpace):
+            surface, is_in_zone = outside_zone(body.shape, np.array(_tip(cell, body)), cell.checks.contact_zone)
+            if is_in_zone and surface is not None:
+                yield surface
+
+
+def _tip(cell: Cell, body: SceneBody) -> tuple[float, float, float]:
+    """Tip of the tool of a robot in the frame of one of its bodies in [m]."""
+    robot = cell.robot(str(body.robot))
+    x, y, z = (inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT)[:3, 3].tolist()
+    return x, y, z
 
 
 @lru_cache(maxsize=64)

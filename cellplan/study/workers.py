@@ -96,6 +96,11 @@ class Workers(ThreadPoolExecutor):
 
         return value
 
+    def attempt(self, function: Callable[..., object], *arguments: object) -> None:
+        """Do ``function(*arguments)`` in one of the processes, which it may end: what goes wrong is ignored."""
+        with suppress(CellplanError):
+            self.submit(_called, function, arguments).result()
+
     def stop(self) -> None:
         """End the processes of trials under way: nothing is asked of these any more."""
         self._children.stop()

@@ -8,7 +8,7 @@ import pytest
 
 from cellplan.cache import key_of
 from cellplan.cache.store import forget
-from cellplan.collision.hull_cache import hull_of
+from cellplan.collision.hull_cache import hull_of, keep_hulls, without_hull
 from cellplan.collision.hulls import convex_hull
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.cache import keep_mesh
@@ -79,3 +79,15 @@ def test_a_kept_surface_with_a_dent_is_no_hull() -> None:
     keep_mesh(key_of("hull", POINTS.tobytes()), replace(hull, vertices=dented))
 
     assert_same(hull_of(cloud(POINTS)), hull)
+
+
+def test_a_hull_that_a_helper_has_kept_is_the_same(own_cache: Path) -> None:
+    mesh = cloud(POINTS)
+    lacking = without_hull([mesh])
+    keep_hulls(lacking)
+    forget()
+
+    assert lacking == [mesh]
+    assert without_hull([mesh]) == []
+    assert len(list(own_cache.iterdir())) == 1
+    assert_same(hull_of(mesh), convex_hull(mesh))

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from cellplan.collision.hull_cache import keep_hulls, without_hull
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
@@ -16,10 +17,12 @@ from cellplan.pipeline.fastest.scaling import scaled_values, whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.limits import Standing, standing_of
 from cellplan.pipeline.layout.prepared import Prepared, values_of
-from cellplan.pipeline.quick_clearance import Begin, QuickClearance
+from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.report.record.misplacement import MisplacementRecord
+from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
+from cellplan.study.workers import Workers
 
 NODES: Final = 129  # [-] of the finish
 KEYS: Final = 25  # [-] configurations at which distances are asked there
@@ -110,14 +113,14 @@ class Finish:
     Attributes:
         ready: The cell.
         progress: Called with the stage and the fraction done.
-        begin: Begins a function in another process, see ``QuickClearance``; None where all is done here.
+        workers: Processes that help where they are idle; None where all is done here.
         solves: How often a layout was solved in full so far.
         records: What was found of each layout with displaced bases, by its trial; empty where none are asked for.
     """
 
     ready: Prepared
     progress: Progress
-    begin: Begin | None = None
+    workers: Workers | None = None
     solves: int = 0
     records: dict[int, MisplacementRecord] = field(default_factory=dict)
     _problems: dict[tuple[Prepared, int], Any] = field(default_factory=dict)
@@ -178,8 +181,10 @@ class Finish:
         self.solves += 1
         try:
             cell = self.ready.variables.given_cell.with_values(values_of(self.ready, x, start))
+            if self.workers is not None and (new := without_hull(cut_tools(cell))):
+                self.workers.attempt(keep_hulls, new)
             is_once = self.ready.request.objective is not Objective.CYCLE  # else other durations are tried
-            quick = QuickClearance(self.begin if is_once else None)
+            quick = QuickClearance(self.workers.begin if is_once and self.workers is not None else None)
             program = self._timed(cell, standing.measures.cycle, quick).certified(self.progress, quick)
         except (InputError, NoSolutionError) as error:
             return None, str(error).splitlines()[0]

@@ -18,7 +18,6 @@ from cellplan.pipeline.layout.result_file import file_records, result_files
 from cellplan.pipeline.layout.searched import read_attempts
 from cellplan.pipeline.layout.trial import evaluate
 from cellplan.pipeline.layout.workers import layout_workers
-from cellplan.pipeline.quick_clearance import Begin
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.layout import layout_files
 from cellplan.report.record.layout import LayoutRecord
@@ -164,7 +163,7 @@ def search_layout(
             workers=pool,
             stop=stop or Stop(seconds=BUDGET),
             progress=progress,
-            finish=finish_of(ready, progress, pool.begin if isinstance(pool, Workers) else None),
+            finish=finish_of(ready, progress, pool if isinstance(pool, Workers) else None),
             proposals=proposals_of(request, ready),
         )
         finished, best = search.run(resume=resume)
@@ -172,20 +171,20 @@ def search_layout(
         return _written(search, finished, best)
 
 
-def finish_of(ready: Prepared, progress: Progress, begin: Begin | None = None) -> Finish:
+def finish_of(ready: Prepared, progress: Progress, workers: Workers | None = None) -> Finish:
     """The finish of the layouts of a cell, with displaced bases where they are asked for.
 
     Args:
         ready: The cell.
         progress: Called with the stage and the fraction done.
-        begin: Begins a function in another process; see ``Finish``.
+        workers: Processes that help; see ``Finish``.
     """
     misplacement = ready.variables.settings.misplacement
     if misplacement is None:
-        return Finish(ready=ready, progress=progress, begin=begin)
+        return Finish(ready=ready, progress=progress, workers=workers)
     from cellplan.pipeline.layout.misplacement import MisplacedFinish
 
-    return MisplacedFinish(ready=ready, progress=progress, misplacement=misplacement)
+    return MisplacedFinish(ready=ready, progress=progress, workers=workers, misplacement=misplacement)
 
 
 def _written(search: _Search, finished: Finished, best: Certified | None) -> LayoutResult:

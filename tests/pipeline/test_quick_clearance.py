@@ -1,0 +1,43 @@
+"""The clearance of a search has the verdicts of ``solve`` and its smallest distances, as far as they are exact."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cellplan import load_cell
+from cellplan.checks.verify import Clearance, run_clearance
+from cellplan.model.progress import silent
+from cellplan.pipeline.quick_clearance import QuickClearance
+from cellplan.pipeline.solve import certified, solve_motion
+
+CELL = Path(__file__).resolve().parents[2] / "cells" / "planar_pair.yaml"
+VALUES = {"motion.duration_s": 2.0, "motion.step_s": 0.02}
+
+
+@pytest.mark.parametrize("is_begun", [False, True])
+def test_verdicts_and_smallest_distances_are_those_of_solve(is_begun: bool) -> None:
+    asked: list[int] = []
+
+    def begin(function: Callable[..., Clearance], *arguments: object) -> Callable[[], Clearance]:
+        asked.append(len(arguments))
+        return lambda: function(*arguments)
+
+    quick = QuickClearance(begin if is_begun else None)
+    scene, solution = solve_motion(load_cell(CELL).with_values(VALUES), task=None, progress=silent, quick=quick)
+    found = certified(solution, scene, progress=silent, quick=quick).runs[0]
+
+    q = np.concatenate([found.report.q[robot.name] for robot in scene.cell.robots], axis=1)
+    clearance, checks = run_clearance(scene, found.schedule, q)
+    for kind, full in clearance.minima.items():
+        own = found.report.clearance.minima[kind]
+        assert (own.pair, own.certified, own.exact) == (full.pair, full.certified, full.exact)
+        if full.minimum is not None:
+            assert own.minimum == pytest.approx(full.minimum, abs=1e-4)  # both proved, to within 0.1 mm of the truth
+            assert (own.minimum or 0.0) <= full.minimum  # curves only raise what is proved
+    of_clearance = found.report.checks[-len(checks) :]
+    assert [(each.name, each.subject, each.passed) for each in of_clearance] == [
+        (each.name, each.subject, each.passed) for each in checks
+    ]
+    assert len(asked) == is_begun
