@@ -15,6 +15,7 @@ from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.run import run, run_near
 from cellplan.search.kernel.screws import Directions
+from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
 
 
@@ -119,6 +120,11 @@ class LayoutProblem:
         if not isinstance(found.found, _Found):
             raise TypeError("distance_derivatives: expected distances of this problem")
         return self.bodies.derivatives(found.found.near, point.x, by_joints.q[found.found.nodes])
+
+    def arms(self, point: Point) -> SingularValues:
+        """See ``Problem``."""
+        layout = self.variables.layouts(point.x[None], point.start[None])
+        return SingularValues.of(self.job, layout, point.q, lambda: self.variables.directions(point.x))
 
     def pair_names(self, pair: int) -> tuple[str, str]:
         """See ``Problem``."""
