@@ -139,6 +139,8 @@ class LayoutSettings:
         margin: Distance from its limits in [rad] that every turning joint is to keep.
         margin_sliding: Distance from its limits in [m] that every sliding joint is to keep.
         cost: Cost of a change by 0.1 m, by 10 deg or by a factor of 10, by the address of the range; 1 when absent.
+        singular: Least singular values of the arms that are to be kept, as shares of what is usual; None for the usual
+            share, as far as the job allows it.
         misplacement: By how much every base may be off while all demands are kept; None where it need not be asked.
         is_default: Whether the file says nothing of what may change.
     """
@@ -153,6 +155,7 @@ class LayoutSettings:
     margin: float = 0.0
     margin_sliding: float = 0.0
     cost: Mapping[str, float] = field(default_factory=dict)
+    singular: float | None = None
     misplacement: Misplacement | None = None
     is_default: bool = True
 

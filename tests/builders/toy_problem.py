@@ -70,6 +70,18 @@ class Toy:
     def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:
         return np.tile([-2.0 * point.x[0], 1.0], (len(found.pairs), 1))
 
+    def arms(self, point: Point) -> "Toy.Arms":
+        """One arm whose least singular value is half of x1 at all times."""
+        return Toy.Arms(values=np.full((NODES, 1), 0.5 * point.x[1]))
+
+    @dataclass(frozen=True)
+    class Arms:
+        values: Array
+        names: tuple[str, ...] = ("robot",)
+
+        def derivatives(self, nodes: Indices, subjects: Indices, by: Array) -> Array:
+            return np.tile([0.0, 0.5], (len(nodes), 1))
+
     def pair_names(self, pair: int) -> tuple[str, str]:
         return "one", "other"
 

@@ -67,6 +67,7 @@ def read_layout(
         margin=entry.margin_deg.si,
         margin_sliding=entry.margin_mm.si,
         cost=ties.cost(),
+        singular=entry.singular_share,
         misplacement=_misplacement(entry),
         is_default=entry.vary is None,
     )

@@ -157,6 +157,12 @@ class LayoutEntry(Entry):
     margin_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = Field(
         default=Mm(0.0), description="Distance from its limits that every sliding joint is to keep."
     )
+    singular_share: Annotated[float, Field(ge=0.0, le=1.0)] | None = Field(
+        default=None,
+        description="Least singular value of the Jacobian of every arm at its tool tip, in m and rad, that is to be "
+        "kept, as a share of the median over all its configurations; 0 for none. When absent: 0.1 as far as the job "
+        "allows it, where the shortest cycle is sought.",
+    )
     misplacement: MisplacementEntry | None = Field(
         default=None,
         description="All demands are to be kept, and the cycle to be reached, with every base off by so much and the "

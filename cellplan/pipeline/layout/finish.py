@@ -1,7 +1,10 @@
-"""Finish: a layout of the search improved at more nodes, then solved and verified until it passes or is given up."""
+"""Finish: a layout of the search improved at more nodes, then solved and verified until it passes or is given up.
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+Nodes and keys are added where the solved motion asks for more time, or comes nearer, than those that there are.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -13,31 +16,25 @@ from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress
 from cellplan.model.report import ClearanceClass
 from cellplan.model.units import DEG, MM
-from cellplan.pipeline.fastest.scaling import scaled_values, whole_steps
-from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
+from cellplan.pipeline.fastest.timed_program import TimedProgram
+from cellplan.pipeline.layout.between_nodes import distances_missed_at, exceeded_at, margins_missed_at
+from cellplan.pipeline.layout.cycles import draft, is_scaled, load_of, shortest, time_of
 from cellplan.pipeline.layout.limits import Standing, standing_of
-from cellplan.pipeline.layout.prepared import Prepared, values_of
+from cellplan.pipeline.layout.prepared import Prepared, kept_demands, values_of
 from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.report.record.misplacement import MisplacementRecord
 from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
-from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
+from cellplan.search.programs.layout_problem import LayoutProblem
+from cellplan.search.programs.objective import Demands, Effort, Objective, Room
 from cellplan.study.workers import Workers
 
 NODES: Final = 129  # [-] of the finish
 KEYS: Final = 25  # [-] configurations at which distances are asked there
 ITERATIONS: Final = 25
+REFINED: Final = 3  # [-] times that nodes are added for a shorter cycle before it is certified
+GAIN: Final = 0.001  # [-] share of the cycle that each of them must gain
 ROUNDS: Final = 4  # [-] times that a layout is improved and solved before it is given up
-DURATIONS: Final = 4  # [-] durations tried until the limits hold
-SLOWED: Final = {
-    "position_error_between_rows": 0.5,
-    "orientation_error_between_rows": 0.5,
-    "closure_position_error_between_rows": 0.5,
-    "closure_orientation_error_between_rows": 0.5,
-    "joint_jerk": 1.0 / 3.0,
-    "part_acceleration": 0.5,
-    "tool_speed": 1.0,
-}  # checks that pass when the motion is slow enough: how the time that they ask for grows with their value
 MORE_ANGLE: Final = np.radians(0.05)  # [rad] asked for beyond what was missed
 MORE_LENGTH: Final = 0.0005  # [m] likewise
 MORE_OWN: Final = 0.00002  # [m] and of a robot's own bodies
@@ -98,12 +95,34 @@ class _Room:
     time: float = Room().time
     nodes: int = NODES
     keys: int = KEYS
+    denser: tuple[float, ...] = ()
+    also_at: tuple[float, ...] = ()
+
+    def add_nodes(self, times: Sequence[float], span: float) -> bool:
+        """Add nodes about times in [s] of a motion of so many seconds; False where there are more already."""
+        step = span / (self.nodes - 1)
+        new = [time for time in times if all(abs(time - other) > step for other in self.denser)]
+        self.denser = (*self.denser, *new)
+        return bool(new)
 
     @property
     def effort(self) -> Effort:
         """As the local optimisation is asked."""
         room = Room(margin=self.angle, distance=self.length, own=self.own, time=self.time)
-        return Effort(iterations=ITERATIONS, keys=self.keys, room=room, trust=0.2)
+        return Effort(iterations=ITERATIONS, keys=self.keys, also_at=self.also_at, room=room, trust=0.2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Timed:
+    """A layout at more nodes and its motion, verified but for its clearance; or why there is none."""
+
+    x: Array
+    start: Array
+    standing: Standing
+    demands: Demands
+    quick: QuickClearance
+    program: TimedProgram | None = None
+    reason: str = ""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -123,7 +142,7 @@ class Finish:
     workers: Workers | None = None
     solves: int = 0
     records: dict[int, MisplacementRecord] = field(default_factory=dict)
-    _problems: dict[tuple[Prepared, int], Any] = field(default_factory=dict)
+    _problems: dict[tuple[Prepared, int, tuple[float, ...]], Any] = field(default_factory=dict)
 
     def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:
         """A layout of the search, certified or with the reason why not.
@@ -135,26 +154,76 @@ class Finish:
         x, start = np.array(figures["x"], dtype=float), np.array(figures["start"], dtype=float)
         room, is_first, before = _Room(), True, self.solves
         while True:
-            x, start, standing, demands = self._improved(x, start, room, is_first=is_first)
-            program, reason = self._solved(x, start, standing)
+            timed = self._refined(x, start, room, is_first=is_first)
+            x, start, program, reason = timed.x, timed.start, timed.program, timed.reason
+            self.solves += 1
+            if program is not None:
+                program = program.certified(self.progress, timed.quick)
+                reason = self._rejection(program) or _too_singular(self.ready, timed.standing, program)
             found = Certified(
                 trial=trial,
                 x=x,
                 start=start,
                 program=program,
                 reason=reason,
-                standing=standing,
+                standing=timed.standing,
                 solves=self.solves - before,
             )
-            if found.passed or program is None or found.solves >= ROUNDS or not _enlarged(room, program, demands):
+            if found.passed or program is None or found.solves >= ROUNDS or not _enlarged(room, timed, program):
                 return found
             is_first = False
+
+    def _refined(self, x: Array, start: Array, room: _Room, *, is_first: bool) -> _Timed:
+        """The layout and its motion, improved again with more nodes where it asks for more time than the others do."""
+        best = self._drafted(x, start, room, is_first=is_first)
+        for _ in range(REFINED if is_scaled(self.ready) else 0):
+            if best.program is None:
+                return best
+            problem, measures = best.standing.problem, best.standing.measures
+            peaks = exceeded_at(best.program, measures.cycle, measures.span)
+            if not isinstance(problem, LayoutProblem) or not room.add_nodes(peaks, measures.span):
+                break
+            found = self._drafted(best.x, best.start, room, is_first=False)
+            if found.program is None or time_of(found.program) > (1.0 - GAIN) * time_of(best.program):
+                break
+            best = found
+        return self._shortest(best)
+
+    def _drafted(self, x: Array, start: Array, room: _Room, *, is_first: bool) -> _Timed:
+        """The layout improved at more nodes, with its motion in the cycle that it has there."""
+        x, start, standing, demands = self._improved(x, start, room, is_first=is_first)
+        is_once = self.ready.request.objective is not Objective.CYCLE  # else other durations are tried
+        quick = QuickClearance(self.workers.begin if is_once and self.workers is not None else None)
+        found = _Timed(x=x, start=start, standing=standing, demands=demands, quick=quick)
+        try:
+            cell = self._cell(x, start)
+            program = draft(self.ready, cell, standing.measures.cycle, self.progress, quick)
+            return replace(found, program=program)
+        except (InputError, NoSolutionError) as error:
+            return replace(found, reason=str(error).splitlines()[0])
+
+    def _shortest(self, timed: _Timed) -> _Timed:
+        """The layout with its motion in the shortest cycle that its limits allow."""
+        if timed.program is None or not is_scaled(self.ready):
+            return timed
+        try:
+            cell = self._cell(timed.x, timed.start)
+            return replace(timed, program=shortest(self.ready, cell, timed.program, self.progress))
+        except (InputError, NoSolutionError) as error:
+            return replace(timed, program=None, reason=str(error).splitlines()[0])
+
+    def _cell(self, x: Array, start: Array) -> Cell:
+        """The cell of a layout, as its file has it; a worker begins with hulls of tools that are new."""
+        cell = self.ready.variables.given_cell.with_values(values_of(self.ready, x, start))
+        if self.workers is not None and (new := without_hull(cut_tools(cell))):
+            self.workers.attempt(keep_hulls, new)
+        return cell
 
     def _improved(
         self, x: Array, start: Array, room: _Room, *, is_first: bool
     ) -> tuple[Array, Array, Standing, Demands]:
         """The layout improved at more nodes; one that only has to conform is taken as it is at first."""
-        demands, problem = self.ready.demands(), self._problem(room.nodes)
+        demands, problem = self._demands(x, start), self._problem(room.nodes, room.denser)
         if is_first and demands.objective is Objective.CONFORMING:
             problem, effort = self.ready.coarse, Effort()
             point = problem.evaluate(x, start)
@@ -169,58 +238,20 @@ class Finish:
             return x, start, standing_of(problem, point, demands, room.effort), demands
         return found.x, found.start, standing_of(problem, found.point, demands, room.effort), demands
 
-    def _problem(self, nodes: int) -> Any:
-        """The layout problem at about so many nodes."""
-        key = (self.ready, nodes)
+    def _demands(self, x: Array, start: Array) -> Demands:
+        """What is demanded of a layout of the search."""
+        point = self.ready.coarse.evaluate(x, start)
+        return self.ready.demands() if point is None else kept_demands(self.ready, point)
+
+    def _problem(self, nodes: int, denser: tuple[float, ...] = ()) -> Any:
+        """The layout problem at about so many nodes, and more about some times in [s] on their clock."""
+        key = (self.ready, nodes, denser)
         if key not in self._problems:
-            self._problems[key] = self.ready.problem(nodes)
+            problem = self.ready.problem(nodes)
+            if denser and isinstance(problem, LayoutProblem):
+                problem = problem.finer(self.ready.schedule, nodes=nodes, denser=denser)
+            self._problems[key] = problem
         return self._problems[key]
-
-    def _solved(self, x: Array, start: Array, standing: Standing) -> tuple[TimedProgram | None, str]:
-        """The program of a layout, solved and verified in full, and why it is rejected."""
-        self.solves += 1
-        try:
-            cell = self.ready.variables.given_cell.with_values(values_of(self.ready, x, start))
-            if self.workers is not None and (new := without_hull(cut_tools(cell))):
-                self.workers.attempt(keep_hulls, new)
-            is_once = self.ready.request.objective is not Objective.CYCLE  # else other durations are tried
-            quick = QuickClearance(self.workers.begin if is_once and self.workers is not None else None)
-            program = self._timed(cell, standing.measures.cycle, quick).certified(self.progress, quick)
-        except (InputError, NoSolutionError) as error:
-            return None, str(error).splitlines()[0]
-        return program, self._rejection(program)
-
-    def _timed(self, cell: Cell, cycle: float, quick: QuickClearance) -> TimedProgram:
-        """The program at the shortest cycle, or at the duration of the cell."""
-        is_cycle = self.ready.request.objective is Objective.CYCLE
-        if self.ready.request.timing is Timing.RETIMED:
-            timing: object = "fastest" if is_cycle else {"cycle_s": self.ready.duration}
-            law = Law.COMMON_SPEED if is_cycle else Law.REDUCED_SPEED
-            values = {"motion.timing": timing}
-            return TimedProgram.solved(cell, law, values, task=None, progress=self.progress, quick=quick)
-        if not is_cycle:
-            return TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=self.progress, quick=quick)
-        factor = whole_steps(cell, cycle / self.ready.duration)
-        for _ in range(DURATIONS):
-            program = self._at(cell, factor)
-            load = load_of(program)
-            if 1.0 - MORE_TIME < load <= 1.0:
-                break
-            following = whole_steps(cell, factor * load, longer_than=factor if load > 1.0 else 0.0)
-            if following == factor:
-                break
-            factor = following
-        for _ in range(DURATIONS):
-            asked = max(load_of(program), time_asked(program))
-            if asked <= 1.0:
-                break
-            factor = whole_steps(cell, factor * asked, longer_than=factor)
-            program = self._at(cell, factor)
-        return program
-
-    def _at(self, cell: Cell, factor: float) -> TimedProgram:
-        """The program slower or faster by a factor, verified but for its clearance."""
-        return TimedProgram.solved(cell, Law.TIME_LAWS, scaled_values(cell, factor), task=None, progress=self.progress)
 
     def _rejection(self, program: TimedProgram) -> str:
         """Why a program is rejected; empty where it passed every check and keeps the margins of the search."""
@@ -233,17 +264,18 @@ class Finish:
         return ""
 
 
-def load_of(program: TimedProgram) -> float:
-    """Share of its time in which the limits of speed and acceleration of the joints would allow the same motion."""
-    figures = program.figures
-    return max(figures["max_velocity_ratio"] or 0.0, (figures["max_acceleration_ratio"] or 0.0) ** 0.5)
-
-
-def time_asked(program: TimedProgram) -> float:
-    """How many times as long the motion must last for what is no limit of a joint but gets less when it is slower."""
-    checks = [check for run in program.solution.runs for check in run.report.checks if not check.passed]
-    asked = [(check.value / check.limit) ** SLOWED[check.name] for check in checks if check.name in SLOWED]
-    return max(asked, default=1.0)
+def _too_singular(ready: Prepared, standing: Standing, program: TimedProgram) -> str:
+    """Which arm comes nearer to a singular configuration than the cell allows, by the report; empty for none."""
+    arms, demanded, layout = standing.measures.arms, standing.demands.singular, ready.cell.layout
+    if arms is None or demanded is None or layout is None or layout.singular is None:
+        return ""
+    for run in program.solution.runs:
+        values = {} if run.report.conditioning is None else run.report.conditioning.robots
+        for name, least in zip(arms.names, demanded.tolist(), strict=True):
+            found = values.get(name, np.zeros(0))
+            if found.max(initial=0.0) > 0.0 and found.min() < least:
+                return f"smallest singular value {found.min():.4g} of {name}, {least:.4g} demanded"
+    return ""
 
 
 def certified_cell(found: Certified) -> Cell:
@@ -257,28 +289,34 @@ def certified_cell(found: Certified) -> Cell:
     return found.program.solution.cell
 
 
-def _enlarged(room: _Room, program: TimedProgram, demands: Demands) -> bool:
-    """Ask for what the verified motion missed; False where it missed nothing that can be asked for."""
-    is_asked = False
-    margin, demanded = margin_of(program), DEG * float(demands.margin.max(initial=0.0))
-    if margin is not None and margin < demanded:
-        room.angle += np.radians(demanded - margin) + MORE_ANGLE
-        is_asked = True
+def _enlarged(room: _Room, timed: _Timed, program: TimedProgram) -> bool:
+    """Ask for what the verified motion missed, with nodes and keys there; False where it missed nothing of the kind."""
+    problem, span, times = timed.standing.problem, timed.standing.measures.span, list[float]()
+    demanded = float(timed.demands.margin.max(initial=0.0))
+    margin, load = margin_of(program), load_of(program)
+    missed_margin = margin is not None and margin < DEG * demanded
+    if margin is not None and missed_margin:
+        room.angle += demanded - np.radians(margin) + MORE_ANGLE
+        times += margins_missed_at(program, demanded, span)
     required = MM * program.solution.cell.checks.clearance
-    found = (clearance_of(program, is_own=each) for each in (False, True))
-    others, own = (required if each is None else each for each in found)
-    if others < required:
+    others, own = (clearance_of(program, is_own=each) for each in (False, True))
+    keys = list[float]()
+    if others is not None and others < required:
         room.length += (required - others) / MM + MORE_LENGTH
-    if own < required:
+        keys += distances_missed_at(program, span, is_own=False)
+    if own is not None and own < required:
         room.own += (required - own) / MM + MORE_OWN
-    if min(others, own) < required:
-        room.keys = 2 * room.keys - 1
-        is_asked = True
-    if load_of(program) > 1.0:
-        room.time += load_of(program) - 1.0 + MORE_TIME
-        is_asked = True
-    room.nodes = 2 * room.nodes - 1 if is_asked else room.nodes
-    return is_asked
+        keys += distances_missed_at(program, span, is_own=True)
+    if load > 1.0:
+        room.time += load - 1.0 + MORE_TIME
+        times += exceeded_at(program, program.cycle, span)
+    if not (missed_margin or keys or load > 1.0):
+        return False
+    room.also_at = (*room.also_at, *keys)
+    if not isinstance(problem, LayoutProblem) or not room.add_nodes([*times, *keys], span):
+        room.nodes = 2 * room.nodes - 1
+        room.keys = 2 * room.keys - 1 if keys else room.keys
+    return True
 
 
 def margin_of(program: TimedProgram) -> float | None:

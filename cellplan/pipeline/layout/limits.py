@@ -19,6 +19,7 @@ from cellplan.search.programs.problem import Point, PointDerivatives, Problem
 BINDS: Final = 0.99  # [-] share of the largest load on the clock from which a joint counts as one that decides it
 NEAR_ANGLE: Final = np.radians(0.5)  # [rad] above the demand at which a margin binds
 TOUCHING: Final = 1e-9  # [m] bodies of which less is demanded may touch
+NEAR_SHARE: Final = 0.05  # [-] likewise of a singular value
 NEAR_LENGTH: Final = 0.004  # [m] likewise of a distance or a sliding joint
 
 
@@ -68,7 +69,7 @@ class Standing:
 
     def violations(self) -> list[LimitRecord]:
         """What it breaks, the worst first."""
-        found = [*self._margins(0.0, 0.0), *self._distances(0.0)]
+        found = [*self._margins(0.0, 0.0), *self._distances(0.0), *_singular(self, 0.0)]
         if self.demands.duration is not None:
             found += self._loads(self._whole)
         return [record for _, record in sorted(found, key=lambda each: -each[0])]
@@ -76,7 +77,12 @@ class Standing:
     def binding(self) -> list[LimitRecord]:
         """What holds it back: loads on the clock, margins, distances, bounds of variables."""
         loads = self._loads(BINDS * self._whole) if self._whole > 0.0 else iter(())
-        found = [*loads, *self._margins(NEAR_ANGLE, NEAR_LENGTH), *self._distances(NEAR_LENGTH)]
+        found = [
+            *loads,
+            *self._margins(NEAR_ANGLE, NEAR_LENGTH),
+            *self._distances(NEAR_LENGTH),
+            *_singular(self, NEAR_SHARE),
+        ]
         return [record for _, record in found] + list(self._bounds())
 
     @property
@@ -142,9 +148,25 @@ class Standing:
                     yield {"kind": "bound", "subject": name, "text": f"{name} at its {side} bound"}
 
 
+def _singular(standing: Standing, room: float) -> Iterator[tuple[float, LimitRecord]]:
+    """Arms nearer to singular configurations than demanded and a little more."""
+    arms, demanded = standing.measures.arms, standing.demands.singular
+    if arms is None or demanded is None:
+        return
+    lacks = standing.measures.singular.value.max(axis=0)
+    for place in np.flatnonzero(lacks > -room).tolist():
+        name, value = arms.names[place], (1.0 - float(lacks[place])) * float(demanded[place])
+        text = f"{name} at a smallest singular value of {value:.3g}, {demanded[place]:.3g} demanded"
+        yield 100.0 * float(lacks[place]), {"kind": "singular", "subject": name, "text": text}
+
+
 def reason(violation: LimitRecord) -> str:
     """Why a trial ended without a conforming layout, the same for all that end for it."""
-    kinds = {"position": "joint too near its limit", "distance": "bodies too near each other"}
+    kinds = {
+        "position": "joint too near its limit",
+        "distance": "bodies too near each other",
+        "singular": "arm too near a singular configuration",
+    }
     what = kinds.get(violation["kind"], f"{violation['kind']} above its limit")
     return f"{what}: {violation['subject']}"
 

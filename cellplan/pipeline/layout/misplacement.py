@@ -14,17 +14,15 @@ from cellplan.model.seeds import generator
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.fastest.scaling import whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
+from cellplan.pipeline.layout.cycles import DURATIONS, load_of, scaled, time_asked
 from cellplan.pipeline.layout.finish import (
-    DURATIONS,
     ITERATIONS,
     KEYS,
     NODES,
     Certified,
     Finish,
     clearance_of,
-    load_of,
     margin_of,
-    time_asked,
 )
 from cellplan.pipeline.layout.limits import standing_of
 from cellplan.pipeline.quick_clearance import QuickClearance
@@ -125,7 +123,7 @@ class MisplacedFinish(Finish):
         else:
             factor = whole_steps(cells[0], (1.0 + MORE_TIME) * cycle / self.ready.duration)
             for _ in range(DURATIONS):
-                found = [self._at(cell, factor) for cell in cells]
+                found = [scaled(cell, factor, self.progress) for cell in cells]
                 asked = max(max(load_of(program), time_asked(program)) for program in found)
                 if asked <= 1.0:
                     break

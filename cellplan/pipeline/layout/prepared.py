@@ -26,8 +26,10 @@ from cellplan.scene.scene import Scene
 from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Job
+from cellplan.search.kernel.singular_values import usual_values
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Objective, Timing
+from cellplan.search.programs.problem import Point
 from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.starts.generator import StartGenerator
 from cellplan.search.starts.problem import StartProblem
@@ -36,6 +38,9 @@ from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
 ALONG_SPLINE: Final = {Timing.LAWS: 4, Timing.RETIMED: 2}  # [-] times as many of a motion along a spline, no parabolas
+SINGULAR_SHARE: Final = 0.1  # [-] of usual singular values: a wrist a few degrees from straight
+NEARLY: Final = 0.99  # [-] of demanded singular values: kept
+SINGULAR_EVERYWHERE: Final = 1e-6  # usual singular value in [m] and [rad] below which it says nothing
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -222,8 +227,39 @@ class Prepared:
             "margin": self.variables.margin,
             "duration": None if objective is Objective.CYCLE else self.duration,
             "timing": self.request.timing,
+            "singular": _singular(self),
         }
         return Demands(**(values | changes))
+
+
+def kept_demands(ready: Prepared, point: Point, **changes: Any) -> Demands:
+    """What is demanded of a layout near one that was improved.
+
+    The usual share of the singular values is demanded only where the point keeps it, one that the cell states always.
+    """
+    demands, layout = ready.demands(**changes), ready.cell.layout
+    if demands.singular is None or (layout is not None and layout.singular is not None):
+        return demands
+    is_kept = bool(np.all(ready.coarse.arms(point).values >= NEARLY * demands.singular))
+    return demands if is_kept else replace(demands, singular=None)
+
+
+def _singular(ready: Prepared) -> Array | None:
+    """Least singular values that the arms are to keep, shape (A,); None where none are demanded."""
+    share = SINGULAR_SHARE if ready.request.objective is Objective.CYCLE else 0.0
+    if (layout := ready.cell.layout) is not None and layout.singular is not None:
+        share = layout.singular
+    if not share > 0.0:
+        return None
+    problem = ready.coarse
+    usual = _usual(problem.nodes.job if isinstance(problem, PathProblem) else problem.job)
+    return np.where(usual > SINGULAR_EVERYWHERE, share * usual, 0.0)
+
+
+@lru_cache(maxsize=8)
+def _usual(job: Job) -> Array:
+    """What is usual of the singular values of the arms."""
+    return usual_values(job)
 
 
 def values_of(ready: Prepared, x: Array, start: Array) -> dict[str, object]:

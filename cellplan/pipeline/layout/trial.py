@@ -14,11 +14,11 @@ from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell
 from cellplan.model.seeds import generator
 from cellplan.pipeline.layout.limits import reason, standing_of
-from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.prepared import Prepared, kept_demands, prepared
 from cellplan.pipeline.layout.proposals import SIZE, proposals_of
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.improve import Improved, improve
-from cellplan.search.programs.objective import Effort
+from cellplan.search.programs.objective import Demands, Effort
 from cellplan.search.programs.perturb import perturbed
 from cellplan.search.spline_path.perturb import perturbed_path
 from cellplan.search.spline_path.problem import PathProblem
@@ -80,11 +80,22 @@ def _evaluated(request: LayoutRequest, number: int, text: str) -> Outcome:
     limit = values.get("give_up_above_s")
     effort = EFFORT if ready.unled is None else PATH
     effort = effort if limit is None else replace(effort, give_up_above=float(str(limit)))
-    found = None if begin is None else improve(ready.coarse, begin.x, begin.start, demands, effort)
+    found = None if begin is None else _improved(ready, begin, demands, effort)
     if begin is None or found is None:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
     outcome = _outcome(ready, found, begin.unled)
     return replace(outcome, figures={**outcome.figures, "sampled": True}) if _is_far(ready, values) else outcome
+
+
+def _improved(ready: Prepared, begin: _Begin, demands: Demands, effort: Effort) -> Improved | None:
+    """The local optimum from a start: once more without the usual singular values where they cannot be kept."""
+    found = improve(ready.coarse, begin.x, begin.start, demands, effort)
+    if found is None or found.is_conforming:
+        return found
+    kept = kept_demands(ready, found.point, clearance=demands.clearance)
+    if kept.singular is not None or demands.singular is None:
+        return found
+    return improve(ready.coarse, found.x, found.start, kept, effort)
 
 
 def _begin(ready: Prepared, values: Mapping[str, object], number: int) -> _Begin | None:
@@ -226,7 +237,7 @@ def change_of(ready: Prepared, x: Array) -> float:
 
 def _outcome(ready: Prepared, found: Improved, unled: Begin | None) -> Outcome:
     """Figures of a local optimum."""
-    standing = standing_of(ready.coarse, found.point, ready.demands(), EFFORT)
+    standing = standing_of(ready.coarse, found.point, kept_demands(ready, found.point), EFFORT)
     figures: dict[str, Any] = {
         "x": found.x.tolist(),
         "start": found.start.tolist(),

@@ -11,7 +11,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check
 from cellplan.model.units import DEG, MM
-from cellplan.pipeline.layout.finish import SLOWED
+from cellplan.pipeline.layout.cycles import SLOWED
 from cellplan.pipeline.solution import Solution
 from cellplan.report.record.common import check_record, number
 

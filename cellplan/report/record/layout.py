@@ -11,7 +11,9 @@ SCHEMA: Final = "cellplan.layout/1"
 class LimitRecord(TypedDict):
     """A limit that a layout breaks or that holds it back."""
 
-    kind: Annotated[str, "`position`, `velocity`, `acceleration`, `distance`, `bound`, `start`, `path` or `check`"]
+    kind: Annotated[
+        str, "`position`, `velocity`, `acceleration`, `distance`, `singular`, `bound`, `start`, `path` or `check`"
+    ]
     subject: Annotated[str, "robot and joint, pair of bodies, or variable"]
     text: Annotated[str, "one line of text"]
 

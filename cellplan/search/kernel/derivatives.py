@@ -101,7 +101,7 @@ class _Rates:
         """Work out the Jacobian, its change and the weighted pseudo-inverse."""
         nq, weights = q.shape[1], layout.weights[0]
         screws = TaskScrews.of(job, layout, q, directions)
-        changes = JacobianChanges(job, screws, qd)
+        changes = JacobianChanges.of(job, screws, qd)
         J, self._idle = changes.jacobian, changes.idle
         self._J, self._weights, self._settling = J[0], weights, job.settling * job.constraints.may_move
         mobility = job.constraints.may_move / weights

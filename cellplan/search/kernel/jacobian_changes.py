@@ -16,30 +16,40 @@ class JacobianChanges:
         idle: 1 for components that a relation leaves open, whose rows are 0, shape (6 T,).
     """
 
-    def __init__(self, job: Job, screws: TaskScrews, qd: Array) -> None:
-        """Build the Jacobian.
+    def __init__(self, job: Job, screws: TaskScrews, own: Array, shared: Array, *, at_tips: bool = False) -> None:
+        """Note the screws and how fast their axes move.
 
         Args:
             job: The tasks at their nodes.
             screws: The screws at all nodes.
-            qd: Joint speeds at the nodes, shape (N, nq).
+            own: Rates of the own axes of each relation, shape (N, T, levels).
+            shared: Rates of the axes of the positioner, shape (N, levels).
+            at_tips: Whether all twists are taken at the tips.
         """
-        self._screws, self._nq, found = screws, qd.shape[1], job.constraints
+        self._screws, self._nq, found = screws, job.cell.joint_count, job.constraints
         self._has_own = (found.operator_signs > 0.0) | (found.carrier_signs > 0.0)
         self._is_carried = found.carrier_signs < 0.0
-        self._ways = [_Way.of(job, int(robot)) for robot in found.operators]
-        self._holder = None if found.carrier is None else _Way.of(job, found.carrier)
-        self._is_whole = found.is_whole
+        self._ways, self._holder = ways(job)
+        self._is_whole = found.is_whole and not at_tips
         self.idle = (1.0 - found.kept).ravel()
         if not self._is_whole:
-            self._rows = _rows(job, screws.tip)
-        own_rates = np.stack([way.axis_rates(qd) for way in self._ways], axis=1)
-        self._turning = screws.own * own_rates[..., None]
+            self._rows = constrained_rows(job, screws.tip)
+        self._turning = screws.own * own[..., None]
         self._twist = self._turning.sum(axis=2, keepdims=True)  # of each tool seen from the base, (N, T, 1, 6)
-        carried = np.zeros_like(screws.shared)
-        self._carried = carried if self._holder is None else screws.shared * self._holder.axis_rates(qd)[..., None]
+        self._carried = screws.shared * shared[..., None]
         self._minus = np.broadcast_to(-screws.shared[:, None], screws.own.shape)  # the part moves, not the tool
-        self.jacobian = self._columns(screws.own, self._minus, screws.based[:, :, :0])
+
+    @classmethod
+    def of(cls, job: Job, screws: TaskScrews, qd: Array) -> "JacobianChanges":
+        """Those at joint speeds at the nodes, shape (N, nq)."""
+        own, holder = ways(job)
+        shared = np.zeros(screws.shared.shape[:2]) if holder is None else holder.axis_rates(qd)
+        return cls(job, screws, np.stack([way.axis_rates(qd) for way in own], axis=1), shared)
+
+    @property
+    def jacobian(self) -> Array:
+        """See the class."""
+        return self._columns(self._screws.own, self._minus, self._screws.based[:, :, :0])
 
     def twists(self) -> Array:
         """Change of ``J qd`` per unit of each joint and direction, shape (N, 6 T, nq + p)."""
@@ -88,7 +98,7 @@ class JacobianChanges:
             found[:, way.columns, self._nq :] += way.to_joints.T @ shared[1]
         return found
 
-    def _put(self, found: Array, rows: "_Way", place: int, blocks: list[Array]) -> None:
+    def _put(self, found: Array, rows: "Way", place: int, blocks: list[Array]) -> None:
         """Add blocks by the own axes, the shared axes and the directions to the rows of a robot's joints."""
         own, shared, layout = (rows.to_joints.T @ block for block in blocks)
         if self._has_own[place]:
@@ -122,7 +132,7 @@ class JacobianChanges:
         return own, shared, layout
 
 
-class _Way:
+class Way:
     """The axes on the way to the flange of one robot: its joints among all, and the share of each axis in them."""
 
     def __init__(self, columns: slice, to_joints: Array) -> None:
@@ -130,7 +140,7 @@ class _Way:
         self.columns, self.to_joints = columns, to_joints
 
     @classmethod
-    def of(cls, job: Job, robot: int) -> "_Way":
+    def of(cls, job: Job, robot: int) -> "Way":
         """That of a robot, by its place in the cell."""
         placed = job.cell.robots[robot]
         shares = job.tasks.chains.to_joints[:, : len(placed.model.joints), robot]
@@ -141,7 +151,15 @@ class _Way:
         return qd[:, self.columns] @ self.to_joints.T
 
 
-def _rows(job: Job, tip: Array) -> Array:
+def ways(job: Job) -> tuple[list[Way], Way | None]:
+    """Those of the robot of each relation, and of the positioner."""
+    found = job.constraints
+    return [Way.of(job, int(robot)) for robot in found.operators], (
+        None if found.carrier is None else Way.of(job, found.carrier)
+    )
+
+
+def constrained_rows(job: Job, tip: Array) -> Array:
     """Matrices that take the constrained components from twists at the origin of R, shape (N, T, 6, 6)."""
     found = job.constraints
     rows = np.zeros((*tip.shape[:2], 6, 6))

@@ -77,16 +77,18 @@ class TaskScrews:
         p = np.where(on_part, p_WP[:, None], np.zeros(3))
         bases, tools = np.swapaxes(directions.base, 1, 2), np.swapaxes(directions.tool, 1, 2)
         R_FW = layout.X_FT[0, :, :3, :3] @ np.swapaxes(R_WT, -1, -2)
-        based = bases[own] @ _adjoint(R, p - layout.X_WB[0, own, :3, 3])
-        tooled = tools[own] @ _adjoint(R, p - tips[:, own], R_FW[:, own])
-        shared, held = np.zeros((*axes[:, 0].shape[:2], 6)), np.zeros_like(based[:, 0])
+        shared, held = np.zeros((*axes[:, 0].shape[:2], 6)), np.zeros((len(q), directions.count, 6))
+        based, tooled = np.zeros((2, len(q), len(own), directions.count, 6))
+        if directions.count:
+            based += bases[own] @ _adjoint(R, p - layout.X_WB[0, own, :3, 3])
+            tooled += tools[own] @ _adjoint(R, p - tips[:, own], R_FW[:, own])
         if (holder := found.carrier) is not None:
-            shared = _screws(axes[:, holder], points[:, holder], turning[holder], R_WP, p_WP)
-            held = tools[holder] @ _adjoint(R_WP, p_WP - tips[:, holder], R_FW[:, holder])
+            shared = unit_screws(axes[:, holder], points[:, holder], turning[holder], R_WP, p_WP)
+            held += tools[holder] @ _adjoint(R_WP, p_WP - tips[:, holder], R_FW[:, holder])
             moved = bases[holder] @ _adjoint(R_WP, p_WP - layout.X_WB[0, holder, :3, 3]) + held
             based[:, found.carrier_signs < 0.0] -= moved[:, None]
         return cls(
-            own=_screws(axes[:, own], points[:, own], turning[own], R, p),
+            own=unit_screws(axes[:, own], points[:, own], turning[own], R, p),
             shared=shared,
             tip=((tips[:, own] - p)[..., None, :] @ R)[..., 0, :],
             based=based,
@@ -141,7 +143,7 @@ def _part_poses(job: Job, R_WT: Array, tips: Array) -> tuple[Array, Array]:
     return R_WT[:, holder] @ X_CP[:3, :3], tips[:, holder] + R_WT[:, holder] @ X_CP[:3, 3]
 
 
-def _screws(axes: Array, points: Array, turning: Array, R: Array, p: Array) -> Array:
+def unit_screws(axes: Array, points: Array, turning: Array, R: Array, p: Array) -> Array:
     """Unit screws of axes, directions and points in W of shape (..., levels, 3), seen from frames R at p."""
     linear = np.where(turning, cross(axes, p[..., None, :] - points), axes)
     return np.concatenate([linear @ R, (turning * axes) @ R], axis=-1)

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, Kind, Measures
+from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, SINGULAR, Kind, Measures
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point, Problem
 from cellplan.search.programs.program import Program
@@ -22,11 +22,12 @@ class Binding:
 
     Attributes:
         kind: What it is about.
-        names: Robot and joint, or the two bodies.
+        names: Robot and joint, the two bodies, or the robot whose singular values they are.
         time: When, in [s] on the clock of the nodes.
         share: Of the objective's gradient; that of speeds and accelerations where the cycle is the objective, so that
             these add up to 1.
-        gain: What the objective gains per unit in SI by which the demand is lower; None where it is the objective.
+        gain: What the objective gains per unit in SI by which the demand is lower, of singular values per share of it;
+            None where it is the objective.
     """
 
     kind: Kind
@@ -66,7 +67,7 @@ def explain(problem: Problem, point: Point, demands: Demands, effort: Effort) ->
         at += len(rows.lacks)
         if rows.aim or isinstance(rows, PacedRows):
             gradient += (multipliers @ rows.gradients)[: len(gradient)]
-        binding += _bound(problem, rows, multipliers, unit)
+        binding += _bound(problem, measures, rows, multipliers, unit)
     if demands.objective is Objective.CHANGE:
         gradient = np.sign(point.x - problem.given) * problem.cost * problem.scale
     return Explanation(
@@ -87,24 +88,35 @@ def _unit(measures: Measures, demands: Demands) -> float:
             return 1.0
 
 
-def _bound(problem: Problem, rows: Rows, multipliers: Array, unit: float) -> list[Binding]:
+def _bound(problem: Problem, measures: Measures, rows: Rows, multipliers: Array, unit: float) -> list[Binding]:
     """The rows of one kind that bind."""
-    units = {Kind.DISTANCE: LENGTH, Kind.LOWER_LIMIT: ANGLE, Kind.UPPER_LIMIT: ANGLE}
-    found = []
+    units = {
+        Kind.DISTANCE: LENGTH,
+        Kind.LOWER_LIMIT: ANGLE,
+        Kind.UPPER_LIMIT: ANGLE,
+        Kind.SINGULAR: SINGULAR,
+    }
+    found = list[Binding]()
     if rows.kind is Kind.DURATION:
         return []
     for row in np.flatnonzero(multipliers > COUNTS).tolist():
         subject, size = int(rows.subjects[row]), units.get(rows.kind, SHARE)
         if size == ANGLE and not problem.limits.is_revolute[subject]:
             size = LENGTH
-        is_pair = rows.kind is Kind.DISTANCE
         found.append(
             Binding(
                 kind=rows.kind,
-                names=problem.pair_names(subject) if is_pair else problem.joint_names(subject),
+                names=_names(problem, rows.kind, subject, measures),
                 time=float(problem.times[rows.nodes[row]]),
                 share=float(multipliers[row]),
                 gain=None if rows.aim or isinstance(rows, PacedRows) else float(multipliers[row]) * unit / size,
             )
         )
     return found
+
+
+def _names(problem: Problem, kind: Kind, subject: int, measures: Measures) -> tuple[str, str]:
+    """What a row is about."""
+    if kind is Kind.SINGULAR and measures.arms is not None:
+        return measures.arms.names[subject], "singular values"
+    return problem.pair_names(subject) if kind is Kind.DISTANCE else problem.joint_names(subject)

@@ -14,6 +14,7 @@ from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.job import Job
 from cellplan.search.kernel.run import run, run_near
+from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
 from cellplan.search.programs.near_pairs import NearPairs, distances_at
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
@@ -91,6 +92,11 @@ class LayoutProblem:
         """See ``Problem``."""
         pairs = NearPairs.of(found)
         return self.bodies.derivatives(pairs.near, point.x, by_joints.q[pairs.nodes])
+
+    def arms(self, point: Point) -> SingularValues:
+        """See ``Problem``."""
+        layout = self.variables.layouts(point.x[None], point.start[None])
+        return SingularValues.of(self.job, layout, point.q, lambda: self.variables.directions(point.x))
 
     def pair_names(self, pair: int) -> tuple[str, str]:
         """See ``Problem``."""

@@ -10,12 +10,14 @@ from cellplan.geometry.arrays import Array, Indices
 from cellplan.search.kernel.figures import Crests
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
 from cellplan.search.programs.pace import Pace
-from cellplan.search.programs.problem import Distances, Point, Problem
+from cellplan.search.programs.problem import ArmValues, Distances, Point, Problem
 
 ANGLE: Final = 0.01  # [rad] of a lack that weighs as much as
 LENGTH: Final = 0.003  # [m] and as
 SHARE: Final = 0.01  # [-] of the duration
+SINGULAR: Final = 0.1  # [-] of a singular value that is demanded
 IN_ROOM: Final = 0.02  # [-] of the price of a lack where only the room is missed that counts as kept
+FARTHEST: Final = 1e3  # [-] beyond a singular value that is not demanded
 ROUNDING: Final = 1e-6  # [-] usual units: 3 nm
 
 
@@ -28,6 +30,7 @@ class Kind(StrEnum):
     ACCELERATION = "acceleration"
     DISTANCE = "distance"
     DURATION = "duration"
+    SINGULAR = "singular"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,6 +50,8 @@ class Measures:
         within: Distance in [m] beyond what is demanded, from which on pairs are not near.
         factor: How many times as long as the nodes the motion must last for all speeds and accelerations.
         cycle: Shortest cycle in [s].
+        arms: Least singular values of the arms; None where none are demanded.
+        singular: Shares of what is demanded of them that they miss, negative where they keep it, shape (N, A).
         pace: The motion as fast as the limits allow everywhere; None where it is timed by the laws of the cell.
     """
 
@@ -60,6 +65,8 @@ class Measures:
     within: float
     factor: float
     cycle: float
+    arms: ArmValues | None
+    singular: Crests
     pace: Pace | None = None
 
     @classmethod
@@ -77,6 +84,7 @@ class Measures:
         added = np.where(distances.is_own, 0.0, demands.clearance)
         if allowance is not None:
             added = added + allowance.distance[distances.pairs]
+        arms = None if demands.singular is None else problem.arms(point)
         return cls(
             point=point,
             lower=_crests(problem, limits.lower + margin - point.q),
@@ -88,6 +96,8 @@ class Measures:
             within=effort.within,
             factor=factor,
             cycle=factor * float(times[-1] - times[0]),
+            arms=arms,
+            singular=Crests.of(times, _missing(arms, demands, len(times))),
             pace=pace,
         )
 
@@ -103,6 +113,8 @@ class Measures:
         most[self.distances.pairs] = 0.5 * asked / LENGTH
         lacks.append(worst)
         allowed.append(most)
+        lacks.append((self.singular.value.max(axis=0) + room.singular) / SINGULAR)
+        allowed.append(np.full(len(lacks[-1]), 0.5 * room.singular / SINGULAR))
         if demands.duration is not None and demands.objective is not Objective.CYCLE:
             whole = demands.duration / self.span / (1.0 + room.time)
             loads = np.array([self.factor])
@@ -114,18 +126,20 @@ class Measures:
 
     def values(self, kind: Kind, subjects: Indices, nodes: Indices) -> Array:
         """What rows of a kind are about: lacks of margins and distances, shares of speeds; NaN where not measured."""
+        of_nodes = {
+            Kind.LOWER_LIMIT: self.lower,
+            Kind.UPPER_LIMIT: self.upper,
+            Kind.SPEED: self.speeds,
+            Kind.SINGULAR: self.singular,
+        }
+        if (crests := of_nodes.get(kind)) is not None:
+            return crests.value[nodes, subjects]
         match kind:
-            case Kind.LOWER_LIMIT:
-                return self.lower.value[nodes, subjects]
-            case Kind.UPPER_LIMIT:
-                return self.upper.value[nodes, subjects]
-            case Kind.SPEED:
-                return self.speeds.value[nodes, subjects]
             case Kind.ACCELERATION:
                 return np.sqrt(self.accelerations.value[nodes, subjects])
             case Kind.DURATION:
                 return np.full(len(nodes), self.factor)
-            case Kind.DISTANCE:
+            case _:
                 found = self.distances
                 places = zip(found.pairs.tolist(), found.nodes.tolist(), strict=True)
                 known = dict(zip(places, self.lacks.tolist(), strict=True))
@@ -192,6 +206,14 @@ def _loads(problem: Problem, point: Point, demands: Demands) -> tuple[Crests, Cr
     if (allowance := demands.allowance) is not None:
         speeds, accelerations = _raised(speeds, allowance.speed), _raised(accelerations, allowance.acceleration)
     return speeds, accelerations, max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
+
+
+def _missing(arms: ArmValues | None, demands: Demands, nodes: int) -> Array:
+    """Shares of the singular values that are demanded, which are missed, shape (N, A)."""
+    if arms is None or demands.singular is None:
+        return np.zeros((nodes, 0))
+    asked = demands.singular > 0.0
+    return np.where(asked, 1.0 - arms.values / np.where(asked, demands.singular, 1.0), -FARTHEST)
 
 
 def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[Crests, Crests, float]:

@@ -53,6 +53,7 @@ class Demands:
         timing: How the motion is timed.
         clearance: Added to what the cell demands of every pair but those of one robot's own bodies, in [m].
         allowance: What is demanded beyond all that at each node and of each pair; None for nothing.
+        singular: Least singular values of the arms in [m] and [rad], shape (A,), see ``Problem``; None for any.
     """
 
     objective: Objective
@@ -61,6 +62,7 @@ class Demands:
     timing: Timing = Timing.LAWS
     clearance: float = 0.0
     allowance: Allowance | None = None
+    singular: Array | None = None
 
     def __post_init__(self) -> None:
         """Check at the door what the objective needs."""
@@ -81,12 +83,14 @@ class Room:
         distance: In [m].
         own: Likewise of a robot's own bodies: little, as their distances are often its design.
         time: Share of the duration.
+        singular: Share of the singular values that are demanded.
     """
 
     margin: float = float(np.radians(0.15))
     distance: float = 0.0025
     own: float = 0.0001
     time: float = 0.002
+    singular: float = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

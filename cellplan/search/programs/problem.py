@@ -67,6 +67,26 @@ class Distances:
     found: object
 
 
+class ArmValues(Protocol):
+    """Least singular values of A arms along a motion.
+
+    Attributes:
+        names: Names of the robots.
+        values: The values at the nodes in mixed units of [m] and [rad], shape (N, A).
+    """
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """See the class."""
+
+    @property
+    def values(self) -> Array:
+        """See the class."""
+
+    def derivatives(self, nodes: Indices, subjects: Indices, by: Array) -> Array:
+        """Derivatives of some of them by the variables, from those of the joints, shape (N, nq, n), to (M, n)."""
+
+
 class Problem(Varied, Protocol):
     """What sequential programs improve.
 
@@ -111,6 +131,9 @@ class Problem(Varied, Protocol):
 
     def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:
         """Derivatives of distances by the variables, shape (M, n)."""
+
+    def arms(self, point: Point) -> ArmValues:
+        """Least singular values of the Jacobians of the arms."""
 
     def pair_names(self, pair: int) -> tuple[str, str]:
         """Names of the bodies of a pair."""

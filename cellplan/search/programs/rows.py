@@ -8,11 +8,12 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.search.kernel.figures import Crests
-from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, Kind, Measures, rooms
+from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, SINGULAR, Kind, Measures, rooms
 from cellplan.search.programs.objective import Demands, Objective, Room
 from cellplan.search.programs.pace import Pace
 from cellplan.search.programs.problem import PointDerivatives, Problem
 
+NEAR_SINGULAR: Final = 1.0  # [-] times what is demanded: singular values that are larger by that are no rows
 LEAST_LOAD: Final = 0.5  # [-] shares of limits of a retimed motion from which on they become rows
 
 
@@ -125,7 +126,7 @@ class Linear:
             box: Largest steps of the variables, then of the squares of a retimed motion, relative, (n + m,).
         """
         count = len(self.problem.scale)
-        parts = [*self._margins(room, box[:count]), self._apart(room)]
+        parts = [*self._margins(room, box[:count]), self._apart(room), *self._regular(demands, room)]
         if demands.objective is Objective.CLEARANCE:
             parts.append(self._aimed_apart())
         pace, duration = self.measures.pace, self._duration(demands, room)
@@ -244,6 +245,27 @@ class Linear:
             gradients=-self.distances * self.problem.scale / LENGTH,
             allowed=0.5 * rooms(distances, room) / LENGTH,
             units=np.full(len(distances.pairs), LENGTH),
+        )
+
+    def _regular(self, demands: Demands, room: Room) -> Iterator[Rows]:
+        """Least singular values of the arms."""
+        arms, crests = self.measures.arms, self.measures.singular
+        nodes, subjects = (part.astype(np.intp) for part in np.nonzero(crests.value > -NEAR_SINGULAR))
+        if arms is None or demands.singular is None or not len(nodes):
+            return
+        shares = crests.shares[nodes, subjects]
+        rows, sides = np.nonzero(shares)
+        by = arms.derivatives(nodes[rows] + sides - 1, subjects[rows], self.derivatives.q)
+        gradients = np.zeros((len(nodes), by.shape[1]))
+        np.add.at(gradients, rows, shares[rows, sides, None] * by)
+        yield Rows(
+            kind=Kind.SINGULAR,
+            subjects=subjects,
+            nodes=nodes,
+            lacks=(crests.value[nodes, subjects] + room.singular) / SINGULAR,
+            gradients=-gradients * self.problem.scale / (demands.singular[subjects, None] * SINGULAR),
+            allowed=np.full(len(nodes), 0.5 * room.singular / SINGULAR),
+            units=np.full(len(nodes), SINGULAR),
         )
 
     def _aimed_apart(self) -> Rows:

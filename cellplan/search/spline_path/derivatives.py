@@ -34,7 +34,7 @@ def path_derivatives(
     """
     job, c = nodes.job, nodes.columns
     screws = TaskScrews.of(job, layout, q, directions)
-    changes = JacobianChanges(job, screws, qd)
+    changes = JacobianChanges.of(job, screws, qd)
     J, nq = changes.jacobian.reshape(len(q), -1, q.shape[1]), q.shape[1]
     blocks = J.reshape(len(q), -1, 6, nq)
     own = [blocks[:, task][..., columns] for task, columns in enumerate(nodes.operators)]

@@ -10,6 +10,7 @@ from cellplan.model.cell import joint_at
 from cellplan.model.joint_limits import JointLimits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Layouts
+from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
 from cellplan.search.programs.near_pairs import NearPairs, distances_at
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
@@ -50,24 +51,18 @@ class PathProblem:
     cost: Array = field(init=False)
     given: Array = field(init=False)
     is_dense: bool = field(init=False, default=True)  # its nodes are cheap; wrists near a singularity make peaks narrow
+    times: Array = field(init=False)
+    limits: JointLimits = field(init=False)
 
     def __post_init__(self) -> None:
         """Put the variables one after the other."""
+        object.__setattr__(self, "times", self.nodes.job.times)
+        object.__setattr__(self, "limits", self.nodes.job.limits)
         path, layout = self.path, self.layout
         object.__setattr__(self, "names", (*path.names, *layout.names))
         object.__setattr__(self, "given", np.concatenate([path.given.coefficients.ravel(), layout.given]))
         for name in ("lower", "upper", "scale", "cost"):
             object.__setattr__(self, name, np.concatenate([getattr(path, name), getattr(layout, name)]))
-
-    @property
-    def times(self) -> Array:
-        """See ``Problem``."""
-        return self.nodes.job.times
-
-    @property
-    def limits(self) -> JointLimits:
-        """See ``Problem``."""
-        return self.nodes.job.limits
 
     def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:
         """See ``Problem``."""
@@ -107,6 +102,13 @@ class PathProblem:
         if not len(others):
             return by_path
         return np.concatenate([by_path, self.bodies.derivatives(near, others, dq[..., own:])], axis=1)
+
+    def arms(self, point: Point) -> SingularValues:
+        """See ``Problem``."""
+        _, others = self._split(point.x)
+        return SingularValues.of(
+            self.nodes.job, self._layout_at(point), point.q, lambda: self.layout.directions(others)
+        )
 
     def pair_names(self, pair: int) -> tuple[str, str]:
         """See ``Problem``."""

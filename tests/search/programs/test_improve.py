@@ -47,6 +47,15 @@ def test_bodies_bind() -> None:
     np.testing.assert_allclose(more.x, [1.5, 2.66], atol=1e-5)
 
 
+def test_singular_values_bind() -> None:
+    least = Demands(objective=Objective.CHANGE, margin=NONE, duration=5.0, singular=np.array([2.45]))
+    effort = replace(EXACT, room=replace(EXACT.room, singular=0.0))
+    found = improved(TOY, least, effort)
+    assert found.is_conforming
+    np.testing.assert_allclose(found.x, [1.75, 4.9], atol=1e-6)
+    assert improved(TOY, replace(least, singular=np.zeros(1)), effort).x[1] == TOY.given[1]
+
+
 def test_accelerations_bind() -> None:
     slow = replace(TOY, acceleration=np.array([np.pi / 4.0, np.inf]))
     found = improved(slow, Demands(objective=Objective.CYCLE, margin=NONE))

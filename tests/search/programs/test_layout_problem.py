@@ -43,7 +43,7 @@ def initial() -> SimpleNamespace:
 
 def test_rows_are_the_derivatives_of_what_is_measured(initial: SimpleNamespace) -> None:
     problem, point, effort = initial.problem, initial.point, Effort()
-    demands = Demands(objective=Objective.CYCLE, margin=np.full(24, 0.2))
+    demands = Demands(objective=Objective.CYCLE, margin=np.full(24, 0.2), singular=np.full(3, 0.2))
     here = Measures.of(problem, point, demands, effort)
     count = len(problem.names)
     rows = Linear.of(problem, here).rows(demands, effort.room, np.full(count, 0.5))

@@ -111,6 +111,17 @@ def test_derivatives_are_those_of_central_differences(problem: PathProblem, poin
             assert error < 1e-6 * np.linalg.norm(expected), name
 
 
+def test_singular_values_change_as_their_derivatives_say(problem: PathProblem, point: Point) -> None:
+    found, step = problem.arms(point), 1e-5
+    nodes, arms = (part.ravel().astype(np.intp) for part in np.mgrid[0 : len(problem.times) : 20, 0:2])
+    gradients = found.derivatives(nodes, arms, problem.derivatives(point).q)
+    along = np.random.default_rng(5).normal(size=len(problem.names)) * problem.scale
+
+    ends = [problem.evaluate(point.x + side * step * along, point.start, point) for side in (1.0, -1.0)]
+    values = [problem.arms(each).values[nodes, arms] for each in ends if each is not None]
+    np.testing.assert_allclose(gradients @ along, (values[0] - values[1]) / (2.0 * step), rtol=1e-4, atol=1e-6)
+
+
 def test_distances_change_as_their_derivatives_say(problem: PathProblem, point: Point) -> None:
     keys, step = np.arange(0, len(problem.times), 20), 1e-5
     near = problem.distances(point, keys, 0.03)

@@ -1,0 +1,95 @@
+"""The cycle of a layout's motion: as the nodes have it, then as short as the limits of the verified motion allow."""
+
+from typing import Final
+
+from cellplan.model.cell import Cell
+from cellplan.model.progress import Progress
+from cellplan.pipeline.fastest.scaling import scaled_values, whole_steps
+from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
+from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.quick_clearance import QuickClearance
+from cellplan.search.programs.objective import Objective, Timing
+
+DURATIONS: Final = 4  # [-] durations tried until the limits hold
+UNUSED: Final = 0.002  # [-] share of its time that a motion may leave unused
+SLOWED: Final = {
+    "position_error_between_rows": 0.5,
+    "orientation_error_between_rows": 0.5,
+    "closure_position_error_between_rows": 0.5,
+    "closure_orientation_error_between_rows": 0.5,
+    "joint_jerk": 1.0 / 3.0,
+    "part_acceleration": 0.5,
+    "tool_speed": 1.0,
+}  # checks that pass when the motion is slow enough: how the time that they ask for grows with their value
+
+
+def is_scaled(ready: Prepared) -> bool:
+    """Whether the motion is made as fast as the limits allow as a whole."""
+    return ready.request.objective is Objective.CYCLE and ready.request.timing is Timing.LAWS
+
+
+def draft(
+    ready: Prepared, cell: Cell, cycle: float, progress: Progress, quick: QuickClearance | None = None
+) -> TimedProgram:
+    """The program of a layout in a cycle, or at the duration of the cell, or retimed; verified but for its clearance.
+
+    Args:
+        ready: The search.
+        cell: The cell of the layout.
+        cycle: Its cycle in [s], if that may change.
+        progress: Called with the stage and the fraction done.
+        quick: Begins with its clearance at once, unless its duration may still change.
+    """
+    is_cycle = ready.request.objective is Objective.CYCLE
+    if ready.request.timing is Timing.RETIMED:
+        timing: object = "fastest" if is_cycle else {"cycle_s": ready.duration}
+        law = Law.COMMON_SPEED if is_cycle else Law.REDUCED_SPEED
+        values = {"motion.timing": timing}
+        return TimedProgram.solved(cell, law, values, task=None, progress=progress, quick=quick)
+    if not is_cycle:
+        return TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=progress, quick=quick)
+    return scaled(cell, whole_steps(cell, cycle / ready.duration), progress)
+
+
+def shortest(ready: Prepared, cell: Cell, program: TimedProgram, progress: Progress) -> TimedProgram:
+    """The program in the shortest cycle that its limits allow, from that in another cycle; see ``draft``."""
+    factor = whole_steps(cell, program.cycle / ready.duration)
+    for _ in range(DURATIONS):
+        load = load_of(program)
+        if 1.0 - UNUSED < load <= 1.0:
+            break
+        following = whole_steps(cell, factor * load, longer_than=factor if load > 1.0 else 0.0)
+        if following == factor:
+            break
+        factor = following
+        program = scaled(cell, factor, progress)
+    for _ in range(DURATIONS):
+        asked = max(load_of(program), time_asked(program))
+        if asked <= 1.0:
+            break
+        factor = whole_steps(cell, factor * asked, longer_than=factor)
+        program = scaled(cell, factor, progress)
+    return program
+
+
+def scaled(cell: Cell, factor: float, progress: Progress) -> TimedProgram:
+    """The program slower or faster by a factor, verified but for its clearance."""
+    return TimedProgram.solved(cell, Law.TIME_LAWS, scaled_values(cell, factor), task=None, progress=progress)
+
+
+def load_of(program: TimedProgram) -> float:
+    """Share of its time in which the limits of speed and acceleration of the joints would allow the same motion."""
+    figures = program.figures
+    return max(figures["max_velocity_ratio"] or 0.0, (figures["max_acceleration_ratio"] or 0.0) ** 0.5)
+
+
+def time_of(program: TimedProgram) -> float:
+    """Cycle in [s] in which the limits of speed and acceleration of the joints allow the motion."""
+    return program.cycle * load_of(program)
+
+
+def time_asked(program: TimedProgram) -> float:
+    """How many times as long the motion must last for what is no limit of a joint but gets less when it is slower."""
+    checks = [check for run in program.solution.runs for check in run.report.checks if not check.passed]
+    asked = [(check.value / check.limit) ** SLOWED[check.name] for check in checks if check.name in SLOWED]
+    return max(asked, default=1.0)
