@@ -33,7 +33,6 @@ from cellplan.search.programs.problem import Point
 from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.starts.generator import StartGenerator
 from cellplan.search.starts.problem import StartProblem
-from cellplan.search.variables.choices import Choices
 from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
@@ -176,11 +175,6 @@ class Prepared:
             raise found
         return found
 
-    @property
-    def leads_nowhere(self) -> bool:
-        """Whether no motion begins at the given layout."""
-        return isinstance(self._given, NoSolutionError)
-
     @cached_property
     def _given(self) -> tuple[Array, Array] | NoSolutionError:
         """See ``given``; or why there is none."""
@@ -195,29 +189,10 @@ class Prepared:
         except NoSolutionError as error:
             return error
 
-    def branches(self) -> list[dict[str, list[float]]]:
-        """Other start postures of the given layout from which all tools follow their paths, with their variables.
-
-        Those of the robots whose branch may change; none where the given layout has no start.
-        """
-        robots = frozenset(Choices.of(self.variables.base).branches)
-        if not robots:
-            return []
-        try:
-            x, start = self.starts.branches(robots, self.given_start)
-        except NoSolutionError:
-            return []
-        return [{"x": each.tolist(), "start": own.tolist()} for each, own in zip(x, start, strict=True)]
-
     @property
     def duration(self) -> float:
         """Duration of the job in [s], as the cell has it."""
         return float(self.schedule.times[-1])
-
-    @property
-    def has_accelerations(self) -> bool:
-        """Whether any joint is judged by its acceleration."""
-        return bool(np.isfinite(acceleration_limits(self.scene)).any())
 
     def demands(self, **changes: Any) -> Demands:
         """What is demanded of a layout."""

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from cellplan.errors import NoSolutionError
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.objective import Objective
@@ -141,7 +142,22 @@ def proposals_of(request: LayoutRequest, ready: Prepared) -> "Proposals":
         ready: The cell.
     """
     choices = tuple(Choices.of(ready.cell).values())
-    return Proposals(request=request, choices=choices, branches=(ready.unled or ready).branches())
+    return Proposals(request=request, choices=choices, branches=_branches(ready.unled or ready))
+
+
+def _branches(ready: Prepared) -> list[dict[str, list[float]]]:
+    """Other start postures of the given layout from which all tools follow their paths, with their variables.
+
+    Those of the robots whose branch may change; none where the given layout has no start.
+    """
+    robots = frozenset(Choices.of(ready.variables.base).branches)
+    if not robots:
+        return []
+    try:
+        x, start = ready.starts.branches(robots, ready.given_start)
+    except NoSolutionError:
+        return []
+    return [{"x": each.tolist(), "start": own.tolist()} for each, own in zip(x, start, strict=True)]
 
 
 def _leads_nowhere(trial: Trial) -> bool:

@@ -3,23 +3,21 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
-from cellplan.errors import NoSolutionError
-from cellplan.geometry.arrays import Array
 from cellplan.io.cell.changes import plain_values
-from cellplan.kinematics.reach import arm_reach
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.drawing import drawing, footprint, swept_area
 from cellplan.pipeline.fastest.timed_program import Law
 from cellplan.pipeline.layout.finish import Certified, certified_cell
-from cellplan.pipeline.layout.limits import Standing, effects, standing_of
+from cellplan.pipeline.layout.given_layout import Given, standing_of_given
 from cellplan.pipeline.layout.prepared import Prepared, prepared, values_of
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, choice_text, origin_text
 from cellplan.pipeline.layout.request import LayoutRequest
-from cellplan.pipeline.layout.trial import EFFORT, change_of
+from cellplan.pipeline.layout.trial import change_of
+from cellplan.pipeline.layout.variable_records import path_record, variable_records
 from cellplan.pipeline.write_run import versions
 from cellplan.report.record.common import number
 from cellplan.report.record.layout import (
@@ -27,13 +25,11 @@ from cellplan.report.record.layout import (
     CandidateRecord,
     ChoiceRecord,
     DroppedRecord,
-    GivenRecord,
     LayoutRecord,
-    PathRecord,
     ProgressRecord,
-    VariableRecord,
 )
 from cellplan.report.text.layout import verdict_line
+from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.variables.choices import Choices
 from cellplan.study.study import Finished
 from cellplan.study.trial import TrialStatus
@@ -41,35 +37,8 @@ from cellplan.study.trial import TrialStatus
 TOP: Final = 10  # [-] layouts that are listed
 SAME: Final = 1e-4  # [-] share by which figures of two layouts differ that are not one
 SLOWED: Final = 1.02  # [-] times the cycle that the joints allow, from which on it is said what else counts
-REACH: Final = 5  # [-] rounds that the reach of an arm is sought in: to some millimetres
 SWEPT: Final = 33  # [-] configurations that the swept area is made of
 FINE: Final = 6  # decimals of figures of the search: far above rounding
-LENGTH_STEP: Final = 0.1  # [m] that effects are stated for
-ANGLE_STEP: Final = float(np.radians(10.0))  # [rad] likewise
-
-
-class Given(NamedTuple):
-    """What is shown of the given layout.
-
-    Attributes:
-        record: Its record.
-        drawing: Its floor plan.
-        reach: Reach of each arm, without its tool, in [m].
-    """
-
-    record: GivenRecord
-    drawing: dict[str, Any]
-    reach: dict[str, float]
-
-
-def given_layout(request: LayoutRequest) -> Given:
-    """What is shown of the given layout of a search, whatever comes of the search."""
-    ready = prepared(request)
-    return Given(
-        record=_given(_given_standing(ready), ready),
-        drawing=drawing(ready.scene, _shown_start(ready), ready.schedule),
-        reach={robot.name: float(arm_reach(robot.model, rounds=REACH)) for robot in ready.cell.robots},
-    )
 
 
 def layout_record(
@@ -93,9 +62,10 @@ def layout_record(
     """
     request, cell = ready.request, ready.cell
     listed = list(_candidates(ready, finished, tried))
-    standing = best.standing if best else None if ready.unled else _given_standing(ready)
+    standing = best.standing if best else None if ready.unled else standing_of_given(ready)
     of_best = ready if best is None else _prepared_of(ready, next(_of_number(finished, best.trial)))
     is_free = request.objective == "cycle"
+    has_accelerations = bool(np.isfinite(acceleration_limits(ready.scene)).any())
     return {
         "schema": SCHEMA,
         "kind": "layout",
@@ -107,18 +77,18 @@ def layout_record(
         "duration_s": None if is_free else number(ready.duration),
         "required_clearance_mm": number(MM * cell.checks.clearance),
         "required_margin_deg": number(DEG * float(ready.variables.settings.margin)),
-        "has_accelerations": ready.has_accelerations,
+        "has_accelerations": has_accelerations,
         "seed": request.seed,
         "trials": len(finished.trials),
         "rounds": -(-len(finished.trials) // SIZE),
         "solves": solves,
         "given": given.record,
         "best": next((each for each in listed if best and each["trial"] == best.trial), None),
-        "velocity_only_s": _velocity_only(best) if best and ready.has_accelerations else None,
+        "velocity_only_s": _velocity_only(best) if best and has_accelerations else None,
         "top": listed[:TOP],
         "front": _front(listed),
         "binding": best.standing.binding() if best else [],
-        "variables": _variables(of_best, standing, best),
+        "variables": variable_records(of_best, standing, best),
         "path": path_record(of_best, best.x) if best and ready.unled else None,
         "convergence": _convergence(finished),
         "choices": _choices(ready, finished, tried),
@@ -225,97 +195,6 @@ def _front(listed: list[CandidateRecord]) -> list[CandidateRecord]:
     return found
 
 
-def _given_standing(ready: Prepared) -> Standing | None:
-    """How the given layout stands; None where a tool cannot follow."""
-    if ready.unled is not None and not ready.path_search.is_given:
-        return _given_standing(ready.unled)
-    try:
-        point = ready.coarse.evaluate(ready.coarse.given, ready.given_start)
-    except NoSolutionError:
-        return None
-    return None if point is None else standing_of(ready.coarse, point, ready.demands(), EFFORT)
-
-
-def _given(standing: Standing | None, ready: Prepared) -> GivenRecord:
-    """The given layout."""
-    if standing is None:
-        return {"status": "violating", "cycle_s": None, "margin_deg": None, "clearance_mm": None, "violations": []}
-    at_duration = standing_of(
-        standing.problem,
-        standing.measures.point,
-        ready.demands(objective="conforming", duration=ready.duration),
-        EFFORT,
-    )
-    violations = at_duration.violations()
-    return {
-        "status": "violating" if violations else "conforming",
-        "cycle_s": number(round(standing.measures.cycle, FINE)),
-        "margin_deg": None if standing.margin is None else number(round(standing.margin, FINE)),
-        "clearance_mm": None if standing.clearance is None else number(round(standing.clearance, FINE)),
-        "violations": violations,
-    }
-
-
-def _variables(ready: Prepared, standing: Standing | None, best: Certified | None) -> list[VariableRecord]:
-    """The variables in the units of the file, with their effects."""
-    variables, names = ready.variables, ready.variables.names
-    before = len(ready.coarse.names) - len(names)  # coefficients of a joint path have no rows
-    units = [_unit(name) for name in names]
-    steps = np.array([{"mm": LENGTH_STEP, "deg": ANGLE_STEP, "": float(np.log(2.0))}[unit] for unit in units])
-    of = effects(standing, np.append(np.zeros(before), steps)) if standing is not None else {}
-    shown: list[VariableRecord] = []
-    for place, (name, unit) in enumerate(zip(names, units, strict=True)):
-        values = (variables.lower, variables.upper, variables.given)
-        lower, upper, given = (_in_file_units(float(value[place]), unit) for value in values)
-        shown.append(
-            {
-                "name": name,
-                "unit": unit,
-                "lower": lower,
-                "upper": upper,
-                "given": given,
-                "best": None if best is None else _in_file_units(float(best.x[before + place]), unit),
-                "step": {"mm": MM * LENGTH_STEP, "deg": DEG * ANGLE_STEP, "": 2.0}[unit],
-                "cycle_s": of["cycle_s"][before + place] if of else None,
-                "margin_deg": of["margin_deg"][before + place] if of else None,
-                "clearance_mm": of["clearance_mm"][before + place] if of else None,
-            }
-        )
-    return shown
-
-
-def path_record(ready: Prepared, x: Array) -> PathRecord:
-    """The joint path at variables of shape (n,), beside the given motion."""
-    search = ready.path_search
-    model, departures = ready.variables.base.robot(search.asked.robot).model, search.departures(x)
-    turning = np.array([joint.is_revolute for joint in model.joints])
-    in_deg, in_mm = (departures[kept].max(initial=-1.0) for kept in (turning, ~turning))
-    return {
-        "robot": search.asked.robot,
-        "coefficients": search.asked.coefficients,
-        "degree": search.asked.degree,
-        "is_given": search.is_given,
-        "departure_deg": number(round(DEG * in_deg, FINE)) if in_deg >= 0.0 else None,
-        "departure_mm": number(round(MM * in_mm, FINE)) if in_mm >= 0.0 else None,
-    }
-
-
-def _unit(name: str) -> str:
-    """Unit of a variable; empty for a weight."""
-    if ".weights" in name:
-        return ""
-    return "mm" if "_mm" in name else "deg"
-
-
-def _in_file_units(value: float, unit: str) -> float | None:
-    """A value in the unit of the file; None where it is infinite."""
-    if not np.isfinite(value):
-        return None
-    return number(
-        round({"mm": MM * value, "deg": DEG * value, "": float(np.exp(value)) if not unit else 0.0}[unit], FINE)
-    )
-
-
 def _convergence(finished: Finished) -> list[ProgressRecord]:
     """The cycle of every trial and the best so far, in the order of the trials."""
     best: float | None = None
@@ -406,11 +285,3 @@ def _drawing(ready: Prepared, given: Given, best: Certified) -> dict[str, Any]:
         },
         "keep_out": {area.name: footprint(area.shape, area.X_WS) for area in ready.variables.settings.keep_out},
     }
-
-
-def _shown_start(ready: Prepared) -> Array:
-    """The configuration in which the given layout is drawn: its start, or all joints at zero without one."""
-    try:
-        return ready.given_start
-    except NoSolutionError:
-        return np.zeros(ready.cell.joint_count)

@@ -10,9 +10,10 @@ from typing import Any, Final
 
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
+from cellplan.pipeline.layout.given_layout import Given, given_layout
 from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals, proposals_of
-from cellplan.pipeline.layout.record import Given, given_layout, head_of, layout_record
+from cellplan.pipeline.layout.record import head_of, layout_record
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.result_file import file_records, result_files
 from cellplan.pipeline.layout.searched import read_attempts

@@ -207,7 +207,11 @@ def _is_far(ready: Prepared, values: Mapping[str, object]) -> bool:
     is_near = values["kind"] == "given" or (values["kind"] == "perturbed" and values["of"] is None)
     if not is_near or (ready.unled is not None and ready.path_search.is_given):
         return False
-    return (ready.unled or ready).leads_nowhere
+    try:
+        _ = (ready.unled or ready).given
+    except NoSolutionError:
+        return True
+    return False
 
 
 def _attempt(ready: Prepared, index: int) -> Begin:

@@ -1,0 +1,77 @@
+"""What each variable of a layout search is and does, and the joint path, as the record has them."""
+
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.model.units import DEG, MM
+from cellplan.pipeline.layout.finish import Certified
+from cellplan.pipeline.layout.limits import Standing, effects
+from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.report.record.common import number
+from cellplan.report.record.layout import PathRecord, VariableRecord
+
+FINE: Final = 6  # decimals: far above rounding
+LENGTH_STEP: Final = 0.1  # [m] that effects are stated for
+ANGLE_STEP: Final = float(np.radians(10.0))  # [rad] likewise
+
+
+def variable_records(ready: Prepared, standing: Standing | None, best: Certified | None) -> list[VariableRecord]:
+    """The variables in the units of the file, with their effects."""
+    variables, names = ready.variables, ready.variables.names
+    before = len(ready.coarse.names) - len(names)  # coefficients of a joint path have no rows
+    units = [_unit(name) for name in names]
+    steps = np.array([{"mm": LENGTH_STEP, "deg": ANGLE_STEP, "": float(np.log(2.0))}[unit] for unit in units])
+    of = effects(standing, np.append(np.zeros(before), steps)) if standing is not None else {}
+    shown: list[VariableRecord] = []
+    for place, (name, unit) in enumerate(zip(names, units, strict=True)):
+        values = (variables.lower, variables.upper, variables.given)
+        lower, upper, given = (_in_file_units(float(value[place]), unit) for value in values)
+        shown.append(
+            {
+                "name": name,
+                "unit": unit,
+                "lower": lower,
+                "upper": upper,
+                "given": given,
+                "best": None if best is None else _in_file_units(float(best.x[before + place]), unit),
+                "step": {"mm": MM * LENGTH_STEP, "deg": DEG * ANGLE_STEP, "": 2.0}[unit],
+                "cycle_s": of["cycle_s"][before + place] if of else None,
+                "margin_deg": of["margin_deg"][before + place] if of else None,
+                "clearance_mm": of["clearance_mm"][before + place] if of else None,
+            }
+        )
+    return shown
+
+
+def path_record(ready: Prepared, x: Array) -> PathRecord:
+    """The joint path at variables of shape (n,), beside the given motion."""
+    search = ready.path_search
+    model, departures = ready.variables.base.robot(search.asked.robot).model, search.departures(x)
+    turning = np.array([joint.is_revolute for joint in model.joints])
+    in_deg, in_mm = (departures[kept].max(initial=-1.0) for kept in (turning, ~turning))
+    return {
+        "robot": search.asked.robot,
+        "coefficients": search.asked.coefficients,
+        "degree": search.asked.degree,
+        "is_given": search.is_given,
+        "departure_deg": number(round(DEG * in_deg, FINE)) if in_deg >= 0.0 else None,
+        "departure_mm": number(round(MM * in_mm, FINE)) if in_mm >= 0.0 else None,
+    }
+
+
+def _unit(name: str) -> str:
+    """Unit of a variable; empty for a weight."""
+    if ".weights" in name:
+        return ""
+    return "mm" if "_mm" in name else "deg"
+
+
+def _in_file_units(value: float, unit: str) -> float | None:
+    """A value in the unit of the file; None where it is infinite."""
+    if not np.isfinite(value):
+        return None
+    return number(
+        round({"mm": MM * value, "deg": DEG * value, "": float(np.exp(value)) if not unit else 0.0}[unit], FINE)
+    )
