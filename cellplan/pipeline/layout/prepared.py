@@ -157,37 +157,6 @@ class Prepared:
         problem = StartProblem.of(self.variables.base, self.variables, margin=self.variables.margin)
         return StartGenerator(problem, seed=self.request.seed)
 
-    @property
-    def given(self) -> tuple[Array, Array]:
-        """Variables (n,) and start posture (nq,) of the given layout, or with other branches of inverse kinematics.
-
-        Raises:
-            NoSolutionError: No motion begins there.
-        """
-        found = self._given
-        if isinstance(found, NoSolutionError):
-            raise found
-        return found
-
-    @property
-    def leads_nowhere(self) -> bool:
-        """Whether no motion begins at the given layout."""
-        return isinstance(self._given, NoSolutionError)
-
-    @cached_property
-    def _given(self) -> tuple[Array, Array] | NoSolutionError:
-        """See ``given``; or why there is none."""
-        try:
-            start = self.given_start
-            if self.coarse.evaluate(self.variables.given, start) is not None:
-                return self.variables.given, start
-        except NoSolutionError:
-            pass
-        try:
-            return self.starts.at(0).first
-        except NoSolutionError as error:
-            return error
-
     def branches(self) -> list[dict[str, list[float]]]:
         """Other start postures of the given layout from which all tools follow their paths, with their variables.
 
