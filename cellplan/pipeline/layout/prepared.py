@@ -164,32 +164,6 @@ class Prepared:
         return StartGenerator(problem, seed=self.request.seed)
 
     @property
-    def given(self) -> tuple[Array, Array]:
-        """Variables (n,) and start posture (nq,) of the given layout, or with other branches of inverse kinematics.
-
-        Raises:
-            NoSolutionError: No motion begins there.
-        """
-        found = self._given
-        if isinstance(found, NoSolutionError):
-            raise found
-        return found
-
-    @cached_property
-    def _given(self) -> tuple[Array, Array] | NoSolutionError:
-        """See ``given``; or why there is none."""
-        try:
-            start = self.given_start
-            if self.coarse.evaluate(self.variables.given, start) is not None:
-                return self.variables.given, start
-        except NoSolutionError:
-            pass
-        try:
-            return self.starts.at(0).first
-        except NoSolutionError as error:
-            return error
-
-    @property
     def duration(self) -> float:
         """Duration of the job in [s], as the cell has it."""
         return float(self.schedule.times[-1])

@@ -195,9 +195,8 @@ def _near_given(ready: Prepared, values: Mapping[str, object], number: int) -> B
     Raises:
         NoSolutionError: There is none either.
     """
-    try:
-        begin = ready.given
-    except NoSolutionError:
+    begin = _given(ready)
+    if begin is None:
         return _sampled(ready, number or SIZE - 1)  # the last trial of the first round is sample 0
     return begin if values["kind"] == "given" else _perturbed(ready, begin, values, number)
 
@@ -207,11 +206,22 @@ def _is_far(ready: Prepared, values: Mapping[str, object]) -> bool:
     is_near = values["kind"] == "given" or (values["kind"] == "perturbed" and values["of"] is None)
     if not is_near or (ready.unled is not None and ready.path_search.is_given):
         return False
+    return _given(ready.unled or ready) is None
+
+
+@lru_cache(maxsize=8)
+def _given(ready: Prepared) -> Begin | None:
+    """The given layout, or with other branches of its inverse kinematics; None where no motion begins there."""
     try:
-        _ = (ready.unled or ready).given
+        start = ready.given_start
+        if ready.coarse.evaluate(ready.variables.given, start) is not None:
+            return ready.variables.given, start
     except NoSolutionError:
-        return True
-    return False
+        pass
+    try:
+        return ready.starts.at(0).first
+    except NoSolutionError:
+        return None
 
 
 def _attempt(ready: Prepared, index: int) -> Begin:
