@@ -27,7 +27,6 @@ from cellplan.study.trial import Outcome, TrialStatus, Variant
 EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to
 STAGE: Final = Effort(iterations=6)  # of motions that joint paths begin with
 STAGES: Final = 4
-BOTH: Final = 2
 PROBE: Final = Effort(iterations=12)  # of the paths that a trial chooses from
 PATH: Final = Effort(least_gain=1e-3)  # many coefficients gain little each, but for long
 NOT_FOLLOWED: Final = "a tool cannot follow its path"
@@ -135,8 +134,9 @@ def _path(ready: Prepared, unled: Prepared, values: Mapping[str, Any], number: i
 def _led(ready: Prepared, unled: Prepared, begin: Begin) -> _Begin | None:
     """The path nearest to a motion by the pseudo-inverse, improved in stages, or to one of the stages on the way.
 
-    The last stage whose path the tools can follow, or the first one, whichever some programs make faster: a motion may
-    be at its best where an operator just passes a singularity, which a path beside it does not survive.
+    The last stage whose path the tools can follow, the first one, or halfway between the first and the last, whichever
+    some programs make fastest: a motion may be at its best where an operator just passes a singularity, which a path
+    beside it does not survive.
     """
     begins = [begin]
     for _ in range(STAGES):
@@ -145,8 +145,10 @@ def _led(ready: Prepared, unled: Prepared, begin: Begin) -> _Begin | None:
             break
         begins.append((better.x, better.start))
     paths = (_path_of(ready, each) for each in reversed(begins[1:]))
-    found = [each for each in (next(filter(None, paths), None), _path_of(ready, begin)) if each is not None]
-    if len(found) < BOTH:
+    last, first = next(filter(None, paths), None), _path_of(ready, begin)
+    halfway = None if first is None or len(begins) == 1 else _halfway(ready, first, begins[-1])
+    found = [each for each in (last, first, halfway) if each is not None]
+    if len(found) <= 1:
         return next(iter(found), None)
     ranks = []
     for place, each in enumerate(found):
@@ -155,6 +157,17 @@ def _led(ready: Prepared, unled: Prepared, begin: Begin) -> _Begin | None:
             ranks.append((probed.violation, probed.objective, place))
             found[place] = replace(each, x=probed.x, start=probed.start)
     return found[min(ranks, default=(0.0, 0.0, 0))[2]]
+
+
+def _halfway(ready: Prepared, first: _Begin, last: Begin) -> _Begin | None:
+    """The mean of a path and of that nearest to another motion; None where a tool cannot follow."""
+    search = ready.path_search
+    found = search.fitted(*last)
+    if found is None:
+        return None
+    x = 0.5 * (first.x + search.variables(found[0], search.beside(last[0])))
+    start = 0.5 * (first.start + found[1])
+    return None if ready.coarse.evaluate(x, start) is None else _Begin(x, start, unled=last)
 
 
 def _path_of(ready: Prepared, begin: Begin) -> _Begin | None:

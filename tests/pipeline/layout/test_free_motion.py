@@ -125,6 +125,7 @@ def test_paths_begin_at_the_last_motion_that_they_can_follow(ready: Prepared, mo
         return following and SimpleNamespace(x=following[0], start=following[1])
 
     monkeypatch.setattr(trial, "_path_of", path_of)
+    monkeypatch.setattr(trial, "_halfway", lambda *_: None)
     monkeypatch.setattr(trial, "improve", improved)
     begin = trial._led(ready, ready.unled, begins[0])
 
