@@ -1,6 +1,6 @@
 """Finish: a layout of the search improved at more nodes, then solved and verified until it passes or is given up."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -15,9 +15,10 @@ from cellplan.model.units import DEG, MM
 from cellplan.pipeline.fastest.scaling import scaled_values, whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.limits import Standing, standing_of
-from cellplan.pipeline.layout.prepared import Prepared, values_of
+from cellplan.pipeline.layout.prepared import Prepared, prepared, values_of
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
+from cellplan.search.variables.variables import Variables
 
 NODES: Final = 129  # [-] of the finish
 KEYS: Final = 25  # [-] configurations at which distances are asked there
@@ -109,12 +110,22 @@ class Finish:
         ready: The cell.
         progress: Called with the stage and the fraction done.
         solves: How often a layout was solved in full so far.
+        choice: Discrete choices that the cell was made ready with.
     """
 
     ready: Prepared
     progress: Progress
     solves: int = 0
+    choice: Mapping[str, object] = field(default_factory=dict)
     _problems: dict[tuple[Prepared, int], Any] = field(default_factory=dict)
+
+    def use(self, choice: Mapping[str, object]) -> None:
+        """Make the cell ready with other discrete choices."""
+        self.ready, self.choice = prepared(self.ready.request, choice), choice
+
+    def ordered(self, trials: Sequence[dict[str, Any]]) -> Sequence[dict[str, Any]]:
+        """Trials that conform by the search, best first, in the order in which they are finished."""
+        return trials
 
     def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:
         """A layout of the search, certified or with the reason why not.
@@ -175,7 +186,7 @@ class Finish:
             program = self._timed(cell, standing.measures.cycle).certified(self.progress)
         except (InputError, NoSolutionError) as error:
             return None, str(error).splitlines()[0]
-        return program, self._rejection(program)
+        return program, rejection_of(program, self.ready.variables)
 
     def _timed(self, cell: Cell, cycle: float) -> TimedProgram:
         """The program at the shortest cycle, or at the duration of the cell."""
@@ -208,15 +219,16 @@ class Finish:
         """The program slower or faster by a factor, verified but for its clearance."""
         return TimedProgram.solved(cell, Law.TIME_LAWS, scaled_values(cell, factor), task=None, progress=self.progress)
 
-    def _rejection(self, program: TimedProgram) -> str:
-        """Why a program is rejected; empty where it passed every check and keeps the margins of the search."""
-        failed = [check.message for run in program.solution.runs for check in run.report.checks if not check.passed]
-        if failed:
-            return failed[0]
-        demanded, margin = DEG * float(self.ready.variables.margin.max(initial=0.0)), margin_of(program)
-        if margin is not None and margin < demanded - ROUNDING:
-            return f"smallest margin {margin:.4g} deg, {demanded:.4g} deg demanded"
-        return ""
+
+def rejection_of(program: TimedProgram, variables: Variables) -> str:
+    """Why a program is rejected; empty where it passed every check and keeps the margins of the search."""
+    failed = [check.message for run in program.solution.runs for check in run.report.checks if not check.passed]
+    if failed:
+        return failed[0]
+    demanded, margin = DEG * float(variables.margin.max(initial=0.0)), margin_of(program)
+    if margin is not None and margin < demanded - ROUNDING:
+        return f"smallest margin {margin:.4g} deg, {demanded:.4g} deg demanded"
+    return ""
 
 
 def load_of(program: TimedProgram) -> float:

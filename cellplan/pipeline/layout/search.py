@@ -94,11 +94,11 @@ class _Search:
 
     def _best(self, finished: Finished) -> Certified | None:
         """The first candidate that passes, best first."""
-        for trial in self.candidates(finished)[:CANDIDATES]:
+        for trial in self.finish.ordered(self.candidates(finished))[:CANDIDATES]:
             number = trial["trial"]
             if number not in self.tried:
                 self.progress(f"certifying trial {number}", 1.0)
-                self.finish.ready = prepared(self.request, trial["values"].get("choice"))
+                self.finish.use(trial["values"].get("choice") or {})
                 self.tried[number] = self.finish.certified(number, trial["figures"])
             if self.tried[number].passed:
                 return self.tried[number]
@@ -163,7 +163,7 @@ def search_layout(
             workers=pool,
             stop=stop or Stop(seconds=BUDGET),
             progress=progress,
-            finish=finish_of(ready, progress),
+            finish=finish_of(ready, progress, workers=pool),
             choices=tuple(Choices.of(ready.cell).values()),
             branches=(ready.unled or ready).branches(),
         )
@@ -172,12 +172,18 @@ def search_layout(
         return _written(search, finished, best)
 
 
-def finish_of(ready: Prepared, progress: Progress) -> Finish:
-    """The finish of the layouts of a cell, with displaced bases where they are asked for."""
+def finish_of(ready: Prepared, progress: Progress, *, workers: int | Executor) -> Finish:
+    """The finish of the layouts of a cell, with displaced bases where they are asked for.
+
+    Args:
+        ready: The cell.
+        progress: Called with the stage and the fraction done.
+        workers: Number of processes that verify layouts with displaced bases; or an executor.
+    """
     misplacement = ready.variables.settings.misplacement
     if misplacement is None:
         return Finish(ready=ready, progress=progress)
-    return MisplacedFinish(ready=ready, progress=progress, misplacement=misplacement)
+    return MisplacedFinish(ready=ready, progress=progress, misplacement=misplacement, workers=workers)
 
 
 def _written(search: _Search, finished: Finished, best: Certified | None) -> LayoutResult:

@@ -1,6 +1,6 @@
 """Measures: how a point stands to all demands, without any derivative."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
@@ -65,22 +65,18 @@ class Measures:
     @classmethod
     def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":
         """Measure a point."""
-        times, limits, allowance = problem.times, problem.limits, demands.allowance
+        times, limits, beyond = problem.times, problem.limits, demands.beyond
         pace = Pace.of(problem, point) if demands.timing is Timing.RETIMED else None
-        speeds, accelerations, factor = (
-            _loads(problem, point, demands) if pace is None else _paced(problem, point, pace)
-        )
-        margin, most = demands.margin, demands.clearance
-        if allowance is not None:
-            margin, most = margin + allowance.margin, most + float(allowance.distance.max(initial=0.0))
+        speeds, accelerations, factor = _loads(problem, point) if pace is None else _paced(problem, point, pace)
+        most = demands.clearance + (0.0 if beyond is None else float(beyond.max(initial=0.0)))
         distances = problem.distances(point, key_nodes(problem, effort), effort.within + most)
         added = np.where(distances.is_own, 0.0, demands.clearance)
-        if allowance is not None:
-            added = added + allowance.distance[distances.pairs]
+        if beyond is not None:
+            added = added + beyond[distances.pairs]
         return cls(
             point=point,
-            lower=Crests.of(times, limits.lower + margin - point.q),
-            upper=Crests.of(times, point.q - limits.upper + margin),
+            lower=Crests.of(times, limits.lower + demands.margin - point.q),
+            upper=Crests.of(times, point.q - limits.upper + demands.margin),
             speeds=speeds,
             accelerations=accelerations,
             distances=distances,
@@ -178,12 +174,10 @@ class Missed:
         return price * (self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum()))
 
 
-def _loads(problem: Problem, point: Point, demands: Demands) -> tuple[Crests, Crests, float]:
+def _loads(problem: Problem, point: Point) -> tuple[Crests, Crests, float]:
     """Speeds and accelerations under the laws, and how many times as long as the nodes they must last."""
     speeds = Crests.of(problem.times, point.qd / problem.limits.velocity, in_magnitude=True)
     accelerations = Crests.of(problem.times, point.qdd / problem.acceleration, in_magnitude=True)
-    if (allowance := demands.allowance) is not None:
-        speeds, accelerations = _raised(speeds, allowance.speed), _raised(accelerations, allowance.acceleration)
     return speeds, accelerations, max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
 
 
@@ -195,11 +189,6 @@ def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[Crests, Crests, 
         for order, share in enumerate(pace.reached(point.qd, point.qdd), start=1)
     )
     return speeds, accelerations, factor
-
-
-def _raised(crests: Crests, by: Array) -> Crests:
-    """Values of functions that may be larger by so much, shape (N, n)."""
-    return replace(crests, value=crests.value + by)
 
 
 def rooms(distances: Distances, room: Room) -> Array:

@@ -66,17 +66,17 @@ def test_a_base_on_the_floor_is_not_lowered() -> None:
     assert len(found.names) == 6
 
 
-def test_allowances_are_sums_of_absolute_differences(pair: SimpleNamespace) -> None:
+def test_displacements_take_the_sum_of_absolute_differences(pair: SimpleNamespace) -> None:
     problem, point, step = pair.problem, pair.point, 1e-3
-    found = worst(problem, point, pair.demands, Effort(keys=5)).allowance
+    found = worst(problem, point, pair.demands, Effort(keys=5))
 
     q, qd = np.zeros_like(point.q), np.zeros_like(point.q)
     for unit in np.diag(problem.upper):
         forward, back = (problem.evaluate(side * step * unit, point.start) for side in (1.0, -1.0))
         q += np.abs(forward.q - back.q) / (2.0 * step)
         qd += np.abs(forward.qd - back.qd) / (2.0 * step)
-    np.testing.assert_allclose(found.margin, q, atol=2e-3 * q.max())
-    np.testing.assert_allclose(found.speed, qd / problem.limits.velocity, atol=5e-3 * found.speed.max())
+    np.testing.assert_allclose(found.margins, q, atol=2e-3 * q.max())
+    np.testing.assert_allclose(found.speeds, qd / problem.limits.velocity, atol=5e-3 * found.speeds.max())
 
 
 def test_a_corner_moves_as_the_product_solves_it(pair: SimpleNamespace) -> None:
