@@ -71,7 +71,7 @@ def verified(layout: DisplacedLayout, variant: Variant) -> Outcome:
 
     Args:
         layout: The layout.
-        variant: The displacement ``d`` in [m] and [rad] and a ``start`` posture near the right one.
+        variant: The displacement ``d`` in [m] and [rad] and the ``start`` of a displacement nearby, as values.
     """
     values: Mapping[str, Any] = variant.values
     ready = prepared(layout.request, layout.choice)

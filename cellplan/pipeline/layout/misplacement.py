@@ -51,9 +51,9 @@ FINALISTS: Final = 3  # [-] layouts that differ, of which the one is finished th
 FEW_ROUNDS: Final = 2  # [-] of programs for each of them
 FEW: Final = Effort(iterations=12, keys=9, trust=0.2)
 MANY: Final = Effort(iterations=8, keys=KEYS, trust=0.1)
-ATTEMPTS: Final = 2  # [-] times that a layout is improved and verified before it is given up
+ATTEMPTS: Final = 3  # [-] times that a layout is improved and verified before it is given up
 MORE_TIME: Final = 0.003  # [-] that a cycle of the nodes is lengthened by: peaks between them
-MORE_LENGTH: Final = 0.001  # [m] asked for beyond the demands where distances were not kept
+MORE_LENGTH: Final = 0.002  # [m] asked for beyond the demands where distances were not kept
 NARROWER: Final = 4  # [-] displacements verified in each direction until a tolerance is known
 SECONDS: Final = 900.0  # [s] of the processor to verify one layout
 FINE: Final = 3  # decimals of figures in [mm] and [deg]
@@ -135,7 +135,7 @@ class MisplacedFinish(Finish):
                 break
             room = effort.room
             more = replace(room, margin=room.margin + missing[0], distance=room.distance + missing[1])
-            effort = replace(effort, room=more)
+            effort = replace(effort, room=more, keys=2 * effort.keys - 1)
             search.effort = effort
         return found
 
