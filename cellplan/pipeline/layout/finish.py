@@ -4,6 +4,7 @@ Nodes and keys are added where the solved motion asks for more time, or comes ne
 """
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -20,13 +21,14 @@ from cellplan.pipeline.fastest.timed_program import TimedProgram
 from cellplan.pipeline.layout.between_nodes import distances_missed_at, exceeded_at, margins_missed_at
 from cellplan.pipeline.layout.cycles import draft, is_scaled, load_of, shortest, time_of
 from cellplan.pipeline.layout.limits import Standing, standing_of
-from cellplan.pipeline.layout.prepared import Prepared, kept_demands, values_of
+from cellplan.pipeline.layout.prepared import Prepared, kept_demands, prepared, values_of
 from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.report.record.misplacement import MisplacementRecord
 from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room
+from cellplan.search.variables.variables import Variables
 from cellplan.study.workers import Workers
 
 NODES: Final = 129  # [-] of the finish
@@ -132,17 +134,27 @@ class Finish:
     Attributes:
         ready: The cell.
         progress: Called with the stage and the fraction done.
-        workers: Processes that help where they are idle; None where all is done here.
+        workers: Processes that help where they are idle; or how many each study begins.
         solves: How often a layout was solved in full so far.
         records: What was found of each layout with displaced bases, by its trial; empty where none are asked for.
+        choice: Discrete choices that the cell was made ready with.
     """
 
     ready: Prepared
     progress: Progress
-    workers: Workers | None = None
+    workers: int | Executor = 1
     solves: int = 0
     records: dict[int, MisplacementRecord] = field(default_factory=dict)
+    choice: Mapping[str, object] = field(default_factory=dict)
     _problems: dict[tuple[Prepared, int, tuple[float, ...]], Any] = field(default_factory=dict)
+
+    def use(self, choice: Mapping[str, object]) -> None:
+        """Make the cell ready with other discrete choices."""
+        self.ready, self.choice = prepared(self.ready.request, choice), choice
+
+    def ordered(self, trials: Sequence[dict[str, Any]]) -> Sequence[dict[str, Any]]:
+        """Trials that conform by the search, best first, in the order in which they are finished."""
+        return trials
 
     def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:
         """A layout of the search, certified or with the reason why not.
@@ -159,7 +171,9 @@ class Finish:
             self.solves += 1
             if program is not None:
                 program = program.certified(self.progress, timed.quick)
-                reason = self._rejection(program) or _too_singular(self.ready, timed.standing, program)
+                reason = rejection_of(program, self.ready.variables) or _too_singular(
+                    self.ready, timed.standing, program
+                )
             found = Certified(
                 trial=trial,
                 x=x,
@@ -193,7 +207,8 @@ class Finish:
         """The layout improved at more nodes, with its motion in the cycle that it has there."""
         x, start, standing, demands = self._improved(x, start, room, is_first=is_first)
         is_once = self.ready.request.objective is not Objective.CYCLE  # else other durations are tried
-        quick = QuickClearance(self.workers.begin if is_once and self.workers is not None else None)
+        helping = self.workers if isinstance(self.workers, Workers) else None
+        quick = QuickClearance(helping.begin if is_once and helping is not None else None)
         found = _Timed(x=x, start=start, standing=standing, demands=demands, quick=quick)
         try:
             cell = self._cell(x, start)
@@ -215,7 +230,7 @@ class Finish:
     def _cell(self, x: Array, start: Array) -> Cell:
         """The cell of a layout, as its file has it; a worker begins with hulls of tools that are new."""
         cell = self.ready.variables.given_cell.with_values(values_of(self.ready, x, start))
-        if self.workers is not None and (new := without_hull(cut_tools(cell))):
+        if isinstance(self.workers, Workers) and (new := without_hull(cut_tools(cell))):
             self.workers.attempt(keep_hulls, new)
         return cell
 
@@ -253,15 +268,16 @@ class Finish:
             self._problems[key] = problem
         return self._problems[key]
 
-    def _rejection(self, program: TimedProgram) -> str:
-        """Why a program is rejected; empty where it passed every check and keeps the margins of the search."""
-        failed = [check.message for run in program.solution.runs for check in run.report.checks if not check.passed]
-        if failed:
-            return failed[0]
-        demanded, margin = DEG * float(self.ready.variables.margin.max(initial=0.0)), margin_of(program)
-        if margin is not None and margin < demanded - ROUNDING:
-            return f"smallest margin {margin:.4g} deg, {demanded:.4g} deg demanded"
-        return ""
+
+def rejection_of(program: TimedProgram, variables: Variables) -> str:
+    """Why a program is rejected; empty where it passed every check and keeps the margins of the search."""
+    failed = [check.message for run in program.solution.runs for check in run.report.checks if not check.passed]
+    if failed:
+        return failed[0]
+    demanded, margin = DEG * float(variables.margin.max(initial=0.0)), margin_of(program)
+    if margin is not None and margin < demanded - ROUNDING:
+        return f"smallest margin {margin:.4g} deg, {demanded:.4g} deg demanded"
+    return ""
 
 
 def _too_singular(ready: Prepared, standing: Standing, program: TimedProgram) -> str:

@@ -1,7 +1,10 @@
-"""Finish of a layout whose bases may all be off their places: one cycle for all corners, the worst of them solved."""
+"""Finish of a layout whose bases may all be off their places: one cycle for all corners, each of them verified."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
@@ -15,29 +18,60 @@ from cellplan.model.units import DEG, MM
 from cellplan.pipeline.fastest.scaling import whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.cycles import DURATIONS, load_of, scaled, time_asked
+from cellplan.pipeline.layout.displaced import DisplacedLayout, verified
 from cellplan.pipeline.layout.finish import (
-    ITERATIONS,
     KEYS,
+    MORE_ANGLE,
     NODES,
     Certified,
     Finish,
     clearance_of,
     margin_of,
+    rejection_of,
 )
 from cellplan.pipeline.layout.limits import standing_of
+from cellplan.pipeline.layout.prepared import NODES as FEW_NODES
+from cellplan.pipeline.layout.proposals import BESTS, SAME
 from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.report.record.common import number
 from cellplan.report.record.misplacement import CornerRecord, MisplacementRecord, ToleranceRecord
-from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.misplacement.corners import Corner
 from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.misplacement.guarded import GuardedProblem
-from cellplan.search.misplacement.robust import WITHIN, Robust, robust_layout, seeded_signs
+from cellplan.search.misplacement.robust import WITHIN, Robust, RobustSearch, robust_layout, seeded_signs
 from cellplan.search.misplacement.tolerance import Tolerance, tolerances
 from cellplan.search.programs.objective import Effort, Objective
+from cellplan.study.study import Study
+from cellplan.study.trial import Trial, TrialStatus, Variant
+from cellplan.study.workers import Limits
 
+FINALISTS: Final = 3  # [-] layouts that differ, of which the one is finished that is the best with displaced bases
+FEW_ROUNDS: Final = 2  # [-] of programs for each of them
+FEW: Final = Effort(iterations=12, keys=9, trust=0.2)
+MANY: Final = Effort(iterations=8, keys=KEYS, trust=0.1)
+ATTEMPTS: Final = 3  # [-] times that a layout is improved and verified before it is given up
 MORE_TIME: Final = 0.003  # [-] that a cycle of the nodes is lengthened by: peaks between them
+MORE_LENGTH: Final = 0.002  # [m] asked for beyond the demands where distances were not kept
+NARROWER: Final = 4  # [-] displacements verified in each direction until a tolerance is known
+SECONDS: Final = 900.0  # [s] of the processor to verify one layout
 FINE: Final = 3  # decimals of figures in [mm] and [deg]
+
+Placed = tuple[Array, Array]  # displacement, shape (m,), and start posture, shape (nq,)
+
+
+@dataclass(frozen=True, slots=True)
+class _Verdict:
+    """What ``solve`` says of a layout with displaced bases.
+
+    Attributes:
+        reason: Why it is rejected; empty where it passed.
+        load: How many times as long its limits ask it to last; 0 where it has no motion.
+        is_mendable: Whether only a margin or a distance is missed, so that the search may ask for more.
+    """
+
+    reason: str
+    load: float
+    is_mendable: bool
 
 
 @dataclass(slots=True, kw_only=True)
@@ -49,6 +83,29 @@ class MisplacedFinish(Finish):
     """
 
     misplacement: Misplacement
+    _begun: dict[int, tuple[RobustSearch, Robust | None]] = field(default_factory=dict)
+
+    def ordered(self, trials: Sequence[dict[str, Any]]) -> Sequence[dict[str, Any]]:
+        """See ``Finish``: of the best ones that differ, the one with the shortest cycle with displaced bases first."""
+        if self.ready.request.objective is not Objective.CYCLE:
+            return trials
+        listed = list[dict[str, Any]]()
+        for trial in trials:
+            cycle = trial["figures"][BESTS[Objective.CYCLE].figure]
+            if all(abs(cycle - each["figures"]["cycle_s"]) > SAME * cycle for each in listed):
+                listed.append(trial)
+        listed = listed[:FINALISTS]
+        for trial in listed:
+            if trial["trial"] not in self._begun:
+                self.use(trial["values"].get("choice") or {})
+                self._begin(trial["trial"], trial["figures"])
+
+        def rank(trial: dict[str, Any]) -> tuple[int, float]:
+            robust = self._begun[trial["trial"]][1]
+            return (10**9, np.inf) if robust is None else (len(robust.corners) - robust.kept, robust.cycle)
+
+        first = sorted(listed, key=rank)
+        return [*first, *(trial for trial in trials if all(trial is not each for each in first))]
 
     def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:
         """A layout of the search with all its corners; see ``Finish``.
@@ -56,98 +113,201 @@ class MisplacedFinish(Finish):
         Raises:
             NoSolutionError: A tool cannot follow its path.
         """
-        x, start = np.array(figures["x"], dtype=float), np.array(figures["start"], dtype=float)
-        ready, before, effort = self.ready, self.solves, Effort(iterations=ITERATIONS, keys=KEYS, trust=0.2)
-        self.progress(f"displacing the bases of trial {trial}", 1.0)
-        problem = GuardedProblem.like(self._problem(NODES))
-        count = len(self._displacements(x).names)
-        signs = seeded_signs(generator("layout/misplacement", ready.request.seed), count)
-        robust = robust_layout(problem, self._displaced, (x, start), ready.demands(), effort, signs=signs)
+        if trial not in self._begun:
+            self._begin(trial, figures)
+        search, robust = self._begun[trial]
         if robust is None:
             raise NoSolutionError("a tool cannot follow its path")
-        return self._result(trial, robust, effort, before)
+        self.progress(f"displacing the bases of trial {trial}", 1.0)
+        before, effort = self.solves, MANY
+        search = search.finer(GuardedProblem.like(self._problem(NODES)), robust, effort)
+        for _ in range(ATTEMPTS):
+            x, start = robust.found.x, robust.found.start
+            robust = robust_layout(search, (x, start), signs=self._signs(search)) or robust
+            found, missing = self._result(trial, robust, effort, before)
+            if found.passed or missing is None:
+                break
+            room = effort.room
+            more = replace(room, margin=room.margin + missing[0], distance=room.distance + missing[1])
+            effort = replace(effort, room=more, keys=2 * effort.keys - 1)
+            search.effort = effort
+        return found
 
-    def _result(self, trial: int, robust: Robust, effort: Effort, before: int) -> Certified:
-        """The layout solved, with its record."""
-        program, corners, reason = self._solved_all(robust)
-        demands, found = self.ready.demands(), robust.found
-        span = robust.cycle if program is None else program.cycle
-        asked = replace(effort, within=WITHIN)
-        limits = tolerances(robust.problem, found.start, demands, asked, max(span, robust.cycle))
-        standing = standing_of(self._problem(NODES), found.point, demands, effort)
-        self.records[trial] = self._record(robust, span, standing.measures.cycle, corners, limits)
-        return Certified(
+    def _begin(self, trial: int, figures: Mapping[str, Any]) -> None:
+        """Improve a layout with displaced bases at few nodes."""
+        self.progress(f"displacing the bases of trial {trial}", 0.0)
+        x, start = np.array(figures["x"], dtype=float), np.array(figures["start"], dtype=float)
+        search = RobustSearch(
+            problem=GuardedProblem.like(self._problem(FEW_NODES)),
+            displacements=BaseDisplacements.of(self.ready.variables, x, self.misplacement),
+            demands=self.ready.demands(),
+            effort=FEW,
+        )
+        self._begun[trial] = search, robust_layout(search, (x, start), signs=self._signs(search), rounds=FEW_ROUNDS)
+
+    def _signs(self, search: RobustSearch) -> Array:
+        """The seeded corners."""
+        return seeded_signs(generator("layout/misplacement", self.ready.request.seed), len(search.displacements.names))
+
+    def _result(
+        self, trial: int, robust: Robust, effort: Effort, before: int
+    ) -> tuple[Certified, tuple[float, float] | None]:
+        """The layout solved and all its corners verified, and the margin and distance to ask for where one failed."""
+        x, start, demands = robust.found.x, robust.found.start, self.ready.demands()
+        standing = standing_of(self._problem(NODES), robust.found.point, demands, effort)
+        program, solved, reason, verdicts = None, list[CornerRecord](), "", list[_Verdict]()
+        missing = None
+        try:
+            program, solved, reason, verdicts = self._in_one_cycle(robust)
+        except (InputError, NoSolutionError) as error:
+            reason = str(error).splitlines()[0]
+        failed = [each for each in verdicts if each.reason]
+        if program is not None:
+            if not reason and failed:
+                reason = f"with displaced bases: {failed[0].reason}"
+                missing = (MORE_ANGLE, MORE_LENGTH) if failed[0].is_mendable else None
+            if not reason:
+                limits = self._tolerances(robust, program, effort)
+                self.records[trial] = self._record(robust, program.cycle, verdicts, solved, limits)
+        found = Certified(
             trial=trial,
-            x=found.x,
-            start=found.start,
+            x=x,
+            start=start,
             program=program,
             reason=reason,
             standing=standing,
             solves=self.solves - before,
         )
+        return found, missing
 
-    def _displacements(self, x: Array) -> BaseDisplacements:
-        """Displacements of the bases of a layout."""
-        return BaseDisplacements.of(self.ready.variables, x, self.misplacement)
+    def _in_one_cycle(self, robust: Robust) -> tuple[TimedProgram, list[CornerRecord], str, list[_Verdict]]:
+        """The layout and its worst corners solved in one cycle, and the verdicts on all corners in it.
 
-    def _displaced(self, x: Array) -> GuardedProblem:
-        """The job with displacements of the bases of a layout as variables."""
-        of = self._displacements(x)
-        return GuardedProblem.like(self._problem(NODES), variables=of, bodies=CellDistances.of(self.ready.scene, of))
-
-    def _solved_all(self, robust: Robust) -> tuple[TimedProgram | None, list[CornerRecord], str]:
-        """The layout and its worst corners solved in one cycle: the layout's program, the corners, why it failed."""
-        of = self._displacements(robust.found.x)
-        missed = [corner for corner in robust.corners if not corner.keeps(robust.cycle)]
-        listed = list(_chosen(robust))
-        try:
-            cells = [self.ready.variables.cell(robust.found.x, robust.found.start)]
-            cells += [of.cell(corner.d, corner.start) for _, corner in listed]
-            programs = self._in_one_cycle(cells, robust.cycle)
-        except (InputError, NoSolutionError) as error:
-            return None, [], str(error).splitlines()[0]
-        reasons = [self._rejection(program) for program in programs]
+        Returns:
+            The program of the layout, its worst corners, why one of them failed, and the verdicts.
+        """
+        of, listed = robust.displacements, list(_chosen(robust))
+        cells = [self.ready.variables.cell(robust.found.x, robust.found.start)]
+        cells += [of.cell(corner.d, corner.start) for _, corner in listed]
+        factor = None
+        if self.ready.request.objective is Objective.CYCLE:
+            factor = whole_steps(cells[0], (1.0 + MORE_TIME) * robust.cycle / self.ready.duration)
+        for _ in range(DURATIONS):
+            programs, factor = self._solved_together(cells, factor)
+            verdicts = self._verdicts(
+                robust, [(each.d, each.start) for each in robust.corners], factor, is_first_enough=True
+            )
+            most = max((each.load for each in verdicts), default=0.0)
+            if factor is None or most <= 1.0:
+                break
+            factor = whole_steps(cells[0], factor * most, longer_than=factor)
+        programs = [program.certified(self.progress, QuickClearance()) for program in programs]
+        reasons = [rejection_of(program, self.ready.variables) for program in programs]
         corners = [
             _corner(what, of.names, corner.d, (program, reason))
             for (what, corner), program, reason in zip(listed, programs[1:], reasons[1:], strict=True)
         ]
-        reason = next((each for each in reasons if each), "")
-        if not reason and missed:
-            reason = f"{len(missed)} of {len(robust.corners)} layouts with displaced bases miss: {missed[0].first}"
-        return programs[0], corners, reason
+        return programs[0], corners, next((each for each in reasons if each), ""), verdicts
 
-    def _in_one_cycle(self, cells: Sequence[Cell], cycle: float) -> list[TimedProgram]:
-        """The programs of cells in the shortest common cycle that all of them keep, certified."""
-        if self.ready.request.objective is not Objective.CYCLE:
-            found = [TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=self.progress) for cell in cells]
-        else:
-            factor = whole_steps(cells[0], (1.0 + MORE_TIME) * cycle / self.ready.duration)
-            for _ in range(DURATIONS):
-                found = [scaled(cell, factor, self.progress) for cell in cells]
-                asked = max(max(load_of(program), time_asked(program)) for program in found)
-                if asked <= 1.0:
-                    break
-                factor = whole_steps(cells[0], factor * asked, longer_than=factor)
+    def _solved_together(self, cells: Sequence[Cell], factor: float | None) -> tuple[list[TimedProgram], float | None]:
+        """Programs of cells in the shortest common cycle that all of them keep, from a given one on, and its factor."""
         self.solves += len(cells)
-        return [program.certified(self.progress, QuickClearance()) for program in found]
+        if factor is None:
+            solved = partial(TimedProgram.solved, law=Law.AS_WRITTEN, values={}, task=None, progress=self.progress)
+            return [solved(cell) for cell in cells], None
+        for _ in range(DURATIONS):
+            found = [scaled(cell, factor, self.progress) for cell in cells]
+            asked = max(max(load_of(program), time_asked(program)) for program in found)
+            if asked <= 1.0:
+                break
+            factor = whole_steps(cells[0], factor * asked, longer_than=factor)
+        return found, factor
+
+    def _verdicts(
+        self, robust: Robust, placed: Sequence[Placed], factor: float | None, *, is_first_enough: bool = False
+    ) -> list[_Verdict]:
+        """Verdicts of the product on a layout with displaced bases; up to the first one that fails, if that is enough.
+
+        One that only asks for more time is none of these.
+        """
+        of, x = robust.displacements, robust.found.x
+        layout = DisplacedLayout(
+            request=self.ready.request.anywhere,
+            choice=self.choice,
+            x=tuple(x.tolist()),
+            robots=of.robots,
+            components=of.components,
+            factor=factor,
+        )
+        variants = [
+            Variant(place, {"d": d.tolist(), "start": start.tolist()}) for place, (d, start) in enumerate(placed)
+        ]
+        header = {"kind": "displaced", "cell": self.ready.cell.name, "x": x.tolist(), "factor": factor}
+        with TemporaryDirectory(prefix="cellplan-displaced-") as folder:
+            study = Study.of_variants(Path(folder), header, variants)
+            if is_first_enough:
+                study = replace(study, enough=_is_lost)
+            limits, evaluate = Limits(seconds=SECONDS), partial(verified, layout)
+            try:
+                trials = study.run(evaluate, workers=self.workers, limits=limits, progress=self.progress).trials
+            except KeyboardInterrupt:
+                raise KeyboardInterrupt(
+                    "interrupted while displaced bases were verified; --resume begins with that"
+                ) from None
+        self.solves += len(trials)
+        return [self._verdict(trial) for trial in trials]
+
+    def _verdict(self, trial: Mapping[str, Any]) -> _Verdict:
+        """The verdict of one trial."""
+        figures, demanded = trial["figures"], DEG * float(self.ready.variables.margin.max(initial=0.0))
+        margin = figures.get("margin_deg")
+        is_mendable = bool(figures) and (not figures["is_apart"] or (margin is not None and margin < demanded))
+        reason = "" if trial["status"] == TrialStatus.PASSED else trial["reason"]
+        return _Verdict(reason, figures.get("load") or 0.0, is_mendable)
+
+    def _tolerances(self, robust: Robust, program: TimedProgram, effort: Effort) -> list[Tolerance]:
+        """How far each base may be off, found at the nodes and verified; less where that fails."""
+        factor = None
+        if self.ready.request.objective is Objective.CYCLE:
+            factor = program.cycle / self.ready.duration
+        asked, demands, start = replace(effort, within=WITHIN), self.ready.demands(), robust.found.start
+        found = list(tolerances(robust.problem, start, demands, asked, max(program.cycle, robust.cycle)))
+        of = robust.displacements
+        ends = np.tile(of.amounts, 2)  # verified already, as far as the nodes do not say otherwise
+        lower = np.array([float(end) if each.kept >= end else 0.0 for each, end in zip(found, ends, strict=True)])
+        upper, first = np.array([each.kept for each in found]), [each.first for each in found]
+        at, open_ones = upper.copy(), [place for place, each in enumerate(found) if each.kept > 0.0]
+        for _ in range(NARROWER):
+            placed = [(at[place] * found[place].unit, found[place].start) for place in open_ones]
+            verdicts = self._verdicts(robust, placed, factor) if placed else []
+            for place, verdict in zip(open_ones, verdicts, strict=True):
+                if verdict.reason:
+                    upper[place], first[place] = at[place], verdict.reason
+                else:
+                    lower[place] = at[place]
+            open_ones = [place for place in open_ones if lower[place] < upper[place]]
+            at = 0.5 * (lower + upper)
+        return [
+            replace(each, kept=kept, first=why) for each, kept, why in zip(found, lower.tolist(), first, strict=True)
+        ]
 
     def _record(
         self,
         robust: Robust,
         cycle: float,
-        nominal: float,
+        verdicts: Sequence[_Verdict],
         solved: list[CornerRecord],
         limits: Sequence[Tolerance],
     ) -> MisplacementRecord:
         """All of it in printed units."""
         ends = robust.worst_ones + robust.ends
-        groups = (robust.corners[: robust.worst_ones], robust.corners[robust.worst_ones : ends], robust.corners[ends:])
-        kept = [sum(corner.keeps(max(cycle, robust.cycle)) for corner in group) for group in groups]
+        groups = (verdicts[: robust.worst_ones], verdicts[robust.worst_ones : ends], verdicts[ends:])
+        kept = [sum(not each.reason for each in group) for group in groups]
         return {
             "position_mm": number(MM * self.misplacement.position),
             "orientation_deg": number(round(DEG * self.misplacement.orientation, 9)),
             "cycle_s": number(round(cycle, 6)),
-            "nominal_cycle_s": number(round(nominal, 6)),
+            "nominal_cycle_s": number(round(robust.nominal, 6)),
             "seeded": len(groups[2]),
             "seeded_kept": kept[2],
             "by_derivatives": len(groups[0]),
@@ -157,6 +317,12 @@ class MisplacedFinish(Finish):
             "solved": solved,
             "tolerances": list(_tolerances(limits)),
         }
+
+
+def _is_lost(trial: Trial) -> bool:
+    """Whether a layout with displaced bases fails in any cycle."""
+    load = trial.outcome.figures.get("load")
+    return trial.outcome.status is not TrialStatus.PASSED and not (isinstance(load, float) and load > 1.0)
 
 
 def _chosen(robust: Robust) -> Iterator[tuple[str, Corner]]:

@@ -97,11 +97,11 @@ class _Search:
 
     def _best(self, finished: Finished) -> Certified | None:
         """The first candidate that passes, best first."""
-        for trial in self.candidates(finished)[:CANDIDATES]:
+        for trial in self.finish.ordered(self.candidates(finished))[:CANDIDATES]:
             number = trial["trial"]
             if number not in self.tried:
                 self.progress(f"certifying trial {number}", 1.0)
-                self.finish.ready = prepared(self.request, trial["values"].get("choice"))
+                self.finish.use(trial["values"].get("choice") or {})
                 self.tried[number] = self.finish.certified(number, trial["figures"])
             if self.tried[number].passed:
                 return self.tried[number]
@@ -164,7 +164,7 @@ def search_layout(
             workers=pool,
             stop=stop or Stop(seconds=BUDGET),
             progress=progress,
-            finish=finish_of(ready, progress, pool if isinstance(pool, Workers) else None),
+            finish=finish_of(ready, progress, workers=pool),
             proposals=proposals_of(request, ready),
         )
         finished, best = search.run(resume=resume)
@@ -172,7 +172,7 @@ def search_layout(
         return _written(search, finished, best)
 
 
-def finish_of(ready: Prepared, progress: Progress, workers: Workers | None = None) -> Finish:
+def finish_of(ready: Prepared, progress: Progress, *, workers: int | Executor) -> Finish:
     """The finish of the layouts of a cell, with displaced bases where they are asked for.
 
     Args:

@@ -7,6 +7,7 @@ the normal; for one whose shape changes, the change of its reach in that directi
 """
 
 from collections.abc import Iterator, Sequence, Set
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -132,6 +133,12 @@ class CellDistances:
             and robot.pedestal.solid(robot.X_WB) is None
         }
         return cls(scene.moved(bare) if bare else scene, variables)
+
+    def of_variables(self, variables: LayoutVariables) -> "CellDistances":
+        """The same pairs for other variables that change the same bodies."""
+        found = copy(self)
+        found._variables = variables
+        return found
 
     def near(self, x: Array, q: Array, within: float) -> LayoutDistances:
         """All pairs of one layout that are nearer than a distance.

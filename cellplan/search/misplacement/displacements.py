@@ -91,6 +91,10 @@ class BaseDisplacements:
             amounts=lengths[[component for _, component in places]],
         )
 
+    def at(self, x: Array) -> "BaseDisplacements":
+        """The same displacements of another layout, shape (n,)."""
+        return replace(self, x=x)
+
     def layouts(self, d: Array, start: Array) -> Layouts:
         """Candidates for the kernel at displacements of shape (K, m), with start postures of shape (K, nq)."""
         one = self.variables.layouts(self.x[None], start[:1])

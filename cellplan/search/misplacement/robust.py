@@ -1,32 +1,38 @@
 """Robust layouts: improved until they keep their demands with all bases off their places, with one cycle for all.
 
-The programs ask for what displacements take to first order beyond the demands. What bends beyond that is measured: the
-worst corners by the derivatives, each displacement alone at its ends, and seeded corners are planned anew, and what
-they still miss is asked for in the next round.
+The programs know the motions of a few displacements, their scenarios, beside that of the layout in place: speeds,
+accelerations and margins of each are rows with exact derivatives, so that a step may make the layout less sensitive.
+Of distances they ask for what displacements take to first order. The first scenarios are the corners that are the worst
+for a limit by the derivatives. After each round these, each displacement alone at its ends and seeded corners are
+planned anew; those that miss most are further scenarios of the next round.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.search.misplacement.corners import Corner, judged
+from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.misplacement.guarded import GuardedProblem
-from cellplan.search.misplacement.worst import worst
+from cellplan.search.misplacement.scenarios import ScenarioProblem
+from cellplan.search.misplacement.worst import Worst, worst
 from cellplan.search.programs.improve import Improved, improve
-from cellplan.search.programs.objective import Allowance, Demands, Effort, Objective
+from cellplan.search.programs.objective import Demands, Effort, Objective
 
 SEEDED: Final = 128  # [-] corners
-ROUNDS: Final = 6  # [-] in which what was missed is asked for
+ROUNDS: Final = 5  # [-] of programs and corners
+ADDED: Final = 8  # [-] scenarios that a round adds at most
 WITHIN: Final = 0.003  # [m] beyond the demand: of pairs that are this near in a corner the room is known
-MORE_ANGLE: Final = float(np.radians(0.05))  # [rad] asked for beyond what a corner missed
-MORE_LENGTH: Final = 0.0003  # [m] likewise
+MORE_LENGTH: Final = 0.0003  # [m] asked for beyond what a corner missed
+MOST_LENGTH: Final = 0.006  # [m] asked for at once
 MORE_REACH: Final = 0.003  # [m] likewise of the singular values of arms: 0.01
-MORE_TIME: Final = 0.002  # [-] likewise
-GAIN: Final = 0.002  # [-] share of the cycle that another round must gain
-START_OVER: Final = 0.1  # [-] usual steps: first region of each round
+LONGER: Final = 1e-3  # [-] share by which a corner may last longer than the scenarios and be none
+NEAR: Final = 0.02  # [-] share of the cycle within which a scenario is kept on more nodes
+NEAR_ANGLE: Final = float(np.radians(1.0))  # [rad] or [m] of a margin, likewise
+ANGLE: Final = 0.1  # [rad] or [m] of a margin that a corner misses that weigh as much as twice the cycle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,20 +40,24 @@ class Robust:
     """A layout and its corners.
 
     Attributes:
-        found: The layout, as the last programs left it.
+        found: The layout, as the last programs left it, with its motion in place.
         corners: All corners that were planned: the worst ones by derivatives, the ends, then the seeded ones.
         worst_ones: Number of those by derivatives.
         ends: Number of displacements at their ends, one at a time.
+        nominal: Shortest cycle in [s] of the layout in place.
         cycle: Shortest cycle in [s] in which the layout and all its corners keep their limits.
         problem: The job, with the displacements as its variables.
+        displacements: These.
     """
 
     found: Improved
     corners: tuple[Corner, ...]
     worst_ones: int
     ends: int
+    nominal: float
     cycle: float
     problem: GuardedProblem
+    displacements: BaseDisplacements
 
     @property
     def is_kept(self) -> bool:
@@ -61,75 +71,140 @@ class Robust:
 
 
 @dataclass(slots=True, kw_only=True)
-class _Bent:
-    """What corners were seen to take beyond the first order."""
+class RobustSearch:
+    """Rounds of programs with scenarios.
 
-    margin: Array
-    distance: Array
-    time: float = 0.0
+    Attributes:
+        problem: The layout problem.
+        displacements: Displacements of the bases of any of its layouts.
+        demands: The objective and what must be kept in every corner.
+        effort: How much work each round may do.
+    """
 
-    def on(self, allowance: Allowance) -> Allowance:
-        """What is taken in all."""
-        return Allowance(
-            margin=allowance.margin + self.margin,
-            speed=allowance.speed * (1.0 + self.time) + self.time,
-            acceleration=allowance.acceleration * (1.0 + self.time) + 2.0 * self.time,
-            distance=allowance.distance + self.distance,
+    problem: GuardedProblem
+    displacements: BaseDisplacements
+    demands: Demands
+    effort: Effort
+    _scenarios: list[Array] = field(default_factory=list)
+    _beyond: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Begin without scenarios, and with nothing that corners were seen to miss."""
+        self._beyond = np.zeros(self.problem.pair_count)
+
+    def displaced(self, x: Array) -> GuardedProblem:
+        """The job of a layout, shape (n,), with the displacements of its bases as variables."""
+        of = self.displacements.at(x)
+        return GuardedProblem.like(self.problem, variables=of, bodies=self.problem.bodies.of_variables(of))
+
+    def once(self, x: Array, start: Array) -> Improved | None:
+        """One round from a layout, shape (n,), and its start posture, shape (nq,); None without a motion."""
+        point = self.problem.evaluate(x, start)
+        if point is None:
+            return None
+        of = self.displaced(x)
+        found = worst(of, replace(point, x=of.given), self.demands, self.effort)
+        if not self._scenarios:
+            self._begin(of, found, point.start)
+        demands = replace(self.demands, beyond=found.distances + self._beyond)
+        scenarios = ScenarioProblem.of(self.problem, self.displacements, np.array(self._scenarios))
+        improved = improve(scenarios, x, point.start, demands, self.effort)
+        if improved is None and len(self._scenarios) > 1:  # one is out of reach by now
+            del self._scenarios[1:]
+            self._beyond[len(self.problem.bodies.pairs) :] += MORE_REACH
+            return self.once(x, start)
+        return improved
+
+    def finer(self, problem: GuardedProblem, robust: Robust, effort: Effort) -> "RobustSearch":
+        """The same search on more nodes, with the scenarios of a layout that are near their limits."""
+        near = [
+            corner.d
+            for corner in robust.corners
+            if corner.cycle >= (1.0 - NEAR) * robust.cycle or corner.margins.min() < NEAR_ANGLE
+        ]
+        known = {each.tobytes() for each in self._scenarios}
+        other = RobustSearch(problem=problem, displacements=self.displacements, demands=self.demands, effort=effort)
+        other._beyond = self._beyond.copy()
+        other._scenarios = [robust.problem.given, *(d for d in near if d.tobytes() in known)]
+        return other
+
+    def cornered(self, found: Improved, signs: Array) -> Robust | None:
+        """A layout with all its corners planned anew: the worst by derivatives, the ends, seeded ones of signs (C, m).
+
+        None without a motion.
+        """
+        of = self.displaced(found.x)
+        point = self.problem.evaluate(found.x, found.start)
+        if point is None:
+            return None
+        listed = worst(of, replace(point, x=of.given), self.demands, self.effort).corners
+        ends = np.concatenate([np.diag(of.upper), -np.diag(of.upper)])
+        d = np.concatenate([of.given[None], listed, ends, signs * of.upper])
+        nominal, *corners = judged(of, d, found.start, self.demands, replace(self.effort, within=WITHIN))
+        return Robust(
+            found=replace(found, point=point),
+            corners=tuple(corners),
+            worst_ones=len(listed),
+            ends=len(ends),
+            nominal=nominal.cycle,
+            cycle=max(nominal.cycle, *(corner.cycle for corner in corners)),
+            problem=of,
+            displacements=self.displacements.at(found.x),
         )
 
-    def add(self, robust: Robust, demands: Demands, effort: Effort) -> None:
-        """Ask for what corners missed, and a little more."""
-        followed = [corner for corner in robust.corners if np.isfinite(corner.cycle)]
-        if len(followed) < len(robust.corners):  # out of reach: only further from singular configurations helps
-            self.distance[len(robust.problem.bodies.pairs) :] += MORE_REACH
-        if followed:
-            missed = -np.min([corner.margins for corner in followed], axis=0)
-            self.margin += np.where(missed > 0.0, np.minimum(missed, 10.0 * MORE_ANGLE) + MORE_ANGLE, 0.0)
-            lacks = -np.min([corner.rooms for corner in followed], axis=0)
-            self.distance += np.where(lacks > 0.0, np.minimum(lacks, 20.0 * MORE_LENGTH) + MORE_LENGTH, 0.0)
-        if demands.duration is not None and robust.cycle > demands.duration:
-            self.time += min(robust.cycle / demands.duration - 1.0, 0.05) + effort.room.time
+    def learn(self, robust: Robust) -> bool:
+        """Ask for what corners missed; False where they missed nothing."""
+        corners = robust.corners
+        followed = [corner for corner in corners if np.isfinite(corner.cycle)]
+        if len(followed) < len(corners):  # only further from singular configurations helps
+            self._beyond[len(self.problem.bodies.pairs) :] += MORE_REACH
+        lacks = -np.min([corner.rooms for corner in followed], axis=0) if followed else np.zeros(0)
+        if (lacks > 0.0).any():
+            self._beyond += np.where(lacks > 0.0, np.minimum(lacks, MOST_LENGTH) + MORE_LENGTH, 0.0)
+        most = robust.found.cycle
+        if self.demands.objective is not Objective.CYCLE and self.demands.duration is not None:
+            most = self.demands.duration
+        added = self._add(sorted(followed, key=lambda each: -_missed(each, most)), most)
+        return added or len(followed) < len(corners) or bool((lacks > 0.0).any())
+
+    def _begin(self, of: GuardedProblem, found: Worst, start: Array) -> None:
+        """Take the layout in place and the worst corners as scenarios, as far as tools can follow there."""
+        planned = judged(of, found.corners, start, self.demands, replace(self.effort, keys=1, within=0.0))
+        self._scenarios = [of.given, *(each.d for each in planned if np.isfinite(each.cycle))]
+
+    def _add(self, corners: Sequence[Corner], most: float) -> bool:
+        """Make corners scenarios that miss a margin or last longer than the others, the worst ones first."""
+        known, before = {each.tobytes() for each in self._scenarios}, len(self._scenarios)
+        for corner in corners:
+            if _missed(corner, most) > 0.0 and corner.d.tobytes() not in known:
+                self._scenarios.append(corner.d)
+            if len(self._scenarios) >= before + ADDED:
+                break
+        return len(self._scenarios) > before
 
 
 def robust_layout(
-    problem: GuardedProblem,
-    displaced: Callable[[Array], GuardedProblem],
-    begin: tuple[Array, Array],
-    demands: Demands,
-    effort: Effort,
-    *,
-    signs: Array,
+    search: RobustSearch, begin: tuple[Array, Array], *, signs: Array, rounds: int = ROUNDS
 ) -> Robust | None:
     """Improve a layout until its corners keep all demands; the best of what was found, None without a motion.
 
     Args:
-        problem: The layout problem.
-        displaced: The same job for a layout, shape (n,), with displacements of its bases as variables.
+        search: The search.
         begin: Variables, shape (n,), and start posture, shape (nq,).
-        demands: The objective and what must be kept in every corner.
-        effort: How much work each round may do.
         signs: Seeded corners, each displacement -1 or 1, shape (C, m).
+        rounds: Number of rounds at most.
     """
     (x, start), best = begin, None
-    bent = _Bent(margin=np.zeros(len(start)), distance=np.zeros(problem.pair_count))
-    point = problem.evaluate(x, start)
-    for _ in range(ROUNDS):
-        if point is None:
+    for _ in range(rounds):
+        found = search.once(x, start)
+        robust = None if found is None else search.cornered(found, signs)
+        if found is None or robust is None:
             break
-        of = displaced(point.x)
-        allowance = bent.on(worst(of, replace(point, x=of.given), demands, effort).allowance)
-        found = improve(problem, point.x, point.start, replace(demands, allowance=allowance), effort)
-        if found is None:
-            break
-        robust = _with_corners(displaced(found.x), found, demands, effort, signs)
-        is_better = best is None or _rank(robust, demands) < _rank(best, demands)
-        is_done = best is not None and best.is_kept and not robust.cycle < (1.0 - GAIN) * best.cycle
-        if is_better:
+        if best is None or _rank(robust, search.demands) < _rank(best, search.demands):
             best = robust
-        if is_done or (demands.objective is not Objective.CYCLE and _is_enough(robust, demands)):
+        if not search.learn(robust):
             break
-        bent.add(robust, demands, effort)
-        point = found.point
+        x, start = found.x, found.start
     return best
 
 
@@ -138,29 +213,12 @@ def seeded_signs(rng: np.random.Generator, count: int) -> Array:
     return rng.choice([-1.0, 1.0], (SEEDED, count))
 
 
-def _with_corners(problem: GuardedProblem, found: Improved, demands: Demands, effort: Effort, signs: Array) -> Robust:
-    """A layout with all its corners planned anew."""
-    amounts = problem.upper
-    listed = worst(problem, replace(found.point, x=problem.given), demands, effort).corners
-    ends = np.concatenate([np.diag(amounts), -np.diag(amounts)])
-    d = np.concatenate([problem.given[None], listed, ends, signs * amounts])
-    near = replace(effort, within=WITHIN)
-    nominal, *corners = judged(problem, d, found.start, demands, near)
-    return Robust(
-        found=found,
-        corners=tuple(corners),
-        worst_ones=len(listed),
-        ends=len(ends),
-        cycle=max(nominal.cycle, *(corner.cycle for corner in corners)),
-        problem=problem,
-    )
-
-
-def _is_enough(robust: Robust, demands: Demands) -> bool:
-    """Whether all corners keep all demands, at the duration that is demanded."""
-    return robust.is_kept and (demands.duration is None or robust.cycle <= demands.duration)
+def _missed(corner: Corner, most: float) -> float:
+    """How much a corner misses beside distances: more than 0 where it misses a margin or lasts too long."""
+    return max(corner.cycle / most - 1.0 - LONGER, -float(corner.margins.min()) / ANGLE)
 
 
 def _rank(robust: Robust, demands: Demands) -> tuple[bool, int, float]:
     """What makes one better than another."""
-    return not _is_enough(robust, demands), len(robust.corners) - robust.kept, robust.cycle
+    is_late = demands.duration is not None and robust.cycle > demands.duration
+    return is_late or not robust.is_kept, len(robust.corners) - robust.kept, robust.cycle

@@ -21,6 +21,8 @@ class Tolerance:
     Attributes:
         name: Address of what is displaced.
         sign: Direction, -1 or 1.
+        unit: The displacement by 1 [m] or [rad] in this direction, shape (m,).
+        start: Start posture at ``kept`` in [rad] or [m], shape (nq,).
         kept: Largest displacement found in [m] or [rad] at which all demands are kept, not negative.
         missed: Smallest one found at which a demand is missed; inf where none was missed as far as was asked.
         first: The demand that is missed there; empty without one.
@@ -28,6 +30,8 @@ class Tolerance:
 
     name: str
     sign: float
+    unit: Array
+    start: Array
     kept: float
     missed: float
     first: str
@@ -48,13 +52,15 @@ def tolerances(
     amounts, count = problem.upper, len(problem.upper)
     directions = np.concatenate([np.diag(amounts), -np.diag(amounts)])
     kept, missed, first = np.zeros(2 * count), np.full(2 * count, np.inf), [""] * (2 * count)
-    at = np.full(2 * count, FARTHEST)
+    at, starts = np.full(2 * count, FARTHEST), np.tile(start, (2 * count, 1))
     for _ in range(1 + HALVINGS):
         asked = np.flatnonzero(~(kept == FARTHEST))
+        if not asked.size:
+            break
         corners = judged(problem, at[asked, None] * directions[asked], start, demands, effort)
         for row, corner in zip(asked.tolist(), corners, strict=True):
             if corner.keeps(cycle):
-                kept[row] = at[row]
+                kept[row], starts[row] = at[row], corner.start
             else:
                 missed[row], first[row] = at[row], corner.first
         at = 0.5 * (kept + np.minimum(missed, FARTHEST))
@@ -63,6 +69,8 @@ def tolerances(
         Tolerance(
             name=problem.names[row % count],
             sign=1.0 if row < count else -1.0,
+            unit=directions[row] / size[row],
+            start=starts[row],
             kept=float(kept[row] * size[row]),
             missed=float(missed[row] * size[row]),
             first=first[row],

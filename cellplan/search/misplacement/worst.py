@@ -6,7 +6,7 @@ A figure :math:`g` changes by :math:`\sum_k g_k d_k` with the exact derivatives 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.search.misplacement.guarded import GuardedProblem
 from cellplan.search.programs.measures import Measures
-from cellplan.search.programs.objective import Allowance, Demands, Effort
+from cellplan.search.programs.objective import Demands, Effort
 from cellplan.search.programs.problem import Point, PointDerivatives
 
 MOST: Final = 8  # [-] corners of each kind of demand
@@ -25,11 +25,17 @@ class Worst:
     """What displacements may take from the demands of one layout.
 
     Attributes:
-        allowance: What they take to first order.
+        margins: What they take from the margins at the nodes to first order, in [rad] or [m], shape (N, nq).
+        speeds: Likewise from the speeds as shares of their limits, shape (N, nq).
+        accelerations: Likewise from the accelerations, shape (N, nq).
+        distances: Likewise from each pair of bodies in [m], shape (pairs,).
         corners: The displacements that do it for what comes nearest to its limit, shape (K, m).
     """
 
-    allowance: Allowance
+    margins: Array
+    speeds: Array
+    accelerations: Array
+    distances: Array
     corners: Array
 
 
@@ -49,15 +55,16 @@ def worst(problem: GuardedProblem, point: Point, demands: Demands, effort: Effor
     qdd = np.zeros_like(qd) if by.qdd is None else np.abs(by.qdd) @ amounts
     rows = measures.distances
     taken = problem.kept_from_fold(np.abs(apart) @ amounts, rows.values, rows.pairs)
-    allowance = Allowance(
-        margin=q,
-        speed=qd / problem.limits.velocity,
-        acceleration=qdd / problem.acceleration,
-        distance=_of_pairs(problem, measures, taken),
+    found = Worst(
+        margins=q,
+        speeds=qd / problem.limits.velocity,
+        accelerations=qdd / problem.acceleration,
+        distances=_of_pairs(problem, measures, taken),
+        corners=np.zeros((0, len(amounts))),
     )
-    signs = [*_of_joints(problem, measures, by, allowance), *_of_distances(measures, apart, taken)]
+    signs = [*_of_joints(problem, measures, by, found), *_of_distances(measures, apart, taken)]
     corners = np.unique(np.array(signs).reshape(-1, len(amounts)), axis=0)
-    return Worst(allowance=allowance, corners=corners * amounts)
+    return replace(found, corners=corners * amounts)
 
 
 def _of_pairs(problem: GuardedProblem, measures: Measures, taken: Array) -> Array:
@@ -68,18 +75,16 @@ def _of_pairs(problem: GuardedProblem, measures: Measures, taken: Array) -> Arra
     return found
 
 
-def _of_joints(
-    problem: GuardedProblem, measures: Measures, by: PointDerivatives, allowance: Allowance
-) -> Iterator[Array]:
+def _of_joints(problem: GuardedProblem, measures: Measures, by: PointDerivatives, found: Worst) -> Iterator[Array]:
     """Signs of the displacements that take most from margins, speeds and accelerations."""
     point = measures.point
     units = np.where(problem.limits.is_revolute, np.radians(1.0), 0.01)
     sides = [(measures.lower.value, -1.0), (measures.upper.value, 1.0)]
     for value, sign in sides:
-        yield from _leading((value + allowance.margin) / units, by.q * sign)
-    loads = [((measures.speeds.value + allowance.speed), by.qd * np.sign(point.qd)[..., None])]
+        yield from _leading((value + found.margins) / units, by.q * sign)
+    loads = [((measures.speeds.value + found.speeds), by.qd * np.sign(point.qd)[..., None])]
     if by.qdd is not None:
-        loads.append((measures.accelerations.value + allowance.acceleration, by.qdd * np.sign(point.qdd)[..., None]))
+        loads.append((measures.accelerations.value + found.accelerations, by.qdd * np.sign(point.qdd)[..., None]))
     for value, gradients in loads:
         yield from _leading(value, gradients)
 

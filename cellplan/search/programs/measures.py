@@ -1,6 +1,6 @@
 """Measures: how a point stands to all demands, without any derivative."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
@@ -72,23 +72,19 @@ class Measures:
     @classmethod
     def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":
         """Measure a point."""
-        times, limits, allowance = problem.times, problem.limits, demands.allowance
+        times, limits, beyond = problem.times, problem.limits, demands.beyond
         pace = Pace.of(problem, point) if demands.timing is Timing.RETIMED else None
-        speeds, accelerations, factor = (
-            _loads(problem, point, demands) if pace is None else _paced(problem, point, pace)
-        )
-        margin, most = demands.margin, demands.clearance
-        if allowance is not None:
-            margin, most = margin + allowance.margin, most + float(allowance.distance.max(initial=0.0))
+        speeds, accelerations, factor = _loads(problem, point) if pace is None else _paced(problem, point, pace)
+        most = demands.clearance + (0.0 if beyond is None else float(beyond.max(initial=0.0)))
         distances = problem.distances(point, key_nodes(problem, effort), effort.within + most)
         added = np.where(distances.is_own, 0.0, demands.clearance)
-        if allowance is not None:
-            added = added + allowance.distance[distances.pairs]
+        if beyond is not None:
+            added = added + beyond[distances.pairs]
         arms = None if demands.singular is None else problem.arms(point)
         return cls(
             point=point,
-            lower=_crests(problem, limits.lower + margin - point.q),
-            upper=_crests(problem, point.q - limits.upper + margin),
+            lower=_crests(problem, limits.lower + demands.margin - point.q),
+            upper=_crests(problem, point.q - limits.upper + demands.margin),
             speeds=speeds,
             accelerations=accelerations,
             distances=distances,
@@ -199,12 +195,10 @@ def _crests(problem: Problem, values: Array, *, in_magnitude: bool = False) -> C
     return Crests.of(problem.times, values, in_magnitude=in_magnitude)
 
 
-def _loads(problem: Problem, point: Point, demands: Demands) -> tuple[Crests, Crests, float]:
+def _loads(problem: Problem, point: Point) -> tuple[Crests, Crests, float]:
     """Speeds and accelerations under the laws, and how many times as long as the nodes they must last."""
     speeds = _crests(problem, point.qd / problem.limits.velocity, in_magnitude=True)
     accelerations = _crests(problem, point.qdd / problem.acceleration, in_magnitude=True)
-    if (allowance := demands.allowance) is not None:
-        speeds, accelerations = _raised(speeds, allowance.speed), _raised(accelerations, allowance.acceleration)
     return speeds, accelerations, max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
 
 
@@ -223,11 +217,6 @@ def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[Crests, Crests, 
         Crests.at_nodes(share * factor**order) for order, share in enumerate(pace.reached(point.qd, point.qdd), start=1)
     )
     return speeds, accelerations, factor
-
-
-def _raised(crests: Crests, by: Array) -> Crests:
-    """Values of functions that may be larger by so much, shape (N, n)."""
-    return replace(crests, value=crests.value + by)
 
 
 def rooms(distances: Distances, room: Room) -> Array:

@@ -25,23 +25,6 @@ class Timing(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Allowance:
-    """What a point must keep beyond its demands, because something that is not known may take as much away.
-
-    Attributes:
-        margin: Of the joint positions at the nodes in [rad] or [m], shape (N, nq).
-        speed: Of the speeds, as shares of their limits, shape (N, nq).
-        acceleration: Of the accelerations, as shares of their limits, shape (N, nq).
-        distance: Of each pair of bodies in [m], shape (pairs,).
-    """
-
-    margin: Array
-    speed: Array
-    acceleration: Array
-    distance: Array
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Demands:
     """What is demanded of a point.
 
@@ -52,8 +35,9 @@ class Demands:
             objectives clearance and change need one.
         timing: How the motion is timed.
         clearance: Added to what the cell demands of every pair but those of one robot's own bodies, in [m].
-        allowance: What is demanded beyond all that at each node and of each pair; None for nothing.
         singular: Least singular values of the arms in [m] and [rad], shape (A,), see ``Problem``; None for any.
+        beyond: Distances in [m] that pairs keep beyond all that, as something that is not known may take as much away,
+            shape (pairs,); None for nothing.
     """
 
     objective: Objective
@@ -61,8 +45,8 @@ class Demands:
     duration: float | None = None
     timing: Timing = Timing.LAWS
     clearance: float = 0.0
-    allowance: Allowance | None = None
     singular: Array | None = None
+    beyond: Array | None = None
 
     def __post_init__(self) -> None:
         """Check at the door what the objective needs."""

@@ -66,22 +66,27 @@ def with_pedestals(cell: Cell, settings: LayoutSettings) -> tuple[dict[str, obje
     return values, tuple(remarks)
 
 
-def with_room_below(cell: Cell, ranges: Sequence[VaryRange]) -> tuple[VaryRange, ...]:
+def with_room_below(cell: Cell, ranges: Sequence[VaryRange], *, spare: float = 0.0) -> tuple[VaryRange, ...]:
     """Ranges of heights narrowed so that a column below a base, or above one that hangs, does not vanish.
+
+    Args:
+        cell: The cell.
+        ranges: The ranges.
+        spare: Length in [m] by which bases may be off their heights.
 
     Raises:
         InputError: That leaves no height.
     """
-    found = []
+    found, shortest = [], SHORTEST + spare
     for each in ranges:
         mount = cell.robot(each.name).pedestal if each.kind is VariableKind.BASE and each.index == 2 else None
         lower, upper = each.lower, each.upper
         if isinstance(mount, Hanger):
-            upper = min(upper, mount.ceiling - SHORTEST)
+            upper = min(upper, mount.ceiling - shortest)
         elif isinstance(mount, Pedestal | Wedge):
-            lower = max(lower, mount.floor + SHORTEST)
+            lower = max(lower, mount.floor + shortest)
         if isinstance(mount, Wedge):
-            lower = max(lower, mount.floor + SHORTEST + _slope(cell, each.name, ranges) * _outer_radius(mount))
+            lower = max(lower, mount.floor + shortest + _slope(cell, each.name, ranges) * _outer_radius(mount))
         if not lower < upper:
             where = cell.origin.at(f"layout.vary.{each.address.removeprefix('robots.').removesuffix('.z_mm')}")
             raise InputError(f"{where}: expected heights that leave a column at the base of '{each.name}'")

@@ -6,7 +6,7 @@ import pytest
 
 from cellplan import CellplanError, LayoutRequest
 from cellplan.cli.main import run
-from cellplan.pipeline.layout.quantities import read_angle, read_length, read_time
+from cellplan.pipeline.layout.quantities import read_angle, read_length, read_misplacement, read_time
 from cellplan.pipeline.layout.searched import searched_cell, written_vary
 from cellplan.search.programs.objective import Objective
 
@@ -23,6 +23,8 @@ FOUR = CELLS / "find_a_layout.yaml"
         (read_length, "3", 3.0),
         (read_angle, "0.5rad", 28.64788975654116),
         (read_time, "2min", 120.0),
+        (read_misplacement, "1cm,1deg", (10.0, 1.0)),
+        (read_misplacement, "0.5, 0.2", (0.5, 0.2)),
     ],
 )
 def test_a_quantity_is_read_with_its_unit(read, text, value):  # type: ignore[no-untyped-def]
@@ -43,6 +45,22 @@ def test_a_quantity_is_read_with_its_unit(read, text, value):  # type: ignore[no
         (["--budget", "0"], "error: --budget: expected a time above 0 such as 60s or 10min, got '0'"),
         (["--clearance", "-1mm"], "error: --clearance: expected a length such as 10mm (mm, cm, m), got '-1mm'"),
         (["--margin", "15mm"], "error: --margin: expected an angle such as 15deg (deg, rad), got '15mm'"),
+        (
+            ["--misplacement", "10mm"],
+            "error: --misplacement: expected a length and an angle such as 10mm,1deg, got '10mm'",
+        ),
+        (
+            ["--misplacement", "1deg,10mm"],
+            "error: --misplacement: expected a length such as 10mm (mm, cm, m), got '1deg'",
+        ),
+        (
+            ["--misplacement", "10mm,0deg"],
+            "error: --misplacement: expected a length and an angle above 0 such as 10mm,1deg, got '10mm,0deg'",
+        ),
+        (
+            ["--misplacement", "10mm,1deg", "--timing", "retimed"],
+            "error: --misplacement: expected a motion by the time laws, got --timing retimed: leave one of them out",
+        ),
         (
             ["--objective", "cicle"],
             "error: --objective: expected one of conforming, cycle, clearance, change, got 'cicle', did you mean "

@@ -1,5 +1,6 @@
 """Displaced bases of two planar arms: derivatives by differences, and corners as the product solves them."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,6 +16,8 @@ from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.misplacement.corners import judged
 from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.misplacement.guarded import GuardedProblem
+from cellplan.search.misplacement.robust import RobustSearch, robust_layout, seeded_signs
+from cellplan.search.misplacement.scenarios import ScenarioProblem
 from cellplan.search.misplacement.tolerance import tolerances
 from cellplan.search.misplacement.worst import worst
 from cellplan.search.programs.measures import Measures
@@ -67,17 +70,74 @@ def test_a_base_on_the_floor_is_not_lowered() -> None:
     assert len(found.names) == 6
 
 
-def test_allowances_are_sums_of_absolute_differences(pair: SimpleNamespace) -> None:
+def test_displacements_take_the_sum_of_absolute_differences(pair: SimpleNamespace) -> None:
     problem, point, step = pair.problem, pair.point, 1e-3
-    found = worst(problem, point, pair.demands, Effort(keys=5)).allowance
+    found = worst(problem, point, pair.demands, Effort(keys=5))
 
     q, qd = np.zeros_like(point.q), np.zeros_like(point.q)
     for unit in np.diag(problem.upper):
         forward, back = (problem.evaluate(side * step * unit, point.start) for side in (1.0, -1.0))
         q += np.abs(forward.q - back.q) / (2.0 * step)
         qd += np.abs(forward.qd - back.qd) / (2.0 * step)
-    np.testing.assert_allclose(found.margin, q, atol=2e-3 * q.max())
-    np.testing.assert_allclose(found.speed, qd / problem.limits.velocity, atol=5e-3 * found.speed.max())
+    np.testing.assert_allclose(found.margins, q, atol=2e-3 * q.max())
+    np.testing.assert_allclose(found.speeds, qd / problem.limits.velocity, atol=5e-3 * found.speeds.max())
+
+
+def scenarios_of(pair: SimpleNamespace) -> ScenarioProblem:
+    signs = np.where(np.arange(16).reshape(2, 8) % 3, 1.0, -1.0)
+    d = np.concatenate([np.zeros((1, 8)), signs * pair.of.amounts])
+    return ScenarioProblem.of(pair.ready.problem(33), pair.of, d)
+
+
+def test_scenarios_are_the_motions_of_displaced_layouts(pair: SimpleNamespace) -> None:
+    problem = scenarios_of(pair)
+    point = problem.evaluate(pair.of.x, pair.point.start)
+    corners = judged(pair.problem, problem.d, pair.point.start, pair.demands, Effort(keys=5))
+
+    found = Measures.of(problem, point, pair.demands, Effort(keys=5))
+
+    assert found.cycle == pytest.approx(max(corner.cycle for corner in corners), rel=1e-9)
+    beyond = np.maximum(found.lower.value.max(axis=0), found.upper.value.max(axis=0))
+    np.testing.assert_allclose(-beyond, np.min([corner.margins for corner in corners], axis=0), atol=1e-9)
+    again = problem.evaluate(pair.of.x, pair.point.start, point)
+    for d, near, q in zip(problem.d, np.split(point.q, 3), np.split(again.q, 3), strict=True):
+        alone = pair.problem.evaluate(d, near[0], replace(point, q=near))
+        np.testing.assert_allclose(q, alone.q, atol=1e-9)
+
+
+def test_scenarios_have_the_derivatives_of_their_differences(pair: SimpleNamespace) -> None:
+    problem, step = scenarios_of(pair), 1e-4
+    x = pair.of.x
+    by = problem.derivatives(problem.evaluate(x, pair.point.start))
+    assert by.q.shape == (len(problem.times), 6, len(x))
+
+    unit = problem.scale * np.where(np.arange(len(x)) % 2, 1.0, -0.5)
+    forward, back = (problem.evaluate(x + side * step * unit, pair.point.start) for side in (1.0, -1.0))
+
+    for found, sides in ((by.q, (forward.q, back.q)), (by.qd, (forward.qd, back.qd))):
+        differences = (sides[0] - sides[1]) / (2.0 * step)
+        np.testing.assert_allclose(found @ unit, differences, atol=5e-3 * np.abs(differences).max())
+
+
+def test_a_robust_layout_keeps_its_demands_in_all_corners(pair: SimpleNamespace) -> None:
+    search = RobustSearch(
+        problem=GuardedProblem.like(pair.ready.problem(33)),
+        displacements=pair.of,
+        demands=pair.demands,
+        effort=Effort(iterations=3, keys=5),
+    )
+    begin = pair.of.x, pair.point.start
+    signs = seeded_signs(np.random.default_rng(1), 8)[:6]
+    before = Measures.of(scenarios_of(pair), scenarios_of(pair).evaluate(*begin), pair.demands, Effort(keys=5))
+
+    found = robust_layout(search, begin, signs=signs, rounds=2)
+
+    assert found is not None
+    assert found.is_kept
+    assert len(found.corners) == found.worst_ones + found.ends + len(signs)
+    assert found.nominal <= found.cycle < before.cycle
+    finer = search.finer(GuardedProblem.like(pair.ready.problem(49)), found, Effort(iterations=1, keys=5))
+    assert finer.once(found.found.x, found.found.start) is not None
 
 
 def test_a_corner_moves_as_the_product_solves_it(pair: SimpleNamespace) -> None:
