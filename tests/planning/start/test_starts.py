@@ -110,8 +110,10 @@ def test_found_starts_reach_their_tasks_within_limits_and_free(cell, missing):
     assert scene.touching(q) is None
 
 
-def test_search_gives_the_same_configuration_again(cell):
-    missing = ("kuka", "abb", "staubli")
+@pytest.mark.parametrize(
+    "missing", [pytest.param(("kuka", "abb", "staubli"), marks=pytest.mark.slow), ("reis",)], ids="+".join
+)
+def test_search_gives_the_same_configuration_again(cell, missing):
     _, first = found_without(cell, missing)
     _, again = found_without.__wrapped__(cell, missing)
     np.testing.assert_array_equal(first, again)
