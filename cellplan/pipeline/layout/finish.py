@@ -171,7 +171,7 @@ class Finish:
             self.solves += 1
             if program is not None:
                 program = program.certified(self.progress, timed.quick)
-                reason = rejection_of(program, self.ready.variables) or _too_singular(
+                reason = rejection_of(program, self.ready.variables) or too_singular(
                     self.ready, timed.standing, program
                 )
             found = Certified(
@@ -280,7 +280,7 @@ def rejection_of(program: TimedProgram, variables: Variables) -> str:
     return ""
 
 
-def _too_singular(ready: Prepared, standing: Standing, program: TimedProgram) -> str:
+def too_singular(ready: Prepared, standing: Standing, program: TimedProgram) -> str:
     """Which arm comes nearer to a singular configuration than the cell allows, by the report; empty for none."""
     arms, demanded, layout = standing.measures.arms, standing.demands.singular, ready.cell.layout
     if arms is None or demanded is None or layout is None or layout.singular is None:

@@ -28,6 +28,7 @@ from cellplan.pipeline.layout.finish import (
     clearance_of,
     margin_of,
     rejection_of,
+    too_singular,
 )
 from cellplan.pipeline.layout.limits import standing_of
 from cellplan.pipeline.layout.prepared import NODES as FEW_NODES
@@ -159,6 +160,7 @@ class MisplacedFinish(Finish):
         missing = None
         try:
             program, solved, reason, verdicts = self._in_one_cycle(robust)
+            reason = reason or too_singular(self.ready, standing, program)
         except (InputError, NoSolutionError) as error:
             reason = str(error).splitlines()[0]
         failed = [each for each in verdicts if each.reason]

@@ -91,6 +91,7 @@ class RobustSearch:
     def __post_init__(self) -> None:
         """Begin without scenarios, and with nothing that corners were seen to miss."""
         self._beyond = np.zeros(self.problem.pair_count)
+        self.demands = replace(self.demands, singular=None)  # the problem guards its arms itself
 
     def displaced(self, x: Array) -> GuardedProblem:
         """The job of a layout, shape (n,), with the displacements of its bases as variables."""

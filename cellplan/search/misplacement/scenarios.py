@@ -1,6 +1,6 @@
 """Scenarios: motions of one layout in place and with displaced bases, which keep their limits in one cycle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.run import run, run_near
+from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.misplacement.guarded import GuardedProblem
 from cellplan.search.programs.layout_problem import LayoutProblem
@@ -60,6 +61,10 @@ class ScenarioProblem(GuardedProblem):
         all_q, all_qd = (np.ascontiguousarray(part).reshape(-1, len(start)) for part in (motion.q, motion.qd))
         qdd = (self.job.rates @ motion.qd).reshape(all_qd.shape)
         return Point(x=x, start=all_q[0], q=all_q, qd=all_qd, qdd=qdd)
+
+    def arms(self, point: Point) -> SingularValues:
+        """See ``Problem``: the arms of the layout in place."""
+        return GuardedProblem.arms(self, replace(point, q=point.q[: len(self.job.times)]))
 
     def derivatives(self, point: Point) -> PointDerivatives:
         """See ``Problem``; rates are those of the layout in place."""
