@@ -10,7 +10,7 @@ import os
 import shutil
 from pathlib import Path, PurePosixPath
 from types import TracebackType
-from typing import Self
+from typing import Final, Self
 
 from cellplan.errors import InputError
 from cellplan.io.input.files import digest
@@ -28,6 +28,7 @@ from cellplan.io.run.exchange import exchange
 
 __all__ = ["EXPORT", "MANIFEST", "PROGRAMS", "REHEARSAL", "RunFolder", "is_run_folder", "refuse_unless_replaceable"]
 
+STUDY: Final = "study.jsonl"  # journal of a study, which is not replaced
 NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})  # from file systems that cannot sync folders
 
 
@@ -236,6 +237,8 @@ def _cannot_write(path: Path, error: OSError) -> InputError:
 
 
 def _holds_foreign(path: Path, foreign: str) -> InputError:
+    if (path / STUDY).is_file():
+        return InputError(f"{path}: holds a study, which no run replaces; choose another folder or empty this one")
     return InputError(
         f"{path}: holds '{foreign}', which cellplan did not write; choose another folder or empty this one"
     )

@@ -362,6 +362,15 @@ def test_an_older_run_that_a_dead_process_put_aside_comes_back(tmp_path: Path) -
     assert everything_in(tmp_path) == ["bench", "bench/report.json"]
 
 
+def test_a_study_is_not_replaced_by_a_run(tmp_path: Path) -> None:
+    (tmp_path / "placed").mkdir()
+    (tmp_path / "placed" / "study.jsonl").write_text("{}")
+
+    assert refusal(tmp_path / "placed") == (
+        f"{tmp_path / 'placed'}: holds a study, which no run replaces; choose another folder or empty this one"
+    )
+
+
 def test_an_older_run_that_was_replaced_is_removed_unless_it_holds_something_foreign(tmp_path: Path) -> None:
     write_run(tmp_path / "bench", tables="new")
     left = left_behind(tmp_path, ".replaced")
