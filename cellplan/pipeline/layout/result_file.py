@@ -6,7 +6,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 from cellplan.io.cell.changed_text import changed_text
-from cellplan.io.cell.load import load_cell
 from cellplan.io.input.files import digest, read_regular_file
 from cellplan.model.cell import Cell
 
@@ -45,15 +44,6 @@ def file_records(files: Mapping[str, bytes]) -> list[dict[str, str]]:
     return [{"name": name, "sha256": digest(content)} for name, content in files.items()]
 
 
-def reads_back(folder: Path, cell: Cell, allow_dirs: tuple[Path, ...]) -> bool:
-    """Whether ``best.yaml`` loads to the values of the cell that was certified."""
-    found = load_cell(folder / BEST, allow_dirs=allow_dirs)
-    names = [dict(each.origin.document) for each in (found, cell)]
-    for document in names:
-        document.pop("layout", None)
-    return _without_files(names[0]) == _without_files(names[1])
-
-
 def _is_copied(name: str, given: Path) -> bool:
     """Whether an input lies below the folder of the cell, and is neither the cell itself nor a bundled robot."""
     path = PurePosixPath(name)
@@ -71,12 +61,3 @@ def _renamed(node: Any, old: Path, new: Path, key: str = "") -> Any:
     if is_file and (old / node).exists():
         return Path(os.path.relpath((old / node).resolve(), new.resolve())).as_posix()
     return node
-
-
-def _without_files(node: Any, key: str = "") -> Any:
-    """Values without the names of files, which differ from folder to folder."""
-    if isinstance(node, Mapping):
-        return {name: _without_files(value, str(name)) for name, value in node.items()}
-    if isinstance(node, tuple | list):
-        return [_without_files(value, key) for value in node]
-    return None if key in NAMING | FOLDERS and isinstance(node, str) else node
