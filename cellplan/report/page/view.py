@@ -1,0 +1,76 @@
+"""The 3-D page: one file with its data, its style and its program."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from cellplan.model.units import MM
+from cellplan.report.page.render import template
+from cellplan.report.record.view import ViewRecord
+
+MARK: Final = '<meta name="generator" content="cellplan view">'  # stands in the first lines of every page
+MARK_WITHIN: Final = 400  # [bytes]
+SCRIPTS: Final = (
+    "algebra",
+    "kinematics",
+    "shapes",
+    "camera",
+    "webgl",
+    "painter",
+    "stage",
+    "traces",
+    "dom",
+    "player",
+    "controls",
+    "panels",
+    "bases",
+    "main",
+)  # each after those that it needs
+
+
+def view_page(record: ViewRecord) -> str:
+    """The page as text; it loads nothing and works without a network.
+
+    Args:
+        record: What it shows.
+    """
+    return template("view/view.html").render(
+        r=record,
+        mark=MARK,
+        scripts=[f"view/{name}.js" for name in SCRIPTS],
+        data=script_json(record),
+        about=list(_about(record)),
+    )
+
+
+def _about(record: ViewRecord) -> Iterator[str]:
+    """How exact the page is."""
+    deviation = max((each.get("deviation", 0.0) for each in record["geometries"]), default=0.0)
+    if deviation > 0.0:
+        yield f"Meshes are drawn with fewer triangles, nowhere farther than {MM * deviation:.2g} mm from their files."
+    motion, nearest = record["scenes"][0]["motion"], record["scenes"][0]["nearest"]
+    if motion["count"] > 1:
+        kept = "" if motion["count"] == motion["total"] else f" Of {motion['total']} rows {motion['count']} are in the page."
+        yield f"Joints move linearly between rows.{kept}"
+        yield (
+            f"The closest pair is computed every {MM * nearest['step']:.3g} ms or more often, among pairs that are to keep "
+            "a clearance and move against each other; a distance after ≥ is that of convex hulls, never above the true one. "
+            "In between its line joins the same two points. What is certified between the rows is in the report."
+        )
+
+
+def script_json(record: ViewRecord) -> str:
+    """A record as JSON that no browser takes for markup, wherever it stands in a page."""
+    text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    for sign in "<>&\u2028\u2029":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return text
+
+
+def is_view_page(path: Path) -> bool:
+    """Whether a file is a 3-D page that cellplan wrote."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return MARK.encode() in file.read(MARK_WITHIN)
