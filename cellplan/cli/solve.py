@@ -31,6 +31,11 @@ KeepRejected = Annotated[
     bool, typer.Option("--keep-rejected", help="Write the tables of a failed run below rejected/.")
 ]
 
+WithView = Annotated[
+    bool,
+    typer.Option("--view", help="Write the 3-D page view.html too, as cellplan view does; the report leads to it."),
+]
+
 
 def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     cell: CellFile,
@@ -44,6 +49,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     task: TaskName = None,
     as_json: AsJson = False,
     keep_rejected: KeepRejected = False,
+    with_view: WithView = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
 ) -> None:
@@ -81,7 +87,11 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:
             solution = solve_with_plots(changed, plots, task=task, progress=progress)
-            record = write_run(solution, folder, keep_rejected=keep_rejected, plots=plots)
+            record = write_run(solution, folder, keep_rejected=keep_rejected, plots=plots, view=with_view)
+            if with_view:
+                from cellplan.pipeline.view.write import write_view_of_run
+
+                write_view_of_run(folder, solution.cell, progress=progress)
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
     if as_json:
         place = {"folder": str(folder), "report_path": str(folder / "report.html")}

@@ -39,8 +39,8 @@ def view(
     """Write a 3-D page: one file without a network or a server, which plays a run in a browser.
 
     Of a run it shows the whole motion, the closest pair and every failure at its instant; of a cell that was not solved
-    its start, with the bases to move; of a layout search its best layouts. Exit status: 0 the page was written, whatever
-    it shows, 2 bad input, 4 internal error.
+    its start, with the bases to move; of a layout search its best layouts. Exit status: 0 the page was written,
+    whatever it shows, 2 bad input, 4 internal error.
     """
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.pipeline.view.write import ViewRequest, write_view

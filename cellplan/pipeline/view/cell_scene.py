@@ -1,10 +1,8 @@
 """The scene of a cell that was not solved: at its start postures, or as near to them as can be said."""
 
-from dataclasses import replace
-
 import numpy as np
 
-from cellplan.errors import CellplanError, InputError, NoSolutionError
+from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.progress import Progress, silent

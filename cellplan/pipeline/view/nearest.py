@@ -2,20 +2,23 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.collision.bodies import BodyPoses
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.transforms import inverse
 from cellplan.model.units import MM
 from cellplan.report.record.view import NearestRecord, point_numbers
 from cellplan.scene.bodies import SceneBody, is_ground
+from cellplan.scene.near import NearPairs
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 
 INSTANTS: Final = 200  # [-] at which the closest pair of a motion is looked for, beside those of the report
 WITHIN: Final = (0.05, 0.2, 0.8, 3.2)  # [m] distances within which it is looked for, one after the other
+SURFACES: Final = 600  # [-] distances of surfaces that are asked of a page: some milliseconds each
 DECIMALS: Final = 4  # of distances in [mm]
 
 
@@ -26,6 +29,24 @@ class Stretch:
     scene: Scene
     first: int
     end: int
+
+
+class Closest(NamedTuple):
+    """The closest pair of a configuration.
+
+    Attributes:
+        row: Its place in ``Scene.pairs``.
+        distance: In [m]; zero or less where the bodies touch.
+        first: Point of the first body in the world in [m], shape (3,).
+        second: Point of the second body likewise.
+        is_bound: Whether the distance is that of hulls that hold more than the bodies.
+    """
+
+    row: int
+    distance: float
+    first: Array
+    second: Array
+    is_bound: bool
 
 
 def instants(times: Array, further: Iterable[float | None]) -> Indices:
@@ -54,55 +75,92 @@ def nearest_record(stretches: Sequence[Stretch], times: Array, q: Array, rows: I
         lower_bound=[],
         points=[],
     )
+    queries = SURFACES
     for stretch in stretches:
         own = rows[(rows >= stretch.first) & (rows < stretch.end)]
         if len(own):
-            _look(stretch.scene, q[own], record)
+            queries = _look(stretch.scene, q[own], record, queries)
     return record
 
 
-def _look(scene: Scene, q: Array, record: NearestRecord) -> None:
-    """Add the closest pair at some configurations, shape (K, nq)."""
+@dataclass(slots=True)
+class _Sought:
+    """The closest pairs of some configurations while they are looked for.
+
+    Attributes:
+        scene: The scene.
+        poses: Poses of its bodies.
+        queries: Surface queries that may still be asked.
+    """
+
+    scene: Scene
+    poses: BodyPoses
+    queries: int
+
+    def closest(self, sample: int, near: NearPairs, places: Indices) -> Closest | None:
+        """The closest of some near pairs, the nearest hulls first: surfaces are asked while hulls leave it open."""
+        best: Closest | None = None
+        for place in places[np.argsort(near.distances[places], kind="stable")].tolist():
+            bound = float(near.distances[place])
+            if best is not None and bound >= best.distance:
+                break
+            row = int(near.rows[place])
+            found = Closest(row, bound, near.first[place], near.second[place], _is_bound(self.scene, row, bound))
+            if found.is_bound and self.queries > 0:
+                found = self._of_surfaces(found, sample)
+            best = found if best is None or found.distance < best.distance else best
+        return best
+
+    def _of_surfaces(self, found: Closest, sample: int) -> Closest:
+        """The same pair with the distance of its surfaces; as it was where they touch."""
+        solids = self.scene.pairs[found.row].solids
+        if solids is None:
+            return found
+        self.queries -= 1
+        points = self.scene.engine.surface_points(*solids, self.poses, sample=sample)
+        if points is None:
+            return found
+        return Closest(found.row, float(np.linalg.norm(points[1] - points[0])), *points, is_bound=False)
+
+    def local(self, body: int, point: Array, sample: int) -> Array:
+        """A point of the world in the frame of a body, shape (3,)."""
+        if is_ground(self.scene.bodies[body]):
+            X_SW = inverse(self.scene.bodies[body].X_BS)
+            return X_SW[:3, :3] @ point + X_SW[:3, 3]
+        return self.poses.R[body, sample].T @ (point - self.poses.p[body, sample])
+
+
+def _look(scene: Scene, q: Array, record: NearestRecord, queries: int) -> int:
+    """Add the closest pair at some configurations, shape (K, nq); gives the surface queries that are left."""
     counted = np.array([_counts(scene, pair) for pair in scene.pairs], dtype=bool)
-    found: dict[int, tuple[int, float, Array, Array]] = {}
+    sought = _Sought(scene, scene.body_poses(q), queries)
+    found: dict[int, Closest] = {}
     for within in WITHIN:
-        open_ = np.array([sample for sample in range(len(q)) if sample not in found], dtype=np.intp)
-        if len(open_):
-            found |= _closest(scene, q[open_], within, counted, open_)
-    poses = scene.body_poses(q)
+        left = np.array([sample for sample in range(len(q)) if sample not in found], dtype=np.intp)
+        if not len(left):
+            break
+        near = scene.near(q[left], within)
+        for place, sample in enumerate(left.tolist()):
+            places = np.flatnonzero((near.samples == place) & counted[near.rows])
+            closest = sought.closest(sample, near, places)
+            if closest is not None and closest.distance < within:
+                found[sample] = closest
     for sample in range(len(q)):
-        if sample not in found:
-            record["pairs"].append([])
-            record["distances"].append(0.0)
-            record["lower_bound"].append(False)
-            record["points"].append([])
-            continue
-        row, distance, first, second = found[sample]
-        pair, ends = scene.pairs[row], np.empty((2, 3))
-        for end, (body, point) in enumerate(((pair.first, first), (pair.second, second))):
-            if is_ground(scene.bodies[body]):
-                X_SW = inverse(scene.bodies[body].X_BS)
-                ends[end] = X_SW[:3, :3] @ point + X_SW[:3, 3]
-            else:
-                ends[end] = poses.R[body, sample].T @ (point - poses.p[body, sample])
-        record["pairs"].append([pair.first, pair.second])
-        record["distances"].append(round(MM * distance, DECIMALS) + 0.0)
-        record["lower_bound"].append(_is_bound(scene, pair, distance))
-        record["points"].append(point_numbers(ends))
+        _add(record, sought, sample, found.get(sample))
+    return sought.queries
 
 
-def _closest(
-    scene: Scene, q: Array, within: float, counted: Flags, samples: Indices
-) -> dict[int, tuple[int, float, Array, Array]]:
-    """Row of the closest pair, distance in [m] and both points, by sample; those without a pair so near are left out."""
-    near = scene.near(q, within)
-    kept = np.flatnonzero(counted[near.rows])
-    order = kept[np.lexsort((near.distances[kept], near.samples[kept]))]
-    _, first = np.unique(near.samples[order], return_index=True)
-    return {
-        int(samples[near.samples[k]]): (int(near.rows[k]), float(near.distances[k]), near.first[k], near.second[k])
-        for k in order[first]
-    }
+def _add(record: NearestRecord, sought: _Sought, sample: int, found: Closest | None) -> None:
+    """Add what was found at a configuration."""
+    pair = None if found is None else sought.scene.pairs[found.row]
+    record["pairs"].append([] if pair is None else [pair.first, pair.second])
+    record["distances"].append(0.0 if found is None else round(MM * found.distance, DECIMALS) + 0.0)
+    record["lower_bound"].append(found is not None and found.is_bound)
+    points: list[float] = []
+    if found is not None and pair is not None:
+        ends = ((pair.first, found.first), (pair.second, found.second))
+        points = point_numbers(np.stack([sought.local(body, point, sample) for body, point in ends]))
+    record["points"].append(points)
 
 
 def touching_pairs(scene: Scene, q: Array) -> list[tuple[int, int]]:
@@ -115,7 +173,8 @@ def touching_pairs(scene: Scene, q: Array) -> list[tuple[int, int]]:
         if pair.is_ground:
             touches = scene.ground_heights(pair, poses)[0] <= 0.0
         else:
-            touches = pair.solids is not None and scene.engine.touch(*pair.solids, poses, sample=0)
+            first, second = pair.solids or (pair.first, pair.second)
+            touches = scene.engine.touch(first, second, poses, sample=0)
         if touches:
             kept.append((pair.first, pair.second))
     return kept
@@ -132,8 +191,9 @@ def _is_joined(a: SceneBody, b: SceneBody) -> bool:
     return a.robot is not None and a.robot == b.robot and a.link == b.link
 
 
-def _is_bound(scene: Scene, pair: ScenePair, distance: float) -> bool:
+def _is_bound(scene: Scene, row: int, distance: float) -> bool:
     """Whether a distance is that of hulls that hold more than the bodies; see ``NearPairs``."""
-    solids = pair.solids if pair.solids is not None else (pair.first,)
-    is_hull = not all(scene.engine.bodies[index].is_convex for index in solids)
-    return is_hull and not pair.is_ground and distance > pair.demand
+    pair = scene.pairs[row]
+    if pair.solids is None or distance <= pair.demand:
+        return False
+    return not all(scene.engine.bodies[index].is_convex for index in pair.solids)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -62,15 +63,15 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneVie
     Raises:
         InputError: The series of the run do not fit its cell.
     """
-    played = list(_played(stored, cell))
     program = DemandedProgram.of(cell)
+    played = list(_played(stored, cell, program.labels))
     scenes = program.scenes(cell)
     times, q, firsts = _joined(played)
     bodies = scenes[0].bodies
     index = {body.name: number for number, body in enumerate(bodies)}
     contacts = list(_contacts(stored, played, index))
     failures = list(_failures(stored, played, cell, index))
-    further = [each for contact in contacts for each in (contact["first"], contact["last"])]
+    further: list[float | None] = [each for contact in contacts for each in (contact["first"], contact["last"])]
     further += [failure["at"] for failure in failures]
     further += [at for one in played for at in _worst_instants(stored.records[one.place], one.begin)]
     ends = [*firsts[1:], len(times)]
@@ -113,14 +114,19 @@ def motion_record(times: Array, q: Array, phases: list[dict[str, Any]]) -> Motio
     }
 
 
-def _played(stored: StoredRun, cell: Cell) -> Iterator[Played]:
-    """The phases of the program in their order; those of further cycles repeat the first."""
+def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Played]:
+    """The phases of the program in their order; those of further cycles repeat the first.
+
+    Args:
+        stored: The run.
+        cell: The cell that was solved.
+        labels: Names of the phases of one cycle; a run of a single task has others, all in one scene.
+    """
     phases = [phase for phase in stored.record["phases"] if phase["in_program"]]
     if "" in stored.records:
         times, q = _series(stored, "", cell)
         yield Played(name=phases[0]["name"], place="", begin=0.0, number=0, times=times, q=q)
         return
-    numbers = {name: number for number, name in enumerate(stored.records)}
     read = {name: _series(stored, name, cell) for name in stored.records}
     for phase in phases:
         if phase["name"] not in read:
@@ -131,7 +137,7 @@ def _played(stored: StoredRun, cell: Cell) -> Iterator[Played]:
             name=phase["name"],
             place=phase["name"],
             begin=begin,
-            number=numbers[phase["name"]],
+            number=labels.index(phase["name"]) if phase["name"] in labels else 0,
             times=begin + times,
             q=q,
         )
@@ -148,18 +154,19 @@ def _series(stored: StoredRun, place: str, cell: Cell) -> tuple[Array, Array]:
                 values = tree["joints"][robot.name][joint.name][f"position_{unit}"]
                 columns.append(np.array(values, dtype=np.float64) / scale)
         q = np.stack(columns, axis=1)
-        if q.shape[:1] != times.shape or not np.all(np.isfinite(q)):
-            raise ValueError
+        is_sound = q.shape[:1] == times.shape and bool(np.all(np.isfinite(q)))
     except (KeyError, TypeError, ValueError):
+        is_sound = False
+    if not is_sound:
         file = stored.file(place, SERIES)
-        raise InputError(f"{file}: expected positions of all joints of the cell, got others; solve again") from None
+        raise InputError(f"{file}: joints: expected positions of all joints of the cell, got others; solve again")
     return times, q
 
 
 def _joined(played: Sequence[Played]) -> tuple[Array, Array, list[int]]:
     """All rows one after the other, a row that two phases share once, and the first row of each phase."""
     times, q, firsts = [played[0].times], [played[0].q], [0]
-    for before, one in zip(played, played[1:], strict=False):
+    for before, one in pairwise(played):
         shared = int(abs(one.times[0] - before.times[-1]) <= SAME_TIME)
         firsts.append(sum(map(len, times)))
         times.append(one.times[shared:])
@@ -180,7 +187,7 @@ def _part_places(played: Sequence[Played], cells: Sequence[Cell]) -> list[PlaceR
     places: list[PlaceRecord] = []
     for one in played:
         place = place_record(cells[one.number], one.begin)
-        if not places or any(place[key] != places[-1][key] for key in ("robot", "link", "pose")):  # type: ignore[literal-required]
+        if not places or any(place[key] != places[-1][key] for key in ("robot", "link", "pose")):
             places.append(place)
     return places
 
@@ -199,15 +206,17 @@ def _contacts(stored: StoredRun, played: Sequence[Played], index: dict[str, int]
             }
 
 
-def _failures(stored: StoredRun, played: Sequence[Played], cell: Cell, index: dict[str, int]) -> Iterator[FailureRecord]:
+def _failures(
+    stored: StoredRun, played: Sequence[Played], cell: Cell, index: dict[str, int]
+) -> Iterator[FailureRecord]:
     """Checks that failed, on the clock of the program, in the order of their instants; those without one come last."""
     found: list[FailureRecord] = []
-    told = set[str]()
+    seen = set[str]()
     for one in played:
         for check in stored.records[one.place]["checks"]:
-            if check["passed"] or (one.place and one.place + check["message"] in told):
+            if check["passed"] or (one.place and one.place + check["message"] in seen):
                 continue
-            told.add(one.place + check["message"])
+            seen.add(one.place + check["message"])
             prefix = f"{one.name}: " if one.place else ""
             found.append(
                 {

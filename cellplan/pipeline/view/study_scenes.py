@@ -36,7 +36,7 @@ def read_layout_study(folder: Path) -> Record:
     """
     file = folder / RESULT
     if not file.exists():
-        raise InputError(f"{folder}: expected a study that has ended, got one without {RESULT}: finish it with --resume")
+        raise InputError(f"{file}: missing: the search has not ended; finish it with --resume")
     record = parse_json(read_regular_file(file, file=str(file), limit=RESULT_LIMIT), str(file))
     if record.get("schema") != SCHEMA or record.get("kind") != "layout":
         got = f"one of the kind {shown(record.get('kind', 'unknown'))}"

@@ -19,11 +19,11 @@ from cellplan.pipeline.view.cell_scene import unsolved_scene
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.run_scene import run_scene
 from cellplan.pipeline.view.study_scenes import cell_of_study, read_layout_study, study_scenes
+from cellplan.report.page.render import VIEW_PAGE
 from cellplan.report.page.view import is_view_page, view_page
 from cellplan.report.record.view import SCHEMA, SceneViewRecord, ViewRecord
 from cellplan.study.folder import JOURNAL, RESULT, write_whole
 
-RUN_PAGE: Final = "view.html"  # in a run folder
 STUDY_PAGE: Final = "study-view.html"  # in the folder of a study
 
 
@@ -55,7 +55,7 @@ def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewReco
         if request.settings:
             raise InputError(f"--set: expected a cell file with it, got the folder '{path}'")
         if (path / MANIFEST).exists() or is_run_folder(path):
-            return _view_of_run(request, progress), path / RUN_PAGE
+            return _view_of_run(request, progress), path / VIEW_PAGE
         if (path / RESULT).exists() or (path / JOURNAL).exists():
             return _view_of_study(request, progress), path / STUDY_PAGE
         raise InputError(f"{path}: expected a run, a layout search or a cell file, got a folder that holds none")
@@ -67,18 +67,22 @@ def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewReco
     return _record("cell", cell, geometries, [scene]), Path("outputs") / f"{cell.name}-view.html"
 
 
-def view_of_run(folder: Path, cell: Cell, *, progress: Progress = silent) -> ViewRecord:
-    """The record of the page of a run whose cell is at hand.
+def write_view_of_run(folder: Path, cell: Cell, *, progress: Progress = silent) -> Path:
+    """Write the 3-D page of a run whose cell is at hand into its folder.
 
     Args:
         folder: The run folder.
         cell: The cell that was solved.
         progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The run was changed meanwhile, or the page cannot be written.
     """
     progress("making the 3-D page", 0.0)
     geometries = Geometries()
     scene = run_scene(read_stored_run(folder), cell, geometries)
-    return _record("run", cell, geometries, [scene])
+    write_view(_record("run", cell, geometries, [scene]), folder / VIEW_PAGE)
+    return folder / VIEW_PAGE
 
 
 def write_view(record: ViewRecord, target: Path) -> int:

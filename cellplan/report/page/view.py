@@ -48,16 +48,20 @@ def _about(record: ViewRecord) -> Iterator[str]:
     """How exact the page is."""
     deviation = max((each.get("deviation", 0.0) for each in record["geometries"]), default=0.0)
     if deviation > 0.0:
-        yield f"Meshes are drawn with fewer triangles, nowhere farther than {MM * deviation:.2g} mm from their files."
-    motion, nearest = record["scenes"][0]["motion"], record["scenes"][0]["nearest"]
+        yield f"Meshes are drawn nowhere farther than {MM * deviation:.2g} mm from their files."
+    scene = record["scenes"][0]
+    motion, nearest = scene["motion"], scene["nearest"]
+    if motion["count"] < motion["total"]:
+        yield f"Of {motion['total']} rows {motion['count']} are in the page."
     if motion["count"] > 1:
-        kept = "" if motion["count"] == motion["total"] else f" Of {motion['total']} rows {motion['count']} are in the page."
-        yield f"Joints move linearly between rows.{kept}"
         yield (
-            f"The closest pair is computed every {MM * nearest['step']:.3g} ms or more often, among pairs that are to keep "
-            "a clearance and move against each other; a distance after ≥ is that of convex hulls, never above the true one. "
-            "In between its line joins the same two points. What is certified between the rows is in the report."
+            "Joints move linearly between rows. "
+            f"The closest pair is computed every {MM * nearest['step']:.3g} ms or more often; in between its line joins the "
+            "same two points. What is certified between the rows is in the report."
         )
+    yield "The closest pair is one of those that are to keep a clearance and move against each other."
+    if any(each for one in record["scenes"] for each in one["nearest"]["lower_bound"]):
+        yield "A distance after ≥ is that of convex hulls, never above the true one."
 
 
 def script_json(record: ViewRecord) -> str:

@@ -1,7 +1,7 @@
 """The record behind a 3-D page: bodies, joints, paths, motion and what the checks found, as plain values.
 
-Lengths are in [m] and angles in [rad], as the page computes with them; poses are the upper three rows of a matrix, row by
-row. Arrays are little-endian and in base64.
+Lengths are in [m] and angles in [rad], as the page computes with them; poses are the upper three rows of a matrix, row
+by row. Arrays are little-endian and in base64.
 """
 
 from base64 import b64encode

@@ -1,6 +1,7 @@
 // The camera turns about a point: dragging turns, shift or two fingers move, the wheel zooms.
 
 const FIELD_OF_VIEW = radians(38);
+const FILLED = 0.92; // of the picture
 const PRESETS = {
   oblique: [-55, 24],
   front: [-90, 2],
@@ -17,6 +18,7 @@ class Camera {
     this.pointers = new Map();
     this.centre = [0, 0, 0];
     this.radius = 1;
+    this.corners = [];
     this.target = [0, 0, 0];
     this.distance = 5;
     this.look("oblique");
@@ -29,20 +31,30 @@ class Camera {
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 
-  /** Show a ball round what is to be seen, from the direction of a preset. */
+  /** Show all that is to be seen from the direction of a preset, as near as the picture allows. */
   look(name) {
     [this.azimuth, this.elevation] = PRESETS[name].map(radians);
     this.preset = name;
     this.target = [...this.centre];
-    const aspect = (this.canvas.clientWidth || 1) / (this.canvas.clientHeight || 1);
-    const narrow = Math.atan(Math.tan(FIELD_OF_VIEW / 2) * Math.min(1, aspect));
-    this.distance = this.radius / Math.sin(narrow);
+    const back = unit(subtract(this.eye, this.target));
+    const right = unit(cross([0, 0, 1], back));
+    const up = cross(back, right);
+    const tall = Math.tan(FIELD_OF_VIEW / 2) * FILLED;
+    const wide = (tall * (this.canvas.clientWidth || 1)) / (this.canvas.clientHeight || 1);
+    this.distance = 0.1;
+    for (const corner of this.corners) {
+      const p = subtract(corner, this.target);
+      const across = Math.max(Math.abs(dot(p, right)) / wide, Math.abs(dot(p, up)) / tall);
+      this.distance = Math.max(this.distance, across + dot(p, back));
+    }
     this.onChange();
   }
 
-  fit(centre, radius) {
+  /** What is to be seen: the middle of it, and the corners of boxes that hold it. */
+  fit(centre, radius, corners) {
     this.centre = centre;
     this.radius = radius;
+    this.corners = corners;
   }
 
   get eye() {

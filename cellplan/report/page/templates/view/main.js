@@ -49,7 +49,7 @@ class App {
     if (this.stage.scene !== this.record.scenes[index]) this.stage.setScene(this.record.scenes[index]);
     this.failure = -1;
     this.player.setMotion(this.stage.motion);
-    this.camera.fit(this.stage.centre, this.stage.radius);
+    this.camera.fit(this.stage.centre, this.stage.radius, this.stage.corners);
     this.controls.setScene();
     this.panels.setScene();
     this.bases.setScene();

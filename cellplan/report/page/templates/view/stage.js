@@ -31,7 +31,7 @@ class Stage {
     this.traces = new Traces(this);
     this.grids = scene.bodies.filter((body) => this.isPlane(body)).map((body) => fromRows(body.pose));
     this.measure();
-    this.gridLines = gridLines(GRID_STEP * Math.ceil((1.6 * this.radius) / GRID_STEP), GRID_STEP);
+    this.gridLines = gridLines(GRID_STEP * Math.ceil((1.3 * this.radius) / GRID_STEP), GRID_STEP);
     this.axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => Float32Array.from([0, 0, 0, ...times(axis, 0.4)]));
   }
 
@@ -180,25 +180,19 @@ class Stage {
     return moved(this.bodyPose(index, links, t), moved(place, [0.5, 0.5, 0.5]));
   }
 
-  /** The ball round robots, tools and part at the begin of the motion. */
+  /** Where robots, tools and part are at the begin of the motion: corners of their boxes, and the middle of these. */
   measure() {
     const links = allLinks(this.scene.robots, this.bases, this.motion.row(0));
-    const low = [Infinity, Infinity, Infinity];
-    const high = [-Infinity, -Infinity, -Infinity];
+    this.corners = [];
     this.scene.bodies.forEach((body, index) => {
       if (this.isPlane(body) || body.kind === "obstacle") return;
       const whole = multiply(this.bodyPose(index, links, 0), this.geometries[body.geometry].place);
-      for (let corner = 0; corner < 8; corner += 1) {
-        const point = moved(whole, [corner & 1, (corner >> 1) & 1, (corner >> 2) & 1]);
-        for (let axis = 0; axis < 3; axis += 1) {
-          low[axis] = Math.min(low[axis], point[axis]);
-          high[axis] = Math.max(high[axis], point[axis]);
-        }
-      }
+      for (let i = 0; i < 8; i += 1) this.corners.push(moved(whole, [i & 1, (i >> 1) & 1, (i >> 2) & 1]));
     });
-    const isEmpty = !(low[0] < Infinity);
-    this.centre = isEmpty ? [0, 0, 0] : times(add(low, high), 0.5);
-    this.radius = isEmpty ? 1 : 0.42 * length(subtract(high, low)); // corners of the box are mostly empty
+    const over = (pick) => [0, 1, 2].map((axis) => pick(...this.corners.map((corner) => corner[axis])));
+    const [low, high] = this.corners.length ? [over(Math.min), over(Math.max)] : [[-1, -1, 0], [1, 1, 1]];
+    this.centre = times(add(low, high), 0.5);
+    this.radius = 0.5 * length(subtract(high, low));
   }
 }
 
