@@ -1,5 +1,7 @@
 """The scene of a cell that was not solved: at its start postures, or as near to them as can be said."""
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 
 from cellplan.errors import InputError, NoSolutionError
@@ -33,26 +35,34 @@ def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = s
         geometries: Takes the shapes.
         progress: Called with the stage and the fraction done.
     """
-    failures: list[FailureRecord] = []
+    failures: list[tuple[str, str]] = []  # subject and message
     try:
         found = check(cell, progress=progress)
         started = found.cell
-        failures += [_failure(each.message) for each in found.checks if not each.passed]
+        failures += [(each.subject, each.message) for each in found.checks if not each.passed]
         facts = [["start", found.choice or "given"]]
     except (InputError, NoSolutionError) as error:
         started = cell
-        failures += [_failure(line) for line in str(error).splitlines()]
+        failures += [("", line) for line in str(error).splitlines()]
         facts = [["start", "none found: robots are where the cell puts them"]]
     record = standing_scene(started, geometries)
-    named = {frozenset(each["bodies"]) for each in record["failures"]}
-    own = [each for each in failures if not _says_pair(each, record, named)]
     return {
         **record,
         "facts": facts,
         "passed": not failures,
-        "failures": [*record["failures"], *own],
+        "failures": [*record["failures"], *_further(failures, record)],
         "bases": base_records(cell),
     }
+
+
+def _further(failures: Iterable[tuple[str, str]], record: SceneViewRecord) -> Iterator[FailureRecord]:
+    """Failures by subject and message, but for pairs that are known to touch."""
+    index = {body["name"]: number for number, body in enumerate(record["bodies"])}
+    known = [set(each["bodies"]) for each in record["failures"]]
+    for subject, message in failures:
+        bodies = [index[name] for name in subject.split(" - ") if name in index]
+        if set(bodies) not in known:
+            yield {**_failure(message), "bodies": bodies}
 
 
 def standing_scene(cell: Cell, geometries: Geometries) -> SceneViewRecord:
@@ -105,10 +115,3 @@ def _pair_text(scene: Scene, pair: tuple[int, int]) -> str:
 def _failure(text: str) -> FailureRecord:
     """Something that failed without an instant."""
     return {"text": text, "at": None, "bodies": [], "joint": []}
-
-
-def _says_pair(failure: FailureRecord, record: SceneViewRecord, named: set[frozenset[int]]) -> bool:
-    """Whether a pair that touches was named already."""
-    index = {body["name"]: number for number, body in enumerate(record["bodies"])}
-    words = failure["text"].split("'")[1::2]
-    return "touches" in failure["text"] and frozenset(index.get(word, -1) for word in words) in named

@@ -9,7 +9,7 @@ from cellplan.errors import InputError
 from cellplan.io.cell.load import load_cell
 from cellplan.io.run.content import is_run_folder
 from cellplan.io.run.folder import MANIFEST
-from cellplan.io.run.stored import read_stored_run
+from cellplan.io.run.stored import StoredRun, read_stored_run
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import CAUTION
@@ -79,9 +79,7 @@ def write_view_of_run(folder: Path, cell: Cell, *, progress: Progress = silent) 
         InputError: The run was changed meanwhile, or the page cannot be written.
     """
     progress("making the 3-D page", 0.0)
-    geometries = Geometries()
-    scene = run_scene(read_stored_run(folder), cell, geometries)
-    write_view(_record("run", cell, geometries, [scene]), folder / VIEW_PAGE)
+    write_view(_record_of_run(read_stored_run(folder), cell), folder / VIEW_PAGE)
     return folder / VIEW_PAGE
 
 
@@ -107,8 +105,14 @@ def _view_of_run(request: ViewRequest, progress: Progress) -> ViewRecord:
     stored = read_stored_run(request.path)
     found = load_stored_cell(stored, cell=request.cell, allow_dirs=request.allow_dirs)
     progress("making the 3-D page", 0.0)
+    return _record_of_run(stored, found.cell)
+
+
+def _record_of_run(stored: StoredRun, cell: Cell) -> ViewRecord:
+    """The record of a run that was read."""
     geometries = Geometries()
-    return _record("run", found.cell, geometries, [run_scene(stored, found.cell, geometries)])
+    scene = run_scene(stored, cell, geometries)
+    return {**_record("run", cell, geometries, [scene]), "source": stored.manifest.cell_file}
 
 
 def _view_of_study(request: ViewRequest, progress: Progress) -> ViewRecord:
