@@ -27,7 +27,7 @@ Output = Annotated[
 ]
 
 
-def view(
+def view(  # noqa: PLR0913, PLR0917 - the options of the command
     path: Shown,
     output: Output = None,
     cell: OriginalCell = None,

@@ -45,8 +45,8 @@ def test_a_machine_gets_one_object(sound: Path, tmp_path: Path, capsys: pytest.C
         ),
         (
             ["{run}"],
-            "error: {run}: the run depends on files beside its cell file (meshes/block.stl, paths/bow.csv, "
-            "robots/elbow.stl, robots/left.yaml, robots/right.urdf): name the cell file 'small.yaml' with --cell, so that they can be compared",
+            "error: {run}: the run depends on files beside its cell file ({files}): "
+            "name the cell file 'small.yaml' with --cell, so that they can be compared",
         ),
         (
             ["{study}"],

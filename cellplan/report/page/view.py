@@ -54,10 +54,10 @@ def _about(record: ViewRecord) -> Iterator[str]:
     if motion["count"] < motion["total"]:
         yield f"Of {motion['total']} rows {motion['count']} are in the page."
     if motion["count"] > 1:
+        step = f"{MM * nearest['step']:.3g} ms"
         yield (
-            "Joints move linearly between rows. "
-            f"The closest pair is computed every {MM * nearest['step']:.3g} ms or more often; in between its line joins the "
-            "same two points. What is certified between the rows is in the report."
+            f"Joints move linearly between rows. The closest pair is computed every {step} or more often; in between "
+            "its line joins the same two points. What is certified between the rows is in the report."
         )
     yield "The closest pair is one of those that are to keep a clearance and move against each other."
     if any(each for one in record["scenes"] for each in one["nearest"]["lower_bound"]):
