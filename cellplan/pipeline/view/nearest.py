@@ -1,4 +1,4 @@
-"""The closest pair at some instants of a motion, with the points at which it is nearest."""
+"""The closest pair at some rows of a motion, with the points at which it is nearest."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from cellplan.scene.near import NearPairs
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 
-INSTANTS: Final = 200  # [-] at which the closest pair of a motion is looked for, beside those of the report
+SAMPLES: Final = 200  # [-] at which the closest pair of a motion is looked for, beside those of the report
 WITHIN: Final = (0.05, 0.2, 0.8, 3.2)  # [m] distances within which it is looked for, one after the other
 SURFACES: Final = 600  # [-] distances of surfaces that are asked of a page: some milliseconds each
 DECIMALS: Final = 4  # of distances in [mm]
@@ -49,9 +49,9 @@ class Closest(NamedTuple):
     is_bound: bool
 
 
-def instants(times: Array, further: Iterable[float | None]) -> Indices:
+def sampled_rows(times: Array, further: Iterable[float | None]) -> Indices:
     """Rows at which the closest pair is looked for: evenly spread ones, and those nearest to further times in [s]."""
-    rows = np.linspace(0, len(times) - 1, min(len(times), INSTANTS + 1)).round().astype(np.intp)
+    rows = np.linspace(0, len(times) - 1, min(len(times), SAMPLES + 1)).round().astype(np.intp)
     named = [int(np.argmin(np.abs(times - at))) for at in further if at is not None]
     return np.unique(np.concatenate([rows, np.array(named, dtype=np.intp)]))
 

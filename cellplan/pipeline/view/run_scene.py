@@ -15,7 +15,7 @@ from cellplan.model.cell import Cell
 from cellplan.pipeline.plan.demanded import DemandedProgram
 from cellplan.pipeline.view.describe import body_records, excluded_records, place_record, robot_records, task_records
 from cellplan.pipeline.view.geometries import Geometries
-from cellplan.pipeline.view.nearest import Stretch, instants, nearest_record
+from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows
 from cellplan.report.record.common import Record
 from cellplan.report.record.view import (
     ContactViewRecord,
@@ -73,7 +73,7 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneVie
     failures = list(_failures(stored, played, cell, index))
     further: list[float | None] = [each for contact in contacts for each in (contact["first"], contact["last"])]
     further += [failure["at"] for failure in failures]
-    further += [at for one in played for at in _worst_instants(stored.records[one.place], one.begin)]
+    further += [at for one in played for at in _worst_times(stored.records[one.place], one.begin)]
     ends = [*firsts[1:], len(times)]
     stretches = [Stretch(scenes[one.number], *rows) for one, *rows in zip(played, firsts, ends, strict=True)]
     tasks, faults = task_records(cell)
@@ -87,7 +87,7 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneVie
         "part": _part_places(played, program.cells),
         "tasks": tasks,
         "motion": motion_record(times, q, _phases(stored.record)),
-        "nearest": nearest_record(stretches, times, q, instants(times, further)),
+        "nearest": nearest_record(stretches, times, q, sampled_rows(times, further)),
         "contacts": contacts,
         "failures": failures,
         "excluded": excluded_records(_with_most_pairs(scenes)),
@@ -209,7 +209,7 @@ def _contacts(stored: StoredRun, played: Sequence[Played], index: dict[str, int]
 def _failures(
     stored: StoredRun, played: Sequence[Played], cell: Cell, index: dict[str, int]
 ) -> Iterator[FailureRecord]:
-    """Checks that failed, on the clock of the program, in the order of their instants; those without one come last."""
+    """Checks that failed, on the clock of the program, in the order of their times; those without one come last."""
     found: list[FailureRecord] = []
     seen = set[str]()
     for one in played:
@@ -246,8 +246,8 @@ def _joint(subject: str, cell: Cell) -> list[int]:
     return []
 
 
-def _worst_instants(record: Record, begin: float) -> Iterator[float]:
-    """Instants of the smallest distance of each class."""
+def _worst_times(record: Record, begin: float) -> Iterator[float]:
+    """Times of the smallest distance of each class."""
     for each in record["clearance"].values():
         if each["at_s"] is not None:
             yield begin + each["at_s"]

@@ -112,9 +112,9 @@ class MotionViewRecord(TypedDict):
 
 
 class NearestRecord(TypedDict):
-    """The closest pair at some instants."""
+    """The closest pair at some sample times."""
 
-    step: Annotated[float, "largest time between two instants"]
+    step: Annotated[float, "largest time between two of them"]
     required: float
     times: Numbers
     pairs: Annotated[list[list[int]], "two bodies; empty where none is near"]

@@ -52,14 +52,14 @@ class Controls {
   /** The distance of the closest pair over time, what is demanded of it, and contacts that are not allowed. */
   curve() {
     const { scene, motion } = this.app.stage;
-    const { times: instants, distances, required, pairs } = scene.nearest;
+    const { times: sampled, distances, required, pairs } = scene.nearest;
     const most = Math.max(3 * required, 10);
     const x = (t) => (1000 * t) / motion.end;
     const y = (mm) => CURVE_HEIGHT - 2 - (CURVE_HEIGHT - 4) * clamp(mm / most, 0, 1);
     const marks = scene.contacts.filter((contact) => !contact.allowed).map((contact) => svgElement("rect", {
       x: x(contact.first), y: 0, width: Math.max(x(contact.last) - x(contact.first), 3), height: CURVE_HEIGHT, class: "hit",
     }));
-    const points = instants.flatMap((t, i) => (pairs[i].length ? [`${x(t).toFixed(1)},${y(distances[i]).toFixed(1)}`] : []));
+    const points = sampled.flatMap((t, i) => (pairs[i].length ? [`${x(t).toFixed(1)},${y(distances[i]).toFixed(1)}`] : []));
     const demand = svgElement("line", { x1: 0, x2: 1000, y1: y(required), y2: y(required), class: "demand" });
     const line = svgElement("polyline", { points: points.join(" "), class: "distance" });
     const ticks = scene.failures.filter((failure) => failure.at !== null).map((failure) => svgElement("line", {

@@ -82,10 +82,10 @@ class Stage {
 
   /** The closest pair of the nearest instant that has one, with its two points where they are now. */
   nearest(t, links) {
-    const { times: instants, pairs, distances, lower_bound: bounds, points } = this.scene.nearest;
+    const { times: sampled, pairs, distances, lower_bound: bounds, points } = this.scene.nearest;
     let index = 0;
-    for (let i = 1; i < instants.length; i += 1) {
-      if (Math.abs(instants[i] - t) <= Math.abs(instants[index] - t)) index = i;
+    for (let i = 1; i < sampled.length; i += 1) {
+      if (Math.abs(sampled[i] - t) <= Math.abs(sampled[index] - t)) index = i;
     }
     const pair = pairs[index];
     if (!pair || pair.length === 0) return null;
@@ -93,7 +93,7 @@ class Stage {
       const local = points[index].slice(3 * end, 3 * end + 3);
       return moved(this.bodyPose(pair[end], links, t), local);
     });
-    return { at: instants[index], pair, distance: distances[index], isBound: bounds[index], ends };
+    return { at: sampled[index], pair, distance: distances[index], isBound: bounds[index], ends };
   }
 
   isShown(body) {
