@@ -25,7 +25,10 @@ class Camera {
     canvas.addEventListener("pointerdown", (event) => this.press(event));
     canvas.addEventListener("pointermove", (event) => this.drag(event));
     for (const kind of ["pointerup", "pointercancel"]) {
-      canvas.addEventListener(kind, (event) => this.pointers.delete(event.pointerId));
+      canvas.addEventListener(kind, (event) => {
+        this.pointers.delete(event.pointerId);
+        this.onChange();
+      });
     }
     canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());

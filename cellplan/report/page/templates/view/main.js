@@ -1,5 +1,7 @@
 // The page: its data, its picture, and what connects time, camera and lists.
 
+const MOVING_SHARPNESS = 0.6; // pixels of the picture by those of the window
+
 class App {
   constructor(record) {
     this.record = record;
@@ -21,9 +23,8 @@ class App {
       this.stage.excludedLines = event.target.checked;
       this.refresh();
     });
-    addEventListener("resize", () => this.resized());
+    addEventListener("resize", () => this.refresh());
     addEventListener("hashchange", () => this.follow());
-    this.resized();
     this.setScene(0);
     this.follow();
   }
@@ -129,12 +130,14 @@ class App {
     this.refresh();
   }
 
-  resized() {
+  /** As many pixels as the window has; fewer while the picture moves and the processor draws it. */
+  fitCanvas() {
     const canvas = byId("canvas");
-    const sharpness = Math.min(devicePixelRatio || 1, this.isStill ? 1 : 2);
-    canvas.width = Math.max(1, Math.round(canvas.clientWidth * sharpness));
-    canvas.height = Math.max(1, Math.round(canvas.clientHeight * sharpness));
-    this.refresh();
+    const isSlow = this.isStill || this.view.isSoftware;
+    const moves = this.player.isPlaying || this.camera.pointers.size > 0;
+    const sharpness = isSlow ? (moves ? MOVING_SHARPNESS : 1) : Math.min(devicePixelRatio || 1, 2);
+    const size = [canvas.clientWidth, canvas.clientHeight].map((each) => Math.max(1, Math.round(each * sharpness)));
+    if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
   }
 
   /** Draw soon; several changes at once are one picture. */
@@ -150,6 +153,7 @@ class App {
   draw() {
     const state = this.stage.at(this.player.t);
     if (this.stage.moved) Object.assign(state, { nearest: null, red: new Set() });
+    this.fitCanvas();
     this.view.draw(this.stage.frame(state), this.camera, background());
     this.controls.update();
     this.panels.update(state);

@@ -1,7 +1,7 @@
 // Shapes as triangles: points on a grid of 16 bit in the box that holds them, as meshes come in the page.
 
-const SIDES = 40; // of a round shape
-const RINGS = 9; // of a half ball
+const SIDES = 28; // of a round shape
+const RINGS = 5; // of a half ball
 const GRID_STEPS = 65535;
 
 /** A geometry of the page: points, triangles, and the matrix that brings the points to their places in m. */

@@ -159,7 +159,7 @@ class Stage {
 
   nearestLine(nearest) {
     const points = Float32Array.from(nearest.ends.flat());
-    return { points, place: identity(), width: 4, colour: NEAR_LINE, onTop: true };
+    return { points, place: identity(), width: 4, colour: NEAR_LINE, onTop: true, isBrief: true };
   }
 
   /** A line between the middles of each two bodies that are not checked against each other. */
@@ -172,7 +172,7 @@ class Stage {
       }
     }
     const colour = [0.5, 0.3, 0.8, 0.8];
-    return { points: Float32Array.from(ends), isPairs: true, place: identity(), width: 1.5, colour, onTop: true };
+    return { points: Float32Array.from(ends), isPairs: true, place: identity(), width: 1.5, colour, onTop: true, isBrief: true };
   }
 
   middle(index, links, t) {

@@ -1,6 +1,6 @@
 // Traces of the tools: where each tool tip goes, in the world or on the part; what is done so far is drawn stronger.
 
-const TRACE_POINTS = 1200; // of each robot
+const TRACE_POINTS = 300; // of each robot
 
 class Traces {
   constructor(stage) {

@@ -1,4 +1,4 @@
-// Drawing by WebGL 2: flat triangles, and lines of any width as strips of two triangles.
+// Drawing by WebGL 2: flat triangles, and each piece of a line as two triangles.
 
 const BODY_VERTEX = `#version 300 es
 layout(location = 0) in vec3 position;
@@ -36,7 +36,7 @@ void main() {
   if (b.w < near && a.w > near) b = mix(b, a, (near - b.w) / (a.w - b.w));
   vec2 along = (b.xy / b.w - a.xy / a.w) * viewport;
   along = length(along) > 1e-6 ? normalize(along) : vec2(1.0, 0.0);
-  vec4 at = gl_VertexID < 2 ? a : b;
+  vec4 at = (gl_VertexID & 2) == 0 ? a : b;
   float way = (gl_VertexID & 1) == 0 ? -1.0 : 1.0;
   at.xy += way * vec2(-along.y, along.x) * width / viewport * at.w;
   at.z -= lift * at.w;
@@ -51,7 +51,8 @@ void main() { pixel = colour; }`;
 class WebglView {
   /** Throws where WebGL 2 is missing. */
   constructor(canvas, geometries) {
-    const gl = canvas.getContext("webgl2", { antialias: true, alpha: false });
+    this.isSoftware = drawsInSoftware();
+    const gl = canvas.getContext("webgl2", { antialias: !this.isSoftware, alpha: false });
     if (!gl) throw new Error("WebGL 2 is missing");
     this.gl = gl;
     this.canvas = canvas;
@@ -59,6 +60,7 @@ class WebglView {
     this.lines = this.program(LINE_VERTEX, LINE_FRAGMENT, ["place", "camera", "viewport", "width", "lift", "colour"]);
     this.geometries = geometries.map((geometry) => geometry && this.upload(geometry));
     this.strips = new WeakMap(); // by the points of a line
+    this.brief = []; // of lines that change from picture to picture
   }
 
   program(vertex, fragment, names) {
@@ -131,28 +133,65 @@ class WebglView {
       gl.uniform1f(this.lines.lift, line.lift ?? 0);
       gl.uniform4fv(this.lines.colour, line.colour);
       gl.bindVertexArray(this.strip(line));
-      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, line.count ?? segmentCount(line));
+      gl.drawElements(gl.TRIANGLES, 6 * (line.count ?? segmentCount(line)), gl.UNSIGNED_INT, 0);
     }
     gl.bindVertexArray(null);
+    this.forget();
   }
 
-  /** Buffers of a line: a chain of points, or pairs of them. */
+  /** Buffers of a line, a chain of points or pairs of them: four corners of each piece, all with both its ends. */
   strip(line) {
     const known = this.strips.get(line.points);
     if (known) return known;
     const gl = this.gl;
+    const { ends, triangles } = stripBuffers(line);
     const array = gl.createVertexArray();
     gl.bindVertexArray(array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ARRAY_BUFFER, line.points, gl.STATIC_DRAW);
+    const buffers = [gl.createBuffer(), gl.createBuffer()];
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers[0]);
+    gl.bufferData(gl.ARRAY_BUFFER, ends, gl.STATIC_DRAW);
     for (const place of [0, 1]) {
       gl.enableVertexAttribArray(place);
-      gl.vertexAttribPointer(place, 3, gl.FLOAT, false, line.isPairs ? 24 : 12, 12 * place);
-      gl.vertexAttribDivisor(place, 1);
+      gl.vertexAttribPointer(place, 3, gl.FLOAT, false, 24, 12 * place);
     }
-    this.strips.set(line.points, array);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers[1]);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.STATIC_DRAW);
+    if (line.isBrief) this.brief.push({ array, buffers });
+    else this.strips.set(line.points, array);
     return array;
   }
+
+  /** Give back the buffers of lines that are drawn once. */
+  forget() {
+    for (const { array, buffers } of this.brief) {
+      this.gl.deleteVertexArray(array);
+      buffers.forEach((buffer) => this.gl.deleteBuffer(buffer));
+    }
+    this.brief = [];
+  }
+}
+
+/** Whether WebGL is computed by the processor: pictures are drawn coarser then while they move. */
+function drawsInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  if (!gl) return false;
+  const names = gl.getExtension("WEBGL_debug_renderer_info");
+  const name = String(gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+  gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
+/** Both ends of each piece of a line, four times, and the two triangles of its strip. */
+function stripBuffers(line) {
+  const count = segmentCount(line);
+  const ends = new Float32Array(24 * count);
+  const triangles = new Uint32Array(6 * count);
+  for (let i = 0; i < count; i += 1) {
+    const first = (line.isPairs ? 6 : 3) * i;
+    for (let corner = 0; corner < 4; corner += 1) ends.set(line.points.subarray(first, first + 6), 24 * i + 6 * corner);
+    triangles.set([0, 1, 2, 2, 1, 3].map((corner) => 4 * i + corner), 6 * i);
+  }
+  return { ends, triangles };
 }
 
 /** Number of pieces of a line. */
