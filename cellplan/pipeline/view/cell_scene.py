@@ -45,7 +45,7 @@ def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = s
         started = cell
         failures += [("", line) for line in str(error).splitlines()]
         facts = [["start", "none found: robots are where the cell puts them"]]
-    record = standing_scene(started, geometries)
+    record = standing_scene(Scene.from_cell(started), geometries)
     return {
         **record,
         "facts": facts,
@@ -65,13 +65,9 @@ def _further(failures: Iterable[tuple[str, str]], record: SceneViewRecord) -> It
             yield {**_failure(message), "bodies": bodies}
 
 
-def standing_scene(cell: Cell, geometries: Geometries) -> SceneViewRecord:
-    """The scene of a cell whose robots stand still at their starts.
-
-    Raises:
-        InputError: Two bodies share a name, or an exclusion names something that is no body.
-    """
-    scene = Scene.from_cell(cell)
+def standing_scene(scene: Scene, geometries: Geometries) -> SceneViewRecord:
+    """The scene of a cell whose robots stand still at their starts."""
+    cell = scene.cell
     q = np.concatenate([_standing(robot) for robot in cell.robots])
     touching = touching_pairs(scene, q)
     tasks, faults = task_records(cell)

@@ -1,7 +1,9 @@
 """Shapes of a 3-D page: each once, meshes with as few triangles as a picture needs."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import Any, Final
+from hashlib import sha256
+from typing import Final
 
 import numpy as np
 
@@ -22,24 +24,22 @@ class Geometries:
 
     Attributes:
         records: The shapes.
-        weights: Number of triangles that each mesh has in its file, by identity of the mesh.
+        weights: Number of triangles that each mesh has in its file, by its key.
     """
 
     records: list[GeometryRecord] = field(default_factory=list)
-    weights: dict[int, int] = field(default_factory=dict)
-    _places: dict[Any, int] = field(default_factory=dict)
-    _kept: list[Mesh] = field(default_factory=list)  # identities stay theirs
+    weights: dict[Hashable, int] = field(default_factory=dict)
+    _places: dict[Hashable, int] = field(default_factory=dict)
 
     def announce(self, shapes: list[Shape]) -> None:
         """Name the shapes that are going to be asked for, so that their meshes share the triangles of a page."""
         for shape in shapes:
-            if isinstance(shape, Mesh) and id(shape) not in self.weights:
-                self.weights[id(shape)] = len(shape.faces)
-                self._kept.append(shape)
+            if isinstance(shape, Mesh):
+                self.weights[shape_key(shape)] = len(shape.faces)
 
     def place(self, shape: Shape) -> int:
         """Number of a shape."""
-        key = ("mesh", id(shape)) if isinstance(shape, Mesh) else shape
+        key = shape_key(shape)
         if key not in self._places:
             self.announce([shape])
             self._places[key] = len(self.records)
@@ -61,7 +61,14 @@ class Geometries:
                 return {"plane": []}
             case Mesh():
                 share = MESH_TRIANGLES / max(MESH_TRIANGLES, sum(self.weights.values()))
-                return mesh_record(shape, max(FEWEST, int(share * self.weights[id(shape)])))
+                return mesh_record(shape, max(FEWEST, int(share * len(shape.faces))))
+
+
+def shape_key(shape: Shape) -> Hashable:
+    """What two shapes have in common that look the same."""
+    if not isinstance(shape, Mesh):
+        return shape
+    return shape.source, sha256(shape.vertices.tobytes() + np.ascontiguousarray(shape.faces).tobytes()).digest()
 
 
 def mesh_record(mesh: Mesh, limit: int) -> GeometryRecord:

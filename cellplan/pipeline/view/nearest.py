@@ -19,6 +19,7 @@ from cellplan.scene.scene import Scene
 SAMPLES: Final = 200  # [-] at which the closest pair of a motion is looked for, beside those of the report
 WITHIN: Final = (0.05, 0.2, 0.8, 3.2)  # [m] distances within which it is looked for, one after the other
 SURFACES: Final = 600  # [-] distances of surfaces that are asked of a page: some milliseconds each
+CUT: Final = (Rule.PROCESS, Rule.GRIP)  # of pairs that may touch in a zone
 DECIMALS: Final = 4  # of distances in [mm]
 
 
@@ -49,9 +50,9 @@ class Closest(NamedTuple):
     is_bound: bool
 
 
-def sampled_rows(times: Array, further: Iterable[float | None]) -> Indices:
+def sampled_rows(times: Array, further: Iterable[float | None], steps: int = SAMPLES) -> Indices:
     """Rows at which the closest pair is looked for: evenly spread ones, and those nearest to further times in [s]."""
-    rows = np.linspace(0, len(times) - 1, min(len(times), SAMPLES + 1)).round().astype(np.intp)
+    rows = np.linspace(0, len(times) - 1, min(len(times), steps + 1)).round().astype(np.intp)
     named = [int(np.argmin(np.abs(times - at))) for at in further if at is not None]
     return np.unique(np.concatenate([rows, np.array(named, dtype=np.intp)]))
 
@@ -164,12 +165,13 @@ def _add(record: NearestRecord, sought: _Sought, sample: int, found: Closest | N
 
 
 def touching_pairs(scene: Scene, q: Array) -> list[tuple[int, int]]:
-    """Pairs that must not touch but do, at one configuration of shape (nq,)."""
-    near = scene.near(q[None], 0.0)
+    """Pairs that must not touch but do, at one configuration of shape (nq,); tools at work on the part are left out."""
+    near, poses = scene.near(q[None], 0.0), scene.body_poses(q[None])
     kept = []
     for row in near.rows:
         pair = scene.pairs[row]
-        poses = scene.body_poses(q[None])
+        if pair.rule in CUT:
+            continue
         if pair.is_ground:
             touches = scene.ground_heights(pair, poses)[0] <= 0.0
         else:
