@@ -16,6 +16,7 @@ from cellplan.pipeline.view.describe import (
     place_record,
     robot_records,
     task_records,
+    visual_records,
 )
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.nearest import Stretch, nearest_record, touching_pairs
@@ -79,6 +80,7 @@ def standing_scene(scene: Scene, geometries: Geometries) -> SceneViewRecord:
         "passed": None,
         "robots": robot_records(cell),
         "bodies": body_records(cell, scene.bodies, geometries),
+        "visuals": visual_records(cell, geometries),
         "part": [place_record(cell, 0.0)],
         "tasks": tasks,
         "motion": motion_record(times, q[None], []),

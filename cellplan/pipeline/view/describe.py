@@ -25,6 +25,7 @@ from cellplan.report.record.view import (
     PlaceRecord,
     RobotViewRecord,
     TaskViewRecord,
+    VisualRecord,
     point_numbers,
     pose_numbers,
 )
@@ -83,7 +84,15 @@ def _axis(robot: Robot, link: int) -> AxisRecord:
 
 def body_records(cell: Cell, bodies: Sequence[SceneBody], geometries: Geometries) -> list[BodyViewRecord]:
     """All bodies of a scene in its order."""
+    drawn = {robot.name: {each.link for each in geometries.visuals_of(cell, robot.name)} for robot in cell.robots}
+    replaced = {
+        f"{robot.name}/{body.name}"
+        for robot in cell.robots
+        for body in robot.model.bodies
+        if body.link_name in drawn[robot.name]
+    }
     geometries.announce([body.shape for body in bodies])
+    geometries.announce([each.shape for robot in drawn for each in geometries.visuals[robot]])
     return [
         {
             "name": body.name,
@@ -93,10 +102,24 @@ def body_records(cell: Cell, bodies: Sequence[SceneBody], geometries: Geometries
             "geometry": geometries.place(body.shape),
             "pose": pose_numbers(body.X_BS),
             "accuracy": body.accuracy,
+            "replaced": body.kind is Kind.LINK and body.name in replaced,
             "stands": _stands(cell.robot(body.robot).pedestal) if body.robot and body.kind is Kind.PEDESTAL else {},
         }
         for body in bodies
     ]
+
+
+def visual_records(cell: Cell, geometries: Geometries) -> list[VisualRecord]:
+    """What the files of the robots draw of their links."""
+    records: list[VisualRecord] = []
+    for index, robot in enumerate(cell.robots):
+        links = {link.name: link for link in robot.model.links}
+        for each in geometries.visuals_of(cell, robot.name):
+            if each.link in links:
+                link = links[each.link]
+                place, X_BS = geometries.place(each.shape), link.X_BL @ each.X_LS
+                records.append({"robot": index, "link": link.index, "geometry": place, "pose": pose_numbers(X_BS)})
+    return records
 
 
 def _stands(mount: Mount | None) -> dict[str, float]:

@@ -9,6 +9,9 @@ import numpy as np
 
 from cellplan.geometry.mesh.decimate import decimated
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere
+from cellplan.io.cell.visuals import robot_visuals
+from cellplan.io.robots.urdf.visuals import Visual
+from cellplan.model.cell import Cell
 from cellplan.report.record.view import GeometryRecord, Numbers, packed, point_numbers
 
 MESH_TRIANGLES: Final = 160_000  # [-] of all meshes of a page: 2 MB, and smooth where a browser draws without hardware
@@ -24,10 +27,12 @@ class Geometries:
 
     Attributes:
         records: The shapes.
+        visuals: What the file of each robot draws, by its name; read when it is first asked for.
         weights: Number of triangles that each mesh has in its file, by its key.
     """
 
     records: list[GeometryRecord] = field(default_factory=list)
+    visuals: dict[str, tuple[Visual, ...]] = field(default_factory=dict)
     weights: dict[Hashable, int] = field(default_factory=dict)
     _places: dict[Hashable, int] = field(default_factory=dict)
 
@@ -36,6 +41,12 @@ class Geometries:
         for shape in shapes:
             if isinstance(shape, Mesh):
                 self.weights[shape_key(shape)] = len(shape.faces)
+
+    def visuals_of(self, cell: Cell, robot: str) -> tuple[Visual, ...]:
+        """What the file of a robot draws; the robots of all scenes of a page are the same."""
+        if robot not in self.visuals:
+            self.visuals[robot] = robot_visuals(cell, robot)
+        return self.visuals[robot]
 
     def place(self, shape: Shape) -> int:
         """Number of a shape."""

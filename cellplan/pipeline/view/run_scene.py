@@ -13,7 +13,14 @@ from cellplan.geometry.arrays import Array
 from cellplan.io.run.stored import SERIES, StoredRun
 from cellplan.model.cell import Cell
 from cellplan.pipeline.plan.demanded import DemandedProgram
-from cellplan.pipeline.view.describe import body_records, excluded_records, place_record, robot_records, task_records
+from cellplan.pipeline.view.describe import (
+    body_records,
+    excluded_records,
+    place_record,
+    robot_records,
+    task_records,
+    visual_records,
+)
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows
 from cellplan.report.record.common import Record
@@ -84,6 +91,7 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneVie
         "passed": stored.record["status"] == "passed",
         "robots": robot_records(cell),
         "bodies": body_records(cell, bodies, geometries),
+        "visuals": visual_records(cell, geometries),
         "part": _part_places(played, program.cells),
         "tasks": tasks,
         "motion": motion_record(times, q, _phases(stored.record)),

@@ -80,7 +80,17 @@ class BodyViewRecord(TypedDict):
     geometry: int
     pose: Numbers
     accuracy: Annotated[float | None, "how far the real thing may stick out of it"]
+    replaced: Annotated[bool, "whether the robot's file draws its link otherwise"]
     stands: Annotated[dict[str, float], "of an upright column: height of the `floor` or of the `ceiling`"]
+
+
+class VisualRecord(TypedDict):
+    """What a robot's file draws of a link."""
+
+    robot: int
+    link: int
+    geometry: int
+    pose: Numbers
 
 
 class PlaceRecord(TypedDict):
@@ -166,6 +176,7 @@ class SceneViewRecord(TypedDict):
     passed: bool | None
     robots: list[RobotViewRecord]
     bodies: list[BodyViewRecord]
+    visuals: list[VisualRecord]
     part: list[PlaceRecord]
     tasks: list[TaskViewRecord]
     motion: MotionViewRecord

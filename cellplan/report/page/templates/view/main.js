@@ -74,7 +74,7 @@ class App {
     const { scenes } = this.record;
     byId("layouts-panel").hidden = this.record.kind !== "study";
     byId("layouts").replaceChildren(...scenes.map((scene, index) => {
-      const figures = scene.facts.slice(1).map(([label, value]) => `${label} ${value}`).join(", ");
+      const figures = scene.facts.slice(1, -1).map(([label, value]) => `${label} ${value}`).join(", ");
       const button = element("button", { type: "button", className: "jump" }, scene.name, element("small", { textContent: figures }));
       button.addEventListener("click", () => this.setScene(index));
       return element("li", {}, button);
@@ -186,6 +186,7 @@ class App {
     const { nearest } = state;
     const middle = nearest && this.stage.shown.nearest ? times(add(...nearest.ends), 0.5) : null;
     this.distanceLabel.textContent = nearest ? distanceText(nearest) : "";
+    this.distanceLabel.classList.toggle("mark", nearest !== null && nearest.distance < this.stage.scene.nearest.required);
     this.placeLabel(this.distanceLabel, matrix, middle);
   }
 

@@ -10,7 +10,7 @@ const GRID_STEP = 0.5; // m
 class Stage {
   constructor(record) {
     this.geometries = record.geometries.map(builtGeometry);
-    this.shown = { part: true, tools: true, surroundings: true, floor: true, labels: true, nearest: true };
+    this.shown = { part: true, tools: true, surroundings: true, floor: true, labels: true, nearest: true, meshes: true };
     this.shownRobots = new Set();
     this.shownTasks = new Set();
     this.excludedLines = false;
@@ -27,6 +27,7 @@ class Stage {
     this.shownTasks = new Set(scene.tasks.keys());
     this.picked.clear();
     this.poses = scene.bodies.map((body) => fromRows(body.pose));
+    this.visuals = scene.visuals.map((visual) => fromRows(visual.pose));
     this.paths = scene.tasks.map((task) => Float32Array.from(task.points));
     this.traces = new Traces(this);
     this.grids = scene.bodies.filter((body) => this.isPlane(body)).map((body) => fromRows(body.pose));
@@ -124,14 +125,26 @@ class Stage {
   frame(state) {
     const bodies = [];
     this.scene.bodies.forEach((body, index) => {
-      if (!this.isShown(body)) return;
+      const isMarked = state.red.has(index) || this.picked.has(index);
+      if (!this.isShown(body) || (body.replaced && this.shown.meshes && !isMarked)) return;
       const place = multiply(this.bodyPose(index, state.links, state.t), this.geometries[body.geometry].place);
       bodies.push({ geometry: body.geometry, place, colour: this.colour(body, index, state.red) });
     });
+    if (this.shown.meshes) bodies.push(...this.visualBodies(state));
     const lines = [...this.floorLines(), ...this.pathLines(state), ...this.traces.lines(state)];
     if (this.excludedLines) lines.push(this.excludedLine(state));
     if (this.shown.nearest && state.nearest) lines.push(this.nearestLine(state.nearest));
     return { bodies, lines: lines.filter(Boolean) };
+  }
+
+  /** The links of robots as their files draw them. */
+  visualBodies(state) {
+    return this.scene.visuals.flatMap((visual, index) => {
+      if (!this.shownRobots.has(visual.robot)) return [];
+      const pose = carriedPose(state.links, visual, this.visuals[index]);
+      const place = multiply(pose, this.geometries[visual.geometry].place);
+      return [{ geometry: visual.geometry, place, colour: this.robotColour(visual.robot) }];
+    });
   }
 
   floorLines() {
