@@ -46,6 +46,13 @@ def view_page(record: ViewRecord) -> str:
 
 def _about(record: ViewRecord) -> Iterator[str]:
     """How exact the page is."""
+    if record["scenes"][0]["visuals"]:
+        yield (
+            "Robots are drawn by the visual meshes of their files where these have any; distances and collisions are "
+            "those of the bodies of the proof, which are drawn where they are marked, or with the visual meshes off."
+        )
+    else:
+        yield "Bodies are those of the proof."
     deviation = max((each.get("deviation", 0.0) for each in record["geometries"]), default=0.0)
     if deviation > 0.0:
         yield f"Meshes are drawn nowhere farther than {MM * deviation:.2g} mm from their files."

@@ -65,7 +65,7 @@ class Panels {
     byId("show-tasks").replaceChildren(...members(stage.shownTasks, scene.tasks, (task) => scene.robots[task.robot].colour));
     byId("show-things").replaceChildren(flag("part", "part"), flag("tools", "tools"), flag("surroundings", "surroundings"),
       flag("floor", "floor and axes"), flag("labels", "names"), flag("nearest", "closest pair"));
-    if (scene.visuals.length) byId("show-things").append(flag("meshes", "robots as their files draw them, not as they are judged"));
+    if (scene.visuals.length) byId("show-things").append(flag("meshes", "visual meshes (off: bodies of the proof)"));
     byId("traces").value = stage.traceIn;
     byId("traces-choice").hidden = stage.motion.count < 2;
   }
