@@ -16,7 +16,7 @@ from cellplan.scene.near import NearPairs
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 
-SAMPLES: Final = 200  # [-] at which the closest pair of a motion is looked for, beside those of the report
+SAMPLES: Final = 120  # [-] at which the closest pair of a motion is looked for, beside those of the report
 WITHIN: Final = (0.05, 0.2, 0.8, 3.2)  # [m] distances within which it is looked for, one after the other
 SURFACES: Final = 600  # [-] distances of surfaces that are asked of a page: some milliseconds each
 CUT: Final = (Rule.PROCESS, Rule.GRIP)  # of pairs that may touch in a zone

@@ -108,6 +108,22 @@ def test_a_search_whose_layout_does_not_fit_is_named(cell: Path, tmp_path: Path)
         view(ViewRequest(path=study, cell=cell))
 
 
+def test_a_layout_with_starts_is_shown_with_its_motion(cell: Path, sound: Path, tmp_path: Path) -> None:
+    starts = load_cell(sound / "run" / "cell.yaml", folder=cell.parent)
+    right = {"robots.right.start_deg": np.rad2deg(starts.robot("right").start).tolist()}
+    study = write_study(tmp_path, [right, {**right, "robots.idle.base.x_mm": 900}])
+
+    scenes = view(ViewRequest(path=study, cell=cell))[0]["scenes"]
+
+    run = view(ViewRequest(path=sound / "run", cell=cell))[0]["scenes"][0]
+    times, q = rows_of(dict(run["motion"]))
+    for scene in scenes:
+        own_times, own = rows_of(dict(scene["motion"]))
+        assert np.array_equal(own_times, times)
+        assert np.abs(own - q).max() < 1e-5  # the idle robot's place does not matter to the others
+        assert min(scene["nearest"]["distances"]) == pytest.approx(min(run["nearest"]["distances"]), abs=1e-2)
+
+
 def write_study(folder: Path, settings: list[dict[str, Any]]) -> Path:
     """The result of a layout search as far as a page needs it."""
     figures = {"cycle_s": 1.5, "margin_deg": 12.0, "clearance_mm": 9.0, "change": 2.0, "reason": ""}

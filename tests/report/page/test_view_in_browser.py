@@ -1,5 +1,6 @@
 """3-D pages in headless Chromium: no error, a picture, the instant of the address, controls that work."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from cellplan.pipeline.view.write import ViewRequest, view, write_view
 
 pytestmark = pytest.mark.slow
 
+FIGURES = ("cycle_s", "margin_deg", "clearance_mm", "change")
 STAGE = np.s_[60:690, 5:925]  # of a window of 1280 by 800: the picture, without the lists
 BOX = "  crate: {box: {size_mm: [400, 400, 400]}, at: {xyz_mm: [500, 4000, 500]}}\n"  # round an arm of the idle robot
 
@@ -30,6 +32,10 @@ def folder(sound: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, request in requests.items():
         write_view(view(request)[0], folder / f"{name}.html")
     crowded.unlink()
+    layout = {"origin": "given", "status": "conforming", "reason": "", **dict.fromkeys(FIGURES, 1.0)}
+    top = [{"trial": x, "settings": {"robots.idle.base.x_mm": x}, **layout} for x in (0, 900)]
+    (folder / "study.json").write_text(json.dumps({"schema": "cellplan.layout/1", "kind": "layout", "top": top}))
+    write_view(view(ViewRequest(path=folder, cell=cell))[0], folder / "study.html")
     return folder
 
 
@@ -204,6 +210,18 @@ def test_a_failure_is_shown_with_its_bodies(browser: Browser, folder: Path) -> N
 
     assert "crate" in picked
     assert "crate" in browser.text("touching-now")
+
+
+def test_layouts_follow_one_another(browser: Browser, folder: Path) -> None:
+    browser.open(folder / "study.html")
+    place = "return [document.getElementById('verdict').textContent, app.stage.at(0).links[2][0][12]];"
+
+    assert browser.run(place) == ["1 of 2: trial 0, conforming", 0.0]
+    browser.run('document.dispatchEvent(new KeyboardEvent("keydown", { key: "n", bubbles: true })); await drawn();')
+    assert browser.run(place) == ["2 of 2: trial 900, conforming", 0.9]
+    browser.open(folder / "study.html", "#layout=2")
+    assert browser.run(place)[1] == 0.9
+    assert browser.console == []
 
 
 @pytest.mark.parametrize("name", ["run", "cell"])
