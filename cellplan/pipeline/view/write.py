@@ -64,7 +64,9 @@ def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewReco
     cell = with_overrides(load_cell(path, allow_dirs=request.allow_dirs), request.settings)
     geometries = Geometries()
     scene = unsolved_scene(cell, geometries, progress=progress)
-    return _record("cell", cell, geometries, [scene]), Path("outputs") / f"{cell.name}-view.html"
+    record = _record("cell", cell, geometries, [scene])
+    record["source"], record["settings"] = path.as_posix(), list(request.settings)
+    return record, Path("outputs") / f"{cell.name}-view.html"
 
 
 def write_view_of_run(folder: Path, cell: Cell, *, progress: Progress = silent) -> Path:
@@ -133,6 +135,7 @@ def _record(kind: str, cell: Cell, geometries: Geometries, scenes: list[SceneVie
         "kind": kind,
         "cell": cell.name,
         "source": PurePath(cell.origin.file).name,
+        "settings": [],
         "geometries": geometries.records,
         "scenes": scenes,
         "caution": CAUTION,

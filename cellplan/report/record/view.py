@@ -193,7 +193,8 @@ class ViewRecord(TypedDict):
     schema: str
     kind: Annotated[str, "`run`, `cell` or `study`"]
     cell: str
-    source: Annotated[str, "name of the cell file, for the commands that the page shows"]
+    source: Annotated[str, "the cell file, for the command that the page shows"]
+    settings: Annotated[list[str], "values that were set in it, as `KEY=VALUE`"]
     geometries: list[GeometryRecord]
     scenes: list[SceneViewRecord]
     caution: str

@@ -26,7 +26,7 @@ def folder(sound: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     crowded.write_text(cell.read_text().replace("motion:", f"{BOX}motion:"))
     requests = {
         "run": ViewRequest(path=sound / "run", cell=cell),
-        "cell": ViewRequest(path=cell),
+        "cell": ViewRequest(path=cell, settings=["motion.step_s=0.05", "robots.right.base.x_mm=1900"]),
         "crate": ViewRequest(path=crowded),
     }
     for name, request in requests.items():
@@ -194,7 +194,8 @@ def test_moved_bases_become_options_and_yaml(browser: Browser, folder: Path) -> 
       return [byId("set-text").value, byId("yaml-text").value, app.stage.at(0).links[1][0][12]];
     """)
 
-    assert options == "cellplan check small.yaml --set robots.right.base.x_mm=1950"
+    assert options.startswith("cellplan check /")
+    assert options.endswith("/cell/small.yaml --set motion.step_s=0.05 --set robots.right.base.x_mm=1950")
     assert yaml == "robots:\n  right:\n    base: {xyz_mm: [1950, 300, 480], rpy_deg: [0, 0, 180]}"
     assert x == pytest.approx(1.95)
 

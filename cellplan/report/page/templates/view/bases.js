@@ -42,13 +42,12 @@ class Bases {
       const v = this.values[index];
       stage.bases[base.robot] = poseOf(times(v.slice(0, 3), 1e-3), v.slice(3).map(radians));
     });
-    const options = this.changes().map(([address, value]) => `--set ${address}=${value}`);
-    const file = this.app.record.source;
-    byId("set-text").value = options.length ? `cellplan check ${file} ${options.join(" ")}` : "";
+    const changes = this.changes();
+    byId("set-text").value = changes.length ? this.command(changes) : "";
     byId("yaml-text").value = this.yaml();
-    byId("bases-note").hidden = options.length === 0;
+    byId("bases-note").hidden = changes.length === 0;
     stage.traces = new Traces(stage);
-    stage.moved = options.length > 0;
+    stage.moved = changes.length > 0;
     this.app.refresh();
   }
 
@@ -63,6 +62,15 @@ class Bases {
     });
   }
 
+  /** The command that examines the cell with the change, beside what was set when the page was written. */
+  command(changes) {
+    const { source, settings } = this.app.record;
+    const addresses = new Set(changes.map(([address]) => address));
+    const kept = settings.filter((setting) => !addresses.has(setting.split("=")[0].trim()));
+    const options = [...kept, ...changes.map(([address, value]) => `${address}=${value}`)];
+    return ["cellplan check", quoted(source), ...options.map((option) => `--set ${quoted(option)}`)].join(" ");
+  }
+
   yaml() {
     const lines = this.given.flatMap((base, index) => {
       const given = [...base.xyz_mm, ...base.rpy_deg];
@@ -74,4 +82,9 @@ class Bases {
     });
     return lines.length ? ["robots:", ...lines].join("\n") : "";
   }
+}
+
+/** A word as a shell takes it for one. */
+function quoted(word) {
+  return /^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", `'\\''`)}'`;
 }

@@ -41,6 +41,7 @@ class App {
       byId("notice").textContent = `Still pictures: ${error.message}. Slider, views and lists work; playing is slow.`;
       byId("notice").hidden = false;
       this.view = new PaintedView(canvas, geometries);
+      this.stage.shown.meshes = false; // bodies of the proof have far fewer triangles
       this.isStill = true;
     }
   }
