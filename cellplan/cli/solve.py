@@ -98,7 +98,8 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "report": record})
     else:
         further = [] if solution.passed or task is not None else repair_lines(cell, changed, allow_dir or ())
-        say("\n".join([*summary_lines(record, folder), *further]))
+        page = [f"3-D page: {folder / 'view.html'}"] if with_view else []
+        say("\n".join([*summary_lines(record, folder), *page, *further]))
         if solution.remark:
             say(solution.remark)
     raise typer.Exit(status)

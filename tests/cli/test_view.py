@@ -83,6 +83,7 @@ def test_a_solved_cell_brings_its_page_and_stays_verifiable(
 
     assert run(["solve", str(cell), "--view", "-q", "-o", str(tmp_path / "run")]) == 0
 
+    assert f"3-D page: {tmp_path / 'run' / 'view.html'}" in capsys.readouterr().out
     report = (tmp_path / "run" / "report.html").read_text()
     assert '<a href="view.html">3-D page</a>' in report
     assert 'href="view.html#t=' in report

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from builders.view_pages import body_poses, data_of, rows_of
 
 from cellplan import load_cell, solve, write_run
@@ -16,7 +17,7 @@ from cellplan.io.run.joint_tables import parse_table
 from cellplan.io.run.stored import StoredRun, read_stored_run
 from cellplan.pipeline.gate.open_gate import open_gate
 from cellplan.pipeline.overrides import with_overrides
-from cellplan.pipeline.view.geometries import Geometries
+from cellplan.pipeline.view import geometries
 from cellplan.pipeline.view.run_scene import MOST_NUMBERS, motion_record, run_scene
 from cellplan.pipeline.view.write import ViewRequest, view, write_view
 from cellplan.report.page.view import view_page
@@ -138,6 +139,21 @@ def test_a_long_motion_is_thinned_and_keeps_its_last_row() -> None:
     assert kept.size <= MOST_NUMBERS + 8
 
 
+def test_meshes_share_the_triangles_of_a_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(geometries, "MESH_TRIANGLES", 2000)
+    balls = [trimesh.creation.icosphere(subdivisions=4, radius=r) for r in (0.1, 0.2, 0.3)]
+    meshes = [Mesh(np.array(b.vertices), np.array(b.faces), "ball.stl", is_closed=True) for b in balls]
+    page = geometries.Geometries()
+    page.announce([*meshes])
+
+    places = [page.place(mesh) for mesh in (*meshes, *meshes)]
+
+    counts = [len(b64decode(record["triangles"])) // 6 for record in page.records]
+    assert places == [0, 1, 2, 0, 1, 2]
+    assert 500 < sum(counts) <= 2000
+    assert all(0.0 < record["deviation"] < 0.1 for record in page.records)  # 300 points on a ball are 6 cm apart
+
+
 def test_names_never_become_markup(record: ViewRecord) -> None:
     hostile = "</script><script>alert(1)</script><img src=x onerror=alert(2)>&\u2028"
     page = view_page({**record, "cell": hostile, "caution": hostile})
@@ -164,4 +180,4 @@ def test_a_series_that_does_not_fit_is_named(sound: Path, tmp_path: Path) -> Non
     short = Short(**{name: getattr(stored, name) for name in names})
 
     with pytest.raises(InputError, match=r"series\.json: joints: expected positions of all joints of the cell"):
-        run_scene(short, load_cell(sound / "cell" / "small.yaml"), Geometries())
+        run_scene(short, load_cell(sound / "cell" / "small.yaml"), geometries.Geometries())

@@ -124,23 +124,28 @@ class Stage {
   /** The picture of an instant: bodies, and lines in the order in which they are drawn. */
   frame(state) {
     const bodies = [];
+    const marked = this.markedLinks(state);
     this.scene.bodies.forEach((body, index) => {
-      const isMarked = state.red.has(index) || this.picked.has(index);
-      if (!this.isShown(body) || (body.replaced && this.shown.meshes && !isMarked)) return;
+      if (!this.isShown(body) || (body.replaced && this.shown.meshes && !marked.has(linkKey(body)))) return;
       const place = multiply(this.bodyPose(index, state.links, state.t), this.geometries[body.geometry].place);
       bodies.push({ geometry: body.geometry, place, colour: this.colour(body, index, state.red) });
     });
-    if (this.shown.meshes) bodies.push(...this.visualBodies(state));
+    if (this.shown.meshes) bodies.push(...this.visualBodies(state, marked));
     const lines = [...this.floorLines(), ...this.pathLines(state), ...this.traces.lines(state)];
     if (this.excludedLines) lines.push(this.excludedLine(state));
     if (this.shown.nearest && state.nearest) lines.push(this.nearestLine(state.nearest));
     return { bodies, lines: lines.filter(Boolean) };
   }
 
-  /** The links of robots as their files draw them. */
-  visualBodies(state) {
+  /** Links with a body that touches what it must not, or that a list points to: they are drawn by their bodies. */
+  markedLinks(state) {
+    return new Set([...state.red, ...this.picked].map((index) => linkKey(this.scene.bodies[index])));
+  }
+
+  /** The other links of robots as their files draw them. */
+  visualBodies(state, marked) {
     return this.scene.visuals.flatMap((visual, index) => {
-      if (!this.shownRobots.has(visual.robot)) return [];
+      if (!this.shownRobots.has(visual.robot) || marked.has(linkKey(visual))) return [];
       const pose = carriedPose(state.links, visual, this.visuals[index]);
       const place = multiply(pose, this.geometries[visual.geometry].place);
       return [{ geometry: visual.geometry, place, colour: this.robotColour(visual.robot) }];
@@ -207,6 +212,11 @@ class Stage {
     this.centre = times(add(low, high), 0.5);
     this.radius = 0.5 * length(subtract(high, low));
   }
+}
+
+/** What tells the links of all robots apart. */
+function linkKey(item) {
+  return `${item.robot}/${item.link}`;
 }
 
 function mixed(a, b, share) {
