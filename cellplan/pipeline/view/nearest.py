@@ -16,8 +16,8 @@ from cellplan.scene.near import NearPairs
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 
-SAMPLES: Final = 120  # [-] at which the closest pair of a motion is looked for, beside those of the report
-WITHIN: Final = (0.05, 0.2, 0.8, 3.2)  # [m] distances within which it is looked for, one after the other
+SAMPLES: Final = 120  # [-] at which the closest pair of a motion is searched, beside those of the report
+WITHIN: Final = (0.05, 0.2, 0.8, 3.2)  # [m] distances within which it is searched, one after the other
 SURFACES: Final = 600  # [-] distances of surfaces that are asked of a page: some milliseconds each
 CUT: Final = (Rule.PROCESS, Rule.GRIP)  # of pairs that may touch in a zone
 DECIMALS: Final = 4  # of distances in [mm]
@@ -51,7 +51,7 @@ class Closest(NamedTuple):
 
 
 def sampled_rows(times: Array, further: Iterable[float | None], steps: int = SAMPLES) -> Indices:
-    """Rows at which the closest pair is looked for: evenly spread ones, and those nearest to further times in [s]."""
+    """Rows at which the closest pair is searched: evenly spread ones, and those nearest to further times in [s]."""
     rows = np.linspace(0, len(times) - 1, min(len(times), steps + 1)).round().astype(np.intp)
     named = [int(np.argmin(np.abs(times - at))) for at in further if at is not None]
     return np.unique(np.concatenate([rows, np.array(named, dtype=np.intp)]))
@@ -80,13 +80,13 @@ def nearest_record(stretches: Sequence[Stretch], times: Array, q: Array, rows: I
     for stretch in stretches:
         own = rows[(rows >= stretch.first) & (rows < stretch.end)]
         if len(own):
-            queries = _look(stretch.scene, q[own], record, queries)
+            queries = _search(stretch.scene, q[own], record, queries)
     return record
 
 
 @dataclass(slots=True)
-class _Sought:
-    """The closest pairs of some configurations while they are looked for.
+class _ClosestSearch:
+    """The closest pairs of some configurations while they are searched.
 
     Attributes:
         scene: The scene.
@@ -131,10 +131,10 @@ class _Sought:
         return self.poses.R[body, sample].T @ (point - self.poses.p[body, sample])
 
 
-def _look(scene: Scene, q: Array, record: NearestRecord, queries: int) -> int:
+def _search(scene: Scene, q: Array, record: NearestRecord, queries: int) -> int:
     """Add the closest pair at some configurations, shape (K, nq); gives the surface queries that are left."""
     counted = np.array([_counts(scene, pair) for pair in scene.pairs], dtype=bool)
-    sought = _Sought(scene, scene.body_poses(q), queries)
+    search = _ClosestSearch(scene, scene.body_poses(q), queries)
     found: dict[int, Closest] = {}
     for within in WITHIN:
         left = np.array([sample for sample in range(len(q)) if sample not in found], dtype=np.intp)
@@ -143,24 +143,24 @@ def _look(scene: Scene, q: Array, record: NearestRecord, queries: int) -> int:
         near = scene.near(q[left], within)
         for place, sample in enumerate(left.tolist()):
             places = np.flatnonzero((near.samples == place) & counted[near.rows])
-            closest = sought.closest(sample, near, places)
+            closest = search.closest(sample, near, places)
             if closest is not None and closest.distance < within:
                 found[sample] = closest
     for sample in range(len(q)):
-        _add(record, sought, sample, found.get(sample))
-    return sought.queries
+        _add(record, search, sample, found.get(sample))
+    return search.queries
 
 
-def _add(record: NearestRecord, sought: _Sought, sample: int, found: Closest | None) -> None:
+def _add(record: NearestRecord, search: _ClosestSearch, sample: int, found: Closest | None) -> None:
     """Add what was found at a configuration."""
-    pair = None if found is None else sought.scene.pairs[found.row]
+    pair = None if found is None else search.scene.pairs[found.row]
     record["pairs"].append([] if pair is None else [pair.first, pair.second])
     record["distances"].append(0.0 if found is None else round(MM * found.distance, DECIMALS) + 0.0)
     record["lower_bound"].append(found is not None and found.is_bound)
     points: list[float] = []
     if found is not None and pair is not None:
         ends = ((pair.first, found.first), (pair.second, found.second))
-        points = point_numbers(np.stack([sought.local(body, point, sample) for body, point in ends]))
+        points = point_numbers(np.stack([search.local(body, point, sample) for body, point in ends]))
     record["points"].append(points)
 
 
