@@ -164,6 +164,17 @@ class LayoutSettings:
             equal=tuple(each for each in self.equal if not any(address in addresses for address in each)),
         )
 
+    def among(self, addresses: Container[str]) -> "LayoutSettings":
+        """The same with only some of the numbers, and what ties these."""
+        ranges = tuple(each for each in self.ranges if each.address in addresses)
+        names = {each.name for each in ranges}
+        return replace(
+            self,
+            ranges=ranges,
+            equal=tuple(each for each in self.equal if all(address in addresses for address in each)),
+            mirrored=tuple(pair for pair in self.mirrored if names.issuperset(pair.robots)),
+        )
+
 
 def mirror_image(pair: Mirrored, index: int) -> tuple[float, float]:
     """How a component of the second base follows from that of the first: factor, and term in [m] or [rad].

@@ -10,7 +10,6 @@ import numpy as np
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
-from cellplan.model.layout import LayoutSettings
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.layout.request import LayoutRequest, searched_cell
@@ -19,8 +18,6 @@ from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.run import run
 from cellplan.search.spline_path.problem import PathProblem
-from cellplan.search.variables.pedestals import with_pedestals
-from cellplan.search.variables.ties import Tied
 
 DRAWS: Final = 48  # [-] layouts nearby that are tried side by side where there is no motion
 SPREADS: Final = (0.5, 1.0, 2.0, 4.0)  # [-] usual steps by which they differ, more and more
@@ -53,7 +50,8 @@ def with_attempt(ready: Prepared, attempt: Attempt) -> Prepared:
         InputError: The cell does not take it.
     """
     if attempt.addresses:
-        return _among(ready, frozenset(attempt.addresses))
+        variables = ready.variables.among(frozenset(attempt.addresses))
+        return replace(ready, variables=variables, bodies=CellDistances.of(ready.scene, variables))
     return Prepared.of(ready.request, _varied(ready.cell, attempt.vary))
 
 
@@ -95,38 +93,6 @@ def _near(ready: Prepared, start: Array, rng: np.random.Generator) -> Begin | No
             cost = np.abs(x[followed] - variables.given) @ variables.cost
             return x[followed[int(cost.argmin())]], start
     return None
-
-
-def _among(ready: Prepared, addresses: frozenset[str]) -> Prepared:
-    """The same cell with some of its variables only."""
-    given = ready.variables
-    settings = _restricted(given.settings, addresses)
-    tied = Tied.of(settings)
-    variables = replace(
-        given,
-        names=tied.names,
-        lower=tied.lower,
-        upper=tied.upper,
-        given=tied.given,
-        scale=tied.scale,
-        cost=tied.cost,
-        settings=settings,
-        tied=tied,
-        conversion=with_pedestals(ready.cell, settings)[0],
-    )
-    return replace(ready, variables=variables, bodies=CellDistances.of(ready.scene, variables))
-
-
-def _restricted(settings: LayoutSettings, addresses: frozenset[str]) -> LayoutSettings:
-    """Settings with some of the ranges only, and what ties these."""
-    ranges = tuple(each for each in settings.ranges if each.address in addresses)
-    names = {each.name for each in ranges}
-    return replace(
-        settings,
-        ranges=ranges,
-        equal=tuple(group for group in settings.equal if addresses.issuperset(group)),
-        mirrored=tuple(pair for pair in settings.mirrored if names.issuperset(pair.robots)),
-    )
 
 
 def _varied(cell: Cell, vary: Any) -> Cell:

@@ -26,7 +26,6 @@ from cellplan.scene.scene import Scene
 from cellplan.search.distances.keep_out import keep_out_bodies
 from cellplan.search.distances.layout_pairs import LayoutPair, among, are_own, demands_of, layout_pairs, with_areas
 from cellplan.search.distances.moving_bodies import LayoutVariables, MovingBodies, Placed, far_away, reaches
-from cellplan.search.kernel.job import Layouts
 
 STEP: Final = (
     1e-6  # [m] and [rad] to either side, by which the reach of a body that changes its shape is differentiated
@@ -85,6 +84,7 @@ class CellDistances:
     Attributes:
         pairs: The pairs: those that the checks watch, those of which they judge the depth, then areas of the floor with
             the bases and columns that keep out of them.
+        most_demanded: The largest distance in [m] that is demanded of one.
     """
 
     def __init__(self, scene: Scene, variables: LayoutVariables) -> None:
@@ -113,6 +113,7 @@ class CellDistances:
             is_hull=np.append(near_table(scene).is_hull, [True] * len(added)).astype(bool),
         )
         self._demands, self._own = demands_of(self.pairs), are_own(self.pairs)
+        self.most_demanded = float(self._demands.max(initial=0.0))
         index = {robot.name: place for place, robot in enumerate(self._cell.robots)}
         self._robots = np.array([-1 if each.robot is None else index[each.robot] for each in carriers], dtype=np.intp)
 
@@ -132,13 +133,11 @@ class CellDistances:
         }
         return cls(scene.moved(bare) if bare else scene, variables)
 
-    def near(self, x: Array, layout: Layouts, q: Array, within: float) -> LayoutDistances:  # noqa: ARG002
+    def near(self, x: Array, q: Array, within: float) -> LayoutDistances:
         """All pairs of one layout that are nearer than a distance.
 
         Args:
             x: The variables, shape (n,).
-            layout: The layout as the kernel has it. It does not say where bodies are: a part that lies elsewhere is
-                there a displacement of all bases.
             q: Stacked joint positions at the keys in [rad] or [m], shape (K, nq).
             within: The distance in [m].
         """

@@ -14,7 +14,8 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Job
-from cellplan.search.programs.layout_problem import KernelVariables, LayoutProblem
+from cellplan.search.kernel.varied import KernelVariables
+from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
 
 LENGTH: Final = 0.3  # [m] that a singular value of 1 counts as among the distances

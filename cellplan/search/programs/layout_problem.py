@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
@@ -10,30 +10,13 @@ from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell import joint_at
 from cellplan.model.joint_limits import JointLimits
 from cellplan.model.motion import Schedule
-from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
+from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.derivatives import differentiate
-from cellplan.search.kernel.job import Job, Layouts
+from cellplan.search.kernel.job import Job
 from cellplan.search.kernel.run import run, run_near
-from cellplan.search.kernel.screws import Directions
+from cellplan.search.kernel.varied import KernelVariables
+from cellplan.search.programs.near_pairs import NearPairs, distances_at
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
-
-
-class KernelVariables(Protocol):
-    """Variables, n of them, as the kernel needs them; the rest is as in ``Problem``."""
-
-    def layouts(self, x: Array, start: Array) -> Layouts:
-        """Candidates at values of shape (K, n), with start postures of shape (K, nq)."""
-
-    def directions(self, x: Array) -> Directions:
-        """What each variable does to a candidate, at values of shape (n,)."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Found:
-    """Near pairs and the nodes that their keys are."""
-
-    near: LayoutDistances
-    nodes: Indices
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,16 +43,14 @@ class LayoutProblem:
     times: Array = field(init=False)
     limits: JointLimits = field(init=False)
     is_accelerating: bool = field(init=False)
-    most_demanded: float = field(init=False)
 
     def __post_init__(self) -> None:
-        """Note what the variables and the job know, whether accelerations count, and the largest demand in [m]."""
+        """Note what the variables and the job know, and whether accelerations count."""
         for name in ("names", "lower", "upper", "scale", "cost", "given"):
             object.__setattr__(self, name, getattr(self.variables, name))
         object.__setattr__(self, "times", self.job.times)
         object.__setattr__(self, "limits", self.job.limits)
         object.__setattr__(self, "is_accelerating", bool(np.isfinite(self.acceleration).any()))
-        object.__setattr__(self, "most_demanded", max((pair.demand for pair in self.bodies.pairs), default=0.0))
 
     def finer(self, schedule: Schedule, *, nodes: int, denser: Sequence[float] = ()) -> Self:
         """The same problem on more nodes.
@@ -103,22 +84,12 @@ class LayoutProblem:
 
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
         """See ``Problem``."""
-        layout = self.variables.layouts(point.x[None], point.start[None])
-        near = self.bodies.near(point.x, layout, point.q[nodes], within + self.most_demanded)
-        return Distances(
-            pairs=near.pairs,
-            nodes=nodes[near.keys],
-            values=near.distances,
-            demands=near.demands,
-            is_own=near.is_own,
-            found=_Found(near=near, nodes=nodes),
-        )
+        return distances_at(self.bodies, point.x, point.q, nodes, within)
 
     def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:
         """See ``Problem``."""
-        if not isinstance(found.found, _Found):
-            raise TypeError("distance_derivatives: expected distances of this problem")
-        return self.bodies.derivatives(found.found.near, point.x, by_joints.q[found.found.nodes])
+        pairs = NearPairs.of(found)
+        return self.bodies.derivatives(pairs.near, point.x, by_joints.q[pairs.nodes])
 
     def pair_names(self, pair: int) -> tuple[str, str]:
         """See ``Problem``."""

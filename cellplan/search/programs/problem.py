@@ -5,6 +5,7 @@ from typing import Protocol
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.joint_limits import JointLimits
+from cellplan.search.kernel.varied import Varied
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,43 +65,6 @@ class Distances:
     demands: Array
     is_own: Flags
     found: object
-
-
-class Varied(Protocol):
-    """The variables of a problem, n of them.
-
-    Attributes:
-        names: Names of the variables.
-        lower: Their lower bounds, shape (n,).
-        upper: Their upper bounds, shape (n,).
-        scale: A usual step of each, shape (n,).
-        cost: Cost of a change by one unit of each, shape (n,).
-        given: Values from which a change is counted, shape (n,).
-    """
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """See the class."""
-
-    @property
-    def lower(self) -> Array:
-        """See the class."""
-
-    @property
-    def upper(self) -> Array:
-        """See the class."""
-
-    @property
-    def scale(self) -> Array:
-        """See the class."""
-
-    @property
-    def cost(self) -> Array:
-        """See the class."""
-
-    @property
-    def given(self) -> Array:
-        """See the class."""
 
 
 class Problem(Varied, Protocol):

@@ -8,9 +8,10 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell import joint_at
 from cellplan.model.joint_limits import JointLimits
-from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
+from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Layouts
-from cellplan.search.kernel.screws import Directions
+from cellplan.search.kernel.varied import KernelVariables
+from cellplan.search.programs.near_pairs import NearPairs, distances_at
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
 from cellplan.search.spline_path.derivatives import path_derivatives
 from cellplan.search.spline_path.followed import continued, followed
@@ -18,49 +19,11 @@ from cellplan.search.spline_path.nodes import PathNodes
 from cellplan.search.spline_path.variables import PathVariables
 
 
-class LayoutVariables(Protocol):
-    """What a path problem needs of the variables of the layout, of which there may be none; see ``Problem``."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """See ``Problem``."""
-
-    @property
-    def lower(self) -> Array:
-        """See ``Problem``."""
-
-    @property
-    def upper(self) -> Array:
-        """See ``Problem``."""
-
-    @property
-    def scale(self) -> Array:
-        """See ``Problem``."""
-
-    @property
-    def cost(self) -> Array:
-        """See ``Problem``."""
-
-    @property
-    def given(self) -> Array:
-        """See ``Problem``."""
-
-    def layouts(self, x: Array, start: Array) -> Layouts:
-        """The layouts at some values, shape (K, n), with start postures near the right ones, shape (K, nq)."""
-
-    def directions(self, x: Array) -> Directions:
-        """What each variable displaces at some values, shape (n,)."""
+class WrittenVariables(KernelVariables, Protocol):
+    """Variables of the layout, of which there may be none, that know how the cell file writes them."""
 
     def values(self, x: Array, start: Array) -> dict[str, object]:
         """What to write into the cell file, by address."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Found:
-    """Near pairs and the nodes that their keys are."""
-
-    near: LayoutDistances
-    nodes: Indices
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,7 +40,7 @@ class PathProblem:
 
     nodes: PathNodes
     path: PathVariables
-    layout: LayoutVariables
+    layout: WrittenVariables
     bodies: CellDistances
     acceleration: Array
     names: tuple[str, ...] = field(init=False)
@@ -133,24 +96,12 @@ class PathProblem:
 
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
         """See ``Problem``."""
-        _, others = self._split(point.x)
-        most = max((pair.demand for pair in self.bodies.pairs), default=0.0)
-        near = self.bodies.near(others, self._layout_at(point), point.q[nodes], within + most)
-        return Distances(
-            pairs=near.pairs,
-            nodes=nodes[near.keys],
-            values=near.distances,
-            demands=near.demands,
-            is_own=near.is_own,
-            found=_Found(near=near, nodes=nodes),
-        )
+        return distances_at(self.bodies, self._split(point.x)[1], point.q, nodes, within)
 
     def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:
         """See ``Problem``."""
-        if not isinstance(found.found, _Found):
-            raise TypeError("distance_derivatives: expected distances of this problem")
-        near, own, (_, others) = found.found.near, len(self.path.names), self._split(point.x)
-        dq = by_joints.q[found.found.nodes]
+        pairs, own, (_, others) = NearPairs.of(found), len(self.path.names), self._split(point.x)
+        near, dq = pairs.near, by_joints.q[pairs.nodes]
         by_path = (near.by_joints[:, None] @ dq[near.keys][..., :own])[:, 0]
         if not len(others):
             return by_path

@@ -96,8 +96,7 @@ def judged(problem: StartProblem, x: Array, start: Array, picks: Indices | None 
     for candidate in chosen.tolist():
         if handed_out == HANDED_OUT or violation[candidate] > 0.0:
             break
-        own = layouts.of_places(np.array([candidate]))
-        violation[candidate] += _exact_shortfall(problem, x[candidate], own, motions.q[candidate], drops) / LENGTH
+        violation[candidate] += _exact_shortfall(problem, x[candidate], motions.q[candidate], drops) / LENGTH
         handed_out += violation[candidate] == 0.0
     chosen = chosen[np.lexsort((chosen, cycle[chosen], violation[chosen]))]
     return Judged(
@@ -141,15 +140,14 @@ def _shortfalls(problem: StartProblem, layouts: Layouts, q: Array, drops: Counte
     return np.maximum(0.0, worst.max(axis=1, initial=0.0))
 
 
-def _exact_shortfall(problem: StartProblem, x: Array, layout: Layouts, q: Array, drops: Counter[str]) -> float:
+def _exact_shortfall(problem: StartProblem, x: Array, q: Array, drops: Counter[str]) -> float:
     """The same of one candidate at more nodes, its columns and tools as they are."""
     keys = q[_keys(len(q), MORE_KEYS)]
-    pairs = problem.distances.pairs
-    near = problem.distances.near(x, layout, keys, max((pair.demand for pair in pairs), default=0.0))
+    near = problem.distances.near(x, keys, problem.distances.most_demanded)
     short = near.demands - near.distances
     if not short.max(initial=0.0) > 0.0:
         return 0.0
-    names = pairs[near.pairs[int(np.argmax(short))]].names
+    names = problem.distances.pairs[near.pairs[int(np.argmax(short))]].names
     drops[f"{names[0]} too near {names[1]}"] += 1
     return float(short.max())
 

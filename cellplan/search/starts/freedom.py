@@ -9,39 +9,15 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell import Cell
 from cellplan.search.distances.moving_bodies import LayoutVariables
-from cellplan.search.kernel.job import Layouts
+from cellplan.search.kernel.varied import KernelVariables
 
 PROBE: Final = 0.1  # of a variable's range or usual step: far above rounding
 COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "yaw_deg")  # of a base that a start chooses so that its tool comes there
 FIXED: Final = -1  # in place of a column
 
 
-class StartVariables(LayoutVariables, Protocol):
-    """Variables as starts need them; n of them, see ``search.variables``."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Address of each."""
-        ...
-
-    @property
-    def lower(self) -> Array:
-        """Lower bounds in [m] or [rad], shape (n,)."""
-        ...
-
-    @property
-    def upper(self) -> Array:
-        """Upper bounds, shape (n,)."""
-        ...
-
-    @property
-    def scale(self) -> Array:
-        """A usual step of each, shape (n,)."""
-        ...
-
-    def layouts(self, x: Array, start: Array) -> Layouts:
-        """What the kernel needs of the layouts at x, shape (K, n), with start postures, shape (K, nq)."""
-        ...
+class StartVariables(LayoutVariables, KernelVariables, Protocol):
+    """Variables as starts need them; see ``search.variables``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

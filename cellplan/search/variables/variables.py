@@ -2,12 +2,13 @@
 
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
-from cellplan.model.cell import Cell, Part, Tool
+from cellplan.model.cell import Cell
 from cellplan.model.layout import LayoutSettings, VariableKind
 from cellplan.search.distances.moving_bodies import Beside
 from cellplan.search.kernel.job import Layouts
@@ -79,12 +80,7 @@ class Variables:
         joints = [joint for robot in base.robots for joint in robot.model.joints]
         return cls(
             base=base,
-            names=tied.names,
-            lower=tied.lower,
-            upper=tied.upper,
-            given=tied.given,
-            scale=tied.scale,
-            cost=tied.cost,
+            **_varied(tied),
             margin=np.array([settings.margin if it.is_revolute else settings.margin_sliding for it in joints]),
             remarks=(*remarks, *tied.remarks),
             settings=settings,
@@ -93,6 +89,12 @@ class Variables:
             given_state=State.given(base),
             conversion=conversion,
         )
+
+    def among(self, addresses: Container[str]) -> Self:
+        """The same with only some of the numbers of the file, by their addresses."""
+        settings = self.settings.among(addresses)
+        tied, conversion = Tied.of(settings), with_pedestals(self.given_cell, settings)[0]
+        return replace(self, **_varied(tied), settings=settings, tied=tied, conversion=conversion)
 
     def state(self, x: Array) -> State:
         """The layout at values of the variables, shape (n,)."""
@@ -105,16 +107,6 @@ class Variables:
         start postures as far as they are among the variables.
         """
         return self.state(x).cell(self.base, self.tied.ranges)
-
-    def tools(self, x: Array) -> dict[str, Tool]:
-        """Tools at values of the variables, by robot, of those that change."""
-        state, robots = self.state(x), concerned(self.base, self.tied.ranges, VariableKind.TOOL)
-        return {self.base.robots[robot].name: state.tool(self.base, robot) for robot in robots}
-
-    def part(self, x: Array) -> Part:
-        """The part at values of the variables: that of ``base`` itself where nothing of it changes."""
-        kinds = {each.kind for each in self.tied.ranges}
-        return self.placed(x).part if kinds & {VariableKind.GRASP, VariableKind.PART} else self.base.part
 
     def layouts(self, x: Array, start: Array) -> Layouts:
         """Candidates for the kernel, with a job of ``base``.
@@ -198,3 +190,8 @@ class Variables:
         """Values of the variables in another cell with the same robots, brought into the bounds, shape (n,)."""
         numbers = State.given(cell).numbers(cell, self.tied.ranges)
         return self.tied.values(numbers)
+
+
+def _varied(tied: Tied) -> dict[str, Any]:
+    """What variables have from their ties."""
+    return {name: getattr(tied, name) for name in ("names", "lower", "upper", "given", "scale", "cost")}

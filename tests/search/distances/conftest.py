@@ -13,7 +13,6 @@ from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell, Part, Tool
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.moving_bodies import Beside
-from cellplan.search.kernel.job import Layouts
 
 CELL = Path(__file__).resolve().parents[3] / "cells" / "four_robots.yaml"
 BASES = [("kuka", 0), ("kuka", 1), ("kuka", 2), ("kuka", 5), ("abb", 1), ("abb", 2), ("abb", 3)]  # robot, component
@@ -28,9 +27,6 @@ class SomeVariables:
     @property
     def given(self) -> Array:
         return np.array([0.0] * len(BASES) + [0.15, 0.2, 0.3, 0.0])
-
-    def layouts(self, x: Array, start: Array) -> Layouts:
-        return Layouts.of([self.placed(each) for each in x], start)
 
     def base_twists(self, x: Array) -> Array:
         found = np.zeros((len(self.cell.robots), 6, len(x)))

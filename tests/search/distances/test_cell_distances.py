@@ -7,7 +7,7 @@ from search.distances.conftest import SomeVariables
 from cellplan.geometry.transforms import Array
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
-from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
+from cellplan.search.distances.cell_distances import CellDistances
 
 WITHIN = 0.08
 STEP = 1e-5
@@ -30,14 +30,10 @@ def q(variables: SomeVariables) -> Array:
     return start + np.random.default_rng(0).uniform(-0.1, 0.1, (3, len(start)))
 
 
-def near_at(distances: CellDistances, variables: SomeVariables, x: Array, q: Array, within: float) -> LayoutDistances:
-    return distances.near(x, variables.layouts(x[None], q[:1]), q, within)
-
-
 def test_distances_are_those_of_a_scene_built_from_the_changed_cell(
     distances: CellDistances, variables: SomeVariables, x: Array, q: Array
 ) -> None:
-    near = near_at(distances, variables, x, q, WITHIN)
+    near = distances.near(x, q, WITHIN)
     built = Scene.from_cell(variables.placed(x))
     found = built.near(q, WITHIN)
     rules = {built.names(pair): pair.rule for pair in built.pairs}
@@ -65,14 +61,14 @@ def test_derivatives_are_those_of_differences(
 ) -> None:
     n, nq = len(x), q.shape[1]
     dq = np.random.default_rng(5).normal(size=(len(q), nq, n))
-    near = near_at(distances, variables, x, q, WITHIN)
+    near = distances.near(x, q, WITHIN)
     exact = distances.derivatives(near, x, dq)
     found = np.full_like(exact, np.nan)
     keys = list(zip(near.pairs.tolist(), near.keys.tolist(), strict=True))
     for j, unit in enumerate(np.eye(n)):
         sides = []
         for sign in (1.0, -1.0):
-            side = near_at(distances, variables, x + sign * STEP * unit, q + sign * STEP * dq[..., j], 2.0 * WITHIN)
+            side = distances.near(x + sign * STEP * unit, q + sign * STEP * dq[..., j], 2.0 * WITHIN)
             sides.append(
                 dict(zip(zip(side.pairs.tolist(), side.keys.tolist(), strict=True), side.distances, strict=True))
             )

@@ -16,9 +16,8 @@ from cellplan.model.layout import KeepOut, LayoutSettings
 from cellplan.model.mounting import Pedestal
 from cellplan.model.robot import BASE
 from cellplan.scene.scene import Scene
-from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
+from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.distances.moving_bodies import Beside
-from cellplan.search.kernel.job import Layouts
 
 COLUMN = Pedestal(radius=0.3, floor=0.0)
 HIGH, LOW = pose((0.0, 0.0, 0.5)), np.eye(4)
@@ -36,9 +35,6 @@ class BaseOfB:
     @property
     def given(self) -> Array:
         return np.zeros(3)
-
-    def layouts(self, x: Array, start: Array) -> Layouts:
-        return Layouts.of([self.placed(each) for each in x], start)
 
     def base_twists(self, x: Array) -> Array:
         base = np.zeros((2, 6, 3))
@@ -135,10 +131,6 @@ def verdict(cell: Cell) -> bool:
     return certify(scene, AT_REST).is_kept and all(check.passed for check in check_mounting(scene, AT_REST))
 
 
-def near_at(distances: CellDistances, variables: BaseOfB, x: Array, within: float) -> LayoutDistances:
-    return distances.near(x, variables.layouts(x[None], AT_REST[:1]), AT_REST[:1], within)
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_stands_in_another_thing_fails_the_checks_and_falls_short_of_its_distance(kind: str) -> None:
     cell, names, apart = KINDS[kind]
@@ -146,7 +138,7 @@ def test_what_stands_in_another_thing_fails_the_checks_and_falls_short_of_its_di
     distances = CellDistances.of(Scene.from_cell(cell), variables)
     for deep in (-0.02, 0.03):
         x = np.array([-apart - sign * deep, 0.0, 0.0])
-        near = near_at(distances, variables, x, 0.1)
+        near = distances.near(x, AT_REST[:1], 0.1)
         short = near.distances < near.demands
         failing = [set(distances.pairs[row].names) for row in near.pairs[short].tolist()]
         assert verdict(variables.placed(x)) is (deep < 0.0)
@@ -161,7 +153,7 @@ def test_bases_and_columns_keep_out_of_areas_by_their_footprints(height: float, 
     variables = BaseOfB(cell)
     distances = CellDistances.of(Scene.from_cell(cell), variables)
     for apart in (0.05, -0.04):
-        near = near_at(distances, variables, np.array([apart + reach - 0.8, 0.0, 0.0]), 0.1)
+        near = distances.near(np.array([apart + reach - 0.8, 0.0, 0.0]), AT_REST[:1], 0.1)
         found = {
             distances.pairs[pair].names[1]: (float(d), slope)
             for pair, d, slope in zip(
@@ -183,13 +175,13 @@ def test_the_distances_of_what_stands_change_with_the_base_as_differences_say(ki
     variables = BaseOfB(cell)
     distances = CellDistances.of(Scene.from_cell(cell), variables)
     x = np.array([np.copysign(0.01, apart) - apart, 0.01, 0.02])
-    near = near_at(distances, variables, x, 0.1)
+    near = distances.near(x, AT_REST[:1], 0.1)
     exact = distances.derivatives(near, x, np.zeros((1, cell.joint_count, 3)))
     row = next(row for row, pair in enumerate(near.pairs.tolist()) if set(distances.pairs[pair].names) == names)
     step = 1e-5
     for variable in range(3):
         found = []
         for sign in (step, -step):
-            other = near_at(distances, variables, x + sign * np.eye(3)[variable], 0.2)
+            other = distances.near(x + sign * np.eye(3)[variable], AT_REST[:1], 0.2)
             found.append(float(other.distances[other.pairs == near.pairs[row]][0]))
         assert exact[row, variable] == pytest.approx((found[0] - found[1]) / (2.0 * step), abs=1e-4)

@@ -1,0 +1,54 @@
+"""Varied: what every part of a search asks of its variables."""
+
+from typing import Protocol
+
+from cellplan.geometry.arrays import Array
+from cellplan.search.kernel.job import Layouts
+from cellplan.search.kernel.screws import Directions
+
+
+class Varied(Protocol):
+    """Variables, n of them, in [m] or [rad] unless their names say otherwise.
+
+    Attributes:
+        names: Their addresses in the cell file.
+        lower: Their lower bounds, shape (n,).
+        upper: Their upper bounds, shape (n,).
+        scale: A usual step of each, shape (n,).
+        cost: Cost of a change by one unit of each, shape (n,).
+        given: Values from which a change is counted, shape (n,).
+    """
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """See the class."""
+
+    @property
+    def lower(self) -> Array:
+        """See the class."""
+
+    @property
+    def upper(self) -> Array:
+        """See the class."""
+
+    @property
+    def scale(self) -> Array:
+        """See the class."""
+
+    @property
+    def cost(self) -> Array:
+        """See the class."""
+
+    @property
+    def given(self) -> Array:
+        """See the class."""
+
+
+class KernelVariables(Varied, Protocol):
+    """Variables of which the kernel makes candidates."""
+
+    def layouts(self, x: Array, start: Array) -> Layouts:
+        """Candidates at values of shape (K, n), with start postures near the right ones, shape (K, nq)."""
+
+    def directions(self, x: Array) -> Directions:
+        """What each variable does to a candidate, at values of shape (n,)."""

@@ -1,0 +1,52 @@
+"""Near pairs of bodies at some nodes of a motion, as sequential programs ask for them."""
+
+from dataclasses import dataclass
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
+from cellplan.search.programs.problem import Distances
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NearPairs:
+    """Near pairs and the nodes that their keys are.
+
+    Attributes:
+        near: The pairs.
+        nodes: The nodes, shape (K,).
+    """
+
+    near: LayoutDistances
+    nodes: Indices
+
+    @classmethod
+    def of(cls, distances: Distances) -> "NearPairs":
+        """Those that distances came from.
+
+        Raises:
+            TypeError: The distances are not those of ``distances_at``.
+        """
+        if not isinstance(distances.found, NearPairs):
+            raise TypeError("distance_derivatives: expected distances of this problem")
+        return distances.found
+
+
+def distances_at(bodies: CellDistances, x: Array, q: Array, nodes: Indices, within: float) -> Distances:
+    """Pairs of bodies that are less than a distance beyond what is demanded of any.
+
+    Args:
+        bodies: The bodies of the cell.
+        x: Variables of the layout, shape (n,).
+        q: Joint positions at all nodes in [rad] or [m], shape (N, nq).
+        nodes: The nodes that are asked for, shape (K,).
+        within: The distance in [m].
+    """
+    near = bodies.near(x, q[nodes], within + bodies.most_demanded)
+    return Distances(
+        pairs=near.pairs,
+        nodes=nodes[near.keys],
+        values=near.distances,
+        demands=near.demands,
+        is_own=near.is_own,
+        found=NearPairs(near=near, nodes=nodes),
+    )
