@@ -41,7 +41,7 @@ def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = s
         found = check(cell, progress=progress)
         started = found.cell
         failures += [(each.subject, each.message) for each in found.checks if not each.passed]
-        facts = [["start", found.choice or "given"]]
+        facts = [["start", (found.choice or "given").removeprefix("start ")]]
     except (InputError, NoSolutionError) as error:
         started = cell
         failures += [("", line) for line in str(error).splitlines()]
