@@ -203,8 +203,9 @@ def test_moved_bases_become_options_and_yaml(browser: Browser, folder: Path) -> 
 def test_a_failure_is_shown_with_its_bodies(browser: Browser, folder: Path) -> None:
     browser.open(folder / "crate.html")
 
+    assert browser.run("return app.failure;") == 0  # the page opens there
     picked = browser.run("""
-      byId("failures").querySelector("button").click();
+      byId("failures").querySelectorAll("button")[1].click();
       await drawn();
       return [...app.stage.picked].map((index) => app.stage.scene.bodies[index].name);
     """)

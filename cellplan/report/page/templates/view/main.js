@@ -26,6 +26,7 @@ class App {
     addEventListener("resize", () => this.refresh());
     addEventListener("hashchange", () => this.follow());
     this.setScene(0);
+    if (record.kind !== "study" && this.stage.scene.failures.length) this.showFailure(0);
     this.follow();
   }
 
