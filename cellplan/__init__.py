@@ -7,9 +7,9 @@ The public interface; everything else may change without notice:
   ``search_layout``, ``repair``, ``rehearse``
 - verify: ``verify``, ``open_gate``
 - write: ``write_run``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``, ``write_repair``,
-  ``export_program``
+  ``export_program``; 3-D pages: ``view``, ``write_view``
 - inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``BaseGrid``,
-  ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``
+  ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``, ``ViewRequest``
 - results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``,
   ``LayoutResult``, ``Repair``
 - errors: ``CellplanError``
@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from cellplan.pipeline.solve import solve
     from cellplan.pipeline.sweep import SweepJob, sweep
     from cellplan.pipeline.verify import verify
+    from cellplan.pipeline.view.write import ViewRequest, view, write_view
     from cellplan.pipeline.write_run import write_run
     from cellplan.planning.layout_screening import Candidates, Screening
     from cellplan.study.study import Stop
@@ -84,6 +85,7 @@ _HOME: Final = {
     "SweepJob": "pipeline.sweep",
     "Task": "model.task",
     "Toolpath": "model.toolpath",
+    "ViewRequest": "pipeline.view.write",
     "base_map": "pipeline.base_map.judged",
     "compare": "pipeline.compare",
     "export_program": "pipeline.export",
@@ -99,11 +101,13 @@ _HOME: Final = {
     "solve": "pipeline.solve",
     "sweep": "pipeline.sweep",
     "verify": "pipeline.verify",
+    "view": "pipeline.view.write",
     "write_base_map": "pipeline.base_map.judged",
     "write_fastest": "pipeline.fastest.write",
     "write_repair": "pipeline.repair.write",
     "write_rehearsal": "pipeline.rehearsal.write",
     "write_run": "pipeline.write_run",
+    "write_view": "pipeline.view.write",
 }
 
 __all__ = [
@@ -130,6 +134,7 @@ __all__ = [
     "SweepJob",
     "Task",
     "Toolpath",
+    "ViewRequest",
     "__version__",
     "base_map",
     "compare",
@@ -146,11 +151,13 @@ __all__ = [
     "solve",
     "sweep",
     "verify",
+    "view",
     "write_base_map",
     "write_fastest",
     "write_rehearsal",
     "write_repair",
     "write_run",
+    "write_view",
 ]
 
 

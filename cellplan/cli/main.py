@@ -24,6 +24,7 @@ from cellplan.cli.schema import schema
 from cellplan.cli.solve import solve
 from cellplan.cli.sweep import sweep
 from cellplan.cli.verify import verify
+from cellplan.cli.view import view
 from cellplan.errors import ExitStatus
 
 INTERRUPTIONS: Final = [
@@ -59,6 +60,7 @@ app.command()(check)
 app.command()(explain)
 app.command()(solve)
 app.command()(verify)
+app.command()(view)
 app.command()(export)
 app.command()(sweep)
 app.command()(compare)

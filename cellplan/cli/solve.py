@@ -1,7 +1,7 @@
 """``cellplan solve``: plan a cell, check the result and write joint tables, report and plots."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +21,11 @@ from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
+if TYPE_CHECKING:
+    from cellplan.pipeline.background_plots import BackgroundPlots
+    from cellplan.pipeline.solution import Solution
+    from cellplan.report.record.common import Record
+
 SCHEMA = "cellplan.solve/1"
 
 Output = Annotated[
@@ -29,6 +34,11 @@ Output = Annotated[
 TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Plan this task only.")]
 KeepRejected = Annotated[
     bool, typer.Option("--keep-rejected", help="Write the tables of a failed run below rejected/.")
+]
+
+WithView = Annotated[
+    bool,
+    typer.Option("--view", help="Write the 3-D page view.html too, as cellplan view does; the report leads to it."),
 ]
 
 
@@ -44,6 +54,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     task: TaskName = None,
     as_json: AsJson = False,
     keep_rejected: KeepRejected = False,
+    with_view: WithView = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
 ) -> None:
@@ -63,7 +74,6 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
         from cellplan.pipeline.solve import solve_with_plots
-        from cellplan.pipeline.write_run import write_run
         from cellplan.report.text.run import summary_lines
 
         given = load_cell(cell, allow_dirs=allow_dir or ())
@@ -81,14 +91,27 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:
             solution = solve_with_plots(changed, plots, task=task, progress=progress)
-            record = write_run(solution, folder, keep_rejected=keep_rejected, plots=plots)
+            record = _written(solution, folder, keep_rejected, plots, with_view)
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
     if as_json:
         place = {"folder": str(folder), "report_path": str(folder / "report.html")}
         say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "report": record})
     else:
         further = [] if solution.passed or task is not None else repair_lines(cell, changed, allow_dir or ())
-        say("\n".join([*summary_lines(record, folder), *further]))
+        page = [f"3-D page: {folder / 'view.html'}"] if with_view else []
+        say("\n".join([*summary_lines(record, folder), *page, *further]))
         if solution.remark:
             say(solution.remark)
     raise typer.Exit(status)
+
+
+def _written(solution: "Solution", folder: Path, keep_rejected: bool, plots: "BackgroundPlots", view: bool) -> "Record":
+    """Write a run folder, with its 3-D page where that is desired."""
+    from cellplan.pipeline.write_run import write_run
+
+    record = write_run(solution, folder, keep_rejected=keep_rejected, plots=plots, view=view)
+    if view:
+        from cellplan.pipeline.view.write import write_view_of_run
+
+        write_view_of_run(folder, solution.cell)
+    return record

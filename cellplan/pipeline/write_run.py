@@ -15,7 +15,7 @@ from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.report.page.render import overview_page, report_page
+from cellplan.report.page.render import overview_page, report_page, view_beside
 from cellplan.report.record.common import Provenance, Record, as_json
 from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series_json
@@ -38,6 +38,7 @@ def write_run(
     keep_rejected: bool = False,
     progress: Progress = silent,
     plots: BackgroundPlots | None = None,
+    view: bool = False,
 ) -> Record:
     """Write a run folder; it appears whole or not at all.
 
@@ -51,6 +52,7 @@ def write_run(
         keep_rejected: Write the tables of a failed solution too, under ``rejected/``, marked in every header.
         progress: Called with the stage and the fraction done.
         plots: Renders the plots; plots that it has begun are not rendered again.
+        view: Whether the pages lead to the 3-D page, which ``write_view`` adds.
 
     Returns:
         The record in the ``report.json`` of the folder.
@@ -64,13 +66,14 @@ def write_run(
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            record = _write_report(target, run.cell_of(cell), run, provenance, background)
+            page = view_beside(run.name or "") if view else ""
+            record = _write_report(target, run.cell_of(cell), run, provenance, background, page)
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
             transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
             record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers)
             target.write_text("report.json", as_json(record))
-            target.write_text("report.html", overview_page(record, cell=cell))
+            target.write_text("report.html", overview_page(record, cell=cell, view=view_beside("") if view else ""))
         target.write_text("cell.yaml", render_cell(cell))
         if solution.passed or keep_rejected:
             _write_tables(target, program, "tables" if solution.passed else "rejected")
@@ -90,7 +93,9 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _write_report(target: RunFolder, cell: Cell, run: Run, provenance: Provenance, plots: BackgroundPlots) -> Record:
+def _write_report(
+    target: RunFolder, cell: Cell, run: Run, provenance: Provenance, plots: BackgroundPlots, view: str
+) -> Record:
     """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
     place = "" if run.name is None else f"{run.name}/"
     begun = plots.pictures(run.report, cell=cell)
@@ -100,7 +105,8 @@ def _write_report(target: RunFolder, cell: Cell, run: Run, provenance: Provenanc
     pictures = begun()
     for name, picture in pictures.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    target.write_text(f"{place}report.html", report_page(record, run.report.checks, cell=cell, plots=pictures))
+    page = report_page(record, run.report.checks, cell=cell, plots=pictures, view=view)
+    target.write_text(f"{place}report.html", page)
     return record
 
 

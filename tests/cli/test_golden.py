@@ -32,6 +32,7 @@ COMMANDS = (
     "solve",
     "sweep",
     "verify",
+    "view",
 )
 ERRORS = """\
 cellplan_errors: 1

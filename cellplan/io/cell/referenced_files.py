@@ -193,7 +193,7 @@ class Sources:
             lock_units={joint: "deg" if isinstance(at, Deg) else "mm" for joint, at in entry.locked_joints.items()},
             locks_others=entry.locks_others,
             within=self._folders,
-            xacro_args={key: _argument_text(value) for key, value in entry.xacro_args.items()},
+            xacro_args={key: argument_text(value) for key, value in entry.xacro_args.items()},
             gripper=_gripper_state(entry.gripper),
         )
         if entry.xacro_args and place.suffix.lower() != XACRO_SUFFIX:
@@ -239,7 +239,7 @@ def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, o
     return known[key]
 
 
-def _argument_text(value: str | float) -> str:
+def argument_text(value: str | float) -> str:
     """An argument of a xacro file as its text says it."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 

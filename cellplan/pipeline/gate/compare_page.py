@@ -10,7 +10,7 @@ from cellplan.model.verified_run import VerifiedMotion
 from cellplan.pipeline.gate.compare_report import PLANNER_KEYS
 from cellplan.pipeline.gate.equal_text import first_difference
 from cellplan.pipeline.gate.picture_text import foreign_piece
-from cellplan.report.page.render import overview_page, report_page
+from cellplan.report.page.render import has_view_links, overview_page, report_page, view_beside
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import clearance_sheets, motion_sheets
 from cellplan.report.plots.sheet import Sheet
@@ -48,7 +48,8 @@ def page_findings(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotio
     if "runs" in stored.record:
         reports = {str(motion.name): motion.report for motion in motions}
         expected = summary_record(reports, cell=cell, provenance=_provenance(stored, ""))
-        yield from _difference(stored, "", overview_page(_of_the_run(stored, "", expected), cell=cell))
+        record = _of_the_run(stored, "", expected)
+        yield from _difference(stored, "", overview_page(record, cell=cell, view=_view(stored, "")))
 
 
 def other_pictures(stored: StoredRun, drawn: Drawings) -> Iterator[str]:
@@ -88,12 +89,18 @@ def _page_finding(
         return
     in_order = {name: drawings[name] for name in desired}
     try:
-        page = report_page(record, motion.report.checks, cell=cell, plots=in_order)
+        page = report_page(record, motion.report.checks, cell=cell, plots=in_order, view=_view(stored, place))
     except (KeyError, TypeError, ValueError, AttributeError):  # of what only the planner knows, or of a picture
         file = stored.file(place, "report.json")
         yield f"{file}: solver: expected the form that cellplan writes; solve the cell again"
         return
     yield from _difference(stored, place, page)
+
+
+def _view(stored: StoredRun, place: str) -> str:
+    """Where the 3-D page lies for a page of the run that leads there; empty for one that does not."""
+    text = stored.content(place, PAGE).decode("utf-8", "replace")
+    return view_beside(place) if has_view_links(text) else ""
 
 
 def _difference(stored: StoredRun, place: str, page: str) -> Iterator[str]:

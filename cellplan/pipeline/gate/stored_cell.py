@@ -49,7 +49,8 @@ def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequen
     if cell is None:
         return _without_file(stored)
     changes = stored.manifest.changes
-    original = load_cell(cell, allow_dirs=allow_dirs).with_values(changes)
+    original = load_cell(cell, allow_dirs=allow_dirs)
+    original = original.with_values(changes) if changes else original
     now = {stored.manifest.cell_file if name == cell.name else name: sha for name, sha in original.inputs.items()}
     _refuse_stale(stored, now, where=f"'{cell}'")
     resolved = _resolved(stored, folder=cell.parent, allow_dirs=allow_dirs)

@@ -73,12 +73,16 @@ OUTCOMES: Final = {
     "diverged": "does not converge: the error grew, or the corrected references cannot be followed",
     "unfinished": "has not converged within the allowed rounds",
 }
+VIEW_PAGE: Final = "view.html"  # the 3-D page in a run folder
+VIEW_LINKS: Final = '<p class="view-links">'  # stands in pages that lead to it
 MAX_UNFOLDED: Final = 8  # robots; with more, pictures and long lists are folded
 NARROW_FRACTION: Final = 0.05  # [-] fraction of the half range: smaller margins are marked
 FAST_FRACTION: Final = 0.95  # [-] fraction of the speed limit: higher speeds are marked
 
 
-def report_page(record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes]) -> str:
+def report_page(
+    record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes], view: str = ""
+) -> str:
     """The page of one run.
 
     Args:
@@ -86,6 +90,7 @@ def report_page(record: Record, checks: Iterable[Check], *, cell: Cell, plots: M
         checks: The checks of the run.
         cell: Its cell.
         plots: SVG pictures by file name, as ``draw_plots`` returns them; others are ignored.
+        view: Where its 3-D page lies from there; empty without one.
     """
     return _render(
         "report.html",
@@ -101,14 +106,31 @@ def report_page(record: Record, checks: Iterable[Check], *, cell: Cell, plots: M
             "open_surfaces": [line for _, line in open_surface_notes(record["open_surfaces"])],
             "method": list(method_lines(record["solver"], record["step_s"])),
             "plots": _inline_plots(plots),
+            "view": view,
         },
     )
 
 
-def overview_page(record: Record, *, cell: Cell) -> str:
-    """The page of several runs, with a link to the page of each; ``record`` as ``summary_record`` returns it."""
+def overview_page(record: Record, *, cell: Cell, view: str = "") -> str:
+    """The page of several runs, with a link to the page of each.
+
+    Args:
+        record: Result of ``summary_record``.
+        cell: The cell.
+        view: Where the 3-D page lies from there; empty without one.
+    """
     parts = {"figures": key_figures(record), "left_out": left_out_notes(record), "grips": grip_notes(record)}
-    return _render("overview.html", record, cell, parts)
+    return _render("overview.html", record, cell, {**parts, "view": view})
+
+
+def view_beside(place: str) -> str:
+    """Where the 3-D page of a run lies, seen from the page in one of its folders, or from its own page."""
+    return f"../{VIEW_PAGE}" if place else VIEW_PAGE
+
+
+def has_view_links(page: str) -> bool:
+    """Whether a page of a run leads to its 3-D page."""
+    return VIEW_LINKS in page
 
 
 def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) -> str:

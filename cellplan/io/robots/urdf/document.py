@@ -219,10 +219,10 @@ def _link(element: Element) -> UrdfLink:
     name = _name(element)
     owner = f"link '{name}'"
     drawn = element.all("collision") or element.all("visual")
-    return UrdfLink(name=name, element=element, solids=tuple(_solid(solid, owner) for solid in drawn))
+    return UrdfLink(name=name, element=element, solids=tuple(read_solid(solid, owner) for solid in drawn))
 
 
-def _solid(element: Element, owner: str) -> UrdfSolid:
+def read_solid(element: Element, owner: str) -> UrdfSolid:
     """One collision or visual element."""
     geometry = element.one("geometry", owner)
     shapes = [] if geometry is None else geometry.all(*SHAPES) or geometry.children

@@ -1,0 +1,41 @@
+"""What the URDF of a robot in a cell draws of its links."""
+
+from pathlib import PurePosixPath
+
+from cellplan.cache import as_here
+from cellplan.errors import InputError
+from cellplan.guard import Guard, in_child
+from cellplan.io.cell.load import CellFile
+from cellplan.io.cell.referenced_files import URDF_SUFFIXES, argument_text
+from cellplan.io.cell.user_folders import user_folders
+from cellplan.io.input.allowed_folders import AllowedFolders
+from cellplan.io.robots.urdf.load import UrdfOptions
+from cellplan.io.robots.urdf.visuals import Visual, read_visuals
+from cellplan.model.cell import Cell
+
+
+def robot_visuals(cell: Cell, robot: str) -> tuple[Visual, ...]:
+    """Visual elements of a robot; none of a robot without a URDF, or whose URDF cannot be read any more.
+
+    Args:
+        cell: The cell, read from a file.
+        robot: Name of the robot.
+    """
+    source = cell.origin.source
+    if not isinstance(source, CellFile):
+        return ()
+    entry = source.written["robots"][robot]
+    written = str(entry["model"])
+    if PurePosixPath(written).suffix.lower() not in URDF_SUFFIXES:
+        return ()
+    folders = AllowedFolders(folder=source.folder, allowed=(*source.allow_dirs, *user_folders(source.folder)))
+    try:
+        options = UrdfOptions(
+            package_dirs=tuple(folders.directory(each) for each in entry.get("package_dirs", ())),
+            within=folders,
+            xacro_args={key: argument_text(value) for key, value in entry.get("xacro_args", {}).items()},
+        )
+        guard = Guard(file=written, worker="the URDF reader")
+        return in_child(as_here(read_visuals), folders.file(written), options, guard=guard)
+    except InputError:
+        return ()

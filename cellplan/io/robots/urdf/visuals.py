@@ -1,0 +1,53 @@
+"""What a URDF draws of its links, for pictures: nothing is judged by it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from cellplan.errors import InputError
+from cellplan.geometry.shapes import Solid
+from cellplan.geometry.transforms import Array
+from cellplan.io.robots.urdf.bodies import MeshShelf
+from cellplan.io.robots.urdf.document import UrdfLink, UrdfMesh, read_document, read_solid
+from cellplan.io.robots.urdf.load import UrdfOptions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Visual:
+    """One visual element: its shape, and the pose of the shape in the frame of its link, shape (4, 4)."""
+
+    link: str
+    shape: Solid
+    X_LS: Array
+
+
+def read_visuals(path: Path, options: UrdfOptions) -> tuple[Visual, ...]:
+    """Visual elements of all links that have collision elements too; the bodies of all others are drawn already.
+
+    A link of which one cannot be read is left out: it is drawn by its bodies.
+
+    Args:
+        path: The file.
+        options: Where its meshes lie.
+
+    Raises:
+        InputError: The file is no URDF.
+    """
+    shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
+    found: list[Visual] = []
+    for link in read_document(path, options.xacro).links.values():
+        if link.element.all("collision"):
+            found += _visuals(link, shelf)
+    return tuple(found)
+
+
+def _visuals(link: UrdfLink, shelf: MeshShelf) -> list[Visual]:
+    """The visual elements of a link; none where one cannot be read."""
+    found = []
+    try:
+        for element in link.element.all("visual"):
+            solid = read_solid(element, f"link '{link.name}'")
+            shape = shelf.mesh(solid.shape, element) if isinstance(solid.shape, UrdfMesh) else solid.shape
+            found.append(Visual(link=link.name, shape=shape, X_LS=solid.X_LS))
+    except InputError:
+        return []
+    return found

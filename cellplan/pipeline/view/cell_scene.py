@@ -1,0 +1,115 @@
+"""The scene of a cell that was not solved: at its start postures, or as near to them as can be said."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.check import check
+from cellplan.pipeline.view.describe import (
+    base_records,
+    body_records,
+    excluded_records,
+    place_record,
+    robot_records,
+    task_records,
+    visual_records,
+)
+from cellplan.pipeline.view.geometries import Geometries
+from cellplan.pipeline.view.nearest import Stretch, nearest_record, touching_pairs
+from cellplan.pipeline.view.run_scene import motion_record
+from cellplan.report.record.view import FailureRecord, SceneViewRecord
+from cellplan.scene.scene import Scene
+
+
+def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = silent) -> SceneViewRecord:
+    """The scene of a cell at its start, what ``check`` finds, and the bases for moving them.
+
+    Where no start is found the robots stand at the starts and homes that are given, others in the middle of their
+    ranges, and the scene says why.
+
+    Args:
+        cell: The cell.
+        geometries: Takes the shapes.
+        progress: Called with the stage and the fraction done.
+    """
+    failures: list[tuple[str, str]] = []  # subject and message
+    try:
+        found = check(cell, progress=progress)
+        started = found.cell
+        failures += [(each.subject, each.message) for each in found.checks if not each.passed]
+        facts = [["start", (found.choice or "given").removeprefix("start ")]]
+    except (InputError, NoSolutionError) as error:
+        started = cell
+        failures += [("", line) for line in str(error).splitlines()]
+        facts = [["start", "none found: robots are where the cell puts them"]]
+    record = standing_scene(Scene.from_cell(started), geometries)
+    return {
+        **record,
+        "facts": facts,
+        "passed": not failures,
+        "failures": [*record["failures"], *_further(failures, record)],
+        "bases": base_records(cell),
+    }
+
+
+def _further(failures: Iterable[tuple[str, str]], record: SceneViewRecord) -> Iterator[FailureRecord]:
+    """Failures by subject and message, but for pairs that are known to touch."""
+    index = {body["name"]: number for number, body in enumerate(record["bodies"])}
+    known = [set(each["bodies"]) for each in record["failures"]]
+    for subject, message in failures:
+        bodies = [index[name] for name in subject.split(" - ") if name in index]
+        if set(bodies) not in known:
+            yield {**_failure(message), "bodies": bodies}
+
+
+def standing_scene(scene: Scene, geometries: Geometries) -> SceneViewRecord:
+    """The scene of a cell whose robots stand still at their starts."""
+    cell = scene.cell
+    q = np.concatenate([_standing(robot) for robot in cell.robots])
+    touching = touching_pairs(scene, q)
+    tasks, faults = task_records(cell)
+    times = np.zeros(1)
+    return {
+        "name": cell.name,
+        "facts": [],
+        "remarks": faults,
+        "passed": None,
+        "robots": robot_records(cell),
+        "bodies": body_records(cell, scene.bodies, geometries),
+        "visuals": visual_records(cell, geometries),
+        "part": [place_record(cell, 0.0)],
+        "tasks": tasks,
+        "motion": motion_record(times, q[None], []),
+        "nearest": nearest_record([Stretch(scene, 0, 1)], times, q[None], np.zeros(1, dtype=np.intp)),
+        "contacts": [
+            {"bodies": list(pair), "first": 0.0, "last": 0.0, "allowed": False, "text": _pair_text(scene, pair)}
+            for pair in touching
+        ],
+        "failures": [{**_failure(_pair_text(scene, pair)), "bodies": list(pair), "at": 0.0} for pair in touching],
+        "excluded": excluded_records(scene),
+        "bases": [],
+    }
+
+
+def _standing(robot: Robot) -> Array:
+    """Where a robot stands: its start, its home, or the middle of its range."""
+    for given in (robot.start, robot.home):
+        if given is not None:
+            return given
+    lower, upper = robot.model.lower, robot.model.upper
+    is_bounded = np.isfinite(lower) & np.isfinite(upper)
+    return np.where(is_bounded, 0.5 * (np.where(is_bounded, lower, 0.0) + np.where(is_bounded, upper, 0.0)), 0.0)
+
+
+def _pair_text(scene: Scene, pair: tuple[int, int]) -> str:
+    """Two bodies that touch, as a line of text."""
+    return f"'{scene.bodies[pair[0]].name}' touches '{scene.bodies[pair[1]].name}' at the start"
+
+
+def _failure(text: str) -> FailureRecord:
+    """Something that failed without an instant."""
+    return {"text": text, "at": None, "bodies": [], "joint": []}

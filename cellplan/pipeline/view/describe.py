@@ -1,0 +1,201 @@
+"""What stands in a cell, as records of a 3-D page: robots, bodies, part, paths, pairs that are not checked."""
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.arrays import Array
+from cellplan.geometry.transforms import rpy_from_rotation
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.mounting import Hanger, Mount, Pedestal
+from cellplan.model.task import Frame, Task
+from cellplan.model.units import DEG, MM
+from cellplan.pipeline.view.geometries import Geometries
+from cellplan.planning.path.build import build_toolpath
+from cellplan.report.plots.palette import robot_colours
+from cellplan.report.record.common import number
+from cellplan.report.record.view import (
+    AxisRecord,
+    BaseRecord,
+    BodyViewRecord,
+    ExcludedRecord,
+    JointViewRecord,
+    PlaceRecord,
+    RobotViewRecord,
+    TaskViewRecord,
+    VisualRecord,
+    point_numbers,
+    pose_numbers,
+)
+from cellplan.scene.bodies import Kind, SceneBody, part_body
+from cellplan.scene.scene import Scene
+
+PATH_POINTS: Final = 240  # [-] drawn along a path
+FILE_DECIMALS: Final = 6  # of [mm] and [deg] in a cell file
+
+
+def robot_records(cell: Cell) -> list[RobotViewRecord]:
+    """All robots in the order of the cell."""
+    colours = robot_colours(cell)
+    return [_robot(cell, robot, colours[robot.name]) for robot in cell.robots]
+
+
+def _robot(cell: Cell, robot: Robot, colour: str) -> RobotViewRecord:
+    """One robot."""
+    model = robot.model
+    return {
+        "name": robot.name,
+        "model": model.name,
+        "colour": colour,
+        "base": pose_numbers(robot.X_WB),
+        "column": cell.columns(robot.name).start,
+        "joints": [
+            JointViewRecord(
+                name=joint.name,
+                unit=joint.display_unit.name,
+                scale=joint.display_unit.scale,
+                lower=number(joint.lower),
+                upper=number(joint.upper),
+                velocity=float(joint.velocity),
+            )
+            for joint in model.joints
+        ],
+        "axes": [_axis(robot, link) for link in range(len(model.axes))],
+        "tip_link": model.flange_link,
+        "tip": pose_numbers(model.X_BF @ robot.tool.X_FT),
+    }
+
+
+def _axis(robot: Robot, link: int) -> AxisRecord:
+    """The axis that moves a link."""
+    axis, drive = robot.model.axes[link], robot.model.drive(link)
+    return {
+        "parent": axis.parent,
+        "turns": axis.is_revolute,
+        "axis": [float(each) for each in axis.axis_B],
+        "point": [float(each) for each in axis.point_B],
+        "joint": drive.joint,
+        "ratio": float(drive.ratio),
+        "offset": float(drive.offset),
+    }
+
+
+def body_records(cell: Cell, bodies: Sequence[SceneBody], geometries: Geometries) -> list[BodyViewRecord]:
+    """All bodies of a scene in its order."""
+    drawn = {robot.name: {each.link for each in geometries.visuals_of(cell, robot.name)} for robot in cell.robots}
+    replaced = {
+        f"{robot.name}/{body.name}"
+        for robot in cell.robots
+        for body in robot.model.bodies
+        if body.link_name in drawn[robot.name]
+    }
+    geometries.announce([body.shape for body in bodies])
+    geometries.announce([each.shape for robot in drawn for each in geometries.visuals[robot]])
+    return [
+        {
+            "name": body.name,
+            "kind": str(body.kind),
+            "robot": -1 if body.robot is None else cell.index(body.robot),
+            "link": body.link,
+            "geometry": geometries.place(body.shape),
+            "pose": pose_numbers(body.X_BS),
+            "accuracy": body.accuracy,
+            "replaced": body.kind is Kind.LINK and body.name in replaced,
+            "stands": _stands(cell.robot(body.robot).pedestal) if body.robot and body.kind is Kind.PEDESTAL else {},
+        }
+        for body in bodies
+    ]
+
+
+def visual_records(cell: Cell, geometries: Geometries) -> list[VisualRecord]:
+    """What the files of the robots draw of their links."""
+    records: list[VisualRecord] = []
+    for index, robot in enumerate(cell.robots):
+        links = {link.name: link for link in robot.model.links}
+        for each in geometries.visuals_of(cell, robot.name):
+            if each.link in links:
+                link = links[each.link]
+                place, X_BS = geometries.place(each.shape), link.X_BL @ each.X_LS
+                records.append({"robot": index, "link": link.index, "geometry": place, "pose": pose_numbers(X_BS)})
+    return records
+
+
+def _stands(mount: Mount | None) -> dict[str, float]:
+    """Where an upright column begins or ends, whatever the height of the base on it."""
+    if isinstance(mount, Hanger):
+        return {"ceiling": mount.ceiling}
+    return {"floor": mount.floor} if isinstance(mount, Pedestal) else {}
+
+
+def place_record(cell: Cell, begin: float) -> PlaceRecord:
+    """What carries the part of a cell, from an instant on."""
+    body = part_body(cell, cell.part, *cell.part.held_by[:1])
+    X_SP = np.linalg.inv(cell.part.X_PS)
+    return {
+        "begin": begin,
+        "robot": -1 if body.robot is None else cell.index(body.robot),
+        "link": body.link,
+        "pose": pose_numbers(body.X_BS @ X_SP),
+    }
+
+
+def task_records(cell: Cell) -> tuple[list[TaskViewRecord], list[str]]:
+    """All tasks with points along their paths, and why some have none."""
+    records, faults = list[TaskViewRecord](), list[str]()
+    for task in cell.tasks:
+        try:
+            points = _points(cell, task)
+        except InputError as error:
+            points, fault = np.zeros((0, 3)), str(error)
+            faults.append(fault)
+        records.append(
+            {
+                "name": task.name,
+                "robot": cell.index(task.robot),
+                "in_world": task.relative_to is Frame.WORLD,
+                "points": point_numbers(points),
+            }
+        )
+    return records, faults
+
+
+def _points(cell: Cell, task: Task) -> Array:
+    """Points along the path of a task, shape (N, 3), corners among them."""
+    toolpath = build_toolpath(task, cell.part)
+    if toolpath.is_timed:
+        return toolpath.spread(PATH_POINTS)[:, :3, 3]
+    lengths = np.unique(np.concatenate([np.linspace(0.0, toolpath.length, PATH_POINTS), toolpath.behind]))
+    return toolpath.poses(lengths)[:, :3, 3]
+
+
+def excluded_records(scene: Scene) -> list[ExcludedRecord]:
+    """Pairs of which less than the clearance is demanded, by reason: not watched ones, then those with another rule."""
+    by_reason: dict[str, list[list[int]]] = {}
+    for each in scene.excluded:
+        by_reason.setdefault(each.reason, []).append([each.first, each.second])
+    for pair in scene.pairs:
+        if pair.reason:
+            by_reason.setdefault(pair.reason, []).append([pair.first, pair.second])
+    return [{"reason": reason, "pairs": pairs} for reason, pairs in by_reason.items()]
+
+
+def base_records(cell: Cell) -> list[BaseRecord]:
+    """The base of each robot in the numbers of the cell file."""
+    records: list[BaseRecord] = []
+    for index, robot in enumerate(cell.robots):
+        X = robot.X_WB
+        records.append(
+            {
+                "robot": index,
+                "xyz_mm": _file_numbers(MM * X[:3, 3]),
+                "rpy_deg": _file_numbers(DEG * rpy_from_rotation(X[:3, :3])),
+            }
+        )
+    return records
+
+
+def _file_numbers(values: Iterable[float]) -> list[float]:
+    """Numbers as a cell file has them."""
+    return [round(float(value), FILE_DECIMALS) + 0.0 for value in values]

@@ -1,0 +1,276 @@
+"""The scene of a stored run: its motion as the series have it, and what its reports say of it."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.arrays import Array
+from cellplan.io.run.stored import SERIES, StoredRun
+from cellplan.model.cell import Cell
+from cellplan.pipeline.plan.demanded import DemandedProgram
+from cellplan.pipeline.view.describe import (
+    body_records,
+    excluded_records,
+    place_record,
+    robot_records,
+    task_records,
+    visual_records,
+)
+from cellplan.pipeline.view.geometries import Geometries
+from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows
+from cellplan.report.record.common import Record
+from cellplan.report.record.view import (
+    ContactViewRecord,
+    FailureRecord,
+    MotionViewRecord,
+    PlaceRecord,
+    SceneViewRecord,
+    packed,
+)
+from cellplan.scene.scene import Scene
+
+MOST_NUMBERS: Final = 800_000  # [-] joint positions of a page: 4.3 MB in base64
+SAME_TIME: Final = 1e-9  # [s] within which the end of a phase is the begin of the next
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Played:
+    """A phase as it is played.
+
+    Attributes:
+        name: Name of the phase.
+        place: Folder of its report in the run.
+        begin: When it begins on the clock of the program in [s].
+        number: Number among the phases of one cycle.
+        times: Times of its rows on the clock of the program in [s], shape (N,).
+        q: Stacked joint positions in [rad] or [m], shape (N, nq).
+    """
+
+    name: str
+    place: str
+    begin: float
+    number: int
+    times: Array
+    q: Array
+
+
+def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneViewRecord:
+    """The scene of a run.
+
+    Args:
+        stored: The run.
+        cell: The cell that was solved.
+        geometries: Takes the shapes.
+
+    Raises:
+        InputError: The series of the run do not fit its cell.
+    """
+    program = DemandedProgram.of(cell)
+    played = list(_played(stored, cell, program.labels))
+    scenes = program.scenes(cell)
+    times, q, firsts = _joined(played)
+    bodies = scenes[0].bodies
+    index = {body.name: number for number, body in enumerate(bodies)}
+    contacts = list(_contacts(stored, played, index))
+    failures = list(_failures(stored, played, cell, index))
+    further: list[float | None] = [each for contact in contacts for each in (contact["first"], contact["last"])]
+    further += [failure["at"] for failure in failures]
+    further += [at for one in played for at in _worst_times(stored.records[one.place], one.begin)]
+    ends = [*firsts[1:], len(times)]
+    stretches = [Stretch(scenes[one.number], *rows) for one, *rows in zip(played, firsts, ends, strict=True)]
+    tasks, faults = task_records(cell)
+    return {
+        "name": cell.name,
+        "facts": _facts(stored.record),
+        "remarks": [*faults, *stored.record.get("not_in_program", [])],
+        "passed": stored.record["status"] == "passed",
+        "robots": robot_records(cell),
+        "bodies": body_records(cell, bodies, geometries),
+        "visuals": visual_records(cell, geometries),
+        "part": _part_places(played, program.cells),
+        "tasks": tasks,
+        "motion": motion_record(times, q, _phases(stored.record)),
+        "nearest": nearest_record(stretches, times, q, sampled_rows(times, further)),
+        "contacts": contacts,
+        "failures": failures,
+        "excluded": excluded_records(_with_most_pairs(scenes)),
+        "bases": [],
+    }
+
+
+def motion_record(times: Array, q: Array, phases: list[dict[str, Any]]) -> MotionViewRecord:
+    """A motion, every n-th row of a long one and the last.
+
+    Args:
+        times: Times of the rows in [s], shape (N,).
+        q: Stacked joint positions in [rad] or [m], shape (N, nq).
+        phases: Name, begin and end of each phase.
+    """
+    every = max(1, math.ceil(q.size / MOST_NUMBERS))
+    rows = np.unique(np.append(np.arange(0, len(times), every), len(times) - 1))
+    return {
+        "count": len(rows),
+        "total": len(times),
+        "times": packed(times[rows], "<f8"),
+        "q": packed(q[rows], "<f4"),
+        "phases": phases,
+    }
+
+
+def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Played]:
+    """The phases of the program in their order; those of further cycles repeat the first.
+
+    Args:
+        stored: The run.
+        cell: The cell that was solved.
+        labels: Names of the phases of one cycle; a run of a single task has others, all in one scene.
+    """
+    phases = [phase for phase in stored.record["phases"] if phase["in_program"]]
+    if "" in stored.records:
+        times, q = _series(stored, "", cell)
+        yield Played(name=phases[0]["name"], place="", begin=0.0, number=0, times=times, q=q)
+        return
+    read = {name: _series(stored, name, cell) for name in stored.records}
+    for phase in phases:
+        if phase["name"] not in read:
+            file = stored.file("", "report.json")
+            raise InputError(f"{file}: phases: expected the runs {', '.join(read)}, got '{phase['name']}'")
+        begin, (times, q) = float(phase["begin_s"]), read[phase["name"]]
+        yield Played(
+            name=phase["name"],
+            place=phase["name"],
+            begin=begin,
+            number=labels.index(phase["name"]) if phase["name"] in labels else 0,
+            times=begin + times,
+            q=q,
+        )
+
+
+def _series(stored: StoredRun, place: str, cell: Cell) -> tuple[Array, Array]:
+    """Times and stacked joint positions of one run, from its series."""
+    tree, columns = stored.series(place), list[Array]()
+    try:
+        times = np.array(tree["times_s"], dtype=np.float64)
+        for robot in cell.robots:
+            for joint in robot.model.joints:
+                unit, scale = joint.display_unit
+                values = tree["joints"][robot.name][joint.name][f"position_{unit}"]
+                columns.append(np.array(values, dtype=np.float64) / scale)
+        q = np.stack(columns, axis=1)
+        is_sound = q.shape[:1] == times.shape and bool(np.all(np.isfinite(q)))
+    except (KeyError, TypeError, ValueError):
+        is_sound = False
+    if not is_sound:
+        file = stored.file(place, SERIES)
+        raise InputError(f"{file}: joints: expected positions of all joints of the cell, got others; solve again")
+    return times, q
+
+
+def _joined(played: Sequence[Played]) -> tuple[Array, Array, list[int]]:
+    """All rows one after the other, a row that two phases share once, and the first row of each phase."""
+    times, q, firsts = [played[0].times], [played[0].q], [0]
+    for before, one in pairwise(played):
+        shared = int(abs(one.times[0] - before.times[-1]) <= SAME_TIME)
+        firsts.append(sum(map(len, times)))
+        times.append(one.times[shared:])
+        q.append(one.q[shared:])
+    return np.concatenate(times), np.concatenate(q), firsts
+
+
+def _phases(record: Record) -> list[dict[str, Any]]:
+    """Name, begin and end of all phases; none where there is only one."""
+    phases = record["phases"]
+    if len(phases) < 2:
+        return []
+    return [{"name": each["name"], "begin": each["begin_s"], "end": each["end_s"]} for each in phases]
+
+
+def _part_places(played: Sequence[Played], cells: Sequence[Cell]) -> list[PlaceRecord]:
+    """What carries the part, phase by phase; a phase in which it stays where it was is left out."""
+    places: list[PlaceRecord] = []
+    for one in played:
+        place = place_record(cells[one.number], one.begin)
+        if not places or any(place[key] != places[-1][key] for key in ("robot", "link", "pose")):
+            places.append(place)
+    return places
+
+
+def _contacts(stored: StoredRun, played: Sequence[Played], index: dict[str, int]) -> Iterator[ContactViewRecord]:
+    """What touches, on the clock of the program."""
+    for one in played:
+        for contact in stored.records[one.place].get("contacts", []):
+            pair = contact["pair"]
+            yield {
+                "bodies": [index[name] for name in pair if name in index],
+                "first": one.begin + contact["first_s"],
+                "last": one.begin + contact["last_s"],
+                "allowed": contact["allowed"],
+                "text": contact["reason"] or " and ".join(pair),
+            }
+
+
+def _failures(
+    stored: StoredRun, played: Sequence[Played], cell: Cell, index: dict[str, int]
+) -> Iterator[FailureRecord]:
+    """Checks that failed, on the clock of the program, in the order of their times; those without one come last."""
+    found: list[FailureRecord] = []
+    seen = set[str]()
+    for one in played:
+        for check in stored.records[one.place]["checks"]:
+            if check["passed"] or (one.place and one.place + check["message"] in seen):
+                continue
+            seen.add(one.place + check["message"])
+            prefix = f"{one.name}: " if one.place else ""
+            found.append(
+                {
+                    "text": f"{prefix}{check['message']}",
+                    "at": None if check["at_s"] is None else one.begin + check["at_s"],
+                    "bodies": _named(check, stored.records[one.place], index),
+                    "joint": _joint(check["subject"], cell),
+                }
+            )
+    yield from sorted(found, key=lambda each: math.inf if each["at"] is None else each["at"])
+
+
+def _named(check: Record, record: Record, index: dict[str, int]) -> list[int]:
+    """Bodies that a check is about: named by its subject, or those of the smallest clearance of a class."""
+    names = check["subject"].split(" - ")
+    if check["name"] == "clearance" and (worst := record["clearance"].get(check["subject"])):
+        names = worst["pair"] or []
+    return [index[name] for name in names if name in index]
+
+
+def _joint(subject: str, cell: Cell) -> list[int]:
+    """Numbers of the robot and the joint that a check is about."""
+    robot, _, joint = subject.partition("/")
+    for number, each in enumerate(cell.robots):
+        if each.name == robot and joint in each.model.joint_names:
+            return [number, each.model.joint_names.index(joint)]
+    return []
+
+
+def _worst_times(record: Record, begin: float) -> Iterator[float]:
+    """Times of the smallest distance of each class."""
+    for each in record["clearance"].values():
+        if each["at_s"] is not None:
+            yield begin + each["at_s"]
+
+
+def _facts(record: Record) -> list[list[str]]:
+    """What the head of the page says of a run."""
+    whole = record["clearance"]["whole"]
+    facts = [["mode", str(record["mode"])], ["cycle", f"{record['cycle_time_s']:.4g} s"]]
+    if whole["minimum_mm"] is not None:
+        word = "certified" if whole["certified"] else "not certified"
+        facts.append(["smallest clearance", f"{whole['minimum_mm']:.4g} mm, {word}: {' – '.join(whole['pair'] or [])}"])
+    return facts
+
+
+def _with_most_pairs(scenes: Sequence[Scene]) -> Scene:
+    """The scene in which the fewest pairs are left out: that of most of the program."""
+    return min(scenes, key=lambda scene: len(scene.excluded))

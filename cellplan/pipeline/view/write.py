@@ -1,0 +1,142 @@
+"""Write a 3-D page: of a run, of a cell that was not solved, or of the best layouts of a search."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePath
+from typing import Final
+
+from cellplan.errors import InputError
+from cellplan.io.cell.load import load_cell
+from cellplan.io.run.content import is_run_folder
+from cellplan.io.run.folder import MANIFEST
+from cellplan.io.run.stored import StoredRun, read_stored_run
+from cellplan.model.cell import Cell
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report import CAUTION
+from cellplan.pipeline.gate.stored_cell import load_stored_cell
+from cellplan.pipeline.overrides import with_overrides
+from cellplan.pipeline.view.cell_scene import unsolved_scene
+from cellplan.pipeline.view.geometries import Geometries
+from cellplan.pipeline.view.run_scene import run_scene
+from cellplan.pipeline.view.study_scenes import cell_of_study, read_layout_study, study_scenes
+from cellplan.report.page.render import VIEW_PAGE
+from cellplan.report.page.view import is_view_page, view_page
+from cellplan.report.record.view import SCHEMA, SceneViewRecord, ViewRecord
+from cellplan.study.folder import JOURNAL, RESULT, write_whole
+
+STUDY_PAGE: Final = "study-view.html"  # in the folder of a study
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViewRequest:
+    """What is to be shown.
+
+    Attributes:
+        path: A run folder, a cell file, or the folder of a layout search.
+        cell: The cell file of a run or a search that depends on further files; None where the folder is enough.
+        settings: Values of a cell file that is shown, as ``KEY=VALUE``.
+        allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+    """
+
+    path: Path
+    cell: Path | None = None
+    settings: Sequence[str] = field(default=())
+    allow_dirs: Sequence[Path] = field(default=())
+
+
+def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewRecord, Path]:
+    """The record of a page, and where the page belongs unless the user says otherwise.
+
+    Raises:
+        InputError: The path is neither a run, nor a cell, nor a layout search, or does not fit the options.
+    """
+    path = request.path
+    if path.is_dir():
+        if request.settings:
+            raise InputError(f"--set: expected a cell file with it, got the folder '{path}'")
+        if (path / MANIFEST).exists() or is_run_folder(path):
+            return _view_of_run(request, progress), path / VIEW_PAGE
+        if (path / RESULT).exists() or (path / JOURNAL).exists():
+            return _view_of_study(request, progress), path / STUDY_PAGE
+        raise InputError(f"{path}: expected a run, a layout search or a cell file, got a folder that holds none")
+    if request.cell is not None:
+        raise InputError(f"--cell: expected a run or a layout search with it, got '{path}'")
+    cell = with_overrides(load_cell(path, allow_dirs=request.allow_dirs), request.settings)
+    geometries = Geometries()
+    scene = unsolved_scene(cell, geometries, progress=progress)
+    record = _record("cell", cell, geometries, [scene])
+    record["source"], record["settings"] = path.as_posix(), list(request.settings)
+    return record, Path("outputs") / f"{cell.name}-view.html"
+
+
+def write_view_of_run(folder: Path, cell: Cell, *, progress: Progress = silent) -> Path:
+    """Write the 3-D page of a run whose cell is at hand into its folder.
+
+    Args:
+        folder: The run folder.
+        cell: The cell that was solved.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The run was changed meanwhile, or the page cannot be written.
+    """
+    progress("making the 3-D page", 0.0)
+    write_view(_record_of_run(read_stored_run(folder), cell), folder / VIEW_PAGE)
+    return folder / VIEW_PAGE
+
+
+def write_view(record: ViewRecord, target: Path) -> int:
+    """Write a page whole or not at all; gives its size in bytes.
+
+    Raises:
+        InputError: The place holds something else, or cannot be written.
+    """
+    if target.is_symlink() or (target.exists() and not is_view_page(target)):
+        raise InputError(f"{target}: holds something that is no 3-D page; choose another file with -o")
+    content = view_page(record).encode()
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(target, content)
+    except OSError as error:
+        raise InputError(f"{target}: cannot write the page: {(error.strerror or str(error)).lower()}") from error
+    return len(content)
+
+
+def _view_of_run(request: ViewRequest, progress: Progress) -> ViewRecord:
+    """The record of a run on disk."""
+    stored = read_stored_run(request.path)
+    found = load_stored_cell(stored, cell=request.cell, allow_dirs=request.allow_dirs)
+    progress("making the 3-D page", 0.0)
+    return _record_of_run(stored, found.cell)
+
+
+def _record_of_run(stored: StoredRun, cell: Cell) -> ViewRecord:
+    """The record of a run that was read."""
+    geometries = Geometries()
+    scene = run_scene(stored, cell, geometries)
+    return {**_record("run", cell, geometries, [scene]), "source": stored.manifest.cell_file}
+
+
+def _view_of_study(request: ViewRequest, progress: Progress) -> ViewRecord:
+    """The record of a layout search on disk."""
+    study = read_layout_study(request.path)
+    if not study["top"]:
+        raise InputError(f"{request.path / RESULT}: top: expected at least one layout, got none: nothing was found")
+    cell = cell_of_study(request.path, request.cell, request.allow_dirs)
+    geometries = Geometries()
+    scenes = list(study_scenes(study, cell, str(request.path / RESULT), geometries, progress))
+    return _record("study", cell, geometries, scenes)
+
+
+def _record(kind: str, cell: Cell, geometries: Geometries, scenes: list[SceneViewRecord]) -> ViewRecord:
+    """A page."""
+    return {
+        "schema": SCHEMA,
+        "kind": kind,
+        "cell": cell.name,
+        "source": PurePath(cell.origin.file).name,
+        "settings": [],
+        "geometries": geometries.records,
+        "scenes": scenes,
+        "caution": CAUTION,
+    }

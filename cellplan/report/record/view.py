@@ -1,0 +1,215 @@
+"""The record behind a 3-D page: bodies, joints, paths, motion and what the checks found, as plain values.
+
+Lengths are in [m] and angles in [rad], as the page computes with them; poses are the upper three rows of a matrix, row
+by row. Arrays are little-endian and in base64.
+"""
+
+from base64 import b64encode
+from typing import Annotated, Any, Final, TypedDict
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+
+SCHEMA: Final = "cellplan.view/1"
+POSE_DECIMALS: Final = 9  # [m]: far below what a picture shows
+POINT_DECIMALS: Final = 6  # [m] of paths and nearest points
+
+Numbers = list[float]
+
+
+class GeometryRecord(TypedDict, total=False):
+    """A shape: one of the solids by its dimensions, or a mesh."""
+
+    box: Annotated[Numbers, "edge lengths"]
+    cylinder: Annotated[Numbers, "radius and length"]
+    capsule: Annotated[Numbers, "radius and length of its line"]
+    sphere: Annotated[Numbers, "radius"]
+    plane: Annotated[Numbers, "empty: everything below z = 0 is solid"]
+    low: Annotated[Numbers, "of a mesh: lowest corner"]
+    size: Annotated[Numbers, "of a mesh: edges of the box that holds it"]
+    points: Annotated[str, "of a mesh: 16 bit for each coordinate, from 0 at `low` to 65535 at `low` + `size`"]
+    triangles: Annotated[str, "of a mesh: 16 bit for each corner, or 32 bit of more than 65536 points"]
+    deviation: Annotated[float, "of a mesh: no point that is drawn is farther than this from the file's"]
+
+
+class JointViewRecord(TypedDict):
+    """A driven joint."""
+
+    name: str
+    unit: Annotated[str, "`deg` or `mm`"]
+    scale: Annotated[float, "printed value per value in SI units"]
+    lower: float | None
+    upper: float | None
+    velocity: float
+
+
+class AxisRecord(TypedDict):
+    """An axis that moves a link, at the configuration where all joints read zero, in the frame of the base."""
+
+    parent: Annotated[int, "number of the link that carries it, -1 for the base"]
+    turns: bool
+    axis: Numbers
+    point: Numbers
+    joint: Annotated[int, "number of the joint that drives it"]
+    ratio: float
+    offset: float
+
+
+class RobotViewRecord(TypedDict):
+    """A robot."""
+
+    name: str
+    model: str
+    colour: str
+    base: Annotated[Numbers, "pose of its base in the world"]
+    column: Annotated[int, "number of its first joint among those of all robots"]
+    joints: list[JointViewRecord]
+    axes: list[AxisRecord]
+    tip_link: int
+    tip: Annotated[Numbers, "pose of its tool tip at the reference configuration"]
+
+
+class BodyViewRecord(TypedDict):
+    """A body of the proof."""
+
+    name: str
+    kind: str
+    robot: Annotated[int, "number of the robot that moves it, -1 for none"]
+    link: int
+    geometry: int
+    pose: Numbers
+    accuracy: Annotated[float | None, "how far the real thing may stick out of it"]
+    replaced: Annotated[bool, "whether the robot's file draws its link otherwise"]
+    stands: Annotated[dict[str, float], "of an upright column: height of the `floor` or of the `ceiling`"]
+
+
+class VisualRecord(TypedDict):
+    """What a robot's file draws of a link."""
+
+    robot: int
+    link: int
+    geometry: int
+    pose: Numbers
+
+
+class PlaceRecord(TypedDict):
+    """What carries the part from an instant on."""
+
+    begin: float
+    robot: int
+    link: int
+    pose: Annotated[Numbers, "of the part frame"]
+
+
+class TaskViewRecord(TypedDict):
+    """A task and its path."""
+
+    name: str
+    robot: int
+    in_world: bool
+    points: Annotated[Numbers, "x, y, z of points along the path, in the part frame or in the world"]
+
+
+class MotionViewRecord(TypedDict):
+    """Joint positions over time; joints move linearly between the rows."""
+
+    count: int
+    total: Annotated[int, "rows of the program; fewer are in the page where it is long"]
+    times: Annotated[str, "64 bit for each row"]
+    q: Annotated[str, "32 bit for each row and joint"]
+    phases: Annotated[list[dict[str, Any]], "name, begin and end"]
+
+
+class NearestRecord(TypedDict):
+    """The closest pair at some sample times."""
+
+    step: Annotated[float, "largest time between two of them"]
+    required: float
+    times: Numbers
+    pairs: Annotated[list[list[int]], "two bodies; empty where none is near"]
+    distances: Numbers
+    lower_bound: Annotated[list[bool], "whether the distance is that of convex hulls, never above the true one"]
+    points: Annotated[list[Numbers], "the nearest points, each in the frame of its body"]
+
+
+class ContactViewRecord(TypedDict):
+    """Two bodies that touch for a while."""
+
+    bodies: list[int]
+    first: float
+    last: float
+    allowed: bool
+    text: str
+
+
+class FailureRecord(TypedDict):
+    """Something that failed, and where."""
+
+    text: str
+    at: float | None
+    bodies: list[int]
+    joint: Annotated[list[int], "number of the robot and of its joint; empty for none"]
+
+
+class ExcludedRecord(TypedDict):
+    """Pairs that are not checked, or less than others, for one reason."""
+
+    reason: str
+    pairs: list[list[int]]
+
+
+class BaseRecord(TypedDict):
+    """The base of a robot as its cell file has it."""
+
+    robot: int
+    xyz_mm: Numbers
+    rpy_deg: Numbers
+
+
+class SceneViewRecord(TypedDict):
+    """One layout of a cell and its motion."""
+
+    name: str
+    facts: Annotated[list[list[str]], "pairs of a label and a value"]
+    remarks: list[str]
+    passed: bool | None
+    robots: list[RobotViewRecord]
+    bodies: list[BodyViewRecord]
+    visuals: list[VisualRecord]
+    part: list[PlaceRecord]
+    tasks: list[TaskViewRecord]
+    motion: MotionViewRecord
+    nearest: NearestRecord
+    contacts: list[ContactViewRecord]
+    failures: list[FailureRecord]
+    excluded: list[ExcludedRecord]
+    bases: Annotated[list[BaseRecord], "of a cell whose bases may be moved; else empty"]
+
+
+class ViewRecord(TypedDict):
+    """A 3-D page."""
+
+    schema: str
+    kind: Annotated[str, "`run`, `cell` or `study`"]
+    cell: str
+    source: Annotated[str, "the cell file, for the command that the page shows"]
+    settings: Annotated[list[str], "values that were set in it, as `KEY=VALUE`"]
+    geometries: list[GeometryRecord]
+    scenes: list[SceneViewRecord]
+    caution: str
+
+
+def pose_numbers(X: Array) -> Numbers:
+    """A pose of shape (4, 4) as twelve numbers, row by row."""
+    return [each + 0.0 for each in np.round(X[:3], POSE_DECIMALS).ravel().tolist()]
+
+
+def point_numbers(points: Array) -> Numbers:
+    """Points of shape (..., 3) as x, y, z one after the other."""
+    return [each + 0.0 for each in np.round(points, POINT_DECIMALS).ravel().tolist()]
+
+
+def packed(values: np.ndarray[Any, Any], kind: str) -> str:
+    """An array in base64, each number as ``kind`` says (``<f4``, ``<u2`` …)."""
+    return b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -1,0 +1,95 @@
+"""``cellplan view`` from the shell: what is said, what is written, how it ends."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from cellplan.cli.main import run
+
+
+def test_a_run_gets_its_page_beside_its_report(sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(sound / "run", tmp_path / "run")
+
+    status = run(["view", str(tmp_path / "run"), "--cell", str(sound / "cell" / "small.yaml")])
+
+    out, err = capsys.readouterr()
+    page = tmp_path / "run" / "view.html"
+    assert (status, err) == (0, "")
+    assert out.splitlines()[0].startswith(f"small-pair: {page} (0.")
+    assert out.splitlines()[-1] == f"open {page} in a browser"
+    assert page.stat().st_size < 500_000
+
+
+def test_a_machine_gets_one_object(sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "page.html"
+
+    status = run(["view", str(sound / "cell" / "small.yaml"), "-o", str(page), "--json"])
+
+    found = json.loads(capsys.readouterr().out)
+    assert (status, found["status"], found["kind"], found["failures"]) == (0, "written", "cell", [])
+    assert found["bytes"] == page.stat().st_size
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["{folder}/none"], "error: {folder}/none: no such file"),
+        (["{folder}"], "error: {folder}: expected a run, a layout search or a cell file, got a folder that holds none"),
+        (["{cell}", "--cell", "{cell}"], "error: --cell: expected a run or a layout search with it, got '{cell}'"),
+        (["{run}", "--set", "name=x"], "error: --set: expected a cell file with it, got the folder '{run}'"),
+        (
+            ["{cell}", "-o", "{folder}/mine.txt"],
+            "error: {folder}/mine.txt: holds something that is no 3-D page; choose another file with -o",
+        ),
+        (
+            ["{run}"],
+            "error: {run}: the run depends on files beside its cell file ({files}): "
+            "name the cell file 'small.yaml' with --cell, so that they can be compared",
+        ),
+        (
+            ["{study}"],
+            "error: {study}/study.json: expected the study of a layout search, got one of the kind 'sweep': "
+            "view one of its runs instead",
+        ),
+    ],
+)
+def test_what_cannot_be_shown_ends_with_one_line(
+    arguments: list[str], message: str, sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    (tmp_path / "study").mkdir()
+    (tmp_path / "study" / "study.json").write_text('{"schema": "cellplan.study/1", "kind": "sweep"}')
+    places = {
+        "folder": str(tmp_path),
+        "study": str(tmp_path / "study"),
+        "files": "meshes/block.stl, paths/bow.csv, robots/elbow.stl, robots/left.yaml, robots/right.urdf",
+        "run": str(sound / "run"),
+        "cell": str(sound / "cell" / "small.yaml"),
+    }
+
+    status = run(["view", *(each.format(**places) for each in arguments)])
+
+    out, err = capsys.readouterr()
+    assert (status, out, err) == (2, "", f"{message.format(**places)}\n")
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+def test_a_solved_cell_brings_its_page_and_stays_verifiable(
+    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = sound / "cell" / "small.yaml"
+
+    assert run(["solve", str(cell), "--view", "-q", "-o", str(tmp_path / "run")]) == 0
+
+    assert f"3-D page: {tmp_path / 'run' / 'view.html'}" in capsys.readouterr().out
+    report = (tmp_path / "run" / "report.html").read_text()
+    assert '<a href="view.html">3-D page</a>' in report
+    assert 'href="view.html#t=' in report
+    assert (tmp_path / "run" / "view.html").is_file()
+    assert run(["verify", str(tmp_path / "run"), "--cell", str(cell), "-q"]) == 0
+    shutil.copy(tmp_path / "run" / "view.html", tmp_path / "other.html")
+    assert run(["view", str(tmp_path / "run"), "--cell", str(cell), "-q"]) == 0
+    assert (tmp_path / "run" / "view.html").read_bytes() == (tmp_path / "other.html").read_bytes()
+    capsys.readouterr()
