@@ -6,6 +6,7 @@ class App {
   constructor(record) {
     this.record = record;
     this.failure = -1;
+    this.markedAt = null; // time at which the bodies of a failure are marked
     this.stage = new Stage(record);
     this.camera = new Camera(byId("canvas"), () => this.turned());
     this.player = new Player(() => this.refresh());
@@ -26,7 +27,7 @@ class App {
     addEventListener("resize", () => this.refresh());
     addEventListener("hashchange", () => this.follow());
     this.setScene(0);
-    if (record.kind !== "study" && this.stage.scene.failures.length) this.showFailure(0);
+    if (record.kind !== "study" && !("t" in readAddress()) && this.stage.scene.failures.length) this.showFailure(0);
     this.follow();
   }
 
@@ -51,6 +52,7 @@ class App {
     this.place = index;
     if (this.stage.scene !== this.record.scenes[index]) this.stage.setScene(this.record.scenes[index]);
     this.failure = -1;
+    this.markedAt = null;
     this.player.setMotion(this.stage.motion);
     this.camera.fit(this.stage.centre, this.stage.radius, this.stage.corners);
     this.controls.setScene();
@@ -102,6 +104,16 @@ class App {
       bar.row.classList.toggle("picked", bar.robot === failure.joint[0] && bar.place === failure.joint[1]);
     }
     this.jump(failure.at ?? this.player.t);
+    this.markedAt = this.player.t;
+  }
+
+  /** Bodies and joint of a failure are marked at its time only. */
+  leaveFailure() {
+    if (this.markedAt === null || Math.abs(this.player.t - this.markedAt) < 1e-6) return;
+    this.markedAt = null;
+    this.stage.picked.clear();
+    for (const button of byId("failures").querySelectorAll("[aria-current=true]")) button.setAttribute("aria-current", "false");
+    for (const bar of this.panels.bars) bar.row.classList.remove("picked");
   }
 
   jump(t) {
@@ -153,6 +165,7 @@ class App {
   }
 
   draw() {
+    this.leaveFailure();
     const state = this.stage.at(this.player.t);
     if (this.stage.moved) Object.assign(state, { nearest: null, red: new Set() });
     this.fitCanvas();
