@@ -38,6 +38,7 @@ CONSTANT_DISTANCE_TOL: Final = (
     1e-3  # [m] a distance that varies by less over all configurations is a matter of mounting, not of motion
 )
 CONTACT_TOL: Final = 1e-6  # [m] poses are worked out to less than that: what stands on a floor may seem to float
+ROUNDING: Final = 1e-9  # [m] by which a distance may seem less than it is demanded to be
 FAULT_ORDER: Final = (Kind.PART, Kind.TOOL, Kind.ATTACHMENT, Kind.PEDESTAL, Kind.LINK)  # what is wrongly mounted first
 UNLIMITED_RANGE: Final = np.pi  # [rad] or [m] range sampled to either side of zero where a joint has no limit
 
@@ -237,9 +238,9 @@ def _relaxed(pair: ScenePair, sampled: _Sampled, holder: str | None) -> ScenePai
     nearest, farthest = np.inf, -np.inf
     for distance in sampled.distances(pair, holder):
         nearest, farthest = min(nearest, distance), max(farthest, distance)
-        if farthest >= pair.demand and farthest - nearest > CONSTANT_DISTANCE_TOL:
+        if farthest >= pair.demand - ROUNDING and farthest - nearest > CONSTANT_DISTANCE_TOL:
             return pair  # whatever it is elsewhere
-    if farthest < pair.demand:
+    if farthest < pair.demand - ROUNDING:
         reason = "checked for contact only: closer than the required clearance in every configuration by the mounting"
         return replace(pair, rule=Rule.CONTACT, reason=reason)
     reason = "checked for contact only: their distance is fixed by the mounting"

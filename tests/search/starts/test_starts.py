@@ -7,6 +7,9 @@ import pytest
 
 from cellplan import load_cell, solve
 from cellplan.model.seeds import generator
+from cellplan.search.programs.improve import improve
+from cellplan.search.programs.layout_problem import LayoutProblem
+from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.starts import pools
 from cellplan.search.starts.combined import judged
 from cellplan.search.starts.contacts import Contacts
@@ -158,4 +161,10 @@ def test_real_arms_find_a_layout_from_the_corners_of_the_floor(name, shared_robo
 
     assert starts.at(0).found == ()
     assert starts.at(0).reason.startswith("the given layout: 'abb' follows its path from no configuration")
-    assert starts.at(1).found[0].violation == 0.0
+    layout = LayoutProblem(
+        job=problem.job, variables=variables, bodies=problem.distances, acceleration=problem.acceleration
+    )
+    demands = Demands(objective=Objective.CONFORMING, margin=variables.margin, duration=float(problem.job.times[-1]))
+    found = (start for index in range(1, 5) for start in starts.at(index).found[:2])
+    improved = (improve(layout, start.x, start.start, demands, Effort(iterations=25)) for start in found)
+    assert any(each is not None and each.is_conforming for each in improved)
