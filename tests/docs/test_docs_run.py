@@ -88,6 +88,9 @@ LONG = {  # their commands and functions have tests of their own, which are quic
     "shortest-cycle.md",
     "secondary-goals.md",
     "sweep-values.md",
+    "load-sharing.md",
+    "demanded-feeds.md",
+    "place-a-robot.md",
 }
 RUNNABLE = [pytest.param(page, marks=pytest.mark.slow if page.name in LONG else ()) for page in PAGES]
 
