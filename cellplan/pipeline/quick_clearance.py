@@ -24,17 +24,19 @@ class QuickClearance:
                 where all is done here.
         """
         self._begin = begin
-        self._begun: list[tuple[Array, Callable[[], Clearance]]] = []
+        self._begun: list[tuple[Schedule, Array, Callable[[], Clearance]]] = []
 
     def begin(self, scene: Scene, schedule: Schedule, q: Array) -> None:
         """Begin with a run whose rows are known; arguments as those of ``run_clearance``."""
         if self._begin is not None:
-            self._begun.append((q, self._begin(without_curves, scene, schedule, q)))
+            self._begun.append((schedule, q, self._begin(without_curves, scene, schedule, q)))
 
     def of(self, scene: Scene, schedule: Schedule, q: Array, progress: Progress) -> Clearance:
-        """The clearance of a run: what was begun, or worked out now."""
-        begun = next((result for rows, result in self._begun if np.array_equal(rows, q)), None)
-        return without_curves(scene, schedule, q, progress) if begun is None else begun()
+        """The clearance of a run: what was begun with its schedule and rows, or worked out now."""
+        for known, rows, result in self._begun:
+            if known is schedule and np.array_equal(rows, q):
+                return result()
+        return without_curves(scene, schedule, q, progress)
 
 
 def without_curves(scene: Scene, schedule: Schedule, q: Array, progress: Progress = silent) -> Clearance:

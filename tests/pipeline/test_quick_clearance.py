@@ -1,6 +1,7 @@
 """The clearance of a search has the verdicts of ``solve`` and its smallest distances, as far as they are exact."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,3 +42,19 @@ def test_verdicts_and_smallest_distances_are_those_of_solve(is_begun: bool) -> N
         (each.name, each.subject, each.passed) for each in checks
     ]
     assert len(asked) == is_begun
+
+
+def test_what_was_begun_for_other_tasks_or_rows_is_not_taken() -> None:
+    scene, solution = solve_motion(load_cell(CELL).with_values(VALUES), task=None, progress=silent)
+    run = solution.runs[0]
+    q = np.concatenate([run.report.q[robot.name] for robot in scene.cell.robots], axis=1)
+    own, other = run_clearance(scene, run.schedule, q), (run.report.clearance, ())
+    quick = QuickClearance(lambda *_: lambda: other)
+
+    quick.begin(scene, run.schedule, q)
+
+    assert own[1]
+    assert quick.of(scene, run.schedule, q, silent) is other
+    for schedule, rows in ((replace(run.schedule), q), (run.schedule, q + 1e-9)):
+        checks = quick.of(scene, schedule, rows, silent)[1]
+        assert [each.name for each in checks] == [each.name for each in own[1]]
