@@ -17,7 +17,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.report.page.render import overview_page, report_page, view_beside
 from cellplan.report.plots.rendering import pictures, require_formats
-from cellplan.report.plots.run import run_sheets
+from cellplan.report.plots.run import run_figures
 from cellplan.report.record.common import Provenance, Record, as_json
 from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series_json
@@ -103,7 +103,7 @@ def _write_report(
     record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion, transfers=run.transfers)
     target.write_text(f"{place}report.json", as_json(record))
     target.write_text(f"{place}series.json", series_json(run.report, run.motion))
-    plots = pictures(run_sheets(run.report, cell=cell), formats)
+    plots = pictures(run_figures(run.report, cell=cell), formats)
     for name, picture in plots.items():
         target.write_bytes(f"{place}plots/{name}", picture)
     page = report_page(record, run.report.checks, cell=cell, plots=plots, view=view)

@@ -1,6 +1,5 @@
 """``report.html``: verdict and evidence of a run as one self-contained page."""
 
-import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any, Final
@@ -12,6 +11,7 @@ from cellplan.model.report import Check
 from cellplan.report.page.figures import key_figures
 from cellplan.report.page.filters import fixed, floored, percent, power, range_bar, small, worst
 from cellplan.report.plots.palette import ROBOTS, robot_colours
+from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.tasks import direction_text
 from cellplan.report.text.method import method_lines
@@ -89,7 +89,7 @@ def report_page(
         record: Result of ``run_record``.
         checks: The checks of the run.
         cell: Its cell.
-        plots: SVG pictures by file name, as ``draw_plots`` returns them; others are ignored.
+        plots: SVG pictures by file name, as ``pictures`` returns them; others are ignored.
         view: Where its 3-D page lies from there; empty without one.
     """
     return _render(
@@ -134,7 +134,7 @@ def has_view_links(page: str) -> bool:
 
 
 def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) -> str:
-    """The page of a rehearsal; ``plots`` as ``draw_rehearsal`` returns them."""
+    """The page of a rehearsal; ``plots`` as ``pictures`` returns them."""
     parts = {"plots": _inline_plots(plots), "executions": EXECUTION_TITLES, "outcomes": OUTCOMES}
     return _render("rehearsal.html", record, cell, parts)
 
@@ -214,15 +214,4 @@ def _by_reason(exclusions: Iterable[Record]) -> dict[str, list[str]]:
 def _inline_plots(plots: Mapping[str, bytes]) -> dict[str, str]:
     """SVG pictures as page content, by file name without its suffix."""
     drawings = {name.removesuffix(".svg"): data for name, data in plots.items() if name.endswith(".svg")}
-    return {name: inline_svg(data.decode(), prefix=f"p{i}-") for i, (name, data) in enumerate(drawings.items())}
-
-
-def inline_svg(text: str, *, prefix: str) -> str:
-    """The picture without its file header and with unique ids, so that a page can hold several."""
-    body = text[text.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)
-    head, rest = body.split(">", 1)
-    head = re.sub(r'\s(?:width|height)="[^"]*"', "", head) + ' aria-hidden="true" focusable="false"'
-    rest = re.sub(r'\bid="', f'id="{prefix}', rest)
-    rest = re.sub(r'(url\(|href=")#', rf"\g<1>#{prefix}", rest)
-    return f"{head}>{rest}"
+    return {name: inline_svg(data.decode()) for name, data in drawings.items()}
