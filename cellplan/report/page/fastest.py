@@ -1,9 +1,10 @@
 """``fastest.html``: the shortest cycles of a cell and its production curve as one self-contained page."""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 from cellplan.model.report import CAUTION
+from cellplan.report.page.figures import figure
 from cellplan.report.page.render import template
 from cellplan.report.plots.fastest import COLOURS, SHOWN, curve_figures, curves_of, single_programs
 from cellplan.report.plots.svg import inline_svg, svg_text
@@ -48,18 +49,10 @@ def _programs(record: Record) -> dict[str, Record]:
 
 def _figures(programs: Mapping[str, Record]) -> Entries:
     """The cycle times at the top of the page."""
-    entries: list[dict[str, Any]] = []
+    entries: Entries = []
     for name, program in programs.items():
-        figures = program["figures"]
-        detail = f"{figures['parts_per_h']:.1f} parts per hour"
-        binding = binding_lines(program)
-        entries.append(
-            {
-                "label": name,
-                "value": f"{program['cycle_s']:g}",
-                "unit": "s",
-                "detail": f"{detail}; {binding[0]}" if len(binding) == 1 else detail,
-                "is_bad": program["status"] != "passed",
-            }
-        )
+        per_hour, binding = f"{program['figures']['parts_per_h']:.1f} parts per hour", binding_lines(program)
+        note = f"{per_hour}; {binding[0]}" if len(binding) == 1 else per_hour
+        is_bad = program["status"] != "passed"
+        entries.append(figure(name, f"{program['cycle_s']:g}", "s", note=note, is_bad=is_bad))
     return entries
