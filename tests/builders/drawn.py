@@ -55,7 +55,7 @@ def _panel(node: ET.Element) -> DrawnPanel:
             panel.curves[path.get("data-name", "")] = points
         elif kind == "mark":
             panel.marks.append((points[0, 0], points[0, 1]))
-        elif kind == "limit":
+        elif kind == "bound":
             panel.limits.append(float(points[0, 1]))
     for rect in box.findall(f"{SVG}rect"):
         top = float(rect.get("y", "0"))

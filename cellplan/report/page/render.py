@@ -16,7 +16,7 @@ from cellplan.report.page.links import file_links
 from cellplan.report.page.scripts import SCRIPTS, page_scripts
 from cellplan.report.page.time_line import task_times, time_line
 from cellplan.report.page.times import Shifts, TimeLinks, page_begin, phase_begins
-from cellplan.report.plots.palette import ROBOTS, robot_colours
+from cellplan.report.plots.palette import ROBOTS, dark_rules, robot_colours
 from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.tasks import direction_text
@@ -175,6 +175,7 @@ def _environment() -> Environment:
         "way_round": direction_text,
         "worst": worst,
     }
+    environment.globals["dark_rules"] = dark_rules
     environment.globals["scripts"] = page_scripts(environment.get_template(name).render() for name in SCRIPTS)
     return environment
 

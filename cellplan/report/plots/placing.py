@@ -20,14 +20,14 @@ PLANE_LEFT, PLANE_FOOT, LEGEND = 54.0, 46.0, 164.0
 PLANE_LONGEST: Final = 504.0  # longer side of a plane
 TICK: Final = 4.0
 LINE: Final = 14.0  # from one line of a legend to the next
-LETTER: Final = 0.62  # [-] of its size that a bold letter takes on average
+LETTER: Final = 0.57  # [-] of its size that a bold letter takes on average
 ASCENT, MIDDLE, DESCENT = 0.76, 0.36, 0.2  # [-] of its size: a text below, beside and above a point
 MAX_DECADES: Final = 6  # [-] with a tick for each; more have one for every second or third
 SUPERSCRIPTS: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Words(NamedTuple):
-    """A line of text; its base line begins, ends, or has its middle at the point."""
+    """A line of text; its base line begins, ends, or has its middle at the point; its kind is a class in pages."""
 
     x: float
     y: float
@@ -36,6 +36,7 @@ class Words(NamedTuple):
     colour: str = INK
     is_bold: bool = False
     anchor: str = "start"
+    kind: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -186,22 +187,22 @@ def _panel(
 
 def _headings(panel: Panel, width: float) -> Iterator[Words]:
     """Title, names of the curves and note above a panel."""
-    yield Words(0.0, -5.0, panel.title, size=8.5, is_bold=True)
+    yield Words(0.0, -5.0, panel.title, size=8.5, is_bold=True, kind="title")
     x = 8.5 * LETTER * len(panel.title) + 8.0
     for key in panel.keys:
-        yield Words(x, -5.0, key.text, size=8.5, colour=key.colour, is_bold=True)
+        yield Words(x, -5.0, key.text, size=8.5, colour=key.colour, is_bold=True, kind="key")
         x += 8.5 * LETTER * (len(key.text) + 1)
-    yield Words(width, -5.0, panel.note, size=7.5, colour=GREY, anchor="end")
+    yield Words(width, -5.0, panel.note, size=7.5, colour=GREY, anchor="end", kind="note")
 
 
 def _tick_labels(box: PlacedPanel, *, has_x_labels: bool) -> Iterator[Words]:
     """The numbers along both axes."""
     for value in box.y_ticks:
         y = float(box.down(value)) + 8.0 * MIDDLE
-        yield Words(-TICK, y, number_text(value, box.panel.y), colour=GREY, anchor="end")
+        yield Words(-TICK, y, number_text(value, box.panel.y), colour=GREY, anchor="end", kind="tick-y")
     for value in box.x_ticks if has_x_labels else ():
         y = box.height + TICK + 8.0 * ASCENT
-        yield Words(float(box.across(value)), y, number_text(value, box.x), colour=GREY, anchor="middle")
+        yield Words(float(box.across(value)), y, number_text(value, box.x), colour=GREY, anchor="middle", kind="tick-x")
 
 
 def _words_within(box: PlacedPanel) -> Iterator[Words]:

@@ -70,7 +70,8 @@ def _words(each: Words) -> str:
     place = f'x="{each.x:.2f}" y="{each.y:.2f}" font-size="{each.size:g}" fill="{each.colour}"'
     anchor = f' text-anchor="{each.anchor}"' if each.anchor != "start" else ""
     weight = ' font-weight="bold"' if each.is_bold else ""
-    return f"<text {place}{anchor}{weight}>{escape(each.text)}</text>"
+    kind = f' class="{each.kind}"' if each.kind else ""
+    return f"<text{kind} {place}{anchor}{weight}>{escape(each.text)}</text>"
 
 
 def _swatches(found: Placed) -> Iterator[str]:
@@ -101,7 +102,7 @@ def _panels(found: Placed) -> Iterator[str]:
             yield from _item(box, item)
         yield "</svg>"
         frame = _plane_frame(box) if is_plane else f"M0 0V{box.height:.6g}H{box.width:.6g}"
-        yield f'<path d="{frame}" fill="none" stroke="{GREY if is_plane else FRAME}" stroke-width="0.8"/>'
+        yield f'<path class="frame" d="{frame}" fill="none" stroke="{GREY if is_plane else FRAME}" stroke-width="0.8"/>'
         yield from map(_words, box.words)
         yield "</g>"
 
@@ -146,7 +147,7 @@ def _item(box: PlacedPanel, item: object) -> Iterator[str]:
         line = f"M{_fine(box.across(item.value))} 0V{round(FINE * box.height)}"
         if not item.is_vertical:
             line = f"M0 {_fine(box.down(item.value))}H{round(FINE * box.width)}"
-        yield f'<path class="limit" d="{line}" stroke="{LIMIT}" stroke-width="{FINE}"/>'
+        yield f'<path class="bound" d="{line}" stroke="{LIMIT}" stroke-width="{FINE}"/>'
 
 
 def _fine(length: Array | float) -> int:
