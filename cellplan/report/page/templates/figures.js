@@ -377,5 +377,4 @@
   });
   addEventListener("beforeprint", () => figures.forEach(draw));
   addEventListener("afterprint", () => figures.forEach(draw));
-  document.body.dataset.ready = "true";
 })();

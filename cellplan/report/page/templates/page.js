@@ -133,4 +133,5 @@
   };
   addEventListener("hashchange", unfold);
   unfold();
+  document.body.dataset.ready = "true";
 })();
