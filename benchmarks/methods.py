@@ -193,7 +193,7 @@ def judged(problem: Problem, motion: Motion) -> Result:
     checks = [
         check
         for robot in cell.robots
-        for check in check_joints(robot, joint_uses(robot, times, q[robot.name]), times, q[robot.name])
+        for check in check_joints(joint_uses(robot, times, q[robot.name]), times, q[robot.name])
     ]
     evaluations = motion.iterations if motion.iterations is not None else np.ones(1)
     result = Result(

@@ -11,7 +11,7 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS))
 
-from reproduction import ellipse, nicolato, ribeiro, vargas  # noqa: E402
+from reproduction import ellipse, nicolato, places, ribeiro, vargas  # noqa: E402
 from reproduction.page import page  # noqa: E402
 from reproduction.runs import Numbers, rounded  # noqa: E402
 
@@ -27,6 +27,7 @@ CASES: dict[str, Callable[[], Numbers]] = {
     "nicolato_ellipse": ellipse.measure_ellipse,
     "nicolato_pose": nicolato.measure_pose,
     "ribeiro_modes": ribeiro.measure_modes,
+    "ribeiro_places": places.measure,
     "ribeiro_first_layout": ribeiro.measure_first_layout,
     "ribeiro_appendix_e": ribeiro.measure_appendix,
 }

@@ -104,7 +104,7 @@ class SingularityMeasure(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DampedLeastSquaresSettings:
-    """Where damping sets in; its largest factor is ``SolverSettings.damping``.
+    """Where damping sets in; how large it becomes is stated by ``SolverSettings.damping``.
 
     Attributes:
         measure: Smallest singular value ([Nicolato2007]_ Eq. 2.12) or manipulability ([Vargas2012]_ Eqs. 9-10).
@@ -210,7 +210,8 @@ class SolverSettings:
     Attributes:
         method: The resolution method.
         gain: Error feedback gain in [1/s] of Euler's steps.
-        damping: Largest damping factor of Euler's steps; None lets the smallest singular value decide (``auto``).
+        damping: Largest damping factor of Euler's steps, or with manipulability its square; None lets the smallest
+            singular value decide (``auto``).
         seed: Seed of every random search.
         damped_least_squares: Settings of that method.
         filtered_inverse: Settings of both filtered inverses.

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from reproduction.page_nicolato import circle_rows, ellipse_rows, limit_rows, line_rows, pose_rows
-from reproduction.page_ribeiro import appendix_rows, layout_rows, mode_rows, work_rows
+from reproduction.page_ribeiro import appendix_rows, layout_rows, main_rows, mode_rows, work_rows
 from reproduction.page_vargas import case_rows
 from reproduction.runs import Numbers
-from reproduction.verdicts import ALONE, AMBIGUOUS, NOT, REPRODUCED, Row, shown
+from reproduction.verdicts import ALONE, CHOSEN, NOT, REPRODUCED, Row, shown
 
 TEMPLATE = Path(__file__).resolve().parent / "template.txt"
 HEAD = "| what | published | ours | difference | verdict |\n|---|---|---|---|---|"
@@ -39,6 +39,7 @@ def all_rows(numbers: Numbers) -> dict[str, list[Row]]:
         "nicolato_limits": limit_rows(numbers["nicolato_limits"]),
         "nicolato_ellipse": ellipse_rows(numbers["nicolato_ellipse"]),
         "nicolato_pose": pose_rows(numbers["nicolato_pose"]),
+        "ribeiro_main": main_rows(modes),
         "ribeiro_errors": mode_rows(modes),
         "ribeiro_work": work_rows(modes),
         "ribeiro_first_layout": layout_rows(numbers["ribeiro_first_layout"]),
@@ -50,8 +51,7 @@ def _summary(tables: Mapping[str, Sequence[Row]]) -> str:
     """How many lines there are of each verdict."""
     rows = [row for table in tables.values() for row in table]
     counts = {
-        verdict.strip("*"): sum(row.verdict == verdict for row in rows)
-        for verdict in (REPRODUCED, AMBIGUOUS, NOT, ALONE)
+        verdict.strip("*"): sum(row.verdict == verdict for row in rows) for verdict in (REPRODUCED, NOT, CHOSEN, ALONE)
     }
     return f"Of {len(rows)} lines: {', '.join(f'{count} {verdict}' for verdict, count in counts.items())}."
 

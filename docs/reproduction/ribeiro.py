@@ -2,22 +2,16 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from cellplan import Report, solve
-from cellplan.checks.clearance.check import check_clearance
-from cellplan.geometry.transforms import pose
-from cellplan.pipeline.solution import Run
-from cellplan.scene.scene import Scene
 from reproduction.runs import Array, Numbers, paper_cell
 from reproduction.sheet import Sheet, draw, draw_joints
 
 TASKS = {"circle": "kuka", "rhombus": "abb", "rectangle": "staubli"}
 MODES = {1: "all four robots", 2: "two at a time", 3: "part at rest"}
-LOWERED = 0.7  # [m] by which the base of the REIS is lowered to see it hit the floor
 WORN = ("D4", "F4")  # joints of the STAUBLI that break their limits in mode 3
 
 
@@ -36,6 +30,7 @@ def measure_modes() -> Numbers:
         }
         for name in WORN
     }
+    numbers["abb"] = {f"mode_{mode}": _of_joints(reports[mode], "abb") for mode in (1, 2, 3)}
     numbers["worn"]["wrist_deg"] = np.rad2deg(np.abs(reports[3][0].q["staubli"][:, 4]).min())
     return numbers
 
@@ -46,28 +41,18 @@ def measure_first_layout() -> Numbers:
     report = run.report
     uses = {use.joint: use for use in report.joints}
     b2, c4 = uses["B2"], uses["C4"]
+    highest = int(np.argmax(report.q["kuka"][:, 1]))
     (floor,) = (each for kind, each in report.clearance.minima.items() if str(kind) == "environment")
     _draw_layout(report)
     return {
         "b2_deg": math.degrees(b2.max),
+        "b2_at_s": report.times[highest],
         "c4_deg": math.degrees(c4.max),
         "broken": [f"{use.robot} {use.joint}" for use in report.joints if use.margin < 0.0],
         "floor_mm": math.inf if floor.minimum is None else 1e3 * floor.minimum,
         "floor_pair": " and ".join(floor.pair or ()),
-        "low_base": _on_low_base(run),
         "errors_mm": _errors(report),
     }
-
-
-def _on_low_base(run: Run) -> Numbers:
-    """The same motion with the base of the REIS lower: when the part in its gripper hits the floor."""
-    cell = paper_cell("ribeiro_first_layout")
-    reis = cell.robot("reis")
-    low = replace(reis, X_WB=pose((0.0, 0.0, -LOWERED)) @ reis.X_WB)
-    scene = Scene.from_cell(replace(cell, robots=(low, *cell.robots[1:])))
-    found, _ = check_clearance(scene, run.schedule, run.motion.q)
-    hits = [contact for contact in found.contacts if contact.pair == ("part", "floor")]
-    return {"lowered_mm": 1e3 * LOWERED, "hits_s": [[contact.first_s, contact.last_s] for contact in hits]}
 
 
 def measure_appendix() -> Numbers:
@@ -97,6 +82,16 @@ def _of_mode(reports: Sequence[Report]) -> Numbers:
     return {
         "passed": all(report.passed for report in reports),
         "errors_mm": errors,
+        "turn_deg": math.degrees(
+            max(
+                float(np.linalg.norm(task.orientation_error, axis=1).max())
+                for each in reports
+                for task in each.accuracy
+            )
+        ),
+        "margin_deg": math.degrees(min(use.margin for each in reports for use in each.joints)),
+        "speed_share": max(use.peak_velocity / use.velocity_limit for each in reports for use in each.joints),
+        "collision_free": all(each.passed for report in reports for each in report.checks if each.name == "collision"),
         "travel_deg": {robot: max(_travel(report, robot) for report in reports) for robot in robots},
         "speed_deg_s": {robot: max(_speed(report, robot) for report in reports) for robot in robots},
         "share": {robot: max(report.motion_share[robot][0] for report in reports) for robot in robots},
@@ -106,6 +101,16 @@ def _of_mode(reports: Sequence[Report]) -> Numbers:
 def _errors(report: Report) -> dict[str, float]:
     """Largest position error of each task in [mm]."""
     return {each.task: 1e3 * float(np.linalg.norm(each.position_error, axis=1).max()) for each in report.accuracy}
+
+
+def _of_joints(reports: Sequence[Report], robot: str) -> Numbers:
+    """Range and largest speed of each joint of a robot in the run in which it works."""
+    report = next(each for each in reports if np.any(each.qd[robot]))
+    return {
+        use.joint: {"range_deg": math.degrees(use.max - use.min), "speed_deg_s": math.degrees(use.peak_velocity)}
+        for use in report.joints
+        if use.robot == robot
+    }
 
 
 def _travel(report: Report, robot: str) -> float:

@@ -1,11 +1,10 @@
 """Vargas, Leite and Costa 2012, section 4: three paths of a planar arm, each by three methods."""
 
-import math
-from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from cellplan import Cell
+import cellplan.planning.methods
 from reproduction.runs import Array, Curves, Numbers, curves, paper_cell
 from reproduction.sheet import Sheet, draw, draw_joints, path_curve
 
@@ -16,7 +15,8 @@ METHODS = {
 }
 SETTLED = 5.0  # [s] 25 time constants of the feedback: what is left of the start error is rounding
 PASSED_BY = 30.0  # [s] half of the way from the singular point of case III to its end is behind the arm
-LARGEST = 0.3  # lambda_0
+OWN_METHODS = Path(__file__).resolve().parent / "methods"
+OTHER_READING = "squared_vargas_damping"  # lambda^2 I in Eq. 9
 NAMES = ("$q_1$", "$q_2$", "$q_3$")
 ERRORS = {1: (-0.1, 0.6), 2: (-0.05, 0.3), 3: (-0.1, 0.6)}  # [m] axes of figures 6, 10 and 14
 ZOOMS = {2: ((0.05, 0.23), (-0.15, 0.15)), 3: ((-0.4, 0.3), (-0.4, 0.3))}  # [m] x and y of figures 9 and 13
@@ -33,14 +33,15 @@ def measure(case: int) -> Numbers:
         float(np.linalg.norm(a - b, axis=1).max()) for i, a in enumerate(places) for b in places[i + 1 :]
     )
     if case > 1:
-        numbers["unsquared"] = _of_one(curves(_unsquared(case)))
+        numbers["squared"] = _of_one(_other_reading(case))
     return numbers
 
 
-def _unsquared(case: int) -> Cell:
-    """Damped least squares with ``J J^T + lambda I``: the other way to read Eqs. 9 and 10."""
-    cell = paper_cell(f"vargas_case_{case}", method="damped_least_squares")
-    return replace(cell, solver=replace(cell.solver, damping=math.sqrt(LARGEST)))
+def _other_reading(case: int) -> Curves:
+    """Damped least squares with ``J J^T + lambda^2 I``."""
+    if str(OWN_METHODS) not in cellplan.planning.methods.__path__:
+        cellplan.planning.methods.__path__.append(str(OWN_METHODS))
+    return curves(paper_cell(f"vargas_case_{case}", method=OTHER_READING))
 
 
 def _of_one(run: Curves) -> Numbers:
@@ -60,7 +61,14 @@ def _of_one(run: Curves) -> Numbers:
         "speed_rad_s": np.abs(run.qd).max(),
         "late_speed_rad_s": np.abs(run.qd[late]).max(),
         "late_acceleration_rad_s2": np.abs(run.qdd[late[1:]]).max(),
+        "turned_deg": np.rad2deg(turned(run.actual[settled])),
     }
+
+
+def turned(places: Array) -> float:
+    """Angle in [rad] by which the heading of a path in the plane turns, all turns added up."""
+    along = np.diff(places[:, :2], axis=0)
+    return float(np.abs(np.diff(np.unwrap(np.arctan2(along[:, 1], along[:, 0])))).sum())
 
 
 def nearest(places: Array) -> float:

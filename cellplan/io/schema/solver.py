@@ -22,15 +22,15 @@ Gain = Annotated[float, Field(gt=0.0, le=1e9)]
 
 
 class DampedLeastSquaresEntry(Entry):
-    """Where the damping of `damped_least_squares` sets in; `damping` is its largest factor."""
+    """Where the damping of `damped_least_squares` sets in; how large it becomes is stated by `damping`."""
 
     measure: Literal["singular_value", "manipulability"] = Field(
         default="singular_value", description="Measure of the distance from a singularity."
     )
     region: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
         default=0.02,
-        description="Value of the measure below which damping sets in; with `damping: auto` the largest damping factor "
-        "as well (0.02 with manipulability).",
+        description="Value of the measure below which damping sets in; with `damping: auto` and singular values the "
+        "largest damping factor as well.",
     )
     shape_gain: bool = Field(default=False, description="Whether the feedback gain falls near a singularity.")
 
@@ -164,8 +164,8 @@ class SolverEntry(Entry):
     )
     damping: DampingChoice = Field(
         default="auto",
-        description="Largest damping factor; auto: from the smallest singular value, 0: no damping. Applies to "
-        "Euler's steps, also where the accurate mode falls back to them.",
+        description="Largest damping factor, or with `measure: manipulability` its square; auto: from the smallest "
+        "singular value, 0: no damping. Applies to Euler's steps, also where the accurate mode falls back to them.",
     )
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(default=0, description="Seed of every random search.")
     damped_least_squares: DampedLeastSquaresEntry = Field(

@@ -46,25 +46,27 @@ def nearness(inverse: WeightedInverse, settings: DampedLeastSquaresSettings) -> 
 
 
 def squared_damping(measure: float, settings: DampedLeastSquaresSettings, *, largest: float | None) -> float:
-    r"""Square of the damping factor ([Nicolato2007]_ Eq. 2.12, [Vargas2012]_ Eq. 10).
+    r"""What is added to ``J W^-1 J^T``: the square of the damping factor ([Nicolato2007]_ Eq. 2.12, [Vargas2012]_ 9, 10).
 
     .. math:: \lambda^2 = (1 - (\sigma / \varepsilon)^2) \lambda_{max}^2 \quad (\sigma < \varepsilon), \qquad
-              \lambda^2 = \lambda_0^2 (1 - w / w_0)^2 \quad (w < w_0)
+              \lambda^2 = \lambda_0 (1 - w / w_0)^2 \quad (w < w_0)
 
-    and 0 beyond. Vargas prints ``w`` as ``det(J J^T)``; his figures fit the usual square root of it.
+    and 0 beyond. Vargas adds ``lambda I``: his lambda is the square of the factor that it is elsewhere. He prints ``w``
+    as ``det(J J^T)``; his figures fit the usual square root of it.
 
     Args:
         measure: ``sigma`` or ``w``, at least 0.
         settings: Which of the two it is, and its region ``epsilon`` or ``w0``.
         largest: ``lambda_max`` or ``lambda_0``. None stands for ``epsilon`` with the singular value, so that no
-            direction is ever driven harder than at the border of the region; ``LARGEST_DAMPING`` with ``w``.
+            direction is ever driven harder than at the border of the region; for the square of ``LARGEST_DAMPING``
+            with ``w``.
     """
     ratio = measure / settings.region
     if ratio >= 1.0:
         return 0.0
     if settings.measure is SingularityMeasure.SINGULAR_VALUE:
         return (1.0 - ratio**2) * (settings.region if largest is None else largest) ** 2
-    return (1.0 - ratio) ** 2 * (LARGEST_DAMPING if largest is None else largest) ** 2
+    return (1.0 - ratio) ** 2 * (LARGEST_DAMPING**2 if largest is None else largest)
 
 
 def gain_share(measure: float, region: float) -> float:

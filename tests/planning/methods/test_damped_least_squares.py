@@ -72,13 +72,14 @@ def test_away_from_singularities_the_twist_is_met_exactly():
     np.testing.assert_allclose(J @ speeds, xdot, atol=1e-11)
 
 
-@pytest.mark.parametrize("settings", [BY_VALUE, BY_MANIPULABILITY])
-def test_damping_grows_steadily_from_nothing_at_the_border(settings):
+@pytest.mark.parametrize(("settings", "largest"), [(BY_VALUE, 0.09), (BY_MANIPULABILITY, 0.3)])
+def test_damping_grows_steadily_from_nothing_at_the_border(settings, largest):
+    """Nicolato's factor is squared (Eq. 2.12); Vargas adds his as it stands (Eq. 9)."""
     measures = np.linspace(0.0, 1.5 * settings.region, 3001)
     squares = [squared_damping(m, settings, largest=0.3) for m in measures]
-    assert squares[0] == pytest.approx(0.09)
+    assert squares[0] == pytest.approx(largest)
     assert np.all(np.diff(squares) <= 0.0)
-    assert np.max(np.abs(np.diff(squares))) < 1.5 * 0.09 * 2 / 3000 * 1.01  # slope at most 2 per region: no jump
+    assert np.max(np.abs(np.diff(squares))) < 1.5 * largest * 2 / 3000 * 1.01  # slope at most 2 per region: no jump
     assert squared_damping(settings.region, settings, largest=0.3) == 0.0
 
 
@@ -92,6 +93,16 @@ def test_left_to_the_program_no_direction_is_driven_harder_than_at_the_border():
 @pytest.mark.parametrize(("ratio", "share"), [(0.0, 0.0), (1.0, 0.0), (2.5, 0.25), (4.0, 1.0), (9.0, 1.0)])
 def test_feedback_fades_between_four_regions_and_one(ratio, share):
     assert gain_share(ratio * 0.02, 0.02) == pytest.approx(share)
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.05, 0.2])
+def test_speeds_are_those_of_the_printed_law(bend):
+    """``J^T (J J^T + lambda I)^-1 v`` with ``lambda = lambda_0 (1 - w / w_0)^2`` ([Vargas2012]_ Eqs. 9 and 10)."""
+    J, xdot, speeds = one_step((0.3, bend, -bend), settings=BY_MANIPULABILITY, damping=0.3)
+    w = np.sqrt(np.linalg.det(J @ J.T))
+    assert w < 1.0
+    damping = 0.3 * (1.0 - w) ** 2
+    np.testing.assert_allclose(speeds, J.T @ np.linalg.solve(J @ J.T + damping * np.eye(2), xdot), atol=1e-10)
 
 
 def test_shaped_gain_leaves_only_the_desired_twist_in_the_region():
