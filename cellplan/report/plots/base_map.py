@@ -45,6 +45,7 @@ def map_figure(record: Record) -> Figure:
         x=Axis(low=x[0] - half, high=x[-1] + half, label="x in mm", unit="mm"),
         panels=[panel],
         is_plane=True,
+        is_exact=True,
         legend=list(_legend(record)),
     )
 
