@@ -116,8 +116,8 @@ def _best(record: Record) -> Iterator[Item]:
     for rank, each in enumerate(record["best"]):
         place = record["places"][each["place"]]
         colour = {"passed": PAPER, None: INK}.get((each["certified"] or {}).get("status"), LIMIT)
-        size = 6.5 if rank == 0 else 3.5
-        yield Mark(place["x_mm"], place["y_mm"], colour, size=size, edge=INK, is_star=rank == 0)
+        size, edge = 6.5 if rank == 0 else 3.5, INK if colour == PAPER else PAPER
+        yield Mark(place["x_mm"], place["y_mm"], colour, size=size, edge=edge, is_star=rank == 0)
 
 
 def _legend(record: Record) -> Iterator[Key]:

@@ -143,7 +143,8 @@ def _item(box: PlacedPanel, item: object) -> Iterator[str]:
         (left, right), (bottom, top) = box.across(np.array(item.x)).tolist(), box.down(np.array(item.y)).tolist()
         place = f'x="{_fine(left)}" y="{_fine(top)}" width="{_fine(right) - _fine(left)}"'
         opacity = f' fill-opacity="{item.opacity:g}"' if item.opacity < 1.0 else ""
-        yield f'<rect {place} height="{_fine(bottom) - _fine(top)}" fill="{item.colour}"{opacity} shape-rendering="crispEdges"/>'
+        fill = f'fill="{item.colour}"{opacity} shape-rendering="crispEdges"'
+        yield f'<rect {place} height="{_fine(bottom) - _fine(top)}" {fill}/>'
     elif isinstance(item, Limit):
         line = f"M{_fine(box.across(item.value))} 0V{round(FINE * box.height)}"
         if not item.is_vertical:
