@@ -5,9 +5,9 @@ from typing import Final
 
 from cellplan.model.report import CAUTION
 from cellplan.report.page.figures import figure
-from cellplan.report.page.render import inline_svg, template
-from cellplan.report.plots.fastest import COLOURS, SHOWN, curve_sheets, curves_of, single_programs
-from cellplan.report.plots.rendering import pictures
+from cellplan.report.page.render import template
+from cellplan.report.plots.fastest import COLOURS, SHOWN, curve_figures, curves_of, single_programs
+from cellplan.report.plots.svg import inline_svg, svg_text
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.text.fastest import TITLES, binding_lines, saving_text
 
@@ -21,13 +21,9 @@ def fastest_page(record: Record) -> str:
     Args:
         record: As ``fastest_record`` returns it.
     """
-    sheets = curve_sheets(record)
-    drawn = pictures(sheets)
-    plots = [
-        {"title": SHOWN[name].title, "svg": inline_svg(drawn[f"{name}.svg"].decode(), prefix=f"c{place}-")}
-        for place, name in enumerate(sheets)
-    ]
-    legend = [*curves_of(record), *single_programs(record)] if sheets else []
+    drawn = curve_figures(record)
+    plots = [{"title": SHOWN[name].title, "svg": inline_svg(svg_text(figure))} for name, figure in drawn.items()]
+    legend = [*curves_of(record), *single_programs(record)] if drawn else []
     programs = _programs(record)
     return template("fastest.html").render(
         r=record,

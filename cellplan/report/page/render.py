@@ -1,6 +1,5 @@
 """``report.html``: verdict and evidence of a run as one self-contained page."""
 
-import re
 from collections.abc import Collection, Iterable, Mapping
 from functools import cache
 from typing import Annotated, Final, TypedDict, Unpack
@@ -17,7 +16,8 @@ from cellplan.report.page.links import FLOOR_PLAN, STILL, Links, file_links
 from cellplan.report.page.scripts import SCRIPTS, page_scripts
 from cellplan.report.page.time_line import task_times, time_line
 from cellplan.report.page.times import Shifts, TimeLinks, page_begin, phase_begins
-from cellplan.report.plots.palette import ROBOTS, robot_colours
+from cellplan.report.plots.palette import ROBOTS, dark_rules, robot_colours
+from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.tasks import direction_text
 from cellplan.report.text.method import method_lines
@@ -143,7 +143,7 @@ def has_view_links(page: str) -> bool:
 
 
 def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) -> str:
-    """The page of a rehearsal; ``plots`` as ``draw_rehearsal`` returns them."""
+    """The page of a rehearsal; ``plots`` as ``pictures`` returns them."""
     parts = {"plots": _inline_plots(plots), "executions": EXECUTION_TITLES, "outcomes": OUTCOMES}
     return _render("rehearsal.html", record, cell, parts)
 
@@ -184,6 +184,7 @@ def _environment() -> Environment:
         "way_round": direction_text,
         "worst": worst,
     }
+    environment.globals["dark_rules"] = dark_rules
     environment.globals["scripts"] = page_scripts(environment.get_template(name).render() for name in SCRIPTS)
     return environment
 
@@ -213,20 +214,9 @@ def _by_reason(exclusions: Iterable[Record]) -> dict[str, list[str]]:
 def _inline_plots(plots: Mapping[str, bytes]) -> dict[str, str]:
     """SVG pictures as page content, by file name without its suffix."""
     drawings = {name.removesuffix(".svg"): data for name, data in plots.items() if name.endswith(".svg")}
-    return {name: inline_svg(data.decode(), prefix=f"p{i}-") for i, (name, data) in enumerate(drawings.items())}
+    return {name: inline_svg(data.decode()) for name, data in drawings.items()}
 
 
 def svg_element(text: str) -> str:
     """An SVG element without what a file may have before it."""
     return text[text.index("<svg") :] if text else ""
-
-
-def inline_svg(text: str, *, prefix: str) -> str:
-    """The picture without its file header and with unique ids, so that a page can hold several."""
-    body = text[text.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)
-    head, rest = body.split(">", 1)
-    head = re.sub(r'\s(?:width|height)="[^"]*"', "", head) + ' aria-hidden="true" focusable="false"'
-    rest = re.sub(r'\bid="', f'id="{prefix}', rest)
-    rest = re.sub(r'(url\(|href=")#', rf"\g<1>#{prefix}", rest)
-    return f"{head}>{rest}"

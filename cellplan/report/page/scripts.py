@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from typing import Final
 
-SCRIPTS: Final = ("page.js",)
+SCRIPTS: Final = ("page.js", "figures.js")
 
 
 @dataclass(frozen=True, slots=True)

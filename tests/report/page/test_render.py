@@ -13,7 +13,8 @@ from cellplan.model.report import Check, JointDrift, Repeatability
 from cellplan.report.page import render
 from cellplan.report.page.render import overview_page, report_page
 from cellplan.report.page.scripts import SCRIPTS
-from cellplan.report.plots.run import draw_plots
+from cellplan.report.plots.rendering import pictures
+from cellplan.report.plots.run import run_figures
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
 
@@ -75,7 +76,7 @@ class Page(HTMLParser):
 
 
 def page_of(run: Any, plots: dict[str, bytes] | None = None) -> str:
-    drawn = draw_plots(run.report, cell=run.cell) if plots is None else plots
+    drawn = pictures(run_figures(run.report, cell=run.cell)) if plots is None else plots
     record = run_record(run.report, cell=run.cell, provenance=run.provenance)
     return report_page(record, run.report.checks, cell=run.cell, plots=drawn)
 
@@ -153,7 +154,7 @@ def test_caution_and_assumptions_are_printed(failed_page: str) -> None:
 
 def test_drawings_have_a_text_for_those_who_cannot_see_them(failed_page: str) -> None:
     figures = re.findall(r'<figure class="plot[^>]*>', failed_page)
-    assert len(figures) == 3 + 4 + 4 + 2  # tasks, positions, velocities, clearance and singularity
+    assert len(figures) == 3 + 4 + 4 + 4  # tasks, positions, velocities; margins, speeds, clearance and singularity
     assert all('role="img"' in figure and 'aria-label="' in figure for figure in figures)
 
 
@@ -276,13 +277,13 @@ def test_with_many_robots_pictures_are_folded_and_each_robot_has_a_line(
         assert len(page.ids) == len(set(page.ids))
         assert {link[1:] for link in page.links if link.startswith("#")} <= set(page.ids)
         assert page.tags.count("details") == page.tags.count("summary")
-        assert page.unfolded_plots <= 1  # of clearance
+        assert page.unfolded_plots <= 3  # margins, speeds and clearance
         assert "Smallest margin and highest speed of each robot; details follow" in page.text
         assert {f"joints-{robot}" for robot in run.report.q} <= set(page.ids)
 
 
 def test_with_few_robots_only_joint_curves_are_folded(passed_run: Any) -> None:
-    assert Page(page_of(passed_run)).unfolded_plots == 3 + 2  # tasks, clearance and singularity
+    assert Page(page_of(passed_run)).unfolded_plots == 3 + 4  # tasks; margins, speeds, clearance and singularity
 
 
 def test_the_line_of_a_robot_names_its_worst_joints(failed_run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
