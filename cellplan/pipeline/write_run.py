@@ -1,5 +1,6 @@
 """Write a solution: report, plots, the resolved cell and, when every check passed, the joint tables."""
 
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
@@ -14,8 +15,9 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.background_plots import BackgroundPlots
+from cellplan.pipeline.cell_drawings import FLOOR_PLAN, STILL, DrawnPhase, phase_drawings, program_drawings
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.report.page.render import overview_page, report_page, view_beside
+from cellplan.report.page.render import Beside, overview_page, report_page, view_beside
 from cellplan.report.record.common import Provenance, Record, as_json
 from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series_json
@@ -42,9 +44,10 @@ def write_run(
 ) -> Record:
     """Write a run folder; it appears whole or not at all.
 
-    The folder holds ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only
-    if every check passed. The phases of a program with one for each task have reports and plots of their own in
-    subfolders, and an overview above them. Last comes ``manifest.json``, which names every file.
+    The folder holds ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; as drawings
+    ``still.svg`` and ``floor_plan.svg``; ``tables/`` only if every check passed. The phases of a program with one for
+    each task have reports, drawings and plots of their own in subfolders, and an overview above them. Last comes
+    ``manifest.json``, which names every file.
 
     Args:
         solution: The solution.
@@ -73,7 +76,10 @@ def write_run(
             transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
             record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers)
             target.write_text("report.json", as_json(record))
-            target.write_text("report.html", overview_page(record, cell=cell, view=view_beside("") if view else ""))
+            phases = [DrawnPhase(run.cell_of(cell), run.schedule, run.report) for run in solution.runs]
+            beside = _write_drawings(target, "", program_drawings(cell, phases))
+            beside["view"] = view_beside("") if view else ""
+            target.write_text("report.html", overview_page(record, cell=cell, **beside))
         target.write_text("cell.yaml", render_cell(cell))
         if solution.passed or keep_rejected:
             _write_tables(target, program, "tables" if solution.passed else "rejected")
@@ -105,9 +111,18 @@ def _write_report(
     pictures = begun()
     for name, picture in pictures.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    page = report_page(record, run.report.checks, cell=cell, plots=pictures, view=view)
+    beside = _write_drawings(target, place, phase_drawings(DrawnPhase(cell, run.schedule, run.report)))
+    beside["view"] = view
+    page = report_page(record, run.report.checks, cell=cell, plots=pictures, **beside)
     target.write_text(f"{place}report.html", page)
     return record
+
+
+def _write_drawings(target: RunFolder, place: str, drawings: Mapping[str, str]) -> Beside:
+    """Write the drawings of the cell; returns them by what a page calls them."""
+    for name, text in drawings.items():
+        target.write_text(f"{place}{name}", text)
+    return {"still": drawings[STILL], "floor_plan": drawings[FLOOR_PLAN]}
 
 
 def _write_tables(target: RunFolder, program: Program, folder: str) -> None:

@@ -10,37 +10,40 @@ from cellplan.model.cell import Cell
 from cellplan.model.report import Check, ClearanceMinimum, JointUse, Report
 from cellplan.model.units import MM
 
-GRAVEST: Final = (
-    "collision",
-    "clearance",
-    "grip_depth",
-    "mount_depth",
-    "standing_depth",
-    "tool_depth",
-    "home",
-    "joint_position",
-    "locked_joint",
-    "closure",
-    "position_error",
-    "orientation_error",
-    "joint_velocity",
-)  # beginnings of the names of checks, the gravest first; all others come after them
 TITLES: Final = {
     "collision": "Collision",
-    "clearance": "Too near",
-    "joint_position": "Joint beyond its limit",
-    "joint_velocity": "Joint too fast",
-    "position_error": "Tool off its path",
-    "position_error_between_rows": "Tool off its path",
-    "orientation_error": "Tool tilted off its task",
-    "orientation_error_between_rows": "Tool tilted off its task",
+    "grip_depth": "Holder too deep in the part",
+    "mount_depth": "Tool too deep in the arm",
+    "standing_depth": "Body too deep in its support",
     "tool_depth": "Tool too deep in the part",
+    "joint_position": "Joint beyond its limit",
+    "locked_joint": "Failed joint moves",
+    "home": "Idle robot leaves its home",
+    "payload": "Payload exceeded",
+    "payload_centre": "Centre of mass of the load",
+    "payload_moment": "Moment of the load",
+    "payload_inertia": "Inertia of the load",
+    "clearance": "Clearance too small",
+    "joint_velocity": "Joint too fast",
+    "joint_acceleration": "Joint acceleration too high",
+    "joint_acceleration_between_phases": "Joint acceleration too high where phases meet",
+    "joint_acceleration_assumed": "Joint acceleration above its assumed limit",
+    "joint_jerk": "Joint jerk too high",
+    "part_acceleration": "Acceleration of the part too high",
     "tool_speed": "Tool too fast",
-    "grip_depth": "Grip too deep in the part",
-    "mount_depth": "Mounted body too deep in the arm",
-    "standing_depth": "Mounted body too deep in its support",
-    "home": "Idle robot not at its home",
-}
+    "closure_position_error": "Co-holder off its grasp",
+    "closure_orientation_error": "Co-holder tilted on its grasp",
+    "closure_position_error_between_rows": "Co-holder off its grasp between the rows",
+    "closure_orientation_error_between_rows": "Co-holder tilted on its grasp between the rows",
+    "position_error": "Tool off its path",
+    "orientation_error": "Tool orientation off",
+    "position_error_between_rows": "Tool off its path between the rows",
+    "orientation_error_between_rows": "Tool orientation off between the rows",
+    "process_feed": "Feed not kept",
+    "process_on_delay": "Delay at the start of a process",
+    "process_off_delay": "Delay at the end of a process",
+    "joint_drift": "Joints do not return",
+}  # what failed checks are called, the gravest first
 NOTE_WIDTH: Final = 84  # [characters] of a line below the title
 MOST_NOTES: Final = 2
 
@@ -82,7 +85,7 @@ def worst_instant(report: Report, cell: Cell) -> Instant:
     known = [each for each in report.clearance.minima.values() if each.minimum is not None and each.at_s is not None]
     if not known:
         return _narrowest(report, timeless)
-    smallest = min(known, key=lambda each: (each.minimum or 0.0, each.at_s or 0.0))
+    smallest = min(known, key=lambda each: each.minimum or 0.0)
     return Instant(at_s=smallest.at_s or 0.0, check=timeless, minimum=smallest, bodies=smallest.pair or ())
 
 
@@ -95,15 +98,30 @@ def _narrowest(report: Report, check: Check | None) -> Instant:
     return Instant(at_s=use.margin_at_s, check=check, use=use)
 
 
-def _gravity(check: Check) -> tuple[int, float, float]:
-    """Order of failed checks, the gravest first."""
-    kind = next((place for place, name in enumerate(GRAVEST) if check.name.startswith(name)), len(GRAVEST))
-    if check.name == "clearance":
-        return kind, check.value, check.at_s or 0.0
-    if check.name == "joint_position":
-        return kind, -abs(check.value - check.limit), check.at_s or 0.0
-    excess = abs(check.value) / abs(check.limit) if check.limit else abs(check.value)
-    return kind, -excess, check.at_s or 0.0
+def is_exact(minimum: ClearanceMinimum) -> bool:
+    """Whether a smallest distance is known, rather than a bound of it."""
+    return minimum.certified and minimum.exact
+
+
+def graver(instant: Instant) -> tuple[float, ...]:
+    """Order of the instants of several runs, the gravest first: failures, then the smallest clearances."""
+    if instant.check is not None:
+        return (0.0, *_gravity(instant.check))
+    distance = np.inf if instant.minimum is None else float(instant.minimum.minimum or 0.0)
+    return (1.0, distance)
+
+
+def _gravity(check: Check) -> tuple[float, float]:
+    """Order of failed checks, the gravest first: by kind, then by the excess over the limit."""
+    kinds = list(TITLES)
+    kind = kinds.index(check.name) if check.name in TITLES else len(kinds)
+    if check.name == "collision":
+        excess = check.value  # time in contact
+    elif check.name in {"clearance", "joint_position"}:
+        excess = abs(check.value - check.limit)
+    else:
+        excess = abs(check.value / check.limit) if check.limit else abs(check.value)
+    return float(kind), -excess
 
 
 def _of_check(check: Check, report: Report, cell: Cell) -> Instant:
@@ -128,13 +146,13 @@ def _of_check(check: Check, report: Report, cell: Cell) -> Instant:
 
 def heading(instant: Instant, report: Report) -> tuple[str, tuple[str, ...]]:
     """Title and the lines below it."""
-    at = f"at {instant.at_s:.3f} s"
+    at = f"at {instant.at_s:.3f} s" + (f" of {report.phase}" if report.phase else "")
     if instant.check is not None and (instant.check.at_s is not None or instant.minimum is None):
         title = f"{TITLES.get(instant.check.name, 'Failed')} {at}"
         return title, _wrapped(instant.check.message)
     if instant.minimum is not None and instant.minimum.pair is not None:
         distance = np.floor(10.0 * MM * (instant.minimum.minimum or 0.0)) / 10.0
-        least = "" if instant.minimum.exact else "at least "
+        least = "" if is_exact(instant.minimum) else "at least "
         title = f"Smallest clearance {least}{distance:.1f} mm {at}"
         failed = () if instant.check is None else (instant.check.message,)
         return title, _wrapped(" to ".join(instant.minimum.pair), *failed)

@@ -15,7 +15,7 @@ from cellplan.model.motion import Schedule
 from cellplan.model.report import Report
 from cellplan.model.task import Frame
 from cellplan.model.units import MM
-from cellplan.pipeline.still.instant import Instant, heading, worst_instant
+from cellplan.pipeline.still.instant import Instant, heading, is_exact, worst_instant
 from cellplan.report.plots.palette import robot_colours
 from cellplan.report.still.facets import facets
 from cellplan.report.still.picture import Colour, ShownLine, ShownName, ShownSolid, StillPicture
@@ -68,7 +68,7 @@ def still_picture(cell: Cell, schedule: Schedule, report: Report) -> StillPictur
         material = _material(
             body, marked=marked if is_failed else frozenset(), involved=involved if is_failed else None
         )
-        solids.append(ShownSolid(name=body.name, shape=body.shape, X_WS=X_WS, material=material))  # type: ignore[arg-type]
+        solids.append(ShownSolid(name=body.name, shape=body.shape, X_WS=X_WS, material=material, robot=body.robot))  # type: ignore[arg-type]
     mark, label = _mark(instant, cell, solids, chains=chains, q=q)
     title, notes = heading(instant, report)
     return StillPicture(
@@ -138,7 +138,7 @@ def _mark(
     """The points that matter in the world, and what is written beside them."""
     if instant.minimum is not None and instant.minimum.points is not None:
         distance = MM * (instant.minimum.minimum or 0.0)
-        least = "" if instant.minimum.exact else "≥ "
+        least = "" if is_exact(instant.minimum) else "≥ "
         return np.array(instant.minimum.points), f"{least}{np.floor(10.0 * distance) / 10.0:.1f} mm"
     if len(instant.bodies) == 2:
         return _between([solid for solid in solids if solid.name in instant.bodies]), ""

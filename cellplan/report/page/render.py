@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Mapping
 from functools import cache
-from typing import Any, Final
+from typing import Annotated, Any, Final, TypedDict, Unpack
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
@@ -80,8 +80,16 @@ NARROW_FRACTION: Final = 0.05  # [-] fraction of the half range: smaller margins
 FAST_FRACTION: Final = 0.95  # [-] fraction of the speed limit: higher speeds are marked
 
 
+class Beside(TypedDict, total=False):
+    """What lies beside a page, and the drawings in it; what is left out is empty."""
+
+    view: Annotated[str, "where the 3-D page lies from there"]
+    still: Annotated[str, "picture of the instant that decides the verdict, as the text of an SVG element"]
+    floor_plan: Annotated[str, "floor plan as the text of an SVG element"]
+
+
 def report_page(
-    record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes], view: str = ""
+    record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes], **beside: Unpack[Beside]
 ) -> str:
     """The page of one run.
 
@@ -90,7 +98,7 @@ def report_page(
         checks: The checks of the run.
         cell: Its cell.
         plots: SVG pictures by file name, as ``draw_plots`` returns them; others are ignored.
-        view: Where its 3-D page lies from there; empty without one.
+        **beside: What lies beside it, and its drawings of the cell.
     """
     return _render(
         "report.html",
@@ -106,21 +114,26 @@ def report_page(
             "open_surfaces": [line for _, line in open_surface_notes(record["open_surfaces"])],
             "method": list(method_lines(record["solver"], record["step_s"])),
             "plots": _inline_plots(plots),
-            "view": view,
+            **_beside(beside),
         },
     )
 
 
-def overview_page(record: Record, *, cell: Cell, view: str = "") -> str:
+def overview_page(record: Record, *, cell: Cell, **beside: Unpack[Beside]) -> str:
     """The page of several runs, with a link to the page of each.
 
     Args:
         record: Result of ``summary_record``.
         cell: The cell.
-        view: Where the 3-D page lies from there; empty without one.
+        **beside: What lies beside it, and its drawings of the cell.
     """
     parts = {"figures": key_figures(record), "left_out": left_out_notes(record), "grips": grip_notes(record)}
-    return _render("overview.html", record, cell, {**parts, "view": view})
+    return _render("overview.html", record, cell, {**parts, **_beside(beside)})
+
+
+def _beside(beside: Beside) -> dict[str, str]:
+    """What a template is given of it."""
+    return {name: beside.get(name, "") for name in ("view", "still", "floor_plan")}  # type: ignore[misc]
 
 
 def view_beside(place: str) -> str:

@@ -16,12 +16,14 @@ class ShownSolid:
         shape: The solid.
         X_WS: Its pose in the world, shape (4, 4).
         material: Name of its colour.
+        robot: Name of the robot that moves it; None in the surroundings.
     """
 
     name: str
     shape: Solid
     X_WS: Array
     material: str
+    robot: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -31,9 +31,9 @@ def still_svg(picture: StillPicture) -> str:
     body = painter.paths(picture.solids, picture.lines)
     enlarged = "" if window is None else detail(picture, camera, window, painter.classes)
     used = [(name, picture.materials[key], tone) for (key, tone), name in painter.classes.items()]
-    light, dark = rules(".still", used)
+    light, dark = rules(".still-sheet", used)
     parts = [
-        f'<svg class="still" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" '
+        f'<svg class="still-sheet" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" '
         'aria-labelledby="still-title still-desc">',
         f'<title id="still-title">{escape(picture.title)}</title>',
         f'<desc id="still-desc">{escape(_described(picture))}</desc>',

@@ -5,14 +5,15 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.shapes import bounding_box
 from cellplan.report.still.camera import view_axes
-from cellplan.report.still.picture import StillPicture
+from cellplan.report.still.picture import ShownSolid, StillPicture
 
-AZIMUTHS: Final = np.radians(np.arange(-60.0, 300.0, 15.0))  # the first ones are preferred among equals
+AZIMUTHS: Final = np.radians(np.arange(-50.0, 310.0, 15.0))  # the first ones are preferred among equals
 ELEVATIONS: Final = np.radians((28.0, 16.0, 42.0, 60.0, 90.0))
 IN_SIGHT: Final = 2.0  # weight of the share of points that nothing hides
+ROBOTS_IN_SIGHT: Final = 1.0  # weight of the share of the robots that the surroundings do not hide
 UNSHORTENED: Final = 1.5  # weight of the length of the connection on the sheet by its true length
 ENOUGH: Final = 0.94  # [-] of that: more is not better
 WIDE: Final = 0.25  # weight of how much of the sheet the cell fills
@@ -33,6 +34,7 @@ def best_axes(picture: StillPicture, aspect: float) -> Array:
     choices = [(view_axes(a, e), usual) for e, usual in zip(ELEVATIONS, USUAL, strict=True) for a in AZIMUTHS]
     axes = np.array([each for each, _ in choices])
     scores = np.array([usual for _, usual in choices]) + WIDE * _filled(picture, axes, aspect)
+    scores += ROBOTS_IN_SIGHT * _robots_in_sight(picture, axes[:, 2])
     if len(picture.mark):
         scores += IN_SIGHT * _in_sight(picture, axes[:, 2])
     if len(picture.mark) == 2:
@@ -49,17 +51,30 @@ def _in_sight(picture: StillPicture, toward: Array) -> Array:
     points = np.array([point for point, _ in sights])
     hidden = np.zeros((len(toward), len(points)), dtype=bool)
     for solid in picture.solids:
-        counts = np.array([solid.name not in own for _, own in sights])
-        middle, half = bounding_box(solid.shape)
-        R, p = solid.X_WS[:3, :3], solid.X_WS[:3, 3]
-        start = (points - p) @ R - middle  # in the frame of the solid, shape (P, 3)
-        step = (toward @ R)[:, None]
-        step = np.where(np.abs(step) < PARALLEL, PARALLEL, step)
-        first, second = (-half - start) / step, (half - start) / step
-        enters = np.minimum(first, second).max(axis=-1)
-        leaves = np.maximum(first, second).min(axis=-1)
-        hidden |= (leaves > np.maximum(enters, 0.0)) & counts
+        hidden |= _hides(solid, points, toward) & np.array([solid.name not in own for _, own in sights])
     return 1.0 - hidden.mean(axis=1)
+
+
+def _robots_in_sight(picture: StillPicture, toward: Array) -> Array:
+    """Share of what robots move that the surroundings do not hide, for directions to the viewer of shape (D, 3)."""
+    points = np.array([solid.X_WS[:3, 3] for solid in picture.solids if solid.robot is not None]).reshape(-1, 3)
+    hidden = np.zeros((len(toward), len(points)), dtype=bool)
+    for solid in picture.solids:
+        if solid.robot is None:
+            hidden |= _hides(solid, points, toward)
+    return 1.0 - hidden.mean(axis=1) if len(points) else np.ones(len(toward))
+
+
+def _hides(solid: ShownSolid, points: Array, toward: Array) -> Flags:
+    """Whether the box round a solid lies before points, shape (P, 3), seen from directions, shape (D, 3)."""
+    middle, half = bounding_box(solid.shape)
+    R, p = solid.X_WS[:3, :3], solid.X_WS[:3, 3]
+    start = (points - p) @ R - middle  # in the frame of the solid
+    step = (toward @ R)[:, None]
+    step = np.where(np.abs(step) < PARALLEL, PARALLEL, step)
+    first, second = (-half - start) / step, (half - start) / step
+    enters = np.minimum(first, second).max(axis=-1)
+    return np.maximum(first, second).min(axis=-1) > np.maximum(enters, 0.0)
 
 
 def _sights(picture: StillPicture) -> Iterator[tuple[Array, tuple[str, ...]]]:
