@@ -120,7 +120,7 @@
 
   // Boxes that scroll can be scrolled by keys; what an address leads to is unfolded.
   const wide = () => {
-    for (const box of document.querySelectorAll(".wide, .plot"))
+    for (const box of document.querySelectorAll(".wide, .plot, .floor-plan div"))
       if (box.scrollWidth > box.clientWidth) box.tabIndex = 0;
       else box.removeAttribute("tabindex");
   };
