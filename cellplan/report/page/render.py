@@ -12,7 +12,7 @@ from cellplan.report.page.checks import check_groups, failure_groups
 from cellplan.report.page.figures import key_figures
 from cellplan.report.page.filters import fixed, floored, percent, power, range_bar, small, worst
 from cellplan.report.page.first_screen import MAX_SPEEDS, clearance_shift, not_judged, process_speeds, worst_instant
-from cellplan.report.page.links import file_links
+from cellplan.report.page.links import FLOOR_PLAN, STILL, Links, file_links
 from cellplan.report.page.scripts import SCRIPTS, page_scripts
 from cellplan.report.page.time_line import task_times, time_line
 from cellplan.report.page.times import Shifts, TimeLinks, page_begin, phase_begins
@@ -57,9 +57,11 @@ class Beside(TypedDict, total=False):
     """What lies beside a page, and the pictures in it; what is left out is empty."""
 
     view: Annotated[str, "where the 3-D page lies from there"]
-    still: Annotated[str, "picture of `worst_instant(record)` as the text of an SVG element"]
-    floor_plan: Annotated[str, "floor plan as the text of an SVG element"]
-    files: Annotated[Collection[str], "names in the run folder that not every run has: joint tables, floor plans"]
+    still: Annotated[
+        str, "picture of `worst_instant(record)` as the text of an SVG element; `still.svg` lies beside it"
+    ]
+    floor_plan: Annotated[str, "floor plan, likewise; `floor_plan.svg`"]
+    files: Annotated[Collection[str], "names of the joint tables in the run folder, as `tables/kuka.csv`"]
 
 
 def report_page(
@@ -82,7 +84,7 @@ def report_page(
         "method": list(method_lines(record["solver"], record["step_s"])),
         "plots": _inline_plots(plots),
         "task_times": task_times(record, cell),
-        "links": file_links(beside.get("files", ()), drawings, phase=record["phase"], has_series=True),
+        "links": _links(record, drawings, beside),
     }
     return _render("report.html", record, cell, parts | _shared_parts(record, cell, beside))
 
@@ -95,8 +97,15 @@ def overview_page(record: Record, *, cell: Cell, **beside: Unpack[Beside]) -> st
         cell: The cell.
         **beside: What lies beside it, and its pictures.
     """
-    parts = {"links": file_links(beside.get("files", ()), (), phase=None, has_series=False)}
+    parts = {"links": _links(record, (), beside)}
     return _render("overview.html", record, cell, parts | _shared_parts(record, cell, beside))
+
+
+def _links(record: Record, plots: Iterable[str], beside: Beside) -> dict[str, Links]:
+    """Files that a page leads to."""
+    names = ["report.json"] if "runs" in record else ["report.json", "series.json"]
+    names += [name for name, text in ((STILL, beside.get("still")), (FLOOR_PLAN, beside.get("floor_plan"))) if text]
+    return file_links(beside.get("files", ()), plots, names, phase=record.get("phase"))
 
 
 def _shared_parts(record: Record, cell: Cell, beside: Beside) -> dict[str, object]:

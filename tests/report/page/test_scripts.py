@@ -67,10 +67,9 @@ def test_links_lead_to_files_of_the_run_and_to_each_of_its_tables(sound: Path, t
 
 
 def test_names_that_are_no_addresses_are_quoted() -> None:
-    links = file_links(["tables/a b%#.csv", "rejected/x.csv", "floor_plan.svg"], ["t?.svg"], phase="p", has_series=True)
+    links = file_links(["tables/a b%#.csv", "rejected/x.csv"], ["t?.svg"], ["report.json"], phase="p")
 
     assert links["Joint tables"] == [("a b%#", "../tables/a%20b%25%23.csv")]
     assert links["Joint tables of a failed run, not for use"] == [("x", "../rejected/x.csv")]
-    assert links["Floor plan"] == [("floor_plan.svg", "../floor_plan.svg")]
     assert links["Plots"] == [("t?", "plots/t%3F.svg")]
-    assert ("series.json", "series.json") in links["Results"]
+    assert [address for _, address in links["Results"]] == ["report.json", "../cell.yaml", "../manifest.json"]
