@@ -178,14 +178,14 @@ CHOSEN = """
   at.click();
   await drawn();
   const link = document.querySelector("#chosen a");
-  const cursor = document.querySelector(".cursor");
+  const cursor = document.querySelector(".strip-cursor");
   const shown = [heard[0], Number(at.dataset.at), link.getAttribute("href"), !document.getElementById("chosen").hidden];
   shown.push(parseFloat(cursor.style.left) / 100 * Number(document.querySelector(".strips").dataset.total));
   const span = document.querySelector(".span.work");
   span.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
   shown.push(heard[1], Number(span.dataset.at));
   document.querySelector("#chosen button").click();
-  shown.push(document.getElementById("chosen").hidden, document.querySelectorAll(".cursor").length);
+  shown.push(document.getElementById("chosen").hidden, document.querySelectorAll(".strip-cursor").length);
   return shown;
 """
 
