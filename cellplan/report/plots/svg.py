@@ -48,14 +48,15 @@ def _head(found: Placed) -> Iterator[str]:
     """The opening tag, what the figure shows in words, its style for dark pages and its paper."""
     figure = found.figure
     size = f"{found.width:.6g} {found.height:.6g}"
-    title = figure.title or figure.panels[0].title
+    title, kind = figure.title or figure.panels[0].title, "exact" if figure.is_exact else "figure"
     yield (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" role="img" data-columns="{figure.columns}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" role="img" class="{kind}" '
         f'font-family="{FONT}" stroke-linejoin="round">'
     )
     yield f"<title>{escape(title)}</title>"
     yield f"<desc>{escape(figure.text or _description(figure))}</desc>"
-    yield f"<style>{dark_rules()}</style>"
+    if not figure.is_exact:
+        yield f"<style>{dark_rules()}</style>"
     yield f'<rect class="paper" width="{found.width:.6g}" height="{found.height:.6g}" fill="{PAPER}"/>'
 
 
@@ -94,7 +95,7 @@ def _panels(found: Placed) -> Iterator[str]:
         )
         width, height = round(FINE * box.width), round(FINE * box.height)
         size = f'width="{box.width:.6g}" height="{box.height:.6g}" viewBox="0 0 {width} {height}"'
-        yield f'<svg class="box" {size} overflow="visible" fill="none">'
+        yield f'<svg class="box" {size} overflow="{"hidden" if is_plane else "visible"}" fill="none">'
         yield from _forbidden(box)
         if not is_plane:
             yield f'<path class="grid" d="{_grid(box)}" stroke="{GRID}" stroke-width="80"/>'
@@ -142,7 +143,8 @@ def _item(box: PlacedPanel, item: object) -> Iterator[str]:
         (left, right), (bottom, top) = box.across(np.array(item.x)).tolist(), box.down(np.array(item.y)).tolist()
         place = f'x="{_fine(left)}" y="{_fine(top)}" width="{_fine(right) - _fine(left)}"'
         opacity = f' fill-opacity="{item.opacity:g}"' if item.opacity < 1.0 else ""
-        yield f'<rect {place} height="{_fine(bottom) - _fine(top)}" fill="{item.colour}"{opacity}/>'
+        fill = f'fill="{item.colour}"{opacity} shape-rendering="crispEdges"'
+        yield f'<rect {place} height="{_fine(bottom) - _fine(top)}" {fill}/>'
     elif isinstance(item, Limit):
         line = f"M{_fine(box.across(item.value))} 0V{round(FINE * box.height)}"
         if not item.is_vertical:

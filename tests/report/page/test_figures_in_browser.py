@@ -216,7 +216,7 @@ def test_print_shows_what_is_in_the_files(page: Path, browser: Browser) -> None:
     printed = ask(
         browser,
         f"dispatchEvent(new Event('beforeprint')); tell(1.0); const svg = figure('{MARGINS}'); "
-        "return [svg.getAttribute('viewBox'), getComputedStyle(svg.querySelector('.cursor')).display];",
+        "return [svg.getAttribute('viewBox'), getComputedStyle(svg.querySelector('.figure-cursor')).display];",
     )
     browser.command("Emulation.setEmulatedMedia", media="")
 

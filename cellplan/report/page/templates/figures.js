@@ -33,7 +33,7 @@
     const marks = [...box.querySelectorAll("path.mark")].map((path) => ({ path, d: path.getAttribute("d") }));
     const ends = [...group.children].filter((each) => each.getAttribute("text-anchor") === "end" && !each.matches(".tick-y"));
     const [width, height] = numbers("size");
-    const cursor = make("g", { class: "cursor" }, group);
+    const cursor = make("g", { class: "figure-cursor" }, group);
     return {
       group, box, left, top, width, height, curves, marks, ends, cursor, frame: group.querySelector("path.frame"),
       x: numbers("x"), y: numbers("y"), view: numbers("x"), isLog: "log" in group.dataset, unit: group.dataset.unit ?? "",
@@ -362,7 +362,7 @@
   status.className = "figure-status";
   status.setAttribute("role", "status");
   document.body.append(status);
-  for (const svg of document.querySelectorAll("figure > svg")) {
+  for (const svg of document.querySelectorAll("figure > svg.figure")) {
     const figure = readFigure(svg);
     if (!figure.panels.length) continue;
     figures.push(figure);
