@@ -69,6 +69,11 @@ def floor_plan(
     )
 
 
+def swept_state(duration: float) -> str:
+    """What the floor plan of a run shows, which takes a time in [s]."""
+    return f"Robots at the start, and what they sweep in {duration:.3f} s"
+
+
 def schedule_paths(schedule: Schedule) -> dict[str, Array]:
     """Points along the path of every task of a run in [m], shape (N, 3) each."""
     found = {}
