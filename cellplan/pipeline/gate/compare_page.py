@@ -12,8 +12,7 @@ from cellplan.pipeline.gate.equal_text import first_difference
 from cellplan.pipeline.gate.picture_text import foreign_piece
 from cellplan.report.page.render import has_view_links, overview_page, report_page, view_beside
 from cellplan.report.plots.rendering import pictures
-from cellplan.report.plots.run import clearance_sheets, motion_sheets
-from cellplan.report.plots.sheet import Sheet
+from cellplan.report.plots.run import run_sheets
 from cellplan.report.record.common import Provenance, Record
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
@@ -26,7 +25,7 @@ EXCERPT_LENGTH: Final = 40  # [characters] shown of a page from where it differs
 
 def drawn_again(motions: Sequence[VerifiedMotion]) -> Drawings:
     """The pictures of what was found, by the place of the run and by file name."""
-    return {motion.name or "": pictures(_sheets(motion, motion.cell)) for motion in motions}
+    return {motion.name or "": pictures(run_sheets(motion.report, cell=motion.cell)) for motion in motions}
 
 
 def page_findings(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], drawn: Drawings) -> Iterator[str]:
@@ -73,16 +72,11 @@ def _foreign_pieces(stored: StoredRun, place: str, drawn: Mapping[str, bytes]) -
                 yield f"{file}: unexpected {foreign}, which cellplan does not draw; solve the cell again"
 
 
-def _sheets(motion: VerifiedMotion, cell: Cell) -> dict[str, Sheet]:
-    """The plots of one run by name, in their order."""
-    return motion_sheets(motion.report, cell=cell) | clearance_sheets(motion.report, cell=cell)
-
-
 def _page_finding(
     stored: StoredRun, place: str, *, cell: Cell, motion: VerifiedMotion, record: Record
 ) -> Iterator[str]:
     """What is wrong with the page of one run."""
-    desired, drawings = [f"{name}.svg" for name in _sheets(motion, cell)], stored.drawings(place)
+    desired, drawings = [f"{name}.svg" for name in run_sheets(motion.report, cell=cell)], stored.drawings(place)
     if sorted(drawings) != sorted(desired):
         names = f"expected the pictures {listed(desired)}, got {listed(drawings)}"
         yield f"{stored.file(place, 'plots')}: {names}; solve the cell again"

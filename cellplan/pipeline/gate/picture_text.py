@@ -7,8 +7,11 @@ from xml.etree import ElementTree as ET
 
 from cellplan.io.input.findings import shown
 
-ELEMENTS: Final = frozenset({"svg", "metadata", "defs", "style", "g", "path", "text", "use"})
-ATTRIBUTES: Final = frozenset({"id", "style", "x", "y", "transform", "d", "xlink:href"})
+ELEMENTS: Final = frozenset({"svg", "path", "rect", "circle", "polygon", "text"})
+ATTRIBUTES: Final = frozenset(
+    {"x", "y", "width", "height", "cx", "cy", "r", "d", "points", "fill", "stroke", "stroke-width", "font-size"}
+    | {"text-anchor", "font-weight", "fill-opacity", "stroke-dasharray"}
+)
 SVG_START: Final = "<svg"
 PIECE: Final = re.compile(r"<[^<>]*>|[^<>]+|[<>]")
 TAG: Final = re.compile(r'</?([\w:]+)((?:\s+[\w:-]+="[^"<>]*")*)\s*/?>')
@@ -46,12 +49,7 @@ def _is_foreign(piece: str) -> bool:
     tag = TAG.fullmatch(piece)
     if tag is None or tag[1] not in ELEMENTS:
         return True
-    return any(
-        name not in ATTRIBUTES
-        or not LOCAL_VALUE.fullmatch(value)
-        or (name == "xlink:href" and not value.startswith("#"))
-        for name, value in ATTRIBUTE.findall(tag[2])
-    )
+    return any(name not in ATTRIBUTES or not LOCAL_VALUE.fullmatch(value) for name, value in ATTRIBUTE.findall(tag[2]))
 
 
 def _unbalanced(got: str) -> Iterator[str]:

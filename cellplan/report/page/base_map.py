@@ -1,5 +1,6 @@
-"""Files of a map: ``map.json``, ``map.html``, ``map.svg`` and ``map.png``."""
+"""Files of a map: ``map.json``, ``map.html`` and ``map.svg``."""
 
+from collections.abc import Collection
 from typing import Any
 
 from cellplan.model.report import CAUTION
@@ -9,13 +10,14 @@ from cellplan.report.plots.rendering import pictures
 from cellplan.report.record.common import Record, as_json
 
 
-def map_files(record: Record) -> dict[str, bytes]:
+def map_files(record: Record, formats: Collection[str] = ()) -> dict[str, bytes]:
     """Content of the files of a map by name.
 
     Args:
         record: As ``base_map`` returns it.
+        formats: Formats of the picture beside SVG.
     """
-    plots = pictures({"map": map_sheet(record)})
+    plots = pictures({"map": map_sheet(record)}, formats)
     return {
         "map.json": as_json(record).encode(),
         **plots,

@@ -1,6 +1,6 @@
 """Files of a comparison: ``study.json``, ``study.csv``, ``study.html`` and its plots."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from cellplan.model.report import CAUTION
@@ -21,14 +21,17 @@ PLOT_TITLES: Final = {
 }
 
 
-def comparison_files(record: Record, curves: Sequence[Record | None]) -> dict[str, bytes]:
+def comparison_files(
+    record: Record, curves: Sequence[Record | None], formats: Collection[str] = ()
+) -> dict[str, bytes]:
     """Content of the files of a comparison by name.
 
     Args:
         record: As ``comparison_record`` returns it.
         curves: Curves of each variant; None for one without a motion.
+        formats: Formats of the plots beside SVG.
     """
-    plots = {f"study-{name}": data for name, data in pictures(comparison_sheets(record, curves)).items()}
+    plots = {f"study-{name}": data for name, data in pictures(comparison_sheets(record, curves), formats).items()}
     drawings = {
         name.removeprefix("study-").removesuffix(".svg"): data.decode()
         for name, data in plots.items()

@@ -1,5 +1,6 @@
 """Files of a study: ``study.json``, ``study.csv``, ``study.html`` and its plot."""
 
+from collections.abc import Collection
 from typing import Final
 
 from cellplan.model.report import CAUTION
@@ -18,13 +19,14 @@ STATUS_TEXTS: Final = {
 }
 
 
-def study_files(record: Record) -> dict[str, bytes]:
+def study_files(record: Record, formats: Collection[str] = ()) -> dict[str, bytes]:
     """Content of the files of a study by name.
 
     Args:
         record: As ``study_record`` returns it.
+        formats: Formats of the plot beside SVG.
     """
-    plots = pictures(study_sheets(record))
+    plots = pictures(study_sheets(record), formats)
     return {
         "study.json": as_json(record).encode(),
         "study.csv": study_table(record).encode(),

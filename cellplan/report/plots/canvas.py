@@ -1,11 +1,11 @@
-"""Rendering of sheets as SVG and PNG in one style; the bytes depend on the sheets alone.
+"""Rendering of sheets as PNG and PDF in one style; the bytes depend on the sheets alone.
 
 The drawing primitives are rendered directly: the axes of the plotting library would take three times as long for the
 same picture.
 """
 
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -24,8 +24,7 @@ with no_backend():
 DPI = 110  # [1/inch] of the PNG files
 
 _STYLE: Any = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "cellplan",
+    "pdf.fonttype": 42,
     "text.parse_math": False,  # names may hold a dollar sign
     "text.hinting": "none",
     "font.family": "sans-serif",
@@ -36,11 +35,10 @@ _STYLE: Any = {
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
 }
-_METADATA: dict[str, dict[str, None]] = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}
 _OPTIONS: dict[str, dict[str, Any]] = {
-    "svg": {},
-    "png": {"dpi": DPI, "pil_kwargs": {"compress_level": 1}},
-}  # quick; files a twelfth larger
+    "png": {"dpi": DPI, "metadata": {"Software": None}, "pil_kwargs": {"compress_level": 1}},  # quick; a twelfth larger
+    "pdf": {"metadata": {"Creator": None, "Producer": None, "CreationDate": None}},
+}
 
 
 @contextmanager
@@ -52,17 +50,17 @@ def style() -> Iterator[None]:
         yield
 
 
-def paint(sheets: Mapping[str, Sheet]) -> dict[str, bytes]:
-    """Every sheet as SVG and PNG, by file name, without date and program name."""
-    files: dict[str, bytes] = {}
+def paint(sheet: Sheet, kind: str) -> bytes:
+    """A sheet as PNG or PDF, without date and program name.
+
+    Args:
+        sheet: The sheet.
+        kind: Name of the format.
+    """
+    buffer = io.BytesIO()
     with style():
-        for name, sheet in sheets.items():
-            figure = _figure(sheet)
-            for kind, options in _OPTIONS.items():
-                buffer = io.BytesIO()
-                figure.savefig(buffer, format=kind, metadata=_METADATA[kind], **options)
-                files[f"{name}.{kind}"] = buffer.getvalue()
-    return files
+        _figure(sheet).savefig(buffer, format=kind, **_OPTIONS[kind])
+    return buffer.getvalue()
 
 
 def _figure(sheet: Sheet) -> Figure:

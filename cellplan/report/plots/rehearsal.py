@@ -10,7 +10,6 @@ from cellplan.model.cell import Cell
 from cellplan.model.rehearsal import Rehearsal, RunRehearsal
 from cellplan.model.report import TaskAccuracy
 from cellplan.report.plots.palette import CLASSES, INK, LIMIT, ROBOTS
-from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import ORIENTATION, POSITION, ErrorKind, draw_error, readable_unit
 from cellplan.report.plots.sheet import Sheet
 from cellplan.report.record.rehearsal import EXECUTIONS, Pick
@@ -19,15 +18,15 @@ TITLES = {"before": "as solved", "after": "corrected from pass to pass", "in_pas
 MIN_SHOWN_MM = 1e-12  # errors below it are drawn there: a logarithm needs a floor
 
 
-def draw_rehearsal(rehearsal: Rehearsal) -> dict[str, bytes]:
-    """All plots as SVG and PNG, by file name (``before_<task>``, ``after_<task>``, ``rounds_<task>``, …)."""
+def rehearsal_sheets(rehearsal: Rehearsal) -> dict[str, Sheet]:
+    """All plots by name (``before_<task>``, ``after_<task>``, ``rounds_<task>``, …)."""
     sheets: dict[str, Sheet] = {}
     for run in rehearsal.runs:
         for place, errors in enumerate(run.trials[0].before):
             for name, pick in EXECUTIONS.items():
                 sheets |= _execution_sheets(rehearsal.cell, run, place, name=name, pick=pick)
             sheets |= _round_sheets(rehearsal.cell, run, errors.task)
-    return pictures(sheets)
+    return sheets
 
 
 def _execution_sheets(cell: Cell, run: RunRehearsal, place: int, *, name: str, pick: Pick) -> dict[str, Sheet]:

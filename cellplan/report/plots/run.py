@@ -12,7 +12,6 @@ from cellplan.model.report import ClearanceClass, ClosureAccuracy, Conditioning,
 from cellplan.model.task import Frame
 from cellplan.report.plots import palette
 from cellplan.report.plots.palette import INK, LIMIT
-from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.sheet import Sheet
 from cellplan.report.record.common import rounded_down
 
@@ -50,18 +49,13 @@ ORIENTATION = ErrorKind(
 )
 
 
-def draw_plots(report: Report, *, cell: Cell) -> dict[str, bytes]:
-    """All plots of one run as SVG and PNG, by file name (``task_<task>``, ``positions_<robot>``, …).
+def run_sheets(report: Report, *, cell: Cell) -> dict[str, Sheet]:
+    """All plots of one run by name (``task_<task>``, ``positions_<robot>``, …).
 
     Args:
         report: What is drawn.
         cell: Where tolerances, the required clearance and the order of the robots come from.
     """
-    return pictures(motion_sheets(report, cell=cell) | clearance_sheets(report, cell=cell))
-
-
-def motion_sheets(report: Report, *, cell: Cell) -> dict[str, Sheet]:
-    """All plots of one run but that of the clearance, which is known last, by name."""
     sheets: dict[str, Sheet] = {}
     colours = palette.robot_colours(cell)
     for accuracy in report.accuracy:
@@ -74,17 +68,13 @@ def motion_sheets(report: Report, *, cell: Cell) -> dict[str, Sheet]:
         sheets[f"velocities_{robot}"] = _velocities_sheet(robot, uses, report, colours[robot])
     if report.conditioning is not None:
         sheets["singularity"] = _singularity_sheet(report.conditioning, report.times, colours)
+    sheets["clearance"] = _clearance_sheet(report, cell.checks.clearance)
     return sheets
 
 
 def _moving(report: Report) -> list[str]:
     """Names of the robots that move at all."""
     return [name for name, q in report.q.items() if np.any(q != q[0])]
-
-
-def clearance_sheets(report: Report, *, cell: Cell) -> dict[str, Sheet]:
-    """The plot of the clearance over time, by name."""
-    return {"clearance": _clearance_sheet(report, cell.checks.clearance)}
 
 
 def _task_sheet(accuracy: TaskAccuracy, times: Array, cell: Cell) -> Sheet:

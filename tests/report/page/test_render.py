@@ -12,7 +12,8 @@ from cellplan.model.cell import LockedJoint
 from cellplan.model.report import Check, JointDrift, Repeatability
 from cellplan.report.page import render
 from cellplan.report.page.render import overview_page, report_page
-from cellplan.report.plots.run import draw_plots
+from cellplan.report.plots.rendering import pictures
+from cellplan.report.plots.run import run_sheets
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
 
@@ -64,7 +65,7 @@ class Page(HTMLParser):
 
 
 def page_of(run: Any, plots: dict[str, bytes] | None = None) -> str:
-    drawn = draw_plots(run.report, cell=run.cell) if plots is None else plots
+    drawn = pictures(run_sheets(run.report, cell=run.cell)) if plots is None else plots
     record = run_record(run.report, cell=run.cell, provenance=run.provenance)
     return report_page(record, run.report.checks, cell=run.cell, plots=drawn)
 

@@ -9,8 +9,9 @@ import pytest
 PROGRAM = """
 import os, sys
 before = os.environ.get("MPLBACKEND")
-from cellplan.report.plots.rendering import warm_up
-warm_up()
+from cellplan.report.plots.canvas import paint
+from cellplan.report.plots.sheet import Sheet
+paint(Sheet("0", rows=1, columns=1, times=(0.0, 1.0)), "png")
 import matplotlib
 assert os.environ.get("MPLBACKEND") == before
 print(matplotlib.rcParams._get("backend"))

@@ -12,9 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cellplan.errors import InputError
 from cellplan.model.report import Conditioning
-from cellplan.report.plots.run import draw_plots
+from cellplan.report.plots.rendering import pictures, require_formats
+from cellplan.report.plots.run import run_sheets
 from cellplan.report.plots.sheet import nice_ticks, peaks_kept
+
+
+def draw_plots(report: Any, *, cell: Any, formats: Any = ()) -> dict[str, bytes]:
+    return pictures(run_sheets(report, cell=cell), formats)
 
 
 def text_of(svg: bytes) -> list[str]:
@@ -26,22 +32,15 @@ def drawn(failed_run: Any) -> dict[str, bytes]:
     return draw_plots(failed_run.report, cell=failed_run.cell)
 
 
-def test_every_plot_of_the_thesis_is_drawn_twice(drawn: dict[str, bytes]) -> None:
+def test_every_plot_of_the_thesis_is_drawn(drawn: dict[str, bytes]) -> None:
     names = [f"task_{task}" for task in ("circle", "rhombus", "rectangle")]
     names += [f"{kind}_{robot}" for robot in ("reis", "kuka", "abb", "staubli") for kind in ("positions", "velocities")]
     names += ["clearance", "singularity"]
-    assert set(drawn) == {f"{name}.{ending}" for name in names for ending in ("svg", "png")}
+    assert set(drawn) == {f"{name}.svg" for name in names}
 
 
 def test_pictures_are_whole(drawn: dict[str, bytes]) -> None:
-    for name, data in drawn.items():
-        if name.endswith(".svg"):
-            assert ET.fromstring(data).tag == "{http://www.w3.org/2000/svg}svg"  # noqa: S314
-        else:
-            assert data.startswith(b"\x89PNG\r\n\x1a\n")
-            width, height = struct.unpack(">II", data[16:24])
-            assert width == 1100
-            assert 300 < height < 700
+    assert {ET.fromstring(data).tag for data in drawn.values()} == {"{http://www.w3.org/2000/svg}svg"}  # noqa: S314
 
 
 def test_limits_are_written_beside_their_lines(drawn: dict[str, bytes]) -> None:
@@ -92,13 +91,26 @@ def test_error_of_zero_is_drawn_below_its_tolerance(passed_run: Any) -> None:
     assert "0.1" in words
 
 
-def test_same_run_gives_the_same_bytes_whatever_the_user_has_set(failed_run: Any, drawn: dict[str, bytes]) -> None:
-    with mpl.rc_context({"font.size": 20.0, "lines.linewidth": 7.0, "svg.hashsalt": "other", "savefig.dpi": 30}):
+def test_requested_formats_have_the_same_bytes_whatever_the_user_has_set(rail_run: Any) -> None:
+    sheets = {"clearance": run_sheets(rail_run.report, cell=rail_run.cell)["clearance"]}
+    drawn = pictures(sheets, ("png", "pdf"))
+    with mpl.rc_context({"font.size": 20.0, "lines.linewidth": 7.0, "pdf.compression": 0, "savefig.dpi": 30}):
         before = dict(mpl.rcParams)
-        again = draw_plots(failed_run.report, cell=failed_run.cell)
+        assert pictures(sheets, ["pdf", "png", "png"]) == drawn
         assert dict(mpl.rcParams) == before
-    assert again == drawn
-    assert not any(b"Date" in data or b"matplotlib" in data.lower() for data in drawn.values())
+    assert list(drawn) == ["clearance.svg", "clearance.pdf", "clearance.png"]
+    assert not any(b"Date" in data or b"atplotlib" in data for data in drawn.values())
+    assert drawn["clearance.pdf"].startswith(b"%PDF")
+    assert struct.unpack(">I", drawn["clearance.png"][16:20]) == (1100,)
+
+
+def test_formats_that_cannot_be_written_are_refused_before_anything_is_drawn(monkeypatch: Any) -> None:
+    with pytest.raises(InputError, match="expected one of png, pdf, got 'gif'"):
+        require_formats(["png", "gif"])
+    monkeypatch.setattr("cellplan.report.plots.rendering.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"plots as PDF: matplotlib is not installed; run 'pip install \"cellplan"):
+        require_formats(["pdf"])
+    assert pictures({}, ()) == {}
 
 
 def test_robot_that_stands_still_and_a_clock_of_two_samples_can_be_drawn(rail_run: Any) -> None:
