@@ -5,10 +5,11 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any, Final
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check
+from cellplan.report.page.compiled import TEMPLATES, CompiledTemplates
 from cellplan.report.page.figures import key_figures
 from cellplan.report.page.filters import fixed, floored, percent, power, range_bar, small, worst
 from cellplan.report.plots.palette import ROBOTS, robot_colours
@@ -159,12 +160,13 @@ def template(name: str) -> Template:
 @cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=PackageLoader("cellplan.report.page", "templates"),
+        loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.bytecode_cache = CompiledTemplates(environment)
     environment.filters |= {
         "fixed": fixed,
         "small": small,
