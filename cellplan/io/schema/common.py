@@ -118,9 +118,7 @@ Direction = Annotated[
 class Entry(BaseModel):
     """A mapping of a file: unknown keys, converted types and numbers that are not finite are refused."""
 
-    model_config: ClassVar[ConfigDict] = ConfigDict(
-        extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True
-    )
+    model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
 class PoseEntry(Entry):

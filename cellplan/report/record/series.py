@@ -9,7 +9,8 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.motion import Motion
-from cellplan.model.report import JointUse, Report
+from cellplan.model.report import ClearanceReport, JointUse, Report
+from cellplan.model.units import MM
 from cellplan.report.record.common import SIGNIFICANT
 
 SCHEMA: Final = "cellplan.series/1"
@@ -23,8 +24,9 @@ Tree = dict[str, Any]  # by name: trees, arrays of shape (K,), whole numbers, te
 def series(report: Report, motion: Motion | None = None) -> Tree:
     """Quantities along the motion in printed units.
 
-    Every n-th sample is kept, and the last one. Quantities of a step, velocities among them, have one value less than
-    there are samples: the k-th value belongs to the step of the clock that begins at the k-th kept sample.
+    Every n-th sample is kept, and the last one; the clearance has times of its own. Quantities of a step, velocities
+    among them, have one value less than there are samples: the k-th value belongs to the step of the clock that begins
+    at the k-th kept sample.
 
     Args:
         report: The run.
@@ -52,6 +54,7 @@ def series(report: Report, motion: Motion | None = None) -> Tree:
             )
             for robot, q in report.q.items()
         },
+        "clearance": _clearance_series(report.clearance),
         "iterations": None if motion is None or motion.iterations is None else motion.iterations[steps],
         "slack": None if motion is None or motion.slack is None else motion.slack[steps],
     }
@@ -68,6 +71,13 @@ def _of_stack(report: Report) -> dict[str, Array]:
         "squared_condition": conditioning.squared_condition,
         "manipulability": conditioning.manipulability,
     }
+
+
+def _clearance_series(clearance: ClearanceReport) -> Tree:
+    """What each class of pairs keeps over time; nothing where the curves were not worked out."""
+    if not clearance.curves:
+        return {}
+    return {"times_s": clearance.curve_times} | {f"{kind}_mm": MM * kept for kind, kept in clearance.curves.items()}
 
 
 def _joint_series(uses: Iterable[JointUse], *, q: Array, qd: Array) -> Tree:
