@@ -44,7 +44,7 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     },
     "verifying tools, joints, conditioning": {"cellplan.checks.verify": ("verify_motion", "with_clearance")},
     "certifying the clearance": {"cellplan.checks.clearance.check": ("check_clearance",)},
-    "plots": {"cellplan.report.plots.run": ("run_sheets",), "cellplan.report.plots.rendering": ("pictures",)},
+    "plots": {"cellplan.report.plots.run": ("run_figures",), "cellplan.report.plots.rendering": ("pictures",)},
     "report.json": {"cellplan.report.record.run": ("run_record",), "cellplan.report.record.series": ("series_json",)},
     "report.html": {"cellplan.report.page.render": ("report_page",)},
     "writing the run folder": {

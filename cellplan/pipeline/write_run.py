@@ -15,9 +15,9 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.report.page.render import overview_page, report_page, view_beside
+from cellplan.report.page.render import Beside, overview_page, report_page, view_beside
 from cellplan.report.plots.rendering import pictures, require_formats
-from cellplan.report.plots.run import run_sheets
+from cellplan.report.plots.run import run_figures
 from cellplan.report.record.common import Provenance, Record, as_json
 from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series_json
@@ -65,20 +65,24 @@ def write_run(
     require_formats(formats)
     cell, program = solution.cell, solution.program
     provenance = Provenance(versions=versions(), digests={"program": program_digest(program.tables)})
+    released = "tables" if solution.passed else "rejected"
+    has_tables = solution.passed or keep_rejected
+    tables = [f"{released}/{name}.csv" for name in (*program.tables, CLOCK)] if has_tables else []
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            page = view_beside(run.name or "") if view else ""
-            record = _write_report(target, run.cell_of(cell), run, provenance, formats, page)
+            beside = Beside(view=view_beside(run.name or "") if view else "", files=tables)
+            record = _write_report(target, run.cell_of(cell), run, provenance, formats, beside)
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
             transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
             record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers)
             target.write_text("report.json", as_json(record))
-            target.write_text("report.html", overview_page(record, cell=cell, view=view_beside("") if view else ""))
+            beside = Beside(view=view_beside("") if view else "", files=tables)
+            target.write_text("report.html", overview_page(record, cell=cell, **beside))
         target.write_text("cell.yaml", render_cell(cell))
-        if solution.passed or keep_rejected:
-            _write_tables(target, program, "tables" if solution.passed else "rejected")
+        if has_tables:
+            _write_tables(target, program, released)
         manifest = render_manifest(cell, passed=solution.passed, versions=versions(), files=target.written)
         target.write_text(MANIFEST, manifest)
     return record
@@ -96,17 +100,17 @@ def versions() -> dict[str, str]:
 
 
 def _write_report(
-    target: RunFolder, cell: Cell, run: Run, provenance: Provenance, formats: Collection[str], view: str
+    target: RunFolder, cell: Cell, run: Run, provenance: Provenance, formats: Collection[str], beside: Beside
 ) -> Record:
     """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
     place = "" if run.name is None else f"{run.name}/"
     record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion, transfers=run.transfers)
     target.write_text(f"{place}report.json", as_json(record))
     target.write_text(f"{place}series.json", series_json(run.report, run.motion))
-    plots = pictures(run_sheets(run.report, cell=cell), formats)
+    plots = pictures(run_figures(run.report, cell=cell), formats)
     for name, picture in plots.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    page = report_page(record, run.report.checks, cell=cell, plots=plots, view=view)
+    page = report_page(record, run.report.checks, cell=cell, plots=plots, **beside)
     target.write_text(f"{place}report.html", page)
     return record
 

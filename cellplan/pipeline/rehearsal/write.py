@@ -10,7 +10,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.rehearsal import Rehearsal
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.render import rehearsal_page
-from cellplan.report.plots.rehearsal import rehearsal_sheets
+from cellplan.report.plots.rehearsal import rehearsal_figures
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.record.common import Provenance, Record, as_json
 from cellplan.report.record.rehearsal import rehearsal_record
@@ -39,7 +39,7 @@ def write_rehearsal(
     """
     progress("writing the rehearsal", 1.0)
     provenance = Provenance(versions=versions(), digests=_digests(rehearsal))
-    plots = pictures(rehearsal_sheets(rehearsal), formats)
+    plots = pictures(rehearsal_figures(rehearsal), formats)
     record = rehearsal_record(rehearsal, provenance=provenance)
     with RunFolder(folder) as target:
         for name, picture in plots.items():

@@ -5,28 +5,29 @@ from importlib.util import find_spec
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.report.plots.sheet import Sheet
+from cellplan.report.plots.figure import Figure
 from cellplan.report.plots.svg import svg_text
 
 FORMATS: Final = ("png", "pdf")  # that may be requested beside SVG
 
 
-def pictures(sheets: Mapping[str, Sheet], formats: Collection[str] = ()) -> dict[str, bytes]:
+def pictures(figures: Mapping[str, Figure], formats: Collection[str] = ()) -> dict[str, bytes]:
     """Every figure as SVG and in the requested formats, by file name.
 
     Args:
-        sheets: Figures by name.
+        figures: Figures by name.
         formats: Further formats, of ``FORMATS``.
 
     Raises:
         InputError: A format is unknown, or needs the plotting library, which is not installed.
     """
     require_formats(formats)
-    files = {f"{name}.svg": svg_text(sheet).encode() for name, sheet in sheets.items()}
+    files = {f"{name}.svg": svg_text(figure).encode() for name, figure in figures.items()}
     if formats:
         from cellplan.report.plots.canvas import paint
 
-        files |= {f"{name}.{kind}": paint(sheet, kind) for name, sheet in sheets.items() for kind in sorted({*formats})}
+        kinds = sorted({*formats})
+        files |= {f"{name}.{kind}": paint(figure, kind) for name, figure in figures.items() for kind in kinds}
     return files
 
 

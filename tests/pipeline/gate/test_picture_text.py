@@ -8,7 +8,7 @@ DRAWN = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 720 100">
 <path d="M0 1L2 3" fill="none" stroke="#123456"/>
 <text x="1" y="2" fill="#123456">0.5</text>
 <text x="3" y="4" fill="#123456">error in mm</text>
-<circle cx="1" cy="2" r="3" fill="#123456"/>
+<g class="panel" data-y="0 1" data-unit="mm"><text x="1" y="9">10⁻⁵</text></g>
 </svg>
 """
 
@@ -16,9 +16,11 @@ DRAWN = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 720 100">
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ("L2 3", "L2.5 3.25\nL4 -1e-5"),
+        ("L2 3", "L2.5 3.25 4-1e-5"),
         (">0.5<", ">−1.25e-7<"),
-        ("<circle", '<circle cx="9" cy="8" r="3"/><circle'),
+        ("<g ", '<path d="M1e-3 2H3V4" stroke="#123456"/><g '),
+        ('data-y="0 1"', 'data-y="-1e-09 1.5"'),
+        (">10⁻⁵<", ">10⁻⁶<"),
         ('<text x="3"', '<text x="3" y="9">1,000</text><text x="3"'),
         ("", ""),
     ],
@@ -42,6 +44,9 @@ def test_other_figures_and_curves_are_taken_for_rounding(old: str, new: str) -> 
         ("<path ", '<path onclick="1" ', "onclick"),
         ("<path ", "<path onclick='1' ", "onclick"),
         ("<path ", '<path style="display:none" ', "style"),
+        ('fill="none"', 'fill="#ffffff"', "ffffff"),
+        ('data-unit="mm"', 'data-unit="m"', "data-unit"),
+        ("M0 1L2 3", "M0 1L2 3)url(", "url("),
         ('fill="none"', 'fill="url(//localhost/m1)"', "url("),
         ("</svg>", '<image href="#m1"/></svg>', "<image"),
         ("<svg", "<!DOCTYPE svg [<!ENTITY e 'safe'>]><svg", "DOCTYPE"),

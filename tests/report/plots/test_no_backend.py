@@ -10,8 +10,9 @@ PROGRAM = """
 import os, sys
 before = os.environ.get("MPLBACKEND")
 from cellplan.report.plots.canvas import paint
-from cellplan.report.plots.sheet import Sheet
-paint(Sheet("0", rows=1, columns=1, times=(0.0, 1.0)), "png")
+from cellplan.report.plots.figure import Axis, Figure, Panel
+x = Axis(low=0.0, high=1.0)
+paint(Figure(title="0", x=x, panels=[Panel(title="0", y=x, items=[])]), "png")
 import matplotlib
 assert os.environ.get("MPLBACKEND") == before
 print(matplotlib.rcParams._get("backend"))
