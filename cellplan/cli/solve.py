@@ -70,7 +70,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
-        from cellplan.pipeline.solve import solve_in_parallel
+        from cellplan.pipeline.parallel import solve_in_parallel
         from cellplan.report.plots.rendering import require_formats
         from cellplan.report.text.run import summary_lines
 

@@ -7,7 +7,6 @@ from pathlib import PurePath
 from cellplan.checks.joints.joins import with_joins
 from cellplan.checks.verify import completed, stacked, verify_motion, with_clearance
 from cellplan.geometry.transforms import Array
-from cellplan.guard import ForkedWork
 from cellplan.io.run.clock_table import render_clock
 from cellplan.io.run.joint_tables import TableHeader, parse_table, program_digest, render_table, replace_header
 from cellplan.model.cell import Cell
@@ -48,20 +47,6 @@ def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -
     """
     scene, solution = solve_motion(cell, task=task, progress=progress)
     return certified(solution, scene, progress=progress)
-
-
-def solve_in_parallel(cell: Cell, *, task: str | None = None, progress: Progress = silent) -> Solution:
-    """Solve as ``solve`` does; the clearance is checked in copies of this process while it checks all else.
-
-    Args:
-        cell: The cell, as ``load_cell`` gives it.
-        task: Name of the only task to work on.
-        progress: Called with the stage and the fraction done.
-    """
-    with ForkedWork(progress) as work:
-        early = EarlyClearance(work.begin, with_curves=True) if work.is_possible else None
-        scene, solution = solve_motion(cell, task=task, progress=progress, early=early)
-        return certified(solution, scene, progress=progress, early=early)
 
 
 def solve_motion(
