@@ -37,15 +37,15 @@ def shared_solutions() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def one_processor() -> Iterator[None]:
-    """Commands draw their plots in this process: a child would import the plotting library for each of them."""
-    with mock.patch("cellplan.guard.background.processors", return_value=1):
+    """Commands do all in this process, whose solutions a session shares."""
+    with mock.patch("cellplan.guard.forked.processors", return_value=1):
         yield
 
 
 @pytest.fixture
 def two_processors(one_processor: None) -> Iterator[None]:
-    """Plots may be drawn in a child."""
-    with mock.patch("cellplan.guard.background.processors", return_value=2):
+    """Work may be done in copies of this process."""
+    with mock.patch("cellplan.guard.forked.processors", return_value=2):
         yield
 
 

@@ -70,7 +70,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
-        from cellplan.pipeline.solve import solve as solve_cell
+        from cellplan.pipeline.parallel import solve_in_parallel
         from cellplan.report.plots.rendering import require_formats
         from cellplan.report.text.run import summary_lines
 
@@ -89,7 +89,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         folder = output or Path("outputs") / changed.name
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:
-            solution = solve_cell(changed, task=task, progress=progress)
+            solution = solve_in_parallel(changed, task=task, progress=progress)
             record = _written(solution, folder, keep_rejected, plots or (), with_view)
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
     if as_json:

@@ -15,6 +15,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.cell_drawings import FLOOR_PLAN, STILL, DrawnPhase, phase_drawings, program_drawings
+from cellplan.pipeline.early_files import early_files, with_early_files
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.report.page.render import Beside, overview_page, report_page, view_beside
 from cellplan.report.plots.rendering import pictures, require_formats
@@ -103,15 +104,21 @@ def versions() -> dict[str, str]:
     return found
 
 
+def prepared(solution: Solution) -> Solution:
+    """The solution with what of its run folder does not depend on its clearance, which need not be known yet."""
+    versions()  # looked up here for the first time
+    return with_early_files(solution)
+
+
 def _write_report(
     target: RunFolder, cell: Cell, run: Run, provenance: Provenance, formats: Collection[str], beside: Beside
 ) -> Record:
     """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
-    place = "" if run.name is None else f"{run.name}/"
+    place, early = "" if run.name is None else f"{run.name}/", early_files(run)
     record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion, transfers=run.transfers)
     target.write_text(f"{place}report.json", as_json(record))
-    target.write_text(f"{place}series.json", series_json(run.report, run.motion))
-    plots = pictures(run_figures(run.report, cell=cell), formats)
+    target.write_text(f"{place}series.json", series_json(run.report, run.motion, head=early.series))
+    plots = pictures(run_figures(run.report, cell=cell), formats, drawn=early.drawn)
     for name, picture in plots.items():
         target.write_bytes(f"{place}plots/{name}", picture)
     beside |= _write_drawings(target, place, phase_drawings(DrawnPhase(cell, run.schedule, run.report)))

@@ -4,11 +4,12 @@ from collections.abc import Collection, Iterable, Mapping
 from functools import cache
 from typing import Annotated, Final, TypedDict, Unpack
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check
 from cellplan.report.page.checks import check_groups, failure_groups
+from cellplan.report.page.compiled import TEMPLATES, CompiledTemplates
 from cellplan.report.page.figures import key_figures
 from cellplan.report.page.filters import fixed, floored, percent, power, range_bar, small, worst
 from cellplan.report.page.first_screen import MAX_SPEEDS, clearance_shift, not_judged, process_speeds, worst_instant
@@ -168,12 +169,13 @@ def template(name: str) -> Template:
 @cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=PackageLoader("cellplan.report.page", "templates"),
+        loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.bytecode_cache = CompiledTemplates(environment)
     environment.filters |= {
         "fixed": fixed,
         "small": small,
