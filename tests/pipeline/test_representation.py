@@ -19,8 +19,12 @@ def test_results_are_one_line(solution: Solution) -> None:
     report, cell = solution.runs[0].report, solution.cell
     toolpath = build_toolpath(cell.tasks[0], cell.part)
 
-    assert repr(solution) == "<Solution of 'small-pair', simultaneous, passed>"
-    assert repr(report) == f"<Report of 'small-pair', simultaneous, 41 samples, passed: {len(report.checks)} checks>"
+    clearance = min(each.minimum for each in report.clearance.minima.values() if each.minimum is not None)
+    pair = next(" - ".join(each.pair) for each in report.clearance.minima.values() if each.minimum == clearance)
+    found = f"passed: {len(report.checks)} checks; smallest clearance {1e3 * clearance:.4g} mm, {pair}"
+    assert repr(solution) == f"<Solution of 'small-pair', simultaneous, 1 s, {found}>"
+    assert repr(report) == f"<Report of 'small-pair', simultaneous, 1 s, {found}>"
+    assert repr(solution.runs[0]) == f"<Run of 'small-pair', all tasks, 1 s, {found}>"
     assert repr(solution.motion) == "<Motion of 9 joints, 41 samples, 1 s>"
     assert repr(cell) == "<Cell 'small-pair': robots left, right, idle; tasks path; simultaneous>"
     assert repr(cell.robots[0]) == "<Robot 'left': left, 3 joints>"
