@@ -1,7 +1,8 @@
 """cellplan: offline programming and cell layout for cooperative robots that work on one moving part.
 
-From a cell file to a verified program, in four lines::
+From a cell file to a verified program, in a few lines::
 
+    from pathlib import Path
     from cellplan import load_cell, solve, write_run
     solution = solve(load_cell("cell.yaml"))
     print(solution)                      # the verdict in one line; a notebook shows figures and pictures

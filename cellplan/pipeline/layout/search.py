@@ -49,7 +49,9 @@ class LayoutResult(Presented):
 
     def __repr__(self) -> str:
         """One line without arrays."""
-        return f"<Layout of '{self.record['cell']}', {self.record['trials']} trials: {verdict_line(self.record)}>"
+        return (
+            f"<Layout search of '{self.record['cell']}', trials: {self.record['trials']}; {verdict_line(self.record)}>"
+        )
 
 
 @dataclass(slots=True, kw_only=True)

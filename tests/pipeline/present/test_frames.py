@@ -247,7 +247,7 @@ def test_records_of_all_studies_have_tables(cells: Path, tmp_path: Path) -> None
     vary = ["--vary", "right.base={x_mm: [1500, 2300], y_mm: [0, 600]}"]
     commands = {
         "layout": ["layout", pair, *quick, *vary, "--trials", "1"],
-        "map": ["map", pair, "--robot", "right", "--step", "400", "-q"],
+        "map": ["map", pair, "--robot", "right", "--grid", "400", "-q"],
         "fastest": ["fastest", pair, "-q"],
     }
     for name, command in commands.items():
