@@ -187,3 +187,11 @@ def test_rows_that_phases_share_count_to_the_later_one(tmp_path: Path) -> None:
     steps, speeds = np.diff(clock["time_s"]), np.asarray(columns[f"pen.{name}_s"])
     np.testing.assert_allclose(speeds[:-1] * steps, np.diff(joints[name]), atol=1e-7)
     assert np.isnan(speeds[-1])
+
+
+def test_numpy_reads_it_with_all_names(text: str, table: pd.DataFrame) -> None:
+    array = np.genfromtxt(io.StringIO(text), delimiter=",", names=True, deletechars="")
+
+    assert list(array.dtype.names) == list(table.columns)
+    for name in table.columns.drop("phase"):
+        assert np.array_equal(array[name], table[name], equal_nan=True)

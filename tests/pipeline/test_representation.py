@@ -1,6 +1,9 @@
 """Results print as one line without arrays; ``help(cellplan)`` lists the functions."""
 
+import dataclasses
+import inspect
 import pydoc
+import re
 from pathlib import Path
 
 import pytest
@@ -38,6 +41,21 @@ def test_a_check_shows_its_verdict_and_message(solution: Solution) -> None:
 
     assert repr(check) == f"<Check {check.name} of '{check.subject}' passed: {check.message}>"
     assert "\n" not in repr(check)
+
+
+def test_help_describes_every_parameter_and_every_attribute() -> None:
+    silent = []
+    for name in cellplan.__all__:
+        value = getattr(cellplan, name)
+        text = inspect.getdoc(value) or ""
+        named: list[str] = []
+        if dataclasses.is_dataclass(value):
+            named = [field.name for field in dataclasses.fields(value)]
+        elif inspect.isfunction(value):
+            named = [*inspect.signature(value).parameters]
+        silent += [f"{name}: {each}" for each in named if not re.search(rf"^ +{each}: ", text, re.MULTILINE)]
+
+    assert silent == []
 
 
 def test_help_lists_the_public_names_by_group() -> None:
