@@ -1,5 +1,13 @@
 """cellplan: offline programming and cell layout for cooperative robots that work on one moving part.
 
+From a cell file to a verified program, in a few lines::
+
+    from pathlib import Path
+    from cellplan import load_cell, solve, write_run
+    solution = solve(load_cell("cell.yaml"))
+    print(solution)                      # the verdict in one line; a notebook shows figures and pictures
+    write_run(solution, Path("outputs/cell"))
+
 The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
@@ -8,11 +16,15 @@ The public interface; everything else may change without notice:
 - verify: ``verify``, ``open_gate``
 - write: ``write_run``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``, ``write_repair``,
   ``export_program``; 3-D pages: ``view``, ``write_view``
+- show: ``tables``, ``to_frame``, ``to_html``: results as pandas frames, and in a notebook
 - inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``BaseGrid``,
   ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``, ``ViewRequest``
 - results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``,
-  ``LayoutResult``, ``Repair``
+  ``LayoutResult``, ``Repair``, ``VerifiedRun``
 - errors: ``CellplanError``
+
+All values are frozen data in metres, radians and seconds, with NumPy arrays; frames, pages and files are in mm, deg and
+s, with the unit in each name.
 
 Names are imported at first use, so that ``import cellplan`` and the help of the command line are fast.
 """
@@ -35,6 +47,7 @@ if TYPE_CHECKING:
     from cellplan.model.report import Check, Report
     from cellplan.model.task import Task
     from cellplan.model.toolpath import Toolpath
+    from cellplan.model.verified_run import VerifiedRun
     from cellplan.pipeline.base_map.grid import BaseGrid
     from cellplan.pipeline.base_map.judged import base_map, write_base_map
     from cellplan.pipeline.base_map.prepared import MapRequest
@@ -46,6 +59,8 @@ if TYPE_CHECKING:
     from cellplan.pipeline.gate.open_gate import open_gate
     from cellplan.pipeline.layout.request import LayoutRequest
     from cellplan.pipeline.layout.search import LayoutResult, search_layout
+    from cellplan.pipeline.present.frames import tables, to_frame
+    from cellplan.pipeline.present.notebook import to_html
     from cellplan.pipeline.rehearsal.rehearse import rehearse
     from cellplan.pipeline.rehearsal.write import write_rehearsal
     from cellplan.pipeline.repair.repair import Repair, repair
@@ -85,6 +100,7 @@ _HOME: Final = {
     "SweepJob": "pipeline.sweep",
     "Task": "model.task",
     "Toolpath": "model.toolpath",
+    "VerifiedRun": "model.verified_run",
     "ViewRequest": "pipeline.view.write",
     "base_map": "pipeline.base_map.judged",
     "compare": "pipeline.compare",
@@ -100,6 +116,9 @@ _HOME: Final = {
     "search_layout": "pipeline.layout.search",
     "solve": "pipeline.solve",
     "sweep": "pipeline.sweep",
+    "tables": "pipeline.present.frames",
+    "to_frame": "pipeline.present.frames",
+    "to_html": "pipeline.present.notebook",
     "verify": "pipeline.verify",
     "view": "pipeline.view.write",
     "write_base_map": "pipeline.base_map.judged",
@@ -134,6 +153,7 @@ __all__ = [
     "SweepJob",
     "Task",
     "Toolpath",
+    "VerifiedRun",
     "ViewRequest",
     "__version__",
     "base_map",
@@ -150,6 +170,9 @@ __all__ = [
     "search_layout",
     "solve",
     "sweep",
+    "tables",
+    "to_frame",
+    "to_html",
     "verify",
     "view",
     "write_base_map",

@@ -118,3 +118,7 @@ class DivergedError(NoSolutionError):
 
 class SelfTestError(CellplanError):
     """A start-up test of the collision engine failed: no verdict can be trusted."""
+
+
+class MissingPackageError(InputError, ImportError):
+    """An optional package is not installed; the message has the line that installs it."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cellplan.io.schema import errors_schema, json_schema, robot_table_schema
-from cellplan.report.record.schema import advice_schema, layout_schema, report_schema
+from cellplan.report.record.schema import advice_schema, layout_schema, report_schema, series_schema
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 PAGE, ERRORS_PAGE, REPORT_PAGE = FOLDER / "cell-file.md", FOLDER / "errors-file.md", FOLDER / "report-json.md"
@@ -74,6 +74,9 @@ REPORT_INTRODUCTION = """\
 This page is made from the types of the records by `docs/make_reference.py`; do not edit it by hand. `cellplan schema
 --report` prints the same as a JSON Schema (draft 2020-12).
 
+The schemas are kept as files, too: [report.schema.json](report.schema.json) and
+[series.schema.json](series.schema.json).
+
 `report.json` is the result of a run for scripts; `report.html` shows the same as a page. Equal input gives equal
 bytes.
 
@@ -111,31 +114,15 @@ before the next. It is what `--resume` reads, and no interface: its keys may cha
 `cellplan layout CELL --repair` writes `advice.json` (`cellplan.advice/1`) with the record [Advice](#advice); the guide
 is [Repair a cell](../guides/repair-a-cell.md).
 """
-SERIES = """
+SERIES_INTRODUCTION = """
 In the mode `pairwise` every task has a folder with a report of its own. The `report.json` above them is the
 [summary](#summary): the worst values of all of them; its `solver` holds no effort of steps.
 
-## Series
-
-`series.json` (`cellplan.series/1`) of every run holds the curves behind the numbers, one line for each array.
-
-| key | length | meaning |
-|---|---|---|
-| `schema` | | `cellplan.series/1` |
-| `every` | | n: every n-th sample is kept, and the last one |
-| `times_s` | K | times of the kept samples |
-| `tasks.TASK.position_error_mm` | K | distance from the desired position on the part |
-| `tasks.TASK.orientation_error_deg` | K | angle from the desired orientation |
-| `conditioning.smallest_singular_value` | K | of J, see [singularity](#singularity) |
-| `conditioning.condition`, `conditioning.squared_condition` | K | likewise |
-| `conditioning.manipulability` | K | likewise |
-| `joints.ROBOT.JOINT.position_deg` or `position_mm` | K | joint position |
-| `joints.ROBOT.JOINT.speed_deg_s` or `speed_mm_s` | K - 1 | joint velocity |
-| `clearance.times_s` | M | middles of some 200 blocks of the motion, its ends and the times of the minima |
-| `clearance.CLASS_mm` | M | distance that a class (`robot_robot`, …) keeps all through the block that holds the time |
-| `iterations` | K - 1 | evaluations of the tasks per step; `null` in the accurate mode |
-| `slack` | K - 1 | norm of the twist residual; `null` if the method has none |
-
+`series.json` (`cellplan.series/1`) of every run holds the curves behind the numbers, one line for each array. An array
+has a value for each of the K kept samples; velocities, `iterations` and `slack` have one for each of the K - 1 steps
+that begin at a kept sample. `cellplan schema --series` prints the JSON Schema.
+"""
+STEPS = """
 **Steps and samples.** A velocity belongs to the step between two samples: the difference of both positions divided by
 `step_s`. The k-th value of an array of length K - 1 belongs to the step that *begins* at the k-th sample. Add half of
 `step_s` to plot it at the middle of its step.
@@ -173,6 +160,14 @@ def main() -> None:
     ERRORS_PAGE.write_text(errors_reference(), encoding="utf-8")
     REPORT_PAGE.write_text(report_reference(), encoding="utf-8")
     LAYOUT_PAGE.write_text(layout_reference(), encoding="utf-8")
+    for name, text in schema_files().items():
+        (FOLDER / name).write_text(text, encoding="utf-8")
+
+
+def schema_files() -> dict[str, str]:
+    """JSON Schemas of the records of a run, by file name."""
+    schemas = {"report.schema.json": report_schema(), "series.schema.json": series_schema()}
+    return {name: json.dumps(schema, indent=2, ensure_ascii=False) + "\n" for name, schema in schemas.items()}
 
 
 def errors_reference() -> str:
@@ -188,9 +183,9 @@ def report_reference() -> str:
     summary = schema["$defs"]["SummaryRecord"]
     own = {key: field for key, field in summary["properties"].items() if run.get(key) != field}
     parts = [record_section(name, schema["$defs"][name]) for name in names]
-    return "".join(
-        [REPORT_INTRODUCTION, *parts, record_section("SummaryRecord", {**summary, "properties": own}), SERIES]
-    )
+    curves = [record_section(name, form) for name, form in series_schema()["$defs"].items()]
+    worst = record_section("SummaryRecord", {**summary, "properties": own})
+    return "".join([REPORT_INTRODUCTION, *parts, worst, SERIES_INTRODUCTION, *curves, STEPS])
 
 
 def layout_reference() -> str:
@@ -221,7 +216,8 @@ def record_value(field: dict[str, Any]) -> str:
     if not field.keys() - {"description"}:
         return "any value"
     if "anyOf" in field:
-        return " or ".join(record_value(arm) for arm in field["anyOf"])
+        arms = [record_value(arm) for arm in field["anyOf"]]
+        return (", or " if any(" or " in arm for arm in arms) else " or ").join(arms)
     if field["type"] == "array":
         return f"list: {record_value(field['items'])}"
     if field["type"] == "object":

@@ -1,16 +1,42 @@
-"""Every script in ``examples/`` runs and prints what it announces."""
+"""Every script in ``examples/`` runs and prints what it announces, and so does the notebook."""
 
 import runpy
+import shutil
 from pathlib import Path
 
+import nbformat
 import pytest
+from nbclient import NotebookClient
 
 import cellplan.planning.methods
 from cellplan.pipeline.export import EXPORTERS
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+NOTEBOOK = EXAMPLES / "gallery" / "first_look.ipynb"
 PRINTED = {
     "batch_of_cells": ["examples/plate.yaml: passed; smallest joint margin", "examples/missing.yaml: ", "no such file"],
+    "gallery/clearance_over_time": [
+        "passed: 25 checks",
+        "short tool  long tool",
+        "smallest distance of the robots: +7",
+    ],
+    "gallery/layout_result": ["<Layout search of 'planar-pair'", "robots.right.base.x_mm", "solved again: passed True"],
+    "gallery/solve_and_plot": [
+        "passed: 25 checks",
+        "picture: ",
+        "below half of the largest feed in 46% of the path's time",
+    ],
+    "gallery/sweep_into_frame": [
+        "0.4                failed",
+        "0.6                passed",
+        "20% reserve: 0.6 s",
+        "same table: True",
+    ],
+    "gallery/worst_moments": [
+        "smallest margin, right B at 0.000 s",
+        "smallest clearance, left/C - right/C at",
+        "subject  used",
+    ],
     "layout": ["certified after 1 trial, 1 solved", "solved again: passed True"],
     "own_exporter": ["written: left.json right.json"],
     "own_method": ["circle: 150 Euler steps, position error 0.2"],
@@ -21,18 +47,22 @@ PRINTED = {
     "verify_edited_table": ["as written: passed", "edited: position error of task 'circle': 0.159 mm at 1.480 s"],
 }  # by script: texts of its output, in their order
 WRITTEN = {
+    "gallery/solve_and_plot": ["outputs/examples/gallery/feed.png"],
     "layout": ["outputs/examples/layout/best.yaml", "outputs/examples/layout/study.html"],
     "own_exporter": ["outputs/examples/json/left.json", "outputs/examples/json/right.json"],
     "plot_joint": ["outputs/examples/joint.png"],
     "solve": ["outputs/examples/solve/report.html", "outputs/examples/solve/tables/right.csv"],
 }
+MARKS = dict.fromkeys(("gallery/layout_result", "gallery/sweep_into_frame"), pytest.mark.slow)  # with processes
 
 
 def test_every_example_is_run() -> None:
-    assert {path.stem for path in EXAMPLES.glob("*.py")} == set(PRINTED)
+    scripts = {path.relative_to(EXAMPLES).with_suffix("").as_posix() for path in EXAMPLES.rglob("*.py")}
+
+    assert scripts == set(PRINTED)
 
 
-@pytest.mark.parametrize("name", sorted(PRINTED))
+@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in sorted(PRINTED)])
 def test_an_example_runs_and_prints_what_it_announces(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -53,4 +83,34 @@ def test_an_example_runs_and_prints_what_it_announces(
 def test_every_example_is_linked(page: str) -> None:
     text = (EXAMPLES.parent / page).read_text(encoding="utf-8")
 
-    assert [name for name in PRINTED if f"examples/{name}.py)" not in text] == []
+    assert [name for name in PRINTED if "/" not in name and f"examples/{name}.py)" not in text] == []
+    gallery = (EXAMPLES / "gallery" / "README.md").read_text(encoding="utf-8")
+    assert "examples/gallery/README.md)" in text
+    assert [name for name in PRINTED if "/" in name and f"({name.partition('/')[2]}.py)" not in gallery] == []
+
+
+def test_the_notebook_is_kept_without_outputs() -> None:
+    book = nbformat.read(NOTEBOOK, as_version=4)
+    nbformat.validate(book)
+    code = [cell for cell in book.cells if cell.cell_type == "code"]
+
+    assert code
+    assert [cell for cell in code if cell.outputs or cell.execution_count] == []
+    assert len(NOTEBOOK.read_bytes()) < 10_000
+
+
+@pytest.mark.slow
+def test_the_notebook_runs_and_shows_results(tmp_path: Path) -> None:
+    shutil.copytree(EXAMPLES, tmp_path / "examples")
+    folder = tmp_path / "examples" / NOTEBOOK.parent.name
+    book = nbformat.read(NOTEBOOK, as_version=4)
+
+    NotebookClient(book, timeout=300, resources={"metadata": {"path": str(folder)}}).execute()
+
+    code = [cell for cell in book.cells if cell.cell_type == "code"]
+    shown = [output["data"] for cell in code for output in cell.outputs if output.output_type == "execute_result"]
+    pages = [data["text/html"] for data in shown if "✓ passed" in data.get("text/html", "")]
+    assert len(pages) == 1
+    assert all(set(data) >= {"text/plain", "text/html"} and len(data["text/html"]) < 200_000 for data in shown)
+    assert sum("✗ failed: " in data["text/html"] for data in shown) == 1
+    assert shown[0]["text/plain"].startswith("<Cell 'plate'")

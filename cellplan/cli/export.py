@@ -12,7 +12,10 @@ from cellplan.errors import ExitStatus, InputError
 
 SCHEMA = "cellplan.exported/1"
 
-Format = Annotated[str, typer.Option("--format", metavar="NAME", help="Format: csv.", show_default=False)]
+Format = Annotated[
+    str,
+    typer.Option("--format", metavar="NAME", help="Format: csv, or wide: one table of all robots.", show_default=False),
+]
 Output = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder (default: RUN/programs/<format>).")
 ]

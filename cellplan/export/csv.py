@@ -48,7 +48,7 @@ def read_csv(run: VerifiedRun, files: Mapping[str, str]) -> tuple[dict[str, Join
     """
     found = [
         {
-            robot: _read(run.cell.robot(robot), files[path], path)
+            robot: read_table(run.cell.robot(robot), files[path], path)
             for robot in tables
             for path in [file_name(name, robot)]
         }
@@ -62,27 +62,56 @@ def file_name(program: str | None, robot: str) -> str:
     return f"{robot}.csv" if program is None else f"{program}/{robot}.csv"
 
 
+def time_fields(times: Array) -> list[str]:
+    """Times of rows in [s], shape (N,), as fields of a row.
+
+    Raises:
+        InputError: A time is too large for the decimals of the format.
+    """
+    return _fields(rounded_quanta(times, DECIMALS, what=CLOCK) / 10.0**DECIMALS)
+
+
+def joint_fields(robot: Robot, q: Array) -> dict[str, list[str]]:
+    """Positions of the joints of a robot as fields of rows, by the name of their column, none beyond a limit.
+
+    Args:
+        robot: The robot.
+        q: Its joint positions in [rad] or [m], shape (N, n).
+
+    Raises:
+        InputError: A position cannot be written with the decimals of the format.
+    """
+    return {
+        f"{joint.name}_{joint.display_unit.name}": _fields(rounded_inside(joint, q[:, index], DECIMALS))
+        for index, joint in enumerate(robot.model.joints)
+    }
+
+
 def _render(robot: Robot, table: JointTable) -> str:
     """The file of one robot."""
-    times = rounded_quanta(table.times, DECIMALS, what=CLOCK) / 10.0**DECIMALS
-    columns = [times] + [
-        rounded_inside(joint, table.q[:, index], DECIMALS) for index, joint in enumerate(robot.model.joints)
-    ]
-    rows = (",".join(f"{number:.{DECIMALS}f}" for number in row) for row in zip(*map(_floats, columns), strict=True))
-    return "\n".join([_names(robot), *rows]) + "\n"
+    columns = [time_fields(table.times), *joint_fields(robot, table.q).values()]
+    return "\n".join([_names(robot), *map(",".join, zip(*columns, strict=True))]) + "\n"
 
 
-def _floats(column: Array) -> list[float]:
-    numbers: list[float] = column.tolist()
-    return numbers
+def _fields(column: Array) -> list[str]:
+    return [f"{number:.{DECIMALS}f}" for number in column.tolist()]
 
 
 def _names(robot: Robot) -> str:
     return ",".join([CLOCK, *(f"{joint.name}_{joint.display_unit.name}" for joint in robot.model.joints)])
 
 
-def _read(robot: Robot, text: str, file: str) -> JointTable:
-    """The table of one robot."""
+def read_table(robot: Robot, text: str, file: str) -> JointTable:
+    """Read the file of one robot, strictly.
+
+    Args:
+        robot: The robot.
+        text: Content of the file.
+        file: Its name in messages.
+
+    Raises:
+        InputError: With file and line, when the text is not such a file.
+    """
     names, _, rest = text.partition("\n")
     if names != _names(robot):
         raise InputError(f"{file}:1: expected the names '{_names(robot)}', got {names[:80]!r}")

@@ -64,6 +64,15 @@ def rpy_from_rotation(R: Array) -> Array:
     return np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
 
 
+def roll_pitch_yaw(R: Array) -> Array:
+    """Roll, pitch, yaw in [rad] of many rotation matrices, shape (N, 3, 3) to (N, 3); see ``rpy_from_rotation``."""
+    across = np.hypot(R[:, 0, 0], R[:, 1, 0])
+    is_plain = across >= SMALL_ANGLE
+    roll = np.where(is_plain, np.arctan2(R[:, 2, 1], R[:, 2, 2]), 0.0)
+    yaw = np.where(is_plain, np.arctan2(R[:, 1, 0], R[:, 0, 0]), np.arctan2(-R[:, 0, 1], R[:, 1, 1]))
+    return np.stack([roll, np.arctan2(-R[:, 2, 0], across), yaw], axis=1)
+
+
 def skew(v: Array) -> Array:
     """Cross-product matrices ``S(v)``, shape (..., 3, 3), with ``S(v) w = v x w``."""
     S = np.zeros((*v.shape[:-1], 3, 3))

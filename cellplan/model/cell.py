@@ -17,6 +17,7 @@ from cellplan.model.joint_spline import JointSpline
 from cellplan.model.layout import LayoutSettings
 from cellplan.model.mounting import Mount
 from cellplan.model.origin import Origin
+from cellplan.model.presented import Presented
 from cellplan.model.program import ProgramSettings
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.rod import Rod
@@ -278,7 +279,7 @@ class CheckSettings:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Cell:
+class Cell(Presented):
     """Robots, part, tasks and surroundings.
 
     Attributes:

@@ -8,6 +8,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.cell_errors import CellErrors, Draw
 from cellplan.model.motion import Program, Schedule
+from cellplan.model.presented import Presented
 from cellplan.model.report import Check, Report, TaskAccuracy
 
 Angles = tuple[float, float, float]
@@ -171,7 +172,7 @@ class RunRehearsal:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Rehearsal:
+class Rehearsal(Presented):
     """A program rehearsed on real cells.
 
     Attributes:
@@ -195,6 +196,13 @@ class Rehearsal:
     def passed(self) -> bool:
         """Whether the program is sound on the written cell and within tolerance on every real one."""
         return all(check.passed for check in self.checks)
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        failed = [check.message for check in self.checks if not check.passed]
+        found = f"failed: {failed[0]}" if failed else f"passed: {len(self.checks)} checks"
+        trials = len(self.runs[0].trials)
+        return f"<Rehearsal of '{self.cell.name}' on {trials} real {'cell' if trials == 1 else 'cells'}, {found}>"
 
     @property
     def is_released(self) -> bool:

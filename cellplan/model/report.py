@@ -12,7 +12,9 @@ from cellplan.model.between_rows import BetweenRows
 from cellplan.model.left_out import LeftOut
 from cellplan.model.payload import LoadUse
 from cellplan.model.phase import Phase
+from cellplan.model.presented import Presented
 from cellplan.model.units import DisplayUnit, joint_unit
+from cellplan.model.verdict import verdict
 
 CAUTION = (
     "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
@@ -333,7 +335,7 @@ class Repeatability:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Report:
+class Report(Presented):
     """The verdict of one run and everything behind it.
 
     Attributes:
@@ -395,6 +397,4 @@ class Report:
 
     def __repr__(self) -> str:
         """One line without arrays."""
-        failed = sum(not check.passed for check in self.checks)
-        verdict = f"failed: {failed} of {len(self.checks)} checks" if failed else f"passed: {len(self.checks)} checks"
-        return f"<Report of '{self.cell}', {self.mode}, {len(self.times)} samples, {verdict}>"
+        return f"<Report of '{self.cell}', {self.phase or self.mode}, {self.cycle_time:g} s, {verdict([self])}>"

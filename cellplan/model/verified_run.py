@@ -7,7 +7,9 @@ from typing import Final
 
 from cellplan.model.cell import Cell
 from cellplan.model.motion import JointTable, Motion, Schedule
+from cellplan.model.presented import Presented
 from cellplan.model.report import Report
+from cellplan.model.verdict import verdict
 
 ACCESS_TOKEN: Final = object()  # known to ``open_gate`` only
 
@@ -34,7 +36,7 @@ class VerifiedMotion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class VerifiedRun:
+class VerifiedRun(Presented):
     """A run folder that was read back, recomputed and found to be what its report says.
 
     Only ``cellplan.pipeline.gate.open_gate.open_gate`` makes one.
@@ -77,6 +79,11 @@ class VerifiedRun:
         return {
             None: {name: replace(table, times=times, q=q[:, self.cell.columns(name)]) for name, table in tables.items()}
         }
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        found = verdict([motion.report for motion in self.motions])
+        return f"<Verified run of '{self.cell.name}', {float(self.motion.times[-1]):g} s, {found}>"
 
     def by_phase(self, programs: Sequence[Mapping[str, JointTable]]) -> tuple[dict[str, JointTable], ...]:
         """Tables of every motion, each on its own time.

@@ -21,6 +21,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report import CAUTION
 from cellplan.model.verified_run import VerifiedMotion, VerifiedRun
 from cellplan.pipeline.plan.demanded import DemandedProgram
+from cellplan.pipeline.wide_table import read_wide_tables, render_wide_tables
 from cellplan.pipeline.write_run import versions
 from cellplan.report.record.controller import zero_text
 from cellplan.scene.scene import Scene
@@ -45,6 +46,7 @@ class Exporter:
 
 EXPORTERS: Final[Mapping[str, Exporter]] = {
     "csv": Exporter(render=render_csv, read=read_csv, decimals=CSV_DECIMALS),
+    "wide": Exporter(render=render_wide_tables, read=read_wide_tables, decimals=CSV_DECIMALS),
 }
 
 

@@ -1,5 +1,6 @@
 """Screen candidate layouts: resolve the whole job of a cell in hundreds of them."""
 
+from dataclasses import replace
 from functools import reduce
 
 from cellplan.errors import InputError
@@ -39,4 +40,4 @@ def screen(cell: Cell, candidates: Candidates, *, task: str | None = None, accur
         )
         for phase in plan_phases(cell, only=task).program
     ]
-    return reduce(Screening.worst, runs)
+    return replace(reduce(Screening.worst, runs), cell=cell)

@@ -8,7 +8,9 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Program, Schedule
 from cellplan.model.phase import Phase
 from cellplan.model.plan import Plan
+from cellplan.model.presented import Presented
 from cellplan.model.report import Report
+from cellplan.model.verdict import verdict
 from cellplan.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -39,6 +41,12 @@ class Run:
     scene: Scene | None = None
     early: "EarlyFiles | None" = None
 
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return (
+            f"<Run of '{self.report.cell}', {self.phase.name}, {self.report.cycle_time:g} s, {verdict([self.report])}>"
+        )
+
     def cell_of(self, whole: Cell) -> Cell:
         """The cell as it is in this phase.
 
@@ -65,7 +73,7 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Solution:
+class Solution(Presented):
     """A solved cell.
 
     Attributes:
@@ -98,6 +106,7 @@ class Solution:
 
     def __repr__(self) -> str:
         """One line without arrays."""
-        verdict = "passed" if self.passed else "failed"
         runs = ", ".join(run.name for run in self.runs if run.name is not None)
-        return f"<Solution of '{self.cell.name}', {self.cell.motion.mode}{f': {runs}' if runs else ''}, {verdict}>"
+        cycle, found = float(self.motion.times[-1]), verdict([run.report for run in self.runs])
+        mode = f"{self.cell.motion.mode}{f': {runs}' if runs else ''}"
+        return f"<Solution of '{self.cell.name}', {mode}, {cycle:g} s, {found}>"

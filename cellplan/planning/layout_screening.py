@@ -11,6 +11,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.clocked_path import distinct
 from cellplan.model.motion import Schedule
+from cellplan.model.presented import Presented
 from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.settling import settled, settling_joints
@@ -60,7 +61,7 @@ class Candidates:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Screening:
+class Screening(Presented):
     """What came of each candidate; figures of one that was lost hold up to that time.
 
     Attributes:
@@ -70,6 +71,7 @@ class Screening:
         error: Bound of the tool error at the nodes and between them, in [m] or [rad], shape (K,).
         margins: Smallest distance of each joint from its limits in [rad] or [m], negative beyond, shape (K, nq).
         speed_ratios: Largest speed of each joint as a share of its limit, shape (K, nq).
+        cell: The cell whose job was screened, in which the joints have their names; None where it is not known.
     """
 
     start: Array
@@ -77,6 +79,7 @@ class Screening:
     error: Array
     margins: Array
     speed_ratios: Array
+    cell: Cell | None = None
 
     @classmethod
     def unknown(cls, start: Array) -> "Screening":
@@ -91,8 +94,9 @@ class Screening:
 
     def joined(self, others: Sequence["Screening"]) -> "Screening":
         """These figures, then those of others."""
-        names = [field.name for field in fields(self)]
-        return Screening(**{name: np.concatenate([getattr(each, name) for each in (self, *others)]) for name in names})
+        names = [field.name for field in fields(self) if field.name != "cell"]
+        joined = {name: np.concatenate([getattr(each, name) for each in (self, *others)]) for name in names}
+        return Screening(**joined, cell=self.cell)
 
     def worst(self, other: "Screening") -> "Screening":
         """Of two runs from the same candidates, the worse figures; the start postures of the later one."""
@@ -114,6 +118,11 @@ class Screening:
         """Which did it within all joint limits and speeds, shape (K,); nothing is known of collisions yet."""
         within = np.all(self.margins >= 0.0, axis=1) & np.all(self.speed_ratios <= 1.0, axis=1)
         return self.is_followed & within
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        followed, feasible = (int(np.count_nonzero(each)) for each in (self.is_followed, self.is_feasible))
+        return f"<Screening of {len(self.start)} layouts: {followed} follow the paths, {feasible} within all limits>"
 
 
 def screen_layouts(

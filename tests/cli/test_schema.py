@@ -20,5 +20,8 @@ def test_one_schema_is_printed_at_a_time(capsys: pytest.CaptureFixture[str]) -> 
     assert run(["schema", "--layout"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "cellplan.layout/1"
 
+    assert run(["schema", "--series"]) == 0
+    assert json.loads(capsys.readouterr().out)["title"] == "cellplan.series/1"
+
     assert run(["schema", "--layout", "--report"]) == 2
-    assert "expected one of --report and --layout, got both" in capsys.readouterr().err
+    assert "expected one of --report, --series and --layout, got 2" in capsys.readouterr().err

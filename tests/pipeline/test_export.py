@@ -69,7 +69,7 @@ def test_programs_are_not_written_into_a_run_or_over_other_things(copy: Path, pl
 def test_an_unknown_format_is_refused_with_the_list(copy: Path) -> None:
     run = open_gate(copy / "run", cell=copy / "cell" / "small.yaml")
 
-    with pytest.raises(InputError, match="--format: expected one of csv, got 'krl'"):
+    with pytest.raises(InputError, match="--format: expected one of csv, wide, got 'krl'"):
         export_program(run, copy / "programs", form="krl")
 
 

@@ -1,6 +1,9 @@
 """Results print as one line without arrays; ``help(cellplan)`` lists the functions."""
 
+import dataclasses
+import inspect
 import pydoc
+import re
 from pathlib import Path
 
 import pytest
@@ -19,8 +22,12 @@ def test_results_are_one_line(solution: Solution) -> None:
     report, cell = solution.runs[0].report, solution.cell
     toolpath = build_toolpath(cell.tasks[0], cell.part)
 
-    assert repr(solution) == "<Solution of 'small-pair', simultaneous, passed>"
-    assert repr(report) == f"<Report of 'small-pair', simultaneous, 41 samples, passed: {len(report.checks)} checks>"
+    clearance = min(each.minimum for each in report.clearance.minima.values() if each.minimum is not None)
+    pair = next(" - ".join(each.pair) for each in report.clearance.minima.values() if each.minimum == clearance)
+    found = f"passed: {len(report.checks)} checks; smallest clearance {1e3 * clearance:.4g} mm, {pair}"
+    assert repr(solution) == f"<Solution of 'small-pair', simultaneous, 1 s, {found}>"
+    assert repr(report) == f"<Report of 'small-pair', simultaneous, 1 s, {found}>"
+    assert repr(solution.runs[0]) == f"<Run of 'small-pair', all tasks, 1 s, {found}>"
     assert repr(solution.motion) == "<Motion of 9 joints, 41 samples, 1 s>"
     assert repr(cell) == "<Cell 'small-pair': robots left, right, idle; tasks path; simultaneous>"
     assert repr(cell.robots[0]) == "<Robot 'left': left, 3 joints>"
@@ -34,6 +41,21 @@ def test_a_check_shows_its_verdict_and_message(solution: Solution) -> None:
 
     assert repr(check) == f"<Check {check.name} of '{check.subject}' passed: {check.message}>"
     assert "\n" not in repr(check)
+
+
+def test_help_describes_every_parameter_and_every_attribute() -> None:
+    silent = []
+    for name in cellplan.__all__:
+        value = getattr(cellplan, name)
+        text = inspect.getdoc(value) or ""
+        named: list[str] = []
+        if dataclasses.is_dataclass(value):
+            named = [field.name for field in dataclasses.fields(value)]
+        elif inspect.isfunction(value):
+            named = [*inspect.signature(value).parameters]
+        silent += [f"{name}: {each}" for each in named if not re.search(rf"^ +{each}: ", text, re.MULTILINE)]
+
+    assert silent == []
 
 
 def test_help_lists_the_public_names_by_group() -> None:

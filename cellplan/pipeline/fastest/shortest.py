@@ -7,6 +7,7 @@ from typing import Final
 
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.model.cell import Cell
+from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import REDUCED_SPEED
 from cellplan.model.units import MM
@@ -24,7 +25,7 @@ SolvedAt = Callable[[Law, dict[str, object], str], TimedProgram]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ShortestCycles:
+class ShortestCycles(Presented):
     """The shortest cycles of a cell, and what calmer ones load it with.
 
     Attributes:
@@ -54,6 +55,12 @@ class ShortestCycles:
         if self.demand is not None:
             found["demand"] = self.demand.program
         return found
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        name, verdict = self.as_written.solution.cell.name, "passed" if self.passed else "failed"
+        cycles = ", ".join(f"{key.replace('_', ' ')} {one.cycle:.4g} s" for key, one in self.programs.items())
+        return f"<Shortest cycles of '{name}': {cycles}; as written {self.as_written.cycle:.4g} s; {verdict}>"
 
     @property
     def passed(self) -> bool:

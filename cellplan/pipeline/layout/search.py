@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
 from cellplan.pipeline.layout.given_layout import Given, given_layout
@@ -22,6 +23,7 @@ from cellplan.pipeline.layout.workers import layout_workers
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.layout import layout_files
 from cellplan.report.record.layout import LayoutRecord
+from cellplan.report.text.layout import verdict_line
 from cellplan.search.programs.objective import Objective
 from cellplan.study.folder import write_results
 from cellplan.study.study import Finished, Stop, Study
@@ -34,7 +36,7 @@ TRIAL_LIMIT: Final = 900.0  # [s] of the processor for one trial
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LayoutResult:
+class LayoutResult(Presented):
     """What a layout search has come to.
 
     Attributes:
@@ -44,6 +46,12 @@ class LayoutResult:
 
     record: LayoutRecord
     best: Certified | None
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return (
+            f"<Layout search of '{self.record['cell']}', trials: {self.record['trials']}; {verdict_line(self.record)}>"
+        )
 
 
 @dataclass(slots=True, kw_only=True)

@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any, Final
 
 from cellplan.model.cell import Cell
+from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.limits import standing_of
 from cellplan.pipeline.layout.prepared import Prepared
@@ -39,7 +40,7 @@ WITH_LIMITS: Final = "quadratic_program"  # the method that keeps joints within 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Repair:
+class Repair(Presented):
     """What makes a failing cell pass.
 
     Attributes:
@@ -51,6 +52,12 @@ class Repair:
     record: AdviceRecord
     given: Cell
     best: Cell | None
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        remedies = self.record["remedies"]
+        found = f"; {remedies[0]['text']}" if remedies else ""
+        return f"<Repair of '{self.given.name}', {self.record['status'].replace('_', ' ')}{found}>"
 
 
 def repair(request: LayoutRequest, *, workers: int = 1, progress: Progress = silent) -> Repair:

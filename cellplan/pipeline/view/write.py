@@ -47,6 +47,10 @@ class ViewRequest:
 def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewRecord, Path]:
     """The record of a page, and where the page belongs unless the user says otherwise.
 
+    Args:
+        request: What is to be shown.
+        progress: Called with the stage and the fraction done.
+
     Raises:
         InputError: The path is neither a run, nor a cell, nor a layout search, or does not fit the options.
     """
@@ -87,6 +91,10 @@ def write_view_of_run(folder: Path, cell: Cell, *, progress: Progress = silent) 
 
 def write_view(record: ViewRecord, target: Path) -> int:
     """Write a page whole or not at all; gives its size in bytes.
+
+    Args:
+        record: As ``view`` returns it.
+        target: The page; an older one there is replaced.
 
     Raises:
         InputError: The place holds something else, or cannot be written.

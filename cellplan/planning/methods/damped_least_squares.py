@@ -46,7 +46,7 @@ def nearness(inverse: WeightedInverse, settings: DampedLeastSquaresSettings) -> 
 
 
 def squared_damping(measure: float, settings: DampedLeastSquaresSettings, *, largest: float | None) -> float:
-    r"""What is added to ``J W^-1 J^T``: the square of the damping factor ([Nicolato2007]_ Eq. 2.12, [Vargas2012]_ 9, 10).
+    r"""What is added to ``J W^-1 J^T``, the squared damping factor ([Nicolato2007]_ Eq. 2.12, [Vargas2012]_ Eq. 9).
 
     .. math:: \lambda^2 = (1 - (\sigma / \varepsilon)^2) \lambda_{max}^2 \quad (\sigma < \varepsilon), \qquad
               \lambda^2 = \lambda_0 (1 - w / w_0)^2 \quad (w < w_0)

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_
 from cellplan.report.record.advice import AdviceRecord
 from cellplan.report.record.layout import LayoutRecord
 from cellplan.report.record.run import RunRecord
+from cellplan.report.record.series import SeriesRecord
 from cellplan.report.record.summary import SummaryRecord
 
 DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
@@ -41,15 +42,24 @@ def layout_schema() -> dict[str, Any]:
     return _whole(LayoutRecord, "cellplan.layout/1", "study.json of a layout search")
 
 
+def series_schema(*, closed: bool = False) -> dict[str, Any]:
+    """The JSON Schema of ``series.json``.
+
+    Args:
+        closed: Refuse keys that the schema does not name, as for ``report_schema``.
+    """
+    return _whole(SeriesRecord, "cellplan.series/1", "series.json of a run", closed=closed)
+
+
 def advice_schema() -> dict[str, Any]:
     """The JSON Schema of ``advice.json``."""
     return _whole(AdviceRecord, "cellplan.advice/1", "advice.json of a repair")
 
 
-def _whole(form: Any, title: str, description: str) -> dict[str, Any]:
+def _whole(form: Any, title: str, description: str, *, closed: bool = False) -> dict[str, Any]:
     """The schema of a file with one record."""
     definitions: dict[str, dict[str, Any]] = {}
-    top = _schema(form, definitions, closed=False)
+    top = _schema(form, definitions, closed=closed)
     return {"$schema": DIALECT, "title": title, "description": description, **top, "$defs": definitions}
 
 

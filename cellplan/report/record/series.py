@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any, Final
+from typing import Annotated, Any, Final, TypedDict
 
 import numpy as np
 
@@ -11,13 +11,65 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.motion import Motion
 from cellplan.model.report import ClearanceReport, JointUse, Report
 from cellplan.model.units import MM
-from cellplan.report.record.common import SIGNIFICANT
+from cellplan.report.record.common import SIGNIFICANT, Number
 
 SCHEMA: Final = "cellplan.series/1"
 MAX_STEPS: Final = 50_000  # a longer motion is thinned
 DIGITS: Final = 7  # [-] significant: 1e-5 deg of a joint, 1e-7 of an error; the joint tables have all digits
 INDENT: Final = "  "
 CLEARANCE: Final = "clearance"  # name of the last ones
+
+Curve = list[Number]
+
+
+class TaskCurves(TypedDict):
+    """Tool error of a task, one value for each kept sample."""
+
+    position_error_mm: Annotated[Curve, "distance from the desired position on the part"]
+    orientation_error_deg: Annotated[Curve, "angle from the desired orientation"]
+
+
+class JointCurves(TypedDict, total=False):
+    """Motion of a joint; a velocity belongs to the step that begins at its sample, so there is one value less."""
+
+    position_deg: Annotated[Curve, "position of a revolute joint"]
+    speed_deg_s: Annotated[Curve, "its velocity"]
+    position_mm: Annotated[Curve, "position of a prismatic joint"]
+    speed_mm_s: Annotated[Curve, "its velocity"]
+
+
+class ConditioningCurves(TypedDict, total=False):
+    """Distance of all robots together from singularities; empty where no task is worked on; see Singularity."""
+
+    smallest_singular_value: Annotated[Curve, "of J"]
+    condition: Annotated[Curve, "ratio of the smallest to the largest singular value of J"]
+    squared_condition: Annotated[Curve, "the same of `J J^T`"]
+    manipulability: Annotated[Curve, "product of the singular values of J"]
+
+
+class ClearanceCurves(TypedDict, total=False):
+    """Distance that each class of pairs keeps over time; empty where it was not worked out."""
+
+    times_s: Annotated[Curve, "middles of some 200 blocks of the motion, its ends and the times of the minima"]
+    robot_robot_mm: Annotated[Curve, "what pairs of two robots keep all through the block that holds the time"]
+    self_mm: Annotated[Curve, "the same for each robot with itself"]
+    part_mm: Annotated[Curve, "the same for the part"]
+    environment_mm: Annotated[Curve, "the same for the surroundings"]
+
+
+class SeriesRecord(TypedDict):
+    """The curves of a run."""
+
+    schema: Annotated[str, "`cellplan.series/1`, always the first key"]
+    every: Annotated[int, "n: every n-th sample is kept, and the last one"]
+    times_s: Annotated[Curve, "times of the kept samples"]
+    tasks: Annotated[dict[str, TaskCurves], "by task"]
+    conditioning: Annotated[ConditioningCurves, "distance from singularities"]
+    joints: Annotated[dict[str, dict[str, JointCurves]], "by robot and joint"]
+    iterations: Annotated[Curve | None, "evaluations of the tasks in each step; null in the accurate mode"]
+    slack: Annotated[Curve | None, "norm of the twist residual in each step; null if the method has none"]
+    clearance: Annotated[ClearanceCurves, "distance that bodies keep"]
+
 
 Tree = dict[str, Any]  # by name: trees, arrays of shape (K,), whole numbers, texts or None
 

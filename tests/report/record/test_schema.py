@@ -14,7 +14,8 @@ from cellplan.model.motion import Motion, NearestSingular, Resolution
 from cellplan.model.solver import Integrator
 from cellplan.report.record.common import as_json
 from cellplan.report.record.run import run_record
-from cellplan.report.record.schema import report_schema
+from cellplan.report.record.schema import report_schema, series_schema
+from cellplan.report.record.series import series_json
 from cellplan.report.record.summary import summary_record
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
@@ -107,10 +108,49 @@ def test_the_published_schema_permits_keys_that_later_releases_add(passed_run: A
     assert Draft202012Validator({**schema, "oneOf": schema["oneOf"][:1]}).is_valid(json.loads(json.dumps(later)))
 
 
+@pytest.mark.parametrize("kind", ["passed_run", "failed_run", "rail_run"])
+@pytest.mark.parametrize("has_motion", [False, True])
+def test_the_series_of_a_run_conform(kind: str, has_motion: bool, request: pytest.FixtureRequest) -> None:
+    run = request.getfixturevalue(kind)
+    schema = series_schema(closed=True)
+    Draft202012Validator.check_schema(schema)
+    curves = json.loads(series_json(run.report, planned(run) if has_motion else None))
+
+    assert list(map(str, Draft202012Validator(schema).iter_errors(curves))) == []
+    del curves["joints"]
+    assert not Draft202012Validator(schema).is_valid(curves)
+
+
+def test_the_files_of_the_docs_are_the_schemas(repository: Path, sound: Path) -> None:
+    folder = repository / "docs" / "reference"
+    for name, schema in (("report", report_schema()), ("series", series_schema())):
+        text = (folder / f"{name}.schema.json").read_text(encoding="utf-8")
+        assert json.loads(text) == schema, "run: python docs/make_reference.py"
+        record = json.loads((sound / "run" / f"{name}.json").read_text(encoding="utf-8"))
+        assert Draft202012Validator(json.loads(text)).is_valid(record)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["four_robots", "four_robots_initial", "load_sharing", "rail", "three_tasks_each", "turntable"]
+)
+def test_the_reports_and_series_of_shipped_cells_conform(
+    validator: Draft202012Validator, cells: Path, tmp_path: Path, name: str
+) -> None:
+    run_cli(["solve", str(cells / f"{name}.yaml"), "-o", str(tmp_path / "run"), "-q"])
+
+    curves = Draft202012Validator(series_schema(closed=True))
+    assert (tmp_path / "run" / "report.json").is_file()
+    for file in sorted((tmp_path / "run").rglob("report.json")):
+        assert findings(validator, json.loads(file.read_text(encoding="utf-8"))) == []
+    for file in sorted((tmp_path / "run").rglob("series.json")):
+        assert curves.is_valid(json.loads(file.read_text(encoding="utf-8")))
+
+
 def test_every_key_has_a_description() -> None:
     silent = [
         f"{name}.{key}"
-        for name, entry in report_schema()["$defs"].items()
+        for name, entry in (report_schema()["$defs"] | series_schema()["$defs"]).items()
         for key, field in entry["properties"].items()
         if not field.get("description")
     ]

@@ -1,0 +1,237 @@
+"""Columns of the wide table of a program: joints, tools, errors, speeds and distances in every row.
+
+A quantity of a step, such as a speed, belongs to the row at which the step begins. Where a quantity is not defined, as
+a speed in the last row of a program or the error of a task that is not worked on, it is not a number.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array, inverse, roll_pitch_yaw
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.plan import Interval
+from cellplan.model.report import ClearanceClass, Report
+from cellplan.model.task import TIME_TOLERANCE, Frame
+from cellplan.model.units import DEG, MM
+
+TIME: Final = "time_s"
+POSE: Final = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")
+
+Column = Array | NDArray[np.int8] | tuple[str, ...]  # numbers, 0 and 1, or texts
+Columns = dict[str, Column]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PhaseRows:
+    """One phase of a program, and where its tools are.
+
+    Attributes:
+        name: Name of the phase.
+        rows: Its rows in the table.
+        schedule: Desired tool poses.
+        report: What the checks found in these rows.
+        X_WT: Tool tips in the world, shape (n, 4, 4), by robot.
+        X_WP: The part in the world, shape (n, 4, 4), or (1, 4, 4) for a part at rest.
+    """
+
+    name: str
+    rows: slice
+    schedule: Schedule
+    report: Report
+    X_WT: Mapping[str, Array]
+    X_WP: Array
+
+    def scheduled(self, task: str) -> TaskSchedule | None:
+        """The desired tool poses of a task; None where it is not worked on."""
+        return next((each for each in self.schedule.tasks if each.task.name == task), None)
+
+    def tool_poses(self, task: str) -> Array | None:
+        """Tool poses of a task in the frame that it is given in, shape (n, 4, 4); None where it is not worked on."""
+        own = self.scheduled(task)
+        if own is None:
+            return None
+        X_WT = self.X_WT[own.task.robot]
+        return X_WT if own.task.relative_to is Frame.WORLD else inverse(self.X_WP) @ X_WT
+
+    def errors(self, task: str) -> Array | None:
+        """Position error in [mm] and orientation error in [deg] of a task, shape (n, 2); None likewise."""
+        own = next((each for each in self.report.accuracy if each.task == task), None)
+        if own is None:
+            return None
+        position, orientation = (np.linalg.norm(e, axis=1) for e in (own.position_error, own.orientation_error))
+        return np.stack([MM * position, DEG * orientation], axis=1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProgramRows:
+    """A program with all that its wide table shows.
+
+    Attributes:
+        cell: The cell.
+        times: Times of the rows in [s], shape (N,).
+        sigma: Nominal times of the rows in [s], shape (N,).
+        phases: Its phases in their order; the row that two of them share is of the later one.
+        process: Stretches of nominal time in [s] in which the tool of a task is on its path, by task.
+    """
+
+    cell: Cell
+    times: Array
+    sigma: Array
+    phases: Sequence[PhaseRows]
+    process: Mapping[str, Sequence[Interval]]
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """Names of the tasks that are worked on, in the order of the cell."""
+        at_work = {scheduled.task.name for phase in self.phases for scheduled in phase.schedule.tasks}
+        return tuple(task.name for task in self.cell.tasks if task.name in at_work)
+
+    def positions(self, robot: str) -> Array:
+        """Joint positions of a robot in [rad] or [m], shape (N, n)."""
+        return self.spread(lambda phase: phase.report.q[robot], width=len(self.cell.robot(robot).model.joints))
+
+    def spread(self, values_of: Callable[[PhaseRows], Array | None], *, width: int | None = None) -> Array:
+        """Values of all rows from those of each phase, not a number where there is none.
+
+        Args:
+            values_of: Values of a phase in its n rows, or in its n - 1 steps; None where it has none.
+            width: Number of values in each row; None for plain numbers.
+
+        Returns:
+            The values, shape (N,), or (N, width).
+        """
+        found = np.full((len(self.times), *([] if width is None else [width])), np.nan)
+        for phase in self.phases:
+            found[phase.rows] = np.nan
+            values = values_of(phase)
+            if values is not None:
+                found[phase.rows.start : phase.rows.start + len(values)] = values
+        return found
+
+
+def wide_columns(program: ProgramRows) -> Columns:
+    """The columns of the wide table by name, in the units of the names.
+
+    Args:
+        program: The program.
+
+    Raises:
+        InputError: Two columns would have the same name.
+    """
+    robots, tasks = program.cell.robots, program.tasks
+    groups: list[Mapping[str, Column]] = [{TIME: program.times}]
+    groups += [joint_columns(robot, program.positions(robot.name)) for robot in robots]
+    groups.append({"sigma_s": program.sigma, "phase": _phase_names(program)})
+    groups += [_task_columns(program, task) for task in tasks]
+    groups += [_speed_columns(program, robot) for robot in robots]
+    groups.append({"smallest_singular_value": program.spread(_singular_values)})
+    groups += [{f"clearance_{kind}_mm": MM * program.spread(partial(kept_distance, kind))} for kind in ClearanceClass]
+    columns: Columns = {}
+    for group in groups:
+        twice = sorted(columns.keys() & group.keys())
+        if twice:
+            raise InputError(f"wide table: expected every column once, got '{twice[0]}' of a robot and of a task")
+        columns |= group
+    return columns
+
+
+def joint_columns(robot: Robot, q: Array) -> dict[str, Array]:
+    """Positions of the joints of a robot by the name of their column.
+
+    Args:
+        robot: The robot.
+        q: Its joint positions in [rad] or [m], shape (N, n).
+    """
+    return {
+        f"{robot.name}.{joint.name}_{joint.display_unit.name}": joint.display_unit.scale * values
+        for joint, values in zip(robot.model.joints, q.T, strict=True)
+    }
+
+
+def kept_distance(kind: ClearanceClass, phase: PhaseRows) -> Array | None:
+    """Distance in [m] that a class of pairs is proved to keep in each row, shape (n,); None without such pairs.
+
+    The curve of a report holds one distance for each stretch of the motion, at its middle. A row lies in the stretch of
+    the point before it or in that of the point after it; the smaller of the two is never above the truth.
+
+    Args:
+        kind: The class.
+        phase: The phase.
+    """
+    clearance, rows = phase.report.clearance, phase.report.times
+    curve, times = clearance.curves.get(kind), clearance.curve_times
+    if curve is None:
+        return None
+    after = np.clip(np.searchsorted(times, rows), 0, len(times) - 1)
+    before = np.clip(np.searchsorted(times, rows, side="right") - 1, 0, len(times) - 1)
+    return np.minimum(curve[before], curve[after])
+
+
+def _phase_names(program: ProgramRows) -> tuple[str, ...]:
+    """Name of the phase of each row."""
+    names = [""] * len(program.times)
+    for phase in program.phases:
+        names[phase.rows] = [phase.name] * (phase.rows.stop - phase.rows.start)
+    return tuple(names)
+
+
+def _singular_values(phase: PhaseRows) -> Array | None:
+    """Smallest singular value of the tasks of a phase in each row; None where none is worked on."""
+    return None if phase.report.conditioning is None else phase.report.conditioning.stack
+
+
+def _task_columns(program: ProgramRows, task: str) -> Columns:
+    """What the tool of a task does on the part, or in the world for a task given there."""
+
+    def poses(phase: PhaseRows) -> Array | None:
+        X = phase.tool_poses(task)
+        if X is None:
+            return None
+        angles = np.unwrap(roll_pitch_yaw(X[:, :3, :3]), axis=0)  # curves without jumps of a whole turn
+        return np.concatenate([MM * X[:, :3, 3], DEG * angles], axis=1)
+
+    def feeds(phase: PhaseRows) -> Array | None:
+        X = phase.tool_poses(task)
+        return None if X is None else MM * _speeds(X[:, :3, 3], phase.report.times)
+
+    def travelled(phase: PhaseRows) -> Array | None:
+        own = phase.scheduled(task)
+        return None if own is None else MM * own.travelled
+
+    pose = program.spread(poses, width=len(POSE))
+    error = program.spread(lambda phase: phase.errors(task), width=2)
+    columns: Columns = {f"{task}.process": _is_within(program.sigma, program.process.get(task, ()))}
+    columns[f"{task}.s_mm"] = program.spread(travelled)
+    columns |= {f"{task}.{name}": values for name, values in zip(POSE, pose.T, strict=True)}
+    columns |= {f"{task}.position_error_mm": error[:, 0], f"{task}.orientation_error_deg": error[:, 1]}
+    columns[f"{task}.feed_mm_s"] = program.spread(feeds)
+    return columns
+
+
+def _speed_columns(program: ProgramRows, robot: Robot) -> Columns:
+    """Speeds of the joints of a robot, and of its tool tip in the world."""
+    speeds = program.spread(lambda phase: phase.report.qd[robot.name], width=len(robot.model.joints))
+    columns: Columns = {f"{name}_s": values for name, values in joint_columns(robot, speeds).items()}
+    tool = program.spread(lambda phase: _speeds(phase.X_WT[robot.name][:, :3, 3], phase.report.times))
+    columns[f"{robot.name}.tool_speed_mm_s"] = MM * tool
+    return columns
+
+
+def _speeds(points: Array, times: Array) -> Array:
+    """Speeds of a point, shape (n, 3), in the steps between its rows in [m/s], shape (n - 1,)."""
+    return np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(times)
+
+
+def _is_within(sigma: Array, stretches: Sequence[Interval]) -> NDArray[np.int8]:
+    """1 where nominal times, shape (N,), lie in one of some stretches, ends included, else 0."""
+    inside = np.zeros(len(sigma), dtype=np.int8)
+    for begin, end in stretches:
+        inside[(sigma >= begin - TIME_TOLERANCE) & (sigma <= end + TIME_TOLERANCE)] = 1
+    return inside

@@ -1,0 +1,27 @@
+"""The verdict on a program in a few words: the first finding, or the smallest clearance."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from cellplan.model.units import MM
+
+if TYPE_CHECKING:
+    from cellplan.model.report import Report
+
+
+def verdict(reports: Sequence["Report"]) -> str:
+    """Checks that passed and the smallest clearance, or checks that failed and the first of them.
+
+    Args:
+        reports: The report of each phase.
+    """
+    checks = [check for report in reports for check in report.checks]
+    failed = [check.message for check in checks if not check.passed]
+    if failed:
+        return f"failed: {len(failed)} of {len(checks)} checks; {failed[0]}"
+    distances = (each for report in reports for each in report.clearance.minima.values())
+    known = [(each.minimum, each.pair) for each in distances if each.minimum is not None and each.pair is not None]
+    if not known:
+        return f"passed: {len(checks)} checks"
+    least, pair = min(known)
+    return f"passed: {len(checks)} checks; smallest clearance {MM * least:.4g} mm, {' - '.join(pair)}"

@@ -1,0 +1,1 @@
+"""Results as pandas frames, and as what a notebook shows."""

@@ -1,0 +1,260 @@
+"""What a notebook shows of each kind of result."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import singledispatch
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.model.cell import Cell
+from cellplan.model.rehearsal import Rehearsal
+from cellplan.model.report import Report
+from cellplan.model.units import MM
+from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.fastest.shortest import ShortestCycles
+from cellplan.pipeline.fastest.write import fastest_record
+from cellplan.pipeline.present.pictures import record_pictures, run_pictures
+from cellplan.pipeline.present.result_tables import NOWHERE, record_at, run_records, tables_of
+from cellplan.pipeline.solution import Solution
+from cellplan.planning.layout_screening import Screening
+from cellplan.report.page.figures import key_figures
+from cellplan.report.page.filters import fixed, small
+from cellplan.report.page.notebook import Card, Grid
+from cellplan.report.record.common import Record
+from cellplan.report.record.rehearsal import rehearsal_record
+from cellplan.report.record.rows import format_of, run_tables
+from cellplan.report.record.summary import summary_record
+
+TASK_COLUMNS: Final = (
+    "task",
+    "robot",
+    "max_position_error_mm",
+    "tolerance.position_mm",
+    "max_orientation_error_deg",
+    "tolerance.orientation_deg",
+    "path_length_mm",
+    "start_s",
+    "end_s",
+)
+SHOWN: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
+    "study": {
+        "trials": ("status", "cycle_time_s", "min_margin_deg", "max_velocity_ratio", "min_clearance_mm", "reason")
+    },
+    "comparison": {"variants": ("name", "status", "cycle_time_s", "min_margin_deg", "min_clearance_mm", "load_s")},
+    "layout": {
+        "top": ("trial", "status", "cycle_s", "margin_deg", "clearance_mm", "change"),
+        "variables": ("name", "unit", "given", "best", "lower", "upper"),
+    },
+    "advice": {"remedies": ("text", "kind", "cost", "cycle_s", "smallest_margin_deg", "smallest_clearance_mm")},
+    "fastest": {"cycles": ("name", "status", "cycle_s", "share_of_written", "smallest_clearance_mm")},
+    "map": {"places": ("x_mm", "y_mm", "yaw_deg", "verdict", "cycle_s", "reason")},
+    "rehearsal": {"tasks": ("task", "robot", "before.max_position_error_mm", "after.max_position_error_mm")},
+    "report": {"tasks": TASK_COLUMNS},
+}  # by kind of record: tables and their columns
+KINDS: Final[Mapping[str, str]] = {
+    "study": "Sweep",
+    "comparison": "Comparison",
+    "layout": "Layout search",
+    "advice": "Repair",
+    "fastest": "Shortest cycles",
+    "map": "Map of a base",
+    "rehearsal": "Rehearsal",
+    "report": "Run",
+}
+GOOD: Final = frozenset({"passed", "certified", "passes", "repaired"})  # statuses
+
+
+@singledispatch
+def card_of(result: object) -> Card:
+    """What a notebook shows of a result.
+
+    Args:
+        result: What ``to_frame`` takes.
+
+    Raises:
+        InputError: It is no result that can be shown.
+    """
+    record = getattr(result, "record", None)  # of a layout search, or a repair
+    if isinstance(record, Mapping):
+        return _record_card(record)
+    raise InputError(f"to_html: expected a result, a record or a path, got {type(result).__name__}")
+
+
+@card_of.register
+def _(result: Mapping) -> Card:  # type: ignore[type-arg]
+    return _record_card(result)
+
+
+@card_of.register
+def _(result: Path) -> Card:
+    return _record_card(record_at(result))
+
+
+@card_of.register
+def _(result: Solution) -> Card:
+    return _program_card("Solution", result.cell, [(run.report, run.cell_of(result.cell)) for run in result.runs])
+
+
+@card_of.register
+def _(result: VerifiedRun) -> Card:
+    card = _program_card("Verified run", result.cell, [(motion.report, motion.cell) for motion in result.motions])
+    return replace(card, findings=result.remarks)
+
+
+@card_of.register
+def _(result: Report) -> Card:
+    failed = [check.message for check in result.checks if not check.passed]
+    checks = f"{len(result.checks)} checks" if not failed else f"{len(failed)} of {len(result.checks)} checks"
+    clearance = tables_of(result)["clearance"]()
+    figures = [{"label": "Cycle time", "value": fixed(result.cycle_time, 2), "unit": "s", "detail": result.mode}]
+    return Card(
+        kind="Report" if result.phase is None else f"Report of {result.phase}",
+        name=result.cell,
+        verdict=f"{'failed' if failed else 'passed'}: {checks}",
+        passed=not failed,
+        findings=failed,
+        figures=figures,
+        grids=[
+            _grid("Smallest distances", clearance, ("class", "minimum_mm", "first", "second", "at_s"), "clearance"),
+            _grid(
+                "Joints nearest to their limits",
+                _sorted(tables_of(result)["joints"](), "margin"),
+                ("joint", "robot", "unit", "margin", "margin_at_s", "velocity_ratio", "acceleration_ratio"),
+                "joints",
+            ),
+        ],
+    )
+
+
+@card_of.register
+def _(result: Cell) -> Card:
+    tables = tables_of(result)
+    robots, tasks = tables["robots"](), tables["tasks"]()
+    return Card(
+        kind="Cell",
+        name=result.name,
+        figures=[
+            {"label": "Mode", "value": str(result.motion.mode), "unit": "", "detail": ""},
+            {"label": "Part", "value": _part_text(result), "unit": "", "detail": ""},
+            {
+                "label": "Required clearance",
+                "value": small(MM * result.checks.clearance),
+                "unit": "mm",
+                "detail": f"{len(result.obstacles)} obstacles",
+            },
+        ],
+        grids=[
+            _grid("Robots", robots, ("robot", "model", "role", "joints", "x_mm", "y_mm", "z_mm", "yaw_deg"), "robots"),
+            _grid(
+                "Tasks", tasks, ("task", "robot", "path", "relative_to", "start_s", "duration_s", "feed_mm_s"), "tasks"
+            ),
+        ],
+    )
+
+
+@card_of.register
+def _(result: Screening) -> Card:
+    followed, feasible = int(result.is_followed.sum()), int(result.is_feasible.sum())
+    tables = tables_of(result)
+    return Card(
+        kind="Screening",
+        name=f"{len(result.start)} layouts"
+        if result.cell is None
+        else f"{result.cell.name}: {len(result.start)} layouts",
+        figures=[
+            {"label": "Follow the paths", "value": str(followed), "unit": "", "detail": ""},
+            {"label": "Within all limits", "value": str(feasible), "unit": "", "detail": "collisions are not checked"},
+        ],
+        grids=[_grid("Layouts", tables["candidates"](), (), "candidates")],
+    )
+
+
+@card_of.register
+def _(result: ShortestCycles) -> Card:
+    return _record_card(fastest_record(result))
+
+
+@card_of.register
+def _(result: Rehearsal) -> Card:
+    return _record_card(rehearsal_record(result, provenance=NOWHERE))
+
+
+def _part_text(cell: Cell) -> str:
+    """What the part is and who holds it."""
+    holders = ", ".join(cell.positioners)
+    return f"{type(cell.part.shape).__name__}, {f'held by {holders}' if holders else 'fixed in the world'}"
+
+
+def _program_card(kind: str, cell: Cell, phases: Sequence[tuple[Report, Cell]]) -> Card:
+    """A program, with the pictures of its phase that leaves the smallest clearance."""
+    records = run_records(phases)
+    reports = [report for report, _ in phases]
+    failed = [check.message for report in reports for check in report.checks if not check.passed]
+    count = sum(len(report.checks) for report in reports)
+    whole: Record = records[0]
+    if len(records) > 1:
+        whole = summary_record({str(report.phase): report for report in reports}, cell=cell, provenance=NOWHERE)
+    tables = run_tables([whole])
+    return Card(
+        kind=kind,
+        name=cell.name,
+        verdict=f"failed: {len(failed)} of {count} checks" if failed else f"passed: {count} checks",
+        passed=not failed,
+        findings=failed,
+        figures=key_figures(whole),
+        pictures=run_pictures(*min(phases, key=_smallest_clearance)),
+        grids=[_grid("Tasks", tables["tasks"](), TASK_COLUMNS, "tasks")],
+    )
+
+
+def _smallest_clearance(phase: tuple[Report, Cell]) -> float:
+    """Smallest distance of a phase in [m]; infinite without pairs."""
+    found = [each.minimum for each in phase[0].clearance.minima.values() if each.minimum is not None]
+    return min(found, default=np.inf)
+
+
+def _record_card(record: Record) -> Card:
+    """A record: its verdict, its pictures and the tables that are shown of its kind."""
+    tables = tables_of(record)
+    kind = format_of(record)
+    grids = [
+        _grid(name.capitalize(), tables[name](), (*_varied(record), *columns), name)
+        for name, columns in SHOWN.get(kind, {}).items()
+    ]
+    status = str(record.get("status", ""))
+    counts = {name: count for name, count in record.get("counts", {}).items() if count}
+    verdict = status.replace("_", " ") or ", ".join(
+        f"{count} {name.replace('_', ' ')}" for name, count in counts.items()
+    )
+    return Card(
+        kind=KINDS.get(kind, kind),
+        name=record["cell"],
+        verdict=verdict,
+        passed=status in GOOD if status else None,
+        findings=[check["message"] for check in record.get("checks", ()) if not check["passed"]],
+        figures=key_figures(record) if kind == "report" else [],
+        pictures=record_pictures(record),
+        grids=grids,
+    )
+
+
+def _varied(record: Record) -> tuple[str, ...]:
+    """Addresses that a sweep varies."""
+    return tuple(record.get("vary", ()))
+
+
+def _grid(caption: str, columns: Mapping[str, Any], names: Sequence[str], table: str) -> Grid:
+    """Some columns of a table, all of them without names."""
+    kept = {name: columns[name] for name in names if name in columns} if names else dict(columns)
+    shown = {name: values.tolist() if isinstance(values, np.ndarray) else values for name, values in kept.items()}
+    return Grid(caption=caption, columns=shown, more=f'to_frame("{table}")')
+
+
+def _sorted(columns: Mapping[str, Sequence[Any]], name: str) -> dict[str, list[Any]]:
+    """A table in the order of one of its columns, rows without a value there last."""
+    values = columns[name]
+    order = sorted(range(len(values)), key=lambda row: (values[row] is None, values[row]))
+    return {key: [column[row] for row in order] for key, column in columns.items()}

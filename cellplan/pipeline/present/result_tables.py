@@ -1,0 +1,236 @@
+"""The tables of results: of what was solved, verified, searched and screened, and of the files of all these."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import singledispatch
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.export.wide_columns import wide_columns
+from cellplan.io.input.files import read_regular_file
+from cellplan.io.input.json_reader import parse_json
+from cellplan.io.run.folder import MANIFEST
+from cellplan.io.run.stored import read_stored_run
+from cellplan.model.cell import Cell
+from cellplan.model.phase import ALL_TASKS
+from cellplan.model.rehearsal import Rehearsal
+from cellplan.model.report import Report
+from cellplan.model.units import DEG, MM
+from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.fastest.shortest import ShortestCycles
+from cellplan.pipeline.fastest.write import fastest_record
+from cellplan.pipeline.present.cell_tables import cell_tables
+from cellplan.pipeline.solution import Solution
+from cellplan.pipeline.wide_table import solution_rows, verified_rows
+from cellplan.planning.layout_screening import Screening
+from cellplan.report.record.clearance import (
+    clearance_record,
+    closest_pairs_record,
+    contacts_record,
+    left_out_record,
+)
+from cellplan.report.record.common import Provenance, Record, check_record, number
+from cellplan.report.record.joints import joints_record
+from cellplan.report.record.rehearsal import rehearsal_record
+from cellplan.report.record.rows import Row, Tables, columns_of, curve_columns, run_tables, tables_of_record
+from cellplan.report.record.run import run_record
+from cellplan.report.record.series import series
+from cellplan.report.record.world_motion import speed_record
+from cellplan.study.folder import RESULT
+
+RECORDS: Final = ("map.json", "fastest.json", "advice.json", "rehearsal.json", RESULT)  # of folders, first ones first
+LARGEST: Final = 500_000_000  # [bytes] of a file with a record
+NOWHERE: Final = Provenance(versions={}, digests={})
+
+
+@singledispatch
+def tables_of(result: object) -> Tables:
+    """The tables of a result by name, each made when it is called.
+
+    Args:
+        result: The result; also a record of a JSON file, or the path of such a file or of its folder.
+
+    Raises:
+        InputError: It is no result that has tables.
+    """
+    record = getattr(result, "record", None)  # of a layout search, or a repair
+    if isinstance(record, Mapping):
+        return tables_of_record(record)
+    raise InputError(f"to_frame: expected a result, a record or a path, got {type(result).__name__}")
+
+
+@tables_of.register
+def _(result: Mapping) -> Tables:  # type: ignore[type-arg]
+    tables = tables_of_record(result)
+    if not tables:
+        raise InputError(f"to_frame: expected a record of cellplan, got one with schema {result.get('schema')!r}")
+    return tables
+
+
+@tables_of.register
+def _(result: Path) -> Tables:
+    if result.is_dir() and (result / MANIFEST).exists():
+        stored = read_stored_run(result)
+        phases = {record.get("phase"): place for place, record in stored.records.items()}
+        tables = run_tables(list(stored.records.values()))
+        return {**tables, "curves": lambda: _joined({name: stored.series(place) for name, place in phases.items()})}
+    return tables_of(record_at(result))
+
+
+@tables_of.register
+def _(result: Cell) -> Tables:
+    return cell_tables(result)
+
+
+@tables_of.register
+def _(result: Solution) -> Tables:
+    records = run_records([(run.report, run.cell_of(result.cell)) for run in result.runs])
+    return {"motion": lambda: wide_columns(solution_rows(result)), **run_tables(records)}
+
+
+@tables_of.register
+def _(result: VerifiedRun) -> Tables:
+    records = run_records([(motion.report, motion.cell) for motion in result.motions])
+    return {"motion": lambda: wide_columns(verified_rows(result)), **run_tables(records)}
+
+
+@tables_of.register
+def _(result: Report) -> Tables:
+    clearance = result.clearance
+    record: dict[str, Any] = {
+        "phase": result.phase,
+        "checks": list(map(check_record, result.checks)),
+        "joints": joints_record(result.joints, result.accelerations.joints),
+        "tasks": _tool_errors(result),
+        "clearance": clearance_record(clearance.minima),
+        "closest_pairs": closest_pairs_record(clearance),
+        "contacts": contacts_record(clearance),
+        "left_out": left_out_record(clearance.left_out),
+        "speeds": {robot: speed_record(speed) for robot, speed in result.speeds.items()},
+    }
+    tables = run_tables([record])
+    del tables["motion_share"]  # who is at work is known to the cell alone
+    return {**tables, "curves": lambda: curve_columns(series(result)), "distances": lambda: _distances(result)}
+
+
+@tables_of.register
+def _(result: Screening) -> Tables:
+    return {"candidates": lambda: _candidates(result), "joints": lambda: columns_of(_candidate_joints(result))}
+
+
+@tables_of.register
+def _(result: ShortestCycles) -> Tables:
+    return tables_of_record(fastest_record(result))
+
+
+@tables_of.register
+def _(result: Rehearsal) -> Tables:
+    return tables_of_record(rehearsal_record(result, provenance=NOWHERE))
+
+
+def record_at(path: Path) -> Record:
+    """The record of a JSON file, or of the folder of a run, a study, a map, a repair or a rehearsal.
+
+    Args:
+        path: The file or the folder.
+
+    Raises:
+        InputError: There is none, or it cannot be read.
+    """
+    if path.is_dir() and (path / MANIFEST).exists():
+        return read_stored_run(path).record
+    file = next((path / name for name in RECORDS if (path / name).exists()), path) if path.is_dir() else path
+    return parse_json(read_regular_file(file, file=str(file), limit=LARGEST), str(file))
+
+
+def run_records(phases: Sequence[tuple[Report, Cell]]) -> list[Record]:
+    """The record of each phase of a program, as ``report.json`` has it but for the origin of the result.
+
+    Args:
+        phases: The report of each phase, and the cell as it is in it.
+    """
+    return [run_record(report, cell=cell, provenance=NOWHERE) for report, cell in phases]
+
+
+def _joined(phases: Mapping[str | None, Mapping[str, Any]]) -> dict[str, Any]:
+    """The curves of all phases, one after the other, each on its own time."""
+    found = {name or ALL_TASKS: curve_columns(tree) for name, tree in phases.items()}
+    names = dict.fromkeys(name for columns in found.values() for name in columns)
+    joined: dict[str, Any] = {"phase": []} | {name: [] for name in names}
+    for phase, columns in found.items():
+        count = len(columns["time_s"])
+        joined["phase"] += [phase] * count
+        for name in names:
+            joined[name] += columns.get(name, [None] * count)
+    return joined
+
+
+def _tool_errors(report: Report) -> dict[str, Row]:
+    """Tool errors of each task, settling included; what is allowed is known to the cell alone."""
+    found = {}
+    for each in report.accuracy:
+        position, orientation = (np.linalg.norm(e, axis=1) for e in (each.position_error, each.orientation_error))
+        found[each.task] = {
+            "robot": each.robot,
+            "max_position_error_with_settling_mm": number(MM * float(position.max())),
+            "max_orientation_error_with_settling_deg": number(DEG * float(orientation.max())),
+            "path_length_mm": number(MM * each.path_length),
+            "start_s": number(each.start_s),
+            "end_s": number(each.end_s),
+        }
+    return found
+
+
+def _distances(report: Report) -> dict[str, Any]:
+    """The distance that each class of pairs keeps, over time."""
+    clearance = report.clearance
+    curves = {f"clearance_{kind}_mm": MM * curve for kind, curve in clearance.curves.items()}
+    return {"time_s": clearance.curve_times, **curves}
+
+
+def _candidates(found: Screening) -> dict[str, Any]:
+    """A row for each layout; the joint that leaves least of its range and the fastest one, as shares."""
+    return {
+        "candidate": np.arange(len(found.start)),
+        "is_followed": found.is_followed,
+        "is_feasible": found.is_feasible,
+        "lost_at_s": np.where(np.isfinite(found.lost_at), found.lost_at, np.nan),
+        "reached_start": found.lost_at >= 0.0,
+        "error_m_or_rad": found.error,
+        "max_velocity_ratio": found.speed_ratios.max(axis=1, initial=0.0),
+        **_margins(found),
+    }
+
+
+def _margins(found: Screening) -> dict[str, Any]:
+    """Smallest margin of the turning joints and of the sliding ones of each layout, where the cell is known."""
+    if found.cell is None:
+        return {}
+    joints = [joint for robot in found.cell.robots for joint in robot.model.joints]
+    columns = {}
+    for name, is_revolute in (("deg", True), ("mm", False)):
+        own = [index for index, joint in enumerate(joints) if joint.is_revolute == is_revolute]
+        if own:
+            columns[f"min_margin_{name}"] = joints[own[0]].display_unit.scale * found.margins[:, own].min(axis=1)
+    return columns
+
+
+def _candidate_joints(found: Screening) -> Iterator[Row]:
+    """A row for each joint of each layout, in the unit of the joint."""
+    if found.cell is None:
+        return
+    joints = [(robot.name, joint) for robot in found.cell.robots for joint in robot.model.joints]
+    for candidate in range(len(found.start)):
+        for index, (robot, joint) in enumerate(joints):
+            unit, scale = joint.display_unit
+            yield {
+                "candidate": candidate,
+                "robot": robot,
+                "joint": joint.name,
+                "unit": unit,
+                "start": number(scale * float(found.start[candidate, index])),
+                "margin": number(scale * float(found.margins[candidate, index])),
+                "velocity_ratio": number(float(found.speed_ratios[candidate, index])),
+            }

@@ -1,0 +1,91 @@
+"""What a notebook shows of a result: verdict, key figures, pictures and short tables, without scripts.
+
+A piece of a page, not a page: styles stand at the elements, so that they touch nothing else in the notebook, and
+pictures are images, whose texts and names stay within them.
+"""
+
+import math
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from cellplan.report.page.render import template
+from cellplan.report.record.common import Entries
+
+MOST_ROWS: Final = 10  # [-] of a table
+DIGITS: Final = 4  # [-] significant, of numbers in tables
+MOST_LINES: Final = 5  # [-] of findings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grid:
+    """A short table.
+
+    Attributes:
+        caption: What it shows.
+        columns: Values of each column by its name; numbers are shown with four digits.
+        more: Where all of it is found, as Python; empty where nothing is left out.
+    """
+
+    caption: str
+    columns: Mapping[str, Sequence[Any]]
+    more: str = ""
+
+    @property
+    def rows(self) -> list[list[Any]]:
+        """The first rows."""
+        return [list(row) for row in zip(*self.columns.values(), strict=True)][:MOST_ROWS]
+
+    @property
+    def left_out(self) -> int:
+        """Number of rows that are not shown."""
+        return max(0, max(map(len, self.columns.values()), default=0) - MOST_ROWS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Card:
+    """What is shown of a result.
+
+    Attributes:
+        kind: What it is, in a word or two.
+        name: Name of the cell.
+        verdict: The verdict in a few words; empty without one.
+        passed: Whether it is a good one; None where it is neither good nor bad.
+        findings: What is wrong, a line each.
+        figures: Key figures, with ``label``, ``value``, ``unit`` and ``detail``, and ``is_bad`` where they may be.
+        pictures: Pictures as SVG by what they show.
+        grids: Short tables.
+    """
+
+    kind: str
+    name: str
+    verdict: str = ""
+    passed: bool | None = None
+    findings: Sequence[str] = ()
+    figures: Entries = field(default_factory=list)
+    pictures: Mapping[str, str] = field(default_factory=dict)
+    grids: Sequence[Grid] = ()
+
+
+def card_html(card: Card) -> str:
+    """A card as a piece of a page.
+
+    Args:
+        card: What it shows.
+    """
+    pictures = {
+        title: f"data:image/svg+xml;base64,{b64encode(svg.encode()).decode()}" for title, svg in card.pictures.items()
+    }
+    return template("notebook.html").render(card=card, pictures=pictures, shown=_shown, most=MOST_LINES)
+
+
+def _shown(value: Any) -> str:
+    """A value in a table."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float) and math.isnan(value):
+        return "–"
+    if isinstance(value, float):
+        return f"{float(f'{value:.{DIGITS}g}'):.9f}".rstrip("0").rstrip(".").replace("-", "−")
+    return "–" if value is None else str(value)

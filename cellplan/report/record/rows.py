@@ -1,0 +1,248 @@
+"""Records as tables: what JSON files hold in lists and by name, as rows of plain values under one line of names.
+
+Keys and units are those of the record. What is held by name gets a column for the name. A record within a row is
+flattened with a dot: ``tolerance.position_mm``; values by address, settings and figures have their own names. The two
+bodies of a pair are ``first`` and ``second``.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, Final, get_type_hints
+
+from cellplan.model.phase import ALL_TASKS
+from cellplan.report.record.clearance import ClosestPair, Contact, LeftOutRecord
+from cellplan.report.record.common import CheckRecord, Record
+from cellplan.report.record.key_figures import KeyFigures
+from cellplan.report.record.layout import (
+    CandidateRecord,
+    ChoiceRecord,
+    DroppedRecord,
+    LimitRecord,
+    ProgressRecord,
+    VariableRecord,
+)
+
+Row = dict[str, Any]
+Table = Callable[[], dict[str, Any]]  # values of each column by its name
+Tables = dict[str, Table]  # by name, the first one first
+
+LIFTED: Final = frozenset({"values", "settings", "figures"})  # keys whose own keys need no prefix
+PAIR: Final = "pair"
+BODIES: Final = "bodies"  # one, two or many
+BETWEEN: Final = " - "  # names of bodies
+OF_PAIRS: Final[Mapping[str, tuple[str, str]]] = {
+    "points_mm": ("first_point_mm", "second_point_mm"),
+    "accuracies_mm": ("first_accuracy_mm", "second_accuracy_mm"),
+}
+
+
+def columns_of(rows: Iterable[Row], names: Iterable[str] = ()) -> dict[str, Any]:
+    """Values of each column in the order of the rows; None where a row has none.
+
+    Args:
+        rows: The rows.
+        names: Columns that are there even without a row, in their order.
+    """
+    found = list(rows)
+    every = dict.fromkeys([*names, *(name for row in found for name in row)])
+    return {name: [row.get(name) for row in found] for name in every}
+
+
+def tables_of_record(record: Record) -> Tables:
+    """The tables of a record by its format; nothing for a format without tables.
+
+    Args:
+        record: Content of ``report.json``, ``series.json``, ``study.json``, ``map.json``, ``fastest.json``,
+            ``advice.json`` or ``rehearsal.json``.
+    """
+    make = FORMATS.get(format_of(record))
+    return {} if make is None else make(record)
+
+
+def format_of(record: Record) -> str:
+    """What kind of record it is: ``report``, ``series``, ``study`` of a sweep, ``comparison``, ``layout`` and so on."""
+    name = str(record.get("schema", "")).partition("/")[0].removeprefix("cellplan.")
+    return "comparison" if name == "study" and "variants" in record else name
+
+
+def run_tables(records: Sequence[Record]) -> Tables:
+    """The tables of the phases of a program; each row begins with the name of its phase.
+
+    Args:
+        records: The ``report.json`` of each phase.
+    """
+
+    def each(make: Callable[[Record], Iterable[Row]], names: Sequence[str] = ()) -> Table:
+        def rows() -> Iterator[Row]:
+            return ({"phase": _phase(record), **row} for record in records for row in make(record))
+
+        return lambda: columns_of(rows(), ["phase", *names] if names else ())
+
+    return {
+        "checks": each(lambda record: map(flat, record["checks"]), _names(CheckRecord)),
+        "joints": each(_joints),
+        "tasks": each(lambda record: by_name(record["tasks"], "task")),
+        "clearance": each(lambda record: by_name(record["clearance"], "class")),
+        "closest_pairs": each(lambda record: map(flat, record.get("closest_pairs", ())), _names(ClosestPair)),
+        "contacts": each(lambda record: map(flat, record.get("contacts", ())), _names(Contact)),
+        "left_out": each(lambda record: map(flat, record["left_out"]), _names(LeftOutRecord)),
+        "speeds": each(lambda record: by_name(record.get("speeds", {}), "robot")),
+        "motion_share": each(lambda record: by_name(record.get("motion_share", {}), "robot")),
+    }
+
+
+def flat(entry: Mapping[str, Any], prefix: str = "") -> Row:
+    """One row of a record: nested records flattened, pairs as two columns.
+
+    Args:
+        entry: The record.
+        prefix: Stands before the names of its keys.
+    """
+    row: Row = {}
+    for key, value in entry.items():
+        if key == PAIR:
+            first, second = value or (None, None)
+            row |= {f"{prefix}first": first, f"{prefix}second": second}
+        elif key == BODIES:
+            row[f"{prefix}{key}"] = BETWEEN.join(value)
+        elif key in OF_PAIRS:
+            row |= {f"{prefix}{name}": part for name, part in zip(OF_PAIRS[key], value or (None, None), strict=True)}
+        elif isinstance(value, Mapping):
+            row |= flat(value, prefix if key in LIFTED else f"{prefix}{key}.")
+        else:
+            row[f"{prefix}{key}"] = value
+    return row
+
+
+def by_name(entries: Mapping[str, Mapping[str, Any]], name: str) -> Iterator[Row]:
+    """A row for each entry, which begins with its name.
+
+    Args:
+        entries: Records by name.
+        name: Name of the column of the names.
+    """
+    return ({name: key, **flat(entry)} for key, entry in entries.items())
+
+
+def curve_columns(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """The curves of a run as columns, a row for each kept sample; without a value where a step would begin at the last.
+
+    Args:
+        tree: Content of ``series.json``, or the result of ``series``.
+    """
+    count = len(tree["times_s"])
+    columns: dict[str, Any] = {"time_s": tree["times_s"]}
+    for robot, joints in tree["joints"].items():
+        columns |= {f"{robot}.{joint}.{key}": values for joint, own in joints.items() for key, values in own.items()}
+    for task, own in tree["tasks"].items():
+        columns |= {f"{task}.{key}": values for key, values in own.items()}
+    columns |= dict(tree["conditioning"])
+    columns |= {name: tree[name] for name in ("iterations", "slack") if tree[name] is not None}
+    return {name: [*values, *[None] * (count - len(values))] for name, values in columns.items()}
+
+
+def _joints(record: Record) -> Iterator[Row]:
+    """A row for each joint of every robot."""
+    for robot, joints in record["joints"].items():
+        yield from ({"robot": robot, **row} for row in by_name(joints, "joint"))
+
+
+def _phase(record: Record) -> str:
+    """Name of the phase of a record; that of all tasks together for the only one."""
+    return str(record.get("phase") or ALL_TASKS)
+
+
+def _names(form: Any) -> list[str]:
+    """Columns of the rows of a record type, in the order of its keys."""
+    keys = get_type_hints(form)
+    return [name for key in keys for name in (("first", "second") if key == PAIR else [key])]
+
+
+def _listed(record: Record, key: str, form: Any = None, names: Iterable[str] = ()) -> Table:
+    """Table of a list of records."""
+    known = [*names, *(_names(form) if form else ())]
+    return lambda: columns_of(map(flat, record.get(key) or ()), (name for name in known if name not in LIFTED))
+
+
+def _study_tables(record: Record) -> Tables:
+    """The tables of a sweep: a row for each variant."""
+    names = ["trial", *record["vary"], "status", *KeyFigures.__annotations__, "reason"]
+    return {"trials": _listed(record, "trials", names=names)}
+
+
+def _comparison_tables(record: Record) -> Tables:
+    """The tables of a comparison: a row for each mode, cell or run."""
+    names = ["name", "trial", "status", *KeyFigures.__annotations__]
+    return {
+        "variants": _listed(record, "variants", names=names),
+        "differences": _listed(record, "differences", names=("key", "values")),
+    }
+
+
+def _layout_tables(record: Record) -> Tables:
+    """The tables of a layout search."""
+    return {
+        "top": _listed(record, "top", CandidateRecord),
+        "front": _listed(record, "front", CandidateRecord),
+        "variables": _listed(record, "variables", VariableRecord),
+        "binding": _listed(record, "binding", LimitRecord),
+        "convergence": _listed(record, "convergence", ProgressRecord),
+        "choices": _listed(record, "choices", ChoiceRecord),
+        "dropped": _listed(record, "dropped", DroppedRecord),
+    }
+
+
+def _advice_tables(record: Record) -> Tables:
+    """The tables of a repair; what a remedy does to each check is a table of its own."""
+
+    def effects() -> dict[str, Any]:
+        return columns_of(
+            {"remedy": number, **flat(effect)}
+            for number, remedy in enumerate(record["remedies"], start=1)
+            for effect in remedy["effects"]
+        )
+
+    def remedies() -> dict[str, Any]:
+        return columns_of(
+            flat({key: value for key, value in each.items() if key != "effects"}) for each in record["remedies"]
+        )
+
+    return {
+        "remedies": remedies,
+        "effects": effects,
+        "failed": _listed(record, "failed", CheckRecord),
+        "tried": _listed(record, "tried"),
+    }
+
+
+def _fastest_tables(record: Record) -> Tables:
+    """The tables of the shortest cycles: the production curve, and the programs that were solved."""
+    return {
+        "curve": _listed(record, "curve", names=("law",)),
+        "cycles": lambda: columns_of(by_name(record["cycles"], "name")),
+    }
+
+
+def _map_tables(record: Record) -> Tables:
+    """The tables of a map: a row for each place."""
+    return {"places": _listed(record, "places"), "best": _listed(record, "best")}
+
+
+def _rehearsal_tables(record: Record) -> Tables:
+    """The tables of a rehearsal: true errors of each task, and the checks of them."""
+    return {
+        "tasks": lambda: columns_of(by_name(record["tasks"], "task")),
+        "checks": _listed(record, "checks", CheckRecord),
+    }
+
+
+FORMATS: Final[Mapping[str, Callable[[Record], Tables]]] = {
+    "report": lambda record: run_tables([record]),
+    "series": lambda record: {"curves": lambda: curve_columns(record)},
+    "study": _study_tables,
+    "comparison": _comparison_tables,
+    "layout": _layout_tables,
+    "advice": _advice_tables,
+    "fastest": _fastest_tables,
+    "map": _map_tables,
+    "rehearsal": _rehearsal_tables,
+}
