@@ -7,7 +7,7 @@ import typer
 
 from cellplan.cli.errors import InterruptedWorkError
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
@@ -120,5 +120,5 @@ def _say(record: "Record", folder: Path, *, is_certified: bool, as_json: bool) -
         where = {"folder": str(folder), "report_path": str(folder / "map.html")}
         say_json({"schema": SCHEMA, "exit": int(outcome), **where, "map": record})
     else:
-        say("\n".join(map_lines(record, folder)))
+        show(map_lines(record, folder), passed=outcome == ExitStatus.PASSED)
     raise typer.Exit(outcome)

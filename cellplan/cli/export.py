@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
 
@@ -54,7 +54,7 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
         say_json({"schema": SCHEMA, **status, **about, "remarks": list(verified.remarks)})
         return
     lines = [f"{verified.cell.name}: exported", *(f"  note: {remark}" for remark in verified.remarks)]
-    say("\n".join([*lines, f"programs: {folder}"]))
+    show([*lines, f"programs: {folder}"], passed=True)
 
 
 def _require_choice(cell: Path | None, *, without_cell: bool) -> None:

@@ -58,3 +58,6 @@ Settings = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
+Watch = Annotated[
+    bool, typer.Option("--watch", help="Do it again whenever the cell or a file that it names is saved; Ctrl-C ends.")
+]

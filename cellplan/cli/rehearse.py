@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
@@ -73,5 +73,5 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
         place = {"folder": str(folder), "report_path": str(folder / "rehearsal.html")}
         say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "rehearsal": record})
     else:
-        say("\n".join(summary_lines(record, folder)))
+        show(summary_lines(record, folder), passed=rehearsal.passed)
     raise typer.Exit(status)

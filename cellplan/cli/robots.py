@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cellplan.cli.options import AsJson
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say, say_json, show
 
 if TYPE_CHECKING:
     from cellplan.model.robot import RobotModel
@@ -65,11 +65,14 @@ def robots(
     if as_json:
         say_json({"schema": SCHEMA, "robots": records})
     elif model is None:
-        say("\n\n".join("\n".join(_lines(record)) for record in records))
+        for number, record in enumerate(records):
+            if number:
+                say("")
+            show(_lines(record))
     else:
         from cellplan.report.text.robot_description import description_lines
 
-        say("\n".join(description_lines(records[0])))
+        show(description_lines(records[0]))
 
 
 def _listed() -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ import typer
 
 from cellplan.cli.errors import InterruptedWorkError
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
@@ -83,5 +83,5 @@ def sweep(  # noqa: PLR0913, PLR0917 - the options of the command
         place = {"folder": str(folder), "report_path": str(folder / "study.html")}
         say_json({"schema": SCHEMA, "exit": int(status), **place, "study": record})
     else:
-        say("\n".join(study_lines(record, folder)))
+        show(study_lines(record, folder), passed=status == ExitStatus.PASSED)
     raise typer.Exit(status)

@@ -3,7 +3,7 @@
 import typer
 
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus, NotVerifiedError
 
@@ -23,7 +23,8 @@ def verify(
     """
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.pipeline.gate.open_gate import open_gate
-        from cellplan.report.text.run import figure_lines, read_record
+        from cellplan.report.text.failures import count_text
+        from cellplan.report.text.run import figure_lines, motion_text, read_record
 
         try:
             with progress_listener(quiet=quiet) as progress:
@@ -46,6 +47,7 @@ def verify(
         f"  unchanged files: {verified.file_count}",
         f"  unchanged inputs: {', '.join(verified.inputs_compared) or 'none compared'}",
         *(f"  note: {remark}" for remark in verified.remarks),
-        *figure_lines(record),
+        f"  {count_text(record['checks'])}; {motion_text(record)}",
+        *figure_lines(record, "the report"),
     ]
-    say("\n".join(lines))
+    show(lines, passed=True)

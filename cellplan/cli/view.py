@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
@@ -57,4 +57,4 @@ def view(  # noqa: PLR0913, PLR0917 - the options of the command
         say_json({"schema": SCHEMA, "status": "written", "exit": int(ExitStatus.PASSED), **about, "failures": failures})
         return
     shown = [f"  shows: {failure}" for failure in failures] if record["kind"] != "study" else []
-    say("\n".join([f"{record['cell']}: {target} ({size / 1e6:.1f} MB)", *shown, f"open {target} in a browser"]))
+    show([f"{record['cell']}: {target} ({size / 1e6:.1f} MB)", *shown, f"open {target} in a browser"])
