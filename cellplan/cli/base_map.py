@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from cellplan.cli.completion import robot_names
 from cellplan.cli.errors import InterruptedWorkError
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings
 from cellplan.cli.output import json_failure, say, say_json, show
@@ -17,7 +18,10 @@ if TYPE_CHECKING:
 SCHEMA = "cellplan.map/1"
 
 RobotName = Annotated[
-    str, typer.Option("--robot", metavar="NAME", help="Operator whose base is tried.", show_default=False)
+    str,
+    typer.Option(
+        "--robot", metavar="NAME", help="Operator whose base is tried.", show_default=False, autocompletion=robot_names
+    ),
 ]
 SpanX = Annotated[
     str | None,

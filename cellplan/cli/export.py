@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from cellplan.cli.completion import FORMATS, one_of
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
 from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
@@ -12,7 +13,10 @@ from cellplan.errors import ExitStatus, InputError
 
 SCHEMA = "cellplan.exported/1"
 
-Format = Annotated[str, typer.Option("--format", metavar="NAME", help="Format: csv.", show_default=False)]
+Format = Annotated[
+    str,
+    typer.Option("--format", metavar="NAME", help="Format: csv.", show_default=False, autocompletion=one_of(FORMATS)),
+]
 Output = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder (default: RUN/programs/<format>).")
 ]

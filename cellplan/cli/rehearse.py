@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from cellplan.cli.completion import cell_files
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
 from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
@@ -13,7 +14,14 @@ from cellplan.errors import ExitStatus
 SCHEMA = "cellplan.rehearse/1"
 
 ErrorsFile = Annotated[
-    Path, typer.Option("--errors", metavar="FILE", help="Errors of the real cell (YAML).", show_default=False)
+    Path,
+    typer.Option(
+        "--errors",
+        metavar="FILE",
+        help="Errors of the real cell (YAML).",
+        show_default=False,
+        autocompletion=cell_files,
+    ),
 ]
 Feedback = Annotated[
     bool, typer.Option("--feedback", help="Correct the references from pass to pass until the true error converges.")

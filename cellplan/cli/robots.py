@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cellplan.cli.completion import robot_models
 from cellplan.cli.options import AsJson
 from cellplan.cli.output import json_failure, say, say_json, show
 
@@ -19,7 +20,10 @@ SCHEMA = "cellplan.robots/1"
 Model = Annotated[
     str | None,
     typer.Argument(
-        metavar="MODEL", help="URDF, xacro file, joint-axis table or bundled robot to describe.", show_default=False
+        metavar="MODEL",
+        help="URDF, xacro file, joint-axis table or bundled robot to describe.",
+        show_default=False,
+        autocompletion=robot_models,
     ),
 ]
 PackageDirs = Annotated[

@@ -19,6 +19,7 @@ from cellplan.cli.options import (
     Mode,
     Quiet,
     Settings,
+    TaskName,
     Watch,
 )
 from cellplan.cli.output import Result, json_failure, present
@@ -36,7 +37,6 @@ SCHEMA = "cellplan.solve/1"
 Output = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="DIR", help="Run folder (default: outputs/<cell name>).")
 ]
-TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Plan this task only.")]
 KeepRejected = Annotated[
     bool, typer.Option("--keep-rejected", help="Write the tables of a failed run below rejected/.")
 ]
@@ -135,8 +135,10 @@ def _solved(request: _Request, follow: "Callable[[Cell], None]", progress: Liste
 def _result(request: _Request, changed: "Cell", solution: "Solution", record: "Record", folder: Path) -> Result:
     """What to say of a solution that was written."""
     from cellplan.cli.next_steps import after_solve, view_line
+    from cellplan.cli.verbosity import log_effort
     from cellplan.report.text.run import summary_lines
 
+    log_effort(record)
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
     lines = summary_lines(record, folder)
     lines += [f"3-D page: {folder / 'view.html'}"] if request.with_view else []

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from cellplan.cli.errors import InterruptedWorkError
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings, TaskName
 from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -32,7 +32,6 @@ Workers = Annotated[
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue the study in the folder.")]
 KeepRuns = Annotated[bool, typer.Option("--keep-runs", help="Keep the run folder of every variant below runs/.")]
-TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Plan this task only.")]
 
 
 def sweep(  # noqa: PLR0913, PLR0917 - the options of the command

@@ -5,6 +5,7 @@ import typer
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
 from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
+from cellplan.cli.verbosity import log_effort
 from cellplan.errors import ExitStatus, NotVerifiedError
 
 SCHEMA = "cellplan.verify/1"
@@ -36,6 +37,7 @@ def verify(
             say_json({**failure, "errors": error.findings})
             raise typer.Exit(error.status) from None
         record = read_record(run)
+        log_effort(record)
     if as_json:
         about = {"folder": str(run), "cell": verified.cell.name, "run": verified.digest, "files": verified.file_count}
         compared = {"inputs": list(verified.inputs_compared), "remarks": list(verified.remarks)}

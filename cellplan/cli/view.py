@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from cellplan.cli.completion import cell_files
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, Settings
 from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
@@ -14,7 +15,9 @@ SCHEMA = "cellplan.view/1"
 
 Shown = Annotated[
     Path,
-    typer.Argument(metavar="RUN|CELL|STUDY", help="Run folder, cell file, or study of cellplan layout."),
+    typer.Argument(
+        metavar="RUN|CELL|STUDY", help="Run folder, cell file, or study of cellplan layout.", autocompletion=cell_files
+    ),
 ]
 Output = Annotated[
     Path | None,

@@ -80,7 +80,7 @@ def _round(work: Work, files: WatchedFiles, page: WatchPage | None, *, schema: s
 
 
 def _interruptible(files: WatchedFiles, listener: Listener) -> Listener:
-    """The listener, which looks at the files too."""
+    """The listener, which also notices saved files."""
 
     def listen(stage: str, share: float) -> None:
         files.require_unchanged()
@@ -90,7 +90,7 @@ def _interruptible(files: WatchedFiles, listener: Listener) -> Listener:
 
 
 def _refuse(error: Exception, files: WatchedFiles, page: WatchPage | None, *, schema: str, as_json: bool) -> None:
-    """Say why a round has no result, and look out for files that the cell lacks."""
+    """Say why a round has no result, and watch for files that the cell lacks."""
     files.follow_neighbours()
     lines = error_lines(error)
     if as_json:

@@ -13,13 +13,13 @@ from typing import Final
 from cellplan.io.input.files import digest
 from cellplan.model.cell import Cell
 
-POLL_EVERY_S: Final = 0.2  # [s] between two looks at the files
+POLL_EVERY_S: Final = 0.2  # [s] between two polls while waiting
 SETTLED_S: Final = 0.2  # [s] without a further change after which a save counts as complete
-ASK_EVERY_S: Final = 0.3  # [s] between two looks during a computation
+ASK_EVERY_S: Final = 0.3  # [s] between two polls during a computation
 INPUT_SUFFIXES: Final = frozenset(
     {".yaml", ".yml", ".csv", ".stl", ".obj", ".dae", ".ply", ".urdf", ".xacro", ".srdf", ".json"}
 )
-MOST_ENTRIES: Final = 2000  # [-] files below the folder of a cell that are looked at
+MOST_ENTRIES: Final = 2000  # [-] files below the folder of a cell that are polled
 
 Stamp = tuple[int, int, int] | None  # time in [ns], size and number of a file; None while there is none
 
@@ -82,7 +82,7 @@ class WatchedFiles:
         return next((path for path in _neighbours(self.cell.parent) if path not in self._stamps), None)
 
     def require_unchanged(self) -> None:
-        """Look at the files now and then during a computation.
+        """Poll the files now and then during a computation.
 
         Raises:
             InputsChangedError: One of them was saved.
