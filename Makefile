@@ -6,11 +6,12 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install constraints test test-all quick-tests lint style rules format demo bench bench-methods reproduce clean FORCE
+.PHONY: help install constraints test test-all quick-tests lint style rules format demo docs bench bench-methods reproduce clean FORCE
 
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DOCS_STAMP := $(VENV)/.docs-installed
 WORKERS ?= auto
 ROUND_OPTION := $(if $(ROUNDS),--rounds $(ROUNDS))
 USABLE := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
@@ -25,6 +26,7 @@ help:
 	@echo "make lint      everything but the tests"
 	@echo "make install   only make .venv; with CONSTRAINTS=constraints.txt in the versions of that file"
 	@echo "make constraints  write the installed versions to constraints.txt"
+	@echo "make docs      write the documentation as a site to site/; warnings are errors"
 	@echo "make bench     measure speed, beside other libraries and brute force, and write docs/benchmarks.md"
 	@echo "make reproduce solve the cells of the three papers and write docs/reproduction.md, about six minutes"
 	@echo "make bench-methods  run every method on the same cells (a quarter of an hour); writes docs/guides/which-method.md"
@@ -57,6 +59,11 @@ $(STAMP): pyproject.toml
 	$(BIN)/python -m compileall -q cellplan; \
 	printf '%s' '$(CURDIR)' >$@
 
+$(DOCS_STAMP): $(STAMP)
+	@echo "installing what the documentation is made with"
+	@$(BIN)/python -m pip install --quiet $(if $(CONSTRAINTS),--constraint '$(CONSTRAINTS)') --editable '.[docs]'
+	@touch $@
+
 install: $(STAMP)
 
 constraints: $(STAMP)
@@ -80,7 +87,7 @@ test: style
 quick-tests: $(STAMP)
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope -m "not slow"
 
-test-all: lint
+test-all: lint $(DOCS_STAMP)
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope
 
 format: $(STAMP)
@@ -90,6 +97,11 @@ format: $(STAMP)
 demo: $(STAMP)
 	$(BIN)/python -m cellplan solve cells/four_robots.yaml
 	@echo "open outputs/four-robots/report.html in a browser"
+
+# The variable silences an advertisement of the theme, which colours the output.
+docs: $(DOCS_STAMP)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
+	@echo "open site/index.html in a browser"
 
 bench: $(STAMP)
 	$(BIN)/python benchmarks/peer_setup.py
@@ -103,5 +115,5 @@ bench-methods: $(STAMP)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/methods.py $(ROUND_OPTION)
 
 clean:
-	rm -rf $(VENV) .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist outputs/*/
+	rm -rf $(VENV) .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist site outputs/*/
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
