@@ -18,6 +18,7 @@ SECTION = re.compile(r"^## (?P<title>.+)\n(?P<text>(?:(?!## ).*\n?)*)", re.MULTI
 ROW = re.compile(r"^- \[(?P<title>[^\]]+)\]\((?P<target>[^)#]+)\)", re.MULTILINE)
 LINK = re.compile(r"\]\((?P<target>[^)#\s:]+)(?P<anchor>#[^)]*)?\)")
 FORMULA = re.compile(r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<tex>.*?)\\[)\]]</(?P=tag)>', re.DOTALL)
+MESSAGE = re.compile(r'<!-- (?:from|source): [^>]*-->\s*<div class="')  # of the page of messages
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".toml": "toml"}
 
 
@@ -51,7 +52,7 @@ def on_page_markdown(markdown: str, *, page: Page, **_: object) -> str:
 
 
 def on_page_content(html_text: str, *, page: Page, **_: object) -> str:
-    """Write formulas as MathML, which browsers draw without a script."""
+    """Write formulas as MathML, which browsers draw without a script, and let messages be wrapped."""
 
     def drawn(match: re.Match[str]) -> str:
         display = "block" if match["tag"] == "div" else "inline"
@@ -61,7 +62,7 @@ def on_page_content(html_text: str, *, page: Page, **_: object) -> str:
             raise PluginError(f"{page.file.src_uri}: cannot read the formula {match['tex']}: {error}") from error
         return f'<span class="formula">{formula}</span>' if display == "block" else formula
 
-    return FORMULA.sub(drawn, html_text)
+    return FORMULA.sub(drawn, MESSAGE.sub('<div class="message ', html_text))
 
 
 def navigation(index: Path) -> list[dict[str, Any]]:
