@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cellplan.io.schema import errors_schema, json_schema, robot_table_schema
+from cellplan.io.schema.json_schemas import entry_title
 from cellplan.report.record.schema import advice_schema, layout_schema, report_schema
 
 FOLDER = Path(__file__).resolve().parent / "reference"
@@ -16,7 +17,8 @@ INTRODUCTION = """\
 # The cell file
 
 This page is made from the format itself by `docs/make_reference.py`; do not edit it by hand. `cellplan schema` prints
-the same as a JSON Schema for editors.
+the same as a JSON Schema for editors, and `cellplan schema --robot` that of robot tables; `cellplan init` writes a cell
+together with them ([templates](../guides/templates.md)).
 
 - **The version is promised**: `cellplan: 1` is frozen at the first release. From then on keys are only added, each with
   a default that changes nothing for files without it; no key, value, unit or default changes its meaning. Anything else
@@ -244,7 +246,7 @@ def sections(schema: dict[str, Any], title: str, known: set[str]) -> list[str]:
         for name in references(entry.get("properties", {})):
             if name not in known:
                 known.add(name)
-                found.append((heading(name), schema["$defs"][name]))
+                found.append((entry_title(name), schema["$defs"][name]))
     return [section(name, entry) for name, entry in found]
 
 
@@ -256,11 +258,6 @@ def references(node: Any) -> list[str]:
         return []
     own = [node["$ref"].rpartition("/")[2]] if "$ref" in node else []
     return own + [name for value in node.values() for name in references(value)]
-
-
-def heading(name: str) -> str:
-    """Heading of a kind of entry: ``PartShapeEntry`` becomes ``Part shape``."""
-    return re.sub(r"(?<!^)([A-Z])", lambda match: " " + match[1].lower(), name.removesuffix("Entry"))
 
 
 def section(title: str, entry: dict[str, Any]) -> str:
@@ -291,7 +288,7 @@ def shown(value: Any) -> str:
 def words(field: dict[str, Any]) -> str:
     """What may stand as the value of a key."""
     if "$ref" in field:
-        title = heading(field["$ref"].rpartition("/")[2])
+        title = entry_title(field["$ref"].rpartition("/")[2])
         return f"[{title.lower()}](#{title.lower().replace(' ', '-')})"
     for choice in ("oneOf", "anyOf"):
         if choice in field:

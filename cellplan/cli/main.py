@@ -16,6 +16,7 @@ from cellplan.cli.errors import OutputError, report_failure
 from cellplan.cli.explain import explain
 from cellplan.cli.export import export
 from cellplan.cli.fastest import fastest
+from cellplan.cli.init import init
 from cellplan.cli.layout import layout
 from cellplan.cli.output import say
 from cellplan.cli.rehearse import rehearse
@@ -56,6 +57,7 @@ def program(
     """Offline programming for cooperative robots that work on one moving part."""
 
 
+app.command()(init)
 app.command()(check)
 app.command()(explain)
 app.command()(solve)

@@ -24,6 +24,7 @@ COMMANDS = (
     "explain",
     "export",
     "fastest",
+    "init",
     "layout",
     "map",
     "rehearse",
@@ -101,6 +102,9 @@ def test_the_help_of_every_command(place: Path, cells: Path, capsys: pytest.Capt
             ["layout", "cell/small.yaml", "--repair", "--set", "motion.mode=pairwise", "-o", "repair"],
         ),
         ("robots", ["robots"]),
+        ("init", ["init", "new", "--template", "turntable"]),
+        ("init_list", ["init", "--list"]),
+        ("init_refused", ["init", "cell"]),
         ("unknown_command", ["slove"]),
     ],
 )

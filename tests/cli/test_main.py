@@ -30,7 +30,7 @@ def test_help_names_every_command_and_nothing_unfinished(capsys: pytest.CaptureF
     reported = capsys.readouterr().out
     assert status == 0
     commands = [line.split()[0] for line in reported.partition("Commands:")[2].splitlines() if line.strip()]
-    expected = "check explain solve verify view export sweep compare fastest map layout rehearse robots schema"
+    expected = "init check explain solve verify view export sweep compare fastest map layout rehearse robots schema"
     assert commands == expected.split()
 
 

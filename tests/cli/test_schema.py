@@ -2,9 +2,12 @@
 
 import json
 
+import jsonschema
 import pytest
+import yaml
 
 from cellplan.cli.main import run
+from cellplan.io.robots import bundled
 
 
 def test_the_schema_is_one_json_object_with_the_keys_of_a_cell(capsys: pytest.CaptureFixture[str]) -> None:
@@ -21,4 +24,21 @@ def test_one_schema_is_printed_at_a_time(capsys: pytest.CaptureFixture[str]) -> 
     assert json.loads(capsys.readouterr().out)["title"] == "cellplan.layout/1"
 
     assert run(["schema", "--layout", "--report"]) == 2
-    assert "expected one of --report and --layout, got both" in capsys.readouterr().err
+    assert "expected at most one of --robot, --report and --layout" in capsys.readouterr().err
+
+
+def test_a_bundled_table_conforms_to_the_schema_of_robot_tables(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["schema", "--robot"]) == 0
+
+    jsonschema.validate(
+        yaml.safe_load((bundled.FOLDER / "kuka_kr6.yaml").read_bytes()), json.loads(capsys.readouterr().out)
+    )
+
+
+def test_editors_are_offered_the_bundled_robots(capsys: pytest.CaptureFixture[str]) -> None:
+    run(["schema"])
+
+    model = json.loads(capsys.readouterr().out)["$defs"]["RobotEntry"]["properties"]["model"]
+    offered, permitted = model["anyOf"]
+    assert tuple(offered["enum"]) == bundled.bundled_names()
+    assert permitted == {"type": "string"}  # any path may stand there

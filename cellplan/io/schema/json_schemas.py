@@ -1,5 +1,7 @@
 """The formats of the cell file, the robot table and the errors file as JSON Schemas, for editors and the reference."""
 
+import re
+from collections.abc import Iterable
 from typing import Any
 
 from cellplan.io.schema.cell import CellDocument
@@ -7,9 +9,17 @@ from cellplan.io.schema.cell_errors import ErrorsDocument
 from cellplan.io.schema.robot_table import RobotTableDocument
 
 
-def json_schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of the cell file."""
-    return _finished(CellDocument.model_json_schema(), "cellplan cell file, version 1")
+def json_schema(models: Iterable[str] = ()) -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of the cell file.
+
+    Args:
+        models: Names that editors offer as the model of a robot.
+    """
+    schema = _finished(CellDocument.model_json_schema(), "cellplan cell file, version 1")
+    if names := list(models):
+        model = schema["$defs"]["RobotEntry"]["properties"]["model"]
+        model["anyOf"] = [{"enum": names}, {"type": model.pop("type")}]
+    return schema
 
 
 def robot_table_schema() -> dict[str, Any]:
@@ -22,10 +32,29 @@ def errors_schema() -> dict[str, Any]:
     return _finished(ErrorsDocument.model_json_schema(), "cellplan errors file, version 1")
 
 
+def entry_title(name: str) -> str:
+    """Kind of entry in words: ``PartShapeEntry`` becomes ``Part shape``."""
+    return re.sub(r"(?<!^)([A-Z])", lambda match: " " + match[1].lower(), name.removesuffix("Entry"))
+
+
 def _finished(schema: dict[str, Any], title: str) -> dict[str, Any]:
     """The schema with its dialect and title in front."""
     rest = {key: value for key, value in schema.items() if key != "title"}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **_without_null(rest)}
+    finished = _without_null(rest)
+    for entry in (finished, *finished["$defs"].values()):
+        _entitle(entry.get("properties", {}))
+    for name, entry in finished["$defs"].items():
+        entry["title"] = entry_title(name)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **finished}
+
+
+def _entitle(fields: dict[str, Any]) -> None:
+    """Title of each key as the file writes it, which editors show; free names match their pattern or are refused."""
+    for key, field in fields.items():
+        if "$ref" not in field:
+            field["title"] = key
+        if "patternProperties" in field:
+            field["additionalProperties"] = False
 
 
 def _without_null(node: Any) -> Any:
