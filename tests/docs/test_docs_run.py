@@ -91,6 +91,7 @@ LONG = {  # their commands and functions have tests of their own, which are quic
     "load-sharing.md",
     "demanded-feeds.md",
     "place-a-robot.md",
+    "tutorial.md",
     "own-part-and-path.md",
     "hand-over.md",
 }

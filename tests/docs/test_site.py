@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 SECTIONS = [
+    "Tutorial",
     "Guides",
     "Examples",
     "Concepts",
@@ -116,7 +117,7 @@ def test_the_site_loads_nothing_from_the_network_and_shows_all_formulas(site: Pa
 def test_pages_open_from_disk_without_errors_and_fit_the_window(
     site: Path, browser: Browser, width: int, theme: str
 ) -> None:
-    for name in ("index", "concepts/cooperation", "comparison", "troubleshooting", "reference/cell-file"):
+    for name in ("index", "tutorial", "concepts/cooperation", "comparison", "troubleshooting", "reference/cell-file"):
         show(browser, site / f"{name}.html", (width, 900), theme)
 
         assert browser.console == [], name
