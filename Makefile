@@ -100,7 +100,7 @@ demo: $(STAMP)
 
 # The variable silences an advertisement of the theme, which colours the output.
 docs: $(DOCS_STAMP)
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
 	@echo "open site/index.html in a browser"
 
 bench: $(STAMP)

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -66,13 +67,18 @@ def test_every_anchor_that_a_page_names_exists(page: Path) -> None:
     assert [f"{target.name}#{anchor}" for target, anchor in named if anchor not in anchors(target)] == []
 
 
+def build(root: Path, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Build the site of a checkout, with warnings as errors."""
+    command = [sys.executable, "-m", "mkdocs", "build", "--site-dir", str(folder)]
+    environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+    return subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=False)
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site, built with warnings as errors."""
+    """The site of this checkout."""
     folder = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", str(folder)]
-    environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
-    run = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    run = build(ROOT, folder)
     assert run.returncode == 0, f"install with: pip install --editable '.[docs]'\n{run.stdout}{run.stderr}"
     return folder
 
@@ -109,6 +115,31 @@ def test_the_site_loads_nothing_from_the_network_and_shows_all_formulas(site: Pa
     assert len(pages) > len(PAGES)
     assert [path.name for path, text in pages.items() if "arithmatex" in text] == []
     assert "<math" in (site / "concepts" / "cooperation.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("page", "text", "warning"),
+    [
+        ("glossary.md", "[here](nothing.md)", "'nothing.md'"),
+        ("glossary.md", "[here](index.md#no-such-heading)", "'#no-such-heading'"),
+        ("forgotten.md", "# A page in no list", "forgotten.md"),
+    ],
+)
+def test_a_link_to_nowhere_and_a_forgotten_page_end_the_build(
+    tmp_path: Path, page: str, text: str, warning: str
+) -> None:
+    for name in ("docs", "examples"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "mkdocs.yml", tmp_path)
+    with (tmp_path / "docs" / page).open("a", encoding="utf-8") as file:
+        file.write(f"\n{text}\n")
+
+    run = build(tmp_path, tmp_path / "site")
+
+    assert run.returncode == 1
+    assert warning in run.stdout + run.stderr
+    assert "Aborted with 1 warnings in strict mode" in run.stdout + run.stderr
 
 
 @pytest.mark.slow
